@@ -27,7 +27,10 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Join what emulator and controllers left in a run's folder, judge it, draw it, and print a short table.
-    Summary(SummaryArguments),
+    Summary {
+        /// The run's folder.
+        folder: PathBuf,
+    },
     /// Lay runs of one experiment side by side: figures with their change against the first run, curves over each other.
     Compare(CompareArguments),
     /// Tell how much each figure spreads over repetitions of one experiment.
@@ -37,9 +40,16 @@ pub enum Command {
     /// Report the latencies of runs: percentiles, worst events with their causes, a reference beside them, groups side by side.
     Report(ReportArguments),
     /// Name the one cause that a latency report gives for what went wrong in its runs: on stdout its name, or `nothing`.
-    Cause(CauseArguments),
+    Cause {
+        /// The report.json.
+        #[arg(value_name = "REPORT.json")]
+        file: PathBuf,
+    },
     /// Check the bounds of an experiment file: figures that exist, numbers that make sense.
-    CheckExperiment(CheckArguments),
+    CheckExperiment {
+        /// The experiment file.
+        file: PathBuf,
+    },
     /// Run emulator and controllers over hours, segment by segment, and account for every frame.
     Soak(Box<SoakArguments>),
     /// Become a program that ends with the one that starts it; `soak` starts this.
@@ -66,13 +76,6 @@ pub enum Command {
     /// The process that answers; ping-pong starts it.
     #[command(hide = true)]
     Pong(PongArguments),
-}
-
-/// Which run to sum up.
-#[derive(Args, Debug)]
-pub struct SummaryArguments {
-    /// The run's folder.
-    pub folder: PathBuf,
 }
 
 /// Which runs to compare.
@@ -106,13 +109,6 @@ pub struct SpreadArguments {
     pub anyway: bool,
 }
 
-/// Which experiment to check.
-#[derive(Args, Debug)]
-pub struct CheckArguments {
-    /// The experiment file.
-    pub file: PathBuf,
-}
-
 /// What to report on.
 #[derive(Args, Debug)]
 pub struct ReportArguments {
@@ -140,12 +136,4 @@ pub struct ReportArguments {
     /// Write report.md only.
     #[arg(long)]
     pub markdown_only: bool,
-}
-
-/// Which report to ask.
-#[derive(Args, Debug)]
-pub struct CauseArguments {
-    /// The report.json.
-    #[arg(value_name = "REPORT.json")]
-    pub file: PathBuf,
 }

@@ -1,10 +1,10 @@
 //! Runs of one experiment side by side: a table of all figures, and their curves over each other.
 //!
-//! [`differences`] draws how far the others lie from the first instead. Time begins with the experiment, so that runs
-//! whose waiting took longer lie on each other.
+//! [`overlay`] draws the curves, [`differences`] how far the others lie from the first instead. Time begins with the experiment,
+//! so that runs whose waiting took longer lie on each other.
 
 pub mod differences;
-mod overlay;
+pub mod overlay;
 
 use crate::drawing::Picture;
 use crate::runs::{Run, rows};
@@ -16,7 +16,6 @@ use runlog::run_folder::FileError;
 use std::path::{Path, PathBuf};
 
 /// The table: a row for each figure that any run has, and the change against the first run.
-#[must_use]
 pub fn table(runs: &[Run]) -> Grid {
     let Some((first, others)) = runs.split_first() else { return Grid::default() };
     let mut head = vec!["figure".to_owned(), first.name.clone()];
@@ -53,12 +52,6 @@ fn change(first: Option<f64>, other: Option<f64>) -> String {
         }
         _ => "-".into(),
     }
-}
-
-/// The curves of the runs over each other.
-#[must_use]
-pub fn pictures(runs: &[Run]) -> Vec<Picture> {
-    overlay::pictures(runs)
 }
 
 /// The page: heading, runs, table, pictures, all in one file.
@@ -115,7 +108,7 @@ mod tests {
         let row = grid.rows.iter().find(|row| row[0] == "position error dynamic").unwrap();
         assert_eq!(row[1..], ["2.000 mm", "1.000 mm", "-50.0 %"]);
         assert!(grid.rows.iter().all(|row| row[0] != "force settling"), "nobody has it");
-        let page = write(&runs, &grid, &pictures(&runs), &parent.path().join("new")).unwrap();
+        let page = write(&runs, &grid, &overlay::pictures(&runs), &parent.path().join("new")).unwrap();
         let text = std::fs::read_to_string(&page).unwrap();
         for part in ["ramp: 2 runs", "two&lt;", "<svg", "-50.0 %"] {
             assert!(text.contains(part), "{part}");

@@ -84,7 +84,6 @@ pub enum ConformanceError {
 
 impl ConformanceError {
     /// The exit code that tells it.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) => Exit::BusFailed,
@@ -389,7 +388,6 @@ impl Controller {
         Ok(Some(Self(child)))
     }
 
-    /// How it ended, if it has.
     fn ended(&mut self) -> Option<ExitStatus> {
         self.0.try_wait().ok().flatten()
     }

@@ -61,7 +61,6 @@ pub struct Panel {
 /// A named stretch of the time axis.
 #[derive(Clone, Debug)]
 pub struct Band {
-    /// What is written on it.
     pub label: String,
     pub span: Span,
     /// Whether it is what the picture is about, and left white.
@@ -88,7 +87,6 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Failure = Box<dyn std::error::Error>;
 
 impl Picture {
-    /// The picture as SVG.
     pub fn svg(&self) -> Result<String, String> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|error| error.to_string())?;

@@ -32,7 +32,6 @@ const MOST_HELD_ROWS: u64 = 100_000_000;
 /// What keeps a log from being exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The log is none.
     #[error(transparent)]
     Log(#[from] RecordedLogError),
     #[error(transparent)]

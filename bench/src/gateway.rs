@@ -66,7 +66,6 @@ pub enum GatewayError {
 
 impl GatewayError {
     /// The exit code that tells it.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         if matches!(self, Self::Bus(_)) { Exit::BusFailed } else { Exit::BadInput }
     }

@@ -1,8 +1,6 @@
 //! Process beside plant and controller: sums up, judges, draws and compares what they left behind.
 
-use bench::cli::{
-    CauseArguments, CheckArguments, Cli, Command, CompareArguments, ReportArguments, SpreadArguments,
-};
+use bench::cli::{Cli, Command, CompareArguments, ReportArguments, SpreadArguments};
 use bench::conformance::{self, ConformanceError};
 use bench::gateway::{self, GatewayError};
 use bench::ping_pong::{self, PingPongError};
@@ -23,16 +21,16 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let done: Result<Exit, Box<dyn std::error::Error>> = match Cli::parse().command {
-        Command::Summary(arguments) => sum_up(&arguments.folder).map_err(Into::into),
+        Command::Summary { folder } => sum_up(&folder).map_err(Into::into),
         Command::Compare(arguments) => compare_runs(&arguments).map_err(Into::into),
         Command::Spread(arguments) => spread_runs(&arguments).map_err(Into::into),
         Command::Report(arguments) => report_on(&arguments).map_err(Into::into),
-        Command::Cause(arguments) => name_cause(&arguments).map_err(Into::into),
+        Command::Cause { file } => name_cause(&file).map_err(Into::into),
         Command::Figures => {
             print(&figures::list());
             Ok(Exit::Good)
         }
-        Command::CheckExperiment(arguments) => check(&arguments).map_err(Into::into),
+        Command::CheckExperiment { file } => check(&file).map_err(Into::into),
         Command::LatencyTable(arguments) => latency::table::table(&arguments)
             .map(|text| print(&text))
             .map(|()| Exit::Good)
@@ -100,7 +98,7 @@ fn compare_runs(arguments: &CompareArguments) -> Result<Exit, RunsError> {
     let (grid, pictures) = if arguments.differences {
         (compare::differences::table(&runs), compare::differences::pictures(&runs))
     } else {
-        (compare::table(&runs), compare::pictures(&runs))
+        (compare::table(&runs), compare::overlay::pictures(&runs))
     };
     print(&grid.markdown());
     if let Some(out) = &arguments.out {
@@ -140,15 +138,14 @@ fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
     Ok(if made.is_broken() { Exit::BoundBroken } else { Exit::Good })
 }
 
-fn name_cause(arguments: &CauseArguments) -> Result<Exit, ReportError> {
-    let (name, sentence) = latency::cause::name(&latency::cause::read(&arguments.file)?);
+fn name_cause(file: &Path) -> Result<Exit, ReportError> {
+    let (name, sentence) = latency::cause::name(&latency::cause::read(file)?);
     eprintln!("{sentence}");
     print(&name);
     Ok(Exit::Good)
 }
 
-fn check(arguments: &CheckArguments) -> Result<Exit, SummaryError> {
-    let file = &arguments.file;
+fn check(file: &Path) -> Result<Exit, SummaryError> {
     let experiment: toml::Table = read_text(file)?.parse().map_err(|error| FileError::read(file, error))?;
     let passed = experiment.get("passed").map(|passed| passed.as_table().ok_or("[passed] is no table"));
     let passed = passed.transpose().map_err(|error| FileError::read(file, error))?;

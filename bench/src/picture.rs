@@ -43,7 +43,6 @@ pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, Summary
 }
 
 /// What steps most in a run, and when: the force, else the position.
-#[must_use]
 pub fn step(record: &Record) -> Option<(String, f64)> {
     let spans = record.experiments();
     let force = largest_step(record.load.numbers("set_force_N"), &spans, 10.0)

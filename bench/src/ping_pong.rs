@@ -53,7 +53,6 @@ pub enum PingPongError {
 
 impl PingPongError {
     /// The exit code that the error leads to.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::Silent(_) => Exit::BusFailed,

@@ -21,13 +21,12 @@
 //! user space and without switching interrupts off.
 
 pub mod cli;
-mod gaps;
-
-pub use gaps::{Counts, Gap, GapWatch, Total};
+pub mod gaps;
 
 use crate::say;
 use cli::ProbeArguments;
 use crossbeam_channel::{Receiver, Sender, bounded};
+use gaps::{Gap, GapWatch, Total};
 use protocol::exit::Exit;
 use realtime::privileges::parse_cpu_list;
 use realtime::signals::Continued;
@@ -43,7 +42,7 @@ use thread_priority::{
     thread_native_id,
 };
 
-pub const HEAD: &str = "cpu,from_ns,to_ns,another_ran";
+const HEAD: &str = "cpu,from_ns,to_ns,another_ran";
 /// Gaps that wait for the writer: what all CPUs can see in several of its turns.
 const QUEUE: usize = 65_536;
 /// Turn of the writer.
@@ -185,15 +184,7 @@ impl Looking {
         while going_on {
             // Looked at before the clock, so that a gap that outlasts the run is reported too.
             going_on = !watched.stop.came();
-            let counts = || {
-                let read = self.vitals.read();
-                Counts {
-                    voluntary_switches: read.voluntary_switches,
-                    involuntary_switches: read.involuntary_switches,
-                    run_delay_ns: read.run_delay_ns,
-                }
-            };
-            if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), counts)
+            if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), || self.vitals.read())
                 && gaps.try_send((cpu, gap)).is_err()
             {
                 watched.dropped.fetch_add(1, Ordering::Relaxed);
@@ -223,11 +214,7 @@ impl Table {
         for (cpu, gap) in gaps.try_iter() {
             self.rows += 1;
             let of_cpu = self.seen.entry(cpu).or_default();
-            if gap.another_ran {
-                of_cpu.another_ran += &gap
-            } else {
-                of_cpu.stood_still += &gap
-            }
+            if gap.another_ran { &mut of_cpu.another_ran } else { &mut of_cpu.stood_still }.add(&gap);
             if self.rows <= MOST_ROWS {
                 let Gap { from_ns, to_ns, another_ran } = gap;
                 let line = format!("{cpu},{from_ns},{to_ns},{}\n", u8::from(another_ran));

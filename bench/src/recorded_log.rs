@@ -88,7 +88,6 @@ impl RecordedLog {
     }
 
     /// The stamp from which times count, ns of the log's epoch: cycle 0, or the first frame.
-    #[must_use]
     pub fn origin_ns(&self) -> u64 {
         self.cycle_zero_ns.unwrap_or_else(|| self.frames[0].record.stamp_ns)
     }

@@ -36,7 +36,6 @@ const LOOK_PERIOD: Duration = Duration::from_millis(10);
 /// What keeps a log from being replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
-    /// The log is none.
     #[error(transparent)]
     Log(#[from] RecordedLogError),
     #[error("{file} holds frames of {names}: choose one with --interface NAME")]
@@ -53,7 +52,6 @@ pub enum ReplayError {
         bus: String,
         /// Frames of the live rig.
         heard: u64,
-        /// Time of listening, ms.
         listened_ms: u64,
         /// Commands that would have been sent.
         commands: u64,
@@ -72,7 +70,6 @@ pub enum ReplayError {
 
 impl ReplayError {
     /// The exit code that the error leads to.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::NoBus(_) => Exit::BusFailed,

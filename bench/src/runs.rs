@@ -43,19 +43,16 @@ pub struct Run {
 }
 
 impl Run {
-    #[must_use]
     pub fn title(&self) -> String {
         let title = self.record.experiment.get("title").and_then(toml::Value::as_str);
         title.unwrap_or("no experiment").to_owned()
     }
 
-    #[must_use]
     pub fn figure(&self, name: &str) -> Option<f64> {
         self.figures.iter().find(|(own, _)| *own == name).map(|(_, value)| *value)
     }
 
     /// The experiment's begin: the zero of the time axis when runs are laid over each other.
-    #[must_use]
     pub fn start_s(&self) -> f64 {
         self.record.experiments().first().map_or(0.0, |span| span.from_s)
     }

@@ -3,11 +3,13 @@
 use crate::runs::{Run, rows};
 use pagekit::grid::Grid;
 use pagekit::number::{in_use, without_unit};
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 /// A figure over the runs that have it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Spread {
+    #[serde(rename = "n")]
     count: usize,
     mean: f64,
     /// Of the sample; none from a single run.
@@ -42,7 +44,6 @@ fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
     rows().filter_map(spread).collect()
 }
 
-#[must_use]
 pub fn table(runs: &[Run]) -> Grid {
     let head = ["figure", "n", "mean", "standard deviation", "least", "most"];
     let rows = spreads(runs).into_iter().map(|(name, unit, spread)| {
@@ -62,18 +63,9 @@ pub fn table(runs: &[Run]) -> Grid {
 }
 
 /// The spreads as JSON, SI, by the figures' names.
-#[must_use]
 pub fn json(runs: &[Run]) -> Value {
-    let figures: Map<_, _> = spreads(runs)
-        .into_iter()
-        .map(|(name, _, spread)| {
-            let Spread { count, mean, standard_deviation, least, most } = spread;
-            let reported = json!({
-                "n": count, "mean": mean, "standard_deviation": standard_deviation, "least": least, "most": most,
-            });
-            (name.to_owned(), reported)
-        })
-        .collect();
+    let figures: Map<_, _> =
+        spreads(runs).into_iter().map(|(name, _, spread)| (name.to_owned(), json!(spread))).collect();
     let names: Vec<_> = runs.iter().map(|run| run.name.as_str()).collect();
     json!({
         "schema_version": runlog::run_folder::SCHEMA_VERSION,

@@ -16,9 +16,6 @@ use std::io::Write as _;
 const WIDTH: usize = 100;
 
 /// Prints the catalogue.
-///
-/// # Errors
-/// None; the signature is that of the other commands.
 pub fn print(arguments: &EffectsArguments) -> Result<Exit, RunError> {
     let text = if arguments.json {
         serde_json::to_string_pretty(&as_json()).unwrap_or_default()

@@ -204,7 +204,6 @@ pub enum EchoAxis {
 
 impl EchoAxis {
     /// Identifier of the axis's command frame.
-    #[must_use]
     pub fn command_id(self) -> u16 {
         match self {
             Self::Drive => DRIVE_VALVE_COMMAND.id,

@@ -37,18 +37,14 @@ quit                  ends the run; everything is saved";
 pub enum Command {
     /// Something that a person does to the rig.
     Act(Action),
-    /// A hand pushes from now on.
+    /// A hand pushes in +x from now on.
     Hand {
-        /// On what.
         on: Part,
-        /// In +x, N.
         force_n: f64,
     },
-    /// Something breaks.
     Break(Fault),
     /// Something is mended: what is broken like this, or everything.
     Mend(Option<Fault>),
-    /// End the run.
     Quit,
 }
 
@@ -87,9 +83,6 @@ impl Console {
     }
 
     /// Obeys a line without waiting for the loop, and gives what there is to say.
-    ///
-    /// # Errors
-    /// Why it is not obeyed, in words.
     pub fn obey(&self, line: &str) -> Result<&'static str, String> {
         match parse(line, self.limits)? {
             None => Ok(""),
@@ -131,7 +124,6 @@ fn next_line(input: &mut impl BufRead) -> io::Result<Option<Result<String, Strin
 }
 
 /// What is said to a line that is longer than any command.
-#[must_use]
 pub fn too_long() -> String {
     format!("a line of more than {LONGEST_LINE} bytes is no command")
 }

@@ -29,24 +29,13 @@ pub struct AxisCycle {
     reason = "nearly all are the large one, and a box would allocate in the 1 ms path"
 )]
 pub enum TimingRecord {
-    /// A cycle that was sent.
     Cycle {
-        /// Its row of the timing table.
         row: CycleTiming,
         /// Its exchange, drive and load.
         axes: [AxisCycle; 2],
     },
-    /// The overrun that ended the run: cycles that were missed and that no cycle follows.
-    Stopped {
-        /// The first of them.
-        first: u64,
-        /// How many.
-        skipped: u64,
-        /// How late the thread woke for the first.
-        late_ns: u64,
-        /// When it woke.
-        woke_ns: u64,
-    },
+    /// The overrun that ended the run: cycles from `first` on that were missed and that no cycle follows.
+    Stopped { first: u64, skipped: u64, late_ns: u64, woke_ns: u64 },
 }
 
 /// A command that came.
@@ -70,12 +59,6 @@ pub struct ExchangeWatch {
 }
 
 impl ExchangeWatch {
-    /// Nothing was sent yet.
-    #[must_use]
-    pub fn new() -> Self {
-        Self { sent_ns: Box::new([0; ECHO_RANGE as usize]), taken: None, now: AxisCycle::default() }
-    }
-
     /// Begins `cycle`, whose sensors were handed over at `stamp_ns`, or not.
     pub fn begin(&mut self, cycle: u64, stamp_ns: Option<u64>) {
         let sensors_ns = stamp_ns.unwrap_or(0);
@@ -105,8 +88,6 @@ impl ExchangeWatch {
         }
     }
 
-    /// The exchange of this cycle.
-    #[must_use]
     pub fn cycle(&self) -> AxisCycle {
         self.now
     }
@@ -114,13 +95,12 @@ impl ExchangeWatch {
 
 impl Default for ExchangeWatch {
     fn default() -> Self {
-        Self::new()
+        Self { sent_ns: Box::new([0; ECHO_RANGE as usize]), taken: None, now: AxisCycle::default() }
     }
 }
 
 impl AxisCycle {
     /// Age in ns at the start of the first cycle in which the command acts, `due_ns`; `None` when none newly acts.
-    #[must_use]
     pub fn age_ns(&self, due_ns: u64) -> Option<u64> {
         let known = self.exchange.command_ns != 0 && self.answered_sensors_ns != 0;
         known.then(|| due_ns.saturating_sub(self.answered_sensors_ns))
@@ -137,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_command_is_joined_to_its_sensors_across_the_end_of_the_echo() {
-        let mut watch = ExchangeWatch::new();
+        let mut watch = ExchangeWatch::default();
         watch.begin(4095, Some(4_095_000_050));
         watch.begin(4096, Some(4_096_000_060));
         assert_eq!(watch.taken(4095, 4_095_000_400, 4096), Some(350));
@@ -152,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_held_command_has_an_age_and_is_not_new() {
-        let mut watch = ExchangeWatch::new();
+        let mut watch = ExchangeWatch::default();
         watch.begin(7, Some(7));
         watch.begin(8, Some(8));
         watch.latched(Some(2));
@@ -162,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_command_that_does_not_act_is_none_and_sensors_that_did_not_leave_have_no_round_trip() {
-        let mut watch = ExchangeWatch::new();
+        let mut watch = ExchangeWatch::default();
         watch.begin(7, None);
         watch.begin(8, Some(8));
         assert_eq!(watch.taken(7, 20, 8), None);

@@ -28,7 +28,6 @@ use table::{FaultSpec, MOST_KEYS};
 /// A fault of the table at a place, with its numbers, each within its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// What is known of it.
     pub spec: &'static FaultSpec,
     /// Its place, as an index into those of the table.
     place: u8,
@@ -39,46 +38,18 @@ pub struct Fault {
 /// Why something is no fault of the table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    /// Not in the table.
     #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are")]
     Unknown(String),
-    /// Not at this place.
     #[error("at = '{at}': {fault} is at {allowed}")]
-    Place {
-        fault: &'static str,
-        /// The place as written.
-        at: String,
-        /// Where it can be.
-        allowed: String,
-    },
-    /// No number of this fault.
+    Place { fault: &'static str, at: String, allowed: String },
     #[error("unknown key {key} = {value}; {fault} has {known}")]
-    Key {
-        fault: &'static str,
-        /// The key as written.
-        key: String,
-        /// The value as written.
-        value: String,
-        /// The keys that it has.
-        known: String,
-    },
+    Key { fault: &'static str, key: String, value: String, known: String },
     /// A number that has no default is not there.
     #[error("{fault} needs {key}; allowed: {range}")]
-    Missing {
-        fault: &'static str,
-        key: &'static str,
-        /// Allowed values.
-        range: String,
-    },
+    Missing { fault: &'static str, key: &'static str, range: String },
     /// Out of range, not finite, or no number.
     #[error("{key} = {value}: allowed: {range}")]
-    Value {
-        key: String,
-        /// The value as written.
-        value: String,
-        /// Allowed values.
-        range: String,
-    },
+    Value { key: String, value: String, range: String },
 }
 
 /// Most places of a fault that a message names.
@@ -90,9 +61,6 @@ pub const NEEDS_HOST: &str =
 
 impl Fault {
     /// A fault of this name at this place, for comparisons: its numbers mean nothing.
-    ///
-    /// # Errors
-    /// [`FaultError`] with what is allowed.
     pub fn like(name: &str, at: Option<&str>) -> Result<Self, FaultError> {
         let spec = table::spec(name).ok_or_else(|| FaultError::Unknown(name.to_owned()))?;
         let numbers: Vec<_> =
@@ -102,9 +70,6 @@ impl Fault {
 
     /// The fault of this name at this place (`None`: where it can be at one place only, or at the bus as a whole), with the
     /// numbers that are given by key: as number, and as written.
-    ///
-    /// # Errors
-    /// [`FaultError`] with what is allowed.
     pub fn new(
         name: &str,
         at: Option<&str>,
@@ -150,13 +115,11 @@ impl Fault {
     }
 
     /// Its place by name.
-    #[must_use]
     pub fn place(&self) -> String {
         self.spec.places.names().swap_remove(usize::from(self.place))
     }
 
     /// Its place among those of its kind.
-    #[must_use]
     pub fn place_index(&self) -> usize {
         usize::from(self.place)
     }
@@ -167,7 +130,6 @@ impl Fault {
     }
 
     /// Its numbers, in the order of the table's keys.
-    #[must_use]
     pub fn values(&self) -> [f64; MOST_KEYS] {
         self.values
     }

@@ -12,9 +12,6 @@ use runlog::summary::Summary;
 use std::path::Path;
 
 /// Saves what is left to save, tells the run in a few lines, and says how it went.
-///
-/// # Errors
-/// [`RunError::Output`] when a file cannot be written.
 pub(crate) fn finish(
     arguments: &RunArguments,
     started: &RunStart,

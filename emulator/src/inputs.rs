@@ -29,9 +29,6 @@ pub struct Inputs {
 
 impl Inputs {
     /// Reads and checks the files; `sealed` takes the place of the file that the experiment names.
-    ///
-    /// # Errors
-    /// [`RunError::Input`] with file, line, key, value and allowed range.
     pub fn read(rig: &Path, experiment: Option<&Path>, sealed: Option<&Path>) -> Result<Self, RunError> {
         let rig_toml = read(rig)?;
         let parameters = RigParameters::from_toml(&rig_toml, &rig.display().to_string())
@@ -73,9 +70,6 @@ pub struct Script {
 
 impl Script {
     /// Reads and checks the file.
-    ///
-    /// # Errors
-    /// [`RunError::Input`] with file, line, key, value and allowed range.
     pub fn read(path: &Path) -> Result<Self, RunError> {
         let (toml, file) = (read(path)?, path.display().to_string());
         let script =
@@ -84,9 +78,6 @@ impl Script {
     }
 
     /// Refuses faults of the bus where nobody could carry them out.
-    ///
-    /// # Errors
-    /// [`RunError::Input`] with file and line.
     pub fn check_host(&self, hosts_bus: bool) -> Result<(), RunError> {
         let planned = self.script.faults.iter().find(|planned| on_wire(&planned.fault).is_some());
         match planned.filter(|_| !hosts_bus) {

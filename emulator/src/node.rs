@@ -33,16 +33,14 @@ use std::time::Duration;
 /// Longest wait for room in the recorder's queue after a stall, in ms; a writer that is slower than this has failed.
 const LONGEST_WAIT_MS: u32 = 2000;
 
-/// What the node is made of.
 pub struct NodeParts {
     /// The plant in its initial state.
     pub plant: Plant,
     pub sensors: Sensors,
     /// Who does what to it by hand.
     pub people: People,
-    /// What breaks.
     pub faults: FaultSchedule,
-    /// What is typed at the console, if it is open.
+    /// What is typed, if the console is open.
     pub console: Option<Receiver<Command>>,
     /// Where cycles, frames and events go.
     pub recorder: Recorder,
@@ -81,7 +79,6 @@ pub struct EmulatorNode {
 
 impl EmulatorNode {
     /// Puts the rig on its bus, before cycle 0.
-    #[must_use]
     pub fn new(parts: NodeParts) -> Self {
         let NodeParts { plant, sensors, people, faults, console, recorder, bench_frames, lockstep } = parts;
         Self {
@@ -309,7 +306,6 @@ impl EmulatorNode {
     }
 
     /// Whether every controller that was heard says that its chain is done.
-    #[must_use]
     pub fn controllers_done(&self) -> bool {
         self.chains_done.iter().flatten().count() > 0 && self.chains_done.iter().flatten().all(|done| *done)
     }
@@ -323,32 +319,24 @@ impl EmulatorNode {
         finite
     }
 
-    /// Frames by what became of them.
-    #[must_use]
     pub fn frame_counters(&self) -> FrameCounters {
         self.frames
     }
 
-    /// Whether somebody typed quit.
-    #[must_use]
     pub fn quit_asked(&self) -> bool {
         self.quit_asked
     }
 
     /// Whether any valve command was accepted.
-    #[must_use]
     pub fn controller_heard(&self) -> bool {
         self.node.commands().iter().any(|intake| intake.counters().accepted > 0)
     }
 
-    /// Cycles computed without being sent.
-    #[must_use]
     pub fn skipped(&self) -> u64 {
         self.node.skipped()
     }
 
     /// The figures of the run; the node goes, and with it the recorder's sending ends.
-    #[must_use]
     pub fn into_figures(self) -> NodeFigures {
         NodeFigures {
             frames: self.frames,

@@ -47,13 +47,11 @@ impl fmt::Display for Pace {
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
-    /// The controllers said Done.
     ControllersDone,
     /// The time that was asked for has passed.
     TimeUp,
     /// Somebody typed quit at the console.
     Quit,
-    /// Ctrl-C or SIGTERM.
     Interrupted,
     /// The writer could not write; it has said why.
     OutputFailed,
@@ -67,7 +65,6 @@ pub enum End {
     MembersLeft,
     /// Lockstep: this member was not done in time.
     LockstepTimeout(String),
-    /// Overrun policy `stop`.
     Overrun(Overrun),
     /// The plant's state is no longer finite.
     NotFinite,
@@ -106,9 +103,7 @@ pub struct Limits {
 /// A rig on its bus, and what may end its run.
 pub struct RunContext<'a> {
     pub node: &'a mut EmulatorNode,
-    /// Its peer on the bus.
     pub bus: &'a mut dyn Bus,
-    /// When the run ends by itself.
     pub limits: &'a Limits,
     /// What is shared with the rest of the program.
     pub shared: &'a Shared,
@@ -116,7 +111,6 @@ pub struct RunContext<'a> {
 
 /// What a pace leaves behind.
 pub struct RunOutcome {
-    /// Why it ended.
     pub end: End,
     /// Cycles begun, skipped ones included.
     pub cycles: u64,

@@ -27,7 +27,6 @@ const CYCLE_QUEUE: usize = 16 * 1024;
 const FRAME_QUEUE: usize = 8 * CYCLE_QUEUE;
 /// Round trips that fit the queue, one of each axis for each of those cycles.
 const TRIP_QUEUE: usize = 2 * CYCLE_QUEUE;
-/// Events that fit the queue.
 const EVENT_QUEUE: usize = 4096;
 
 /// The sending ends, held by the rig loop.
@@ -104,17 +103,14 @@ fn a_turn<T>(queue: &Receiver<T>) -> impl Iterator<Item = T> {
 }
 
 impl Recorder {
-    /// Hands over a cycle.
     pub fn cycle(&mut self, record: CycleRecord) {
         self.dropped += hand_over(&self.cycles, record, self.waits);
     }
 
-    /// Hands over a frame.
     pub fn frame(&mut self, record: FrameRecord) {
         self.dropped += hand_over(&self.frames, record, self.waits);
     }
 
-    /// Hands over an event.
     pub fn event(&mut self, event: Event) {
         self.dropped += hand_over(&self.events, event, self.waits);
     }
@@ -124,19 +120,15 @@ impl Recorder {
         self.dropped += hand_over(&self.timings, record, self.waits);
     }
 
-    /// Hands over a round trip.
     pub fn round_trip(&mut self, record: RoundTrip) {
         self.dropped += hand_over(&self.round_trips, record, self.waits);
     }
 
     /// Whether there is no room for a cycle, and a writer who will make some.
-    #[must_use]
     pub fn is_full(&self) -> bool {
         self.cycles.is_full() && self.writer_alive.strong_count() > 0
     }
 
-    /// Records lost to full queues.
-    #[must_use]
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

@@ -56,17 +56,10 @@ pub enum RunError {
     Bus(#[from] BusError),
     /// A file of the run's folder cannot be written.
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
-    Output {
-        /// The file or folder.
-        file: String,
-        /// What the system said.
-        reason: String,
-    },
+    Output { file: String, reason: String },
 }
 
 impl RunError {
-    /// The exit code that the error leads to.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_)
@@ -152,9 +145,6 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
 }
 
 /// Watches for Ctrl-C and SIGTERM.
-///
-/// # Errors
-/// [`RunError::Input`] when the system takes no handler.
 pub fn watch_interrupt() -> Result<Interrupt, RunError> {
     Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }

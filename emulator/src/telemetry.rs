@@ -44,7 +44,6 @@ pub struct Telemetry {
 /// Late wake-ups beyond those that are kept for viewers to come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Untold {
-    /// How many.
     pub overruns: u64,
     /// Cycles that they skipped.
     pub skipped: u64,
@@ -60,16 +59,12 @@ struct Told<'a> {
 
 impl Telemetry {
     /// Opens the socket at `path`, readable and writable by this user alone.
-    ///
-    /// # Errors
-    /// [`SocketFileError`] when it cannot be had.
     pub fn open(path: &Path, run: &Described<'_>, console: Option<Console>) -> Result<Self, SocketFileError> {
         let socket = SocketFile::bind(path, SocketType::STREAM, false)?;
         let (description, with_truth) = (description(run), run.with_truth());
         Ok(Self { socket, description, with_truth, console, viewers: Vec::new(), packet: Vec::new() })
     }
 
-    /// Tells a cycle.
     pub fn cycle(&mut self, record: &CycleRecord) {
         if self.viewers.is_empty() {
             return;
@@ -85,7 +80,6 @@ impl Telemetry {
         self.viewers.iter_mut().for_each(|viewer| viewer.offer(&self.packet));
     }
 
-    /// Tells an event.
     pub fn event(&mut self, event: &Event) {
         if !self.viewers.is_empty() {
             self.packet.clear();

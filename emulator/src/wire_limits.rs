@@ -15,7 +15,6 @@ const ROUNDING: f64 = 1e-12;
 pub struct WireMisfit {
     /// Table of the rig file.
     pub table: &'static str,
-    /// Key in it.
     pub key: &'static str,
     /// What is wrong, and what the wire carries.
     pub problem: String,

@@ -118,7 +118,6 @@ impl Figures {
         }
     }
 
-    #[must_use]
     pub fn get(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied()
     }
@@ -135,7 +134,6 @@ impl Figures {
 }
 
 /// All figures that `record` has something to measure on: of several repetitions the worst.
-#[must_use]
 pub fn of(record: &Record) -> Figures {
     let computed = |record: &Record, of_run: bool| {
         let mut figures = Figures::default();
@@ -160,13 +158,10 @@ pub fn definitions() -> impl Iterator<Item = &'static Definition> {
     FAMILIES.iter().flat_map(|family| family.definitions)
 }
 
-#[must_use]
 pub fn definition(name: &str) -> Option<&'static Definition> {
     definitions().find(|definition| definition.name == name)
 }
 
-/// The list for a terminal.
-#[must_use]
 pub fn list() -> String {
     let width = definitions().map(|definition| definition.name.len()).max().unwrap_or(0);
     let mut out = String::new();

@@ -40,19 +40,16 @@ pub struct Joined {
 
 impl Joined {
     /// Whether the run ended well and kept all its bounds.
-    #[must_use]
     pub fn passed(&self) -> bool {
         self.figure("passed") == &Value::Bool(true)
     }
 
     /// The value under a key of the summary; null when it is not there.
-    #[must_use]
     pub fn figure(&self, key: &str) -> &Value {
         known(&self.summary, key)
     }
 
     /// Whether there was no bus: the rehearsal runs the plant inside the controller.
-    #[must_use]
     pub fn is_rehearsal(&self) -> bool {
         is_rehearsal(&self.run)
     }
@@ -202,9 +199,6 @@ fn is_rehearsal(run: &Map<String, Value>) -> bool {
 }
 
 /// The experiment that the run used; empty without one.
-///
-/// # Errors
-/// [`FileError::Read`] when it is no TOML.
 pub fn experiment(run: &Map<String, Value>) -> Result<toml::Table, SummaryError> {
     let text = run.get("experiment_toml").and_then(Value::as_str).unwrap_or_default();
     Ok(text.parse().map_err(|error| FileError::read(Path::new("run.json: experiment_toml"), error))?)

@@ -27,7 +27,6 @@ pub struct Median {
 }
 
 /// The median of these values; nothing of nothing.
-#[must_use]
 pub fn median(mut values: Vec<f64>) -> Option<Median> {
     values.sort_by(f64::total_cmp);
     let count = values.len();

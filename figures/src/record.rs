@@ -68,9 +68,6 @@ pub struct Record {
 
 /// Reads the tables of `folder`; of the controllers' those of the axes that the reports name, since another may be of an
 /// earlier run.
-///
-/// # Errors
-/// [`SummaryError::File`]: a table or a report that is there and cannot be read.
 pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryError> {
     let table = |name: &str, numbers: &[&'static str], states: &[&'static str]| {
         let path = folder.join(name);
@@ -92,20 +89,17 @@ pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryErr
 
 impl Record {
     /// The table whose main chain is reported: the drive's, else the load's.
-    #[must_use]
     pub fn leader(&self) -> &Table {
         if self.drive.states("main_chain").is_empty() { &self.load } else { &self.drive }
     }
 
     /// The stretches of the experiment itself, one for each repetition.
-    #[must_use]
     pub fn experiments(&self) -> Vec<Span> {
         self.leader().in_state("main_chain", &["experiment"])
     }
 
     /// The run cut into its repetitions, the way to each included. One that the end of the run cut short is left out unless
     /// there is no other; a run that tells no states is one repetition.
-    #[must_use]
     pub fn repetitions(&self) -> Vec<Span> {
         let states = self.leader().states("main_chain");
         let is_last = |entry: &StateSpan| entry.state == "final-settling";
@@ -141,20 +135,17 @@ impl Record {
     }
 
     /// The drive's set-point less its position, as its controller saw it.
-    #[must_use]
     pub fn position_error(&self) -> Series {
         self.drive.numbers("set_position_m").minus(self.drive.numbers("position_m"))
     }
 
     /// The stretches of the experiment in which the drive's set-point moves.
-    #[must_use]
     pub fn moves(&self) -> Vec<Span> {
         let moving = self.drive.numbers("moving").stretches(|flag| flag != 0.0);
         common(&moving, &self.experiments())
     }
 
     /// The stretches in which the drive's set-point rests at one place, in the experiment and in the waiting around it.
-    #[must_use]
     pub fn rests(&self) -> Vec<Span> {
         let resting = common(
             &self.drive.numbers("moving").stretches(|flag| flag == 0.0),
@@ -165,7 +156,6 @@ impl Record {
     }
 
     /// Whether the load's set-point follows from the motion: a spring, a damper, a mass, dry friction.
-    #[must_use]
     pub fn load_depends_on_state(&self) -> bool {
         let set_points = self.experiment.get("load").and_then(|load| load.get("set-point"));
         let laws = set_points.and_then(toml::Value::as_array).into_iter().flatten();
@@ -173,7 +163,6 @@ impl Record {
     }
 
     /// Whether the load's controller did anything: wanted a force, or opened its valve.
-    #[must_use]
     pub fn load_acts(&self) -> bool {
         !self.load.numbers("set_force_N").is_empty()
             || self.load.numbers("opening").values().iter().any(|opening| *opening != 0.0)
@@ -181,7 +170,6 @@ impl Record {
 }
 
 /// What two lists of stretches have in common.
-#[must_use]
 pub fn common(these: &[Span], those: &[Span]) -> Vec<Span> {
     these.iter().flat_map(|one| those.iter().filter_map(|other| one.common(other))).collect()
 }
@@ -198,8 +186,6 @@ pub struct Step {
 }
 
 impl Step {
-    /// The signed height.
-    #[must_use]
     pub fn height_value(&self) -> f64 {
         self.after_value - self.before_value
     }
@@ -210,7 +196,6 @@ const STAYS_S: f64 = 0.05;
 
 /// The largest jump of `set_point` within `spans` of at least `least_value`; the first of equals. The values that it leaves
 /// and takes last at least 50 ms each, so that ramps, sines and loads that follow the motion have none.
-#[must_use]
 pub fn largest_step(set_point: &Series, spans: &[Span], least_value: f64) -> Option<Step> {
     let stretches = set_point.constant_stretches();
     let long = |span: &Span| span.length_s() > STAYS_S;

@@ -20,9 +20,6 @@ pub enum Reports {
 }
 
 /// Reads the reports in `folder`.
-///
-/// # Errors
-/// [`SummaryError::File`]: a report that is there and cannot be read.
 pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
     let read = |name: &str| {
         let path = folder.join(name);
@@ -40,7 +37,6 @@ pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
 
 impl Reports {
     /// What they say of each axis that they name.
-    #[must_use]
     pub fn axes(&self) -> Map<String, Value> {
         let of = |reported: &Map<String, Value>| reported.get("axes").and_then(Value::as_object).cloned();
         match self {

@@ -23,13 +23,11 @@ pub struct Span {
 }
 
 impl Span {
-    #[must_use]
     pub fn length_s(&self) -> f64 {
         self.to_s - self.from_s
     }
 
     /// Whether `time_s` lies inside.
-    #[must_use]
     pub fn holds(&self, time_s: f64) -> bool {
         time_s >= self.from_s - SAME_S && time_s < self.to_s - SAME_S
     }
@@ -68,30 +66,24 @@ impl Series {
         self.time_s.iter().copied().zip(self.values.iter().copied())
     }
 
-    #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    #[must_use]
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// Whether there is no sample.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
     /// First time and the time after the last.
-    #[must_use]
     pub fn span(&self) -> Option<Span> {
         Some(Span { from_s: *self.time_s.first()?, to_s: self.time_s.last()? + self.period_s() })
     }
 
     /// Smallest distance of the first samples: the record's cycle.
-    #[must_use]
     pub fn period_s(&self) -> f64 {
         let steps = self.time_s.windows(2).take(100).map(|pair| pair[1] - pair[0]);
         steps.fold(f64::INFINITY, f64::min).min(1.0)
@@ -145,7 +137,6 @@ impl Series {
     }
 
     /// The last value at or before `time_s`.
-    #[must_use]
     pub fn at(&self, time_s: f64) -> Option<f64> {
         let after = self.time_s.partition_point(|time| *time < time_s + SAME_S);
         after.checked_sub(1).map(|place| self.values[place])
@@ -196,53 +187,44 @@ impl Series {
         slopes.filter_map(|(time, window)| Some((*time, slope(window)?))).collect()
     }
 
-    #[must_use]
     pub fn mean(&self) -> Option<f64> {
         (!self.is_empty()).then(|| self.values.iter().sum::<f64>() / self.len() as f64)
     }
 
     /// Root of the mean square.
-    #[must_use]
     pub fn rms(&self) -> Option<f64> {
         self.map(|value| value * value).mean().map(f64::sqrt)
     }
 
-    #[must_use]
     pub fn least(&self) -> Option<f64> {
         self.values.iter().copied().reduce(f64::min)
     }
 
-    #[must_use]
     pub fn most(&self) -> Option<f64> {
         self.values.iter().copied().reduce(f64::max)
     }
 
     /// Largest size of a value.
-    #[must_use]
     pub fn largest(&self) -> Option<f64> {
         self.map(f64::abs).most()
     }
 
     /// Largest less least value.
-    #[must_use]
     pub fn peak_to_peak(&self) -> Option<f64> {
         Some(self.most()? - self.least()?)
     }
 
-    #[must_use]
     pub fn first_time(&self, wanted: impl Fn(f64) -> bool) -> Option<f64> {
         self.iter().find(|(_, value)| wanted(*value)).map(|(time, _)| time)
     }
 
     /// Time of the first sample from which on all values are as wanted; none when the last is not.
-    #[must_use]
     pub fn stays_from(&self, wanted: impl Fn(f64) -> bool) -> Option<f64> {
         let last_bad = self.values.iter().rposition(|value| !wanted(*value));
         self.time_s.get(last_bad.map_or(0, |place| place + 1)).copied()
     }
 
     /// The stretches of neighbouring samples whose values are as wanted; a gap in time ends one.
-    #[must_use]
     pub fn stretches(&self, wanted: impl Fn(f64) -> bool) -> Vec<Span> {
         self.stretches_of(|before, value| wanted(value) && before.is_none_or(&wanted))
             .into_iter()
@@ -251,7 +233,6 @@ impl Series {
     }
 
     /// Stretches of neighbouring samples with the same value.
-    #[must_use]
     pub fn constant_stretches(&self) -> Vec<Span> {
         self.stretches_of(|before, value| before.is_none_or(|before| before == value))
     }

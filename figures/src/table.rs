@@ -8,7 +8,6 @@ use serde_json::Value;
 use std::fmt::Write as _;
 
 /// The summary for a terminal: figures in the units that people use, bounds with whether they were kept.
-#[must_use]
 pub fn table(joined: &Joined) -> String {
     let figure = |key: &str| joined.figure(key);
     let mut rows: Vec<(String, String)> = Vec::new();

@@ -22,19 +22,16 @@ pub struct Table {
 
 impl Table {
     /// The numbers of a column; no samples when the table lacks it.
-    #[must_use]
     pub fn numbers(&self, name: &str) -> &Series {
         self.numbers.get(name).unwrap_or(Series::NONE)
     }
 
     /// The states of a column; none when the table lacks it.
-    #[must_use]
     pub fn states(&self, name: &str) -> &[StateSpan] {
         self.states.get(name).map_or(&[], Vec::as_slice)
     }
 
     /// The stretches of a column in which the state is one of `wanted`; neighbours become one.
-    #[must_use]
     pub fn in_state(&self, name: &str, wanted: &[&str]) -> Vec<Span> {
         let mut spans: Vec<Span> = Vec::new();
         for entry in self.states(name).iter().filter(|entry| wanted.contains(&entry.state.as_str())) {

@@ -87,9 +87,6 @@ impl Bounds {
 }
 
 /// Holds the bounds of `passed` against `summary`: for each figure its bounds, value and whether they were kept.
-///
-/// # Errors
-/// [`SummaryError::Threshold`] when a key is no figure, or a bound is none.
 pub fn judge(passed: &toml::Table, summary: &Map<String, Value>) -> Result<Map<String, Value>, SummaryError> {
     let judged = passed.iter().map(|(key, bound)| {
         let refused = |problem: &str| refusal(key, bound, problem);
@@ -118,9 +115,6 @@ const NO_SUCH: &str =
     "no such figure; `bench figures` lists them, and summary.json has frames_lost, wakeup_ns.p99, …";
 
 /// Finds what is wrong with the bounds of `passed` before there is a run.
-///
-/// # Errors
-/// [`SummaryError::Threshold`] when a key is no figure, or a bound is none.
 pub fn check(passed: &toml::Table) -> Result<(), SummaryError> {
     for (key, bound) in passed {
         Bounds::read(bound).map_err(|problem| refusal(key, bound, problem))?;
@@ -142,12 +136,10 @@ fn is_known(key: &str) -> bool {
 }
 
 /// Whether a judged bound was kept.
-#[must_use]
 pub fn is_kept(entry: &Value) -> bool {
     entry["kept"] == Value::Bool(true)
 }
 
-#[must_use]
 pub fn in_words(entry: &Value) -> String {
     match (entry["least"].as_f64(), entry["most"].as_f64()) {
         (Some(least), Some(most)) => format!("from {least} to {most}"),

@@ -24,7 +24,6 @@ pub fn read(file: &Path) -> Result<Report, FileError> {
 }
 
 /// The cause by its name, `unknown` when something was late that was not recorded, or `nothing`, and the sentence behind it.
-#[must_use]
 pub fn name(report: &Report) -> (String, String) {
     let by_itself = |finding: &&Finding| {
         finding.by_itself || matches!(finding.cause, Cause::MachineStoodStill | Cause::Unexplained)
@@ -44,7 +43,6 @@ pub fn name(report: &Report) -> (String, String) {
 }
 
 /// A cause by its name in `report.json`.
-#[must_use]
 pub fn in_kebab(cause: Cause) -> String {
     let name = serde_json::to_value(cause).ok();
     name.as_ref().and_then(serde_json::Value::as_str).unwrap_or("unexplained").to_owned()

@@ -41,7 +41,6 @@ fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
 }
 
 /// Where a report goes that was given no folder: into its run's, or for several into `report` in the folder that holds them all.
-#[must_use]
 pub fn default_out(chosen: &[Chosen]) -> PathBuf {
     let [first, others @ ..] = chosen else { return PathBuf::from("report") };
     if others.is_empty() {

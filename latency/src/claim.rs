@@ -21,7 +21,6 @@ const SAME_LENGTH: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Interval of the reference: the cycle's.
 const INTERVAL_US: &str = "1000";
 
-#[must_use]
 pub fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
     let reasons = reasons(runs, conditions);
     let not_controlled = not_controlled(runs, conditions);
@@ -47,7 +46,6 @@ pub struct SoFar {
 }
 
 /// Judges runs that still go on by the same rules.
-#[must_use]
 pub fn so_far(runs: &[RunFiles], conditions: &Conditions) -> SoFar {
     let against = [not_granted(runs), disturbed(runs, conditions)].concat();
     SoFar { against, missing: missing(runs, conditions) }

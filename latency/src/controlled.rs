@@ -9,7 +9,6 @@ use realtime::{Grant, Machine};
 use std::collections::BTreeSet;
 
 /// The sentences of all runs, each once.
-#[must_use]
 pub fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
     let mut reported = Vec::new();
     if let Some(host) = virtual_machine(conditions) {

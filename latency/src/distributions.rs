@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 const BELOW_ZERO_SHARE: f64 = 0.01;
 
 /// The distributions of a run, by tag, the reference's among them; tells what could not be had.
-#[must_use]
 pub fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
     let mut found = run.logged.clone();
     if run.whole {
@@ -48,7 +47,6 @@ pub fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
 }
 
 /// Percentiles of a run by tag; those of the summaries where nothing better is there.
-#[must_use]
 pub fn percentiles_of_run(
     run: &RunFiles,
     series: &BTreeMap<String, Series>,
@@ -81,7 +79,6 @@ pub fn percentiles_of_run(
 }
 
 /// Percentiles of the summaries; nothing without samples.
-#[must_use]
 pub fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
     let count = reported.count;
     let at = |value: Option<u64>, least: u64| value.filter(|_| count >= least);
@@ -94,8 +91,6 @@ pub fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
     })
 }
 
-/// All samples of all runs by tag.
-#[must_use]
 pub fn add_up(runs: &[BTreeMap<String, Series>]) -> BTreeMap<String, Samples> {
     let mut sums: BTreeMap<String, Samples> = BTreeMap::new();
     for (tag, series) in runs.iter().flatten() {
@@ -105,7 +100,6 @@ pub fn add_up(runs: &[BTreeMap<String, Series>]) -> BTreeMap<String, Samples> {
 }
 
 /// The distributions as a report shows them.
-#[must_use]
 pub fn shown(runs: &[BTreeMap<String, Series>], sums: &BTreeMap<String, Samples>) -> Vec<Distribution> {
     let mut shown: Vec<_> = sums.iter().map(|(tag, samples)| one(tag, samples, runs)).collect();
     shown.sort_by_key(|distribution| kinds::place(&distribution.name));

@@ -58,7 +58,6 @@ impl Late {
 }
 
 /// All events of a run, in the order of its cycles, process by process.
-#[must_use]
 pub fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
     let late: Vec<_> =
         run.rows.iter().map(|(process, rows)| (process.as_str(), late_rows(process, rows, run))).collect();
@@ -78,7 +77,6 @@ pub fn sort_by_severity(events: &mut [Event]) {
 
 /// One event for each moment: what several processes suffered at once, by the same cause, stands under the worst of them.
 /// Wants the worst first.
-#[must_use]
 pub fn one_of_each_moment(events: Vec<Event>) -> Vec<Event> {
     let severity_ns = |event: &Event| event.late_ns.max(event.slow_ns);
     let from_ns = |event: &Event| event.cycle * PERIOD_NS;

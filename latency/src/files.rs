@@ -59,14 +59,12 @@ pub struct RunFiles {
 }
 
 /// Whether a folder holds anything of a run.
-#[must_use]
 pub fn is_run(folder: &Path) -> bool {
     let names = ["summary.json", "run.json", "emulator.hlog", "emulator-timing.csv"];
     names.iter().any(|name| folder.join(name).is_file())
 }
 
 impl RunFiles {
-    #[must_use]
     pub fn read(folder: &Path) -> Self {
         let mut run = Self { folder: folder.into(), ..Self::default() };
         run.summary = run.json("summary.json");
@@ -225,32 +223,26 @@ impl RunFiles {
     }
 
     /// When the run began, s since 1970; nothing when it is not reported.
-    #[must_use]
     pub fn started_unix_s(&self) -> Option<f64> {
         self.description().started_unix_s
     }
 
-    /// How long it was, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         let cycles = self.counted().cycles;
         cycles.map_or(self.logged_until_s, |cycles| cycles as f64 * 1e-3)
     }
 
     /// `summary.json`; empty when missing.
-    #[must_use]
     pub fn counted(&self) -> Summary {
         typed(&self.summary)
     }
 
     /// `run.json`; empty when missing.
-    #[must_use]
     pub fn description(&self) -> RunDescription {
         typed(&self.run)
     }
 
     /// `conditions.json`; empty when missing.
-    #[must_use]
     pub fn circumstances(&self) -> Conditions {
         self.conditions.clone().unwrap_or_default()
     }

@@ -12,8 +12,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::interval_log::{
-    IntervalLogHistogram, IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry,
-    Tag,
+    IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry, Tag,
 };
 use hdrhistogram::serialization::{Deserializer, V2DeflateSerializer};
 use std::io::{self, Write};
@@ -61,7 +60,8 @@ pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogErro
         for entry in IntervalLogIterator::new(line.as_bytes()) {
             match entry {
                 Ok(LogEntry::Interval(reported)) => {
-                    let histogram = decode(&reported, &mut deserializer).map_err(failed)?;
+                    let histogram =
+                        decode(reported.encoded_histogram(), &mut deserializer).map_err(failed)?;
                     take(Passing {
                         tag: reported.tag().map_or("", |tag| tag.as_str()),
                         start_s: reported.start_timestamp().as_secs_f64(),
@@ -87,11 +87,9 @@ pub fn read(text: &str) -> Result<Vec<Interval>, LogError> {
     Ok(intervals)
 }
 
-fn decode(
-    reported: &IntervalLogHistogram<'_>,
-    deserializer: &mut Deserializer,
-) -> Result<Histogram<u64>, String> {
-    let bytes = STANDARD.decode(reported.encoded_histogram()).map_err(|error| error.to_string())?;
+/// A histogram from its base64.
+pub fn decode(text: &str, deserializer: &mut Deserializer) -> Result<Histogram<u64>, String> {
+    let bytes = STANDARD.decode(text).map_err(|error| error.to_string())?;
     deserializer.deserialize(&mut bytes.as_slice()).map_err(|error| error.to_string())
 }
 

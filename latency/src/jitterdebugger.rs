@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 const VERSION: u32 = 2;
 
 /// The file's contents: wake-up latencies of all processes over all runs.
-#[must_use]
 pub fn value(sums: &BTreeMap<String, Samples>, runs: &[RunFiles]) -> Value {
     // The rig first.
     let mut own: Vec<_> = sums.iter().filter(|(tag, _)| tag.ends_with("-wakeup")).collect();

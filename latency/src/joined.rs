@@ -36,7 +36,6 @@ impl Series {
 /// What joining gave.
 #[derive(Clone, Debug, Default)]
 pub struct OneWay {
-    /// By tag.
     pub series: BTreeMap<String, Series>,
     /// Latencies below what the stamps can tell.
     pub below_zero: u64,
@@ -45,7 +44,6 @@ pub struct OneWay {
 type OfAxis = fn(&CycleTiming) -> Exchange;
 
 /// One-way latencies of a run with rows of both sides.
-#[must_use]
 pub fn one_way(run: &RunFiles) -> OneWay {
     let mut found = OneWay::default();
     let Some(rig) = run.rows.get("emulator") else { return found };
@@ -98,7 +96,6 @@ impl OneWay {
 }
 
 /// What the rows of one process say by themselves, by tag: for runs whose log is missing.
-#[must_use]
 pub fn of_rows(process: &str, rows: &[CycleTiming]) -> BTreeMap<String, Series> {
     let mut found: BTreeMap<String, Series> = BTreeMap::new();
     let mut record = |what: &str, cycle: u64, ns: u64| {

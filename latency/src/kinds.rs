@@ -48,7 +48,6 @@ pub struct Kind {
 }
 
 /// All kinds, in the order in which a report shows them.
-#[must_use]
 pub fn all() -> Vec<Kind> {
     let reference = Kind {
         tag: reference::TAG.into(),
@@ -101,7 +100,6 @@ fn ping_pongs() -> impl Iterator<Item = Kind> {
 }
 
 /// The kind of a tag; one that is not known is shown after the others, with its tag for a name.
-#[must_use]
 pub fn of(tag: &str) -> Kind {
     let known = all().into_iter().find(|kind| kind.tag == tag);
     known.unwrap_or_else(|| {
@@ -114,7 +112,6 @@ pub fn of(tag: &str) -> Kind {
 }
 
 /// Where a tag stands in a report.
-#[must_use]
 pub fn place(tag: &str) -> usize {
     all().iter().position(|kind| kind.tag == tag).unwrap_or(usize::MAX)
 }

@@ -113,7 +113,6 @@ pub struct Made {
 }
 
 /// Makes the report of these runs, with groups side by side if asked for.
-#[must_use]
 pub fn make(chosen: &[Chosen], title: Option<&str>, compare: bool) -> Made {
     let runs = chosen.iter().map(|chosen| RunFiles::read(&chosen.folder)).collect();
     let groups: Vec<_> = chosen.iter().map(|chosen| chosen.group.as_deref()).collect();
@@ -121,7 +120,6 @@ pub fn make(chosen: &[Chosen], title: Option<&str>, compare: bool) -> Made {
 }
 
 /// Makes the report of runs that were read; `groups` may name the group of each.
-#[must_use]
 pub fn from_files(
     mut runs: Vec<RunFiles>,
     groups: &[Option<&str>],
@@ -170,9 +168,6 @@ fn default_title(runs: &[RunFiles]) -> String {
 
 impl Made {
     /// Holds the bounds of a threshold file against the report.
-    ///
-    /// # Errors
-    /// [`ReportError::File`]: a file that cannot be read, or says something that makes no sense.
     pub fn judge(&mut self, file: &Path) -> Result<(), ReportError> {
         let text = read_text(file)?;
         self.report.bounds =
@@ -181,7 +176,6 @@ impl Made {
     }
 
     /// Whether a bound was broken; one that is not resolved was not.
-    #[must_use]
     pub fn is_broken(&self) -> bool {
         self.report.bounds.iter().any(|bound| bound.verdict() == Verdict::Broken)
     }

@@ -8,7 +8,6 @@ use super::tallies;
 use pagekit::grid::Grid;
 use std::fmt::Write as _;
 
-#[must_use]
 pub fn summary(report: &Report) -> String {
     let mut out = String::new();
     let mut section = |heading: &str, text: &str| {
@@ -33,7 +32,6 @@ pub fn summary(report: &Report) -> String {
     out.trim_end().to_owned() + "\n"
 }
 
-#[must_use]
 pub fn table(report: &Report) -> String {
     let mut out = percentiles(&report.distributions).markdown();
     let mut add = |text: &str| {

@@ -107,7 +107,6 @@ pub struct Bin {
     pub from_ns: u64,
     /// Upper end, ns, not included.
     pub to_ns: u64,
-    /// Samples.
     pub count: u64,
 }
 
@@ -244,7 +243,6 @@ pub struct Finding {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RunPart {
     pub folder: String,
-    /// Group, for comparisons.
     pub group: String,
     pub started_unix_s: f64,
     pub duration_s: f64,
@@ -335,7 +333,6 @@ fn decided() -> bool {
 
 impl BoundResult {
     /// Kept, broken, or neither.
-    #[must_use]
     pub fn verdict(&self) -> Verdict {
         match (self.resolved, self.kept) {
             (false, _) => Verdict::NotResolved { pairs: self.pairs_to_resolve },

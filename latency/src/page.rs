@@ -26,7 +26,6 @@ use crate::model::{Claim, Report};
 use pagekit::number;
 use pagekit::page::{document, escaped};
 
-#[must_use]
 pub fn page(report: &Report) -> String {
     let families = families::families(&report.distributions);
     let sections = [

@@ -12,7 +12,6 @@ use std::collections::BTreeMap;
 /// Group of a run that says none.
 const NO_GROUP: &str = "all";
 
-#[must_use]
 pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String, PercentilesNs>) -> RunPart {
     let told_group = run.conditions.as_ref().and_then(|reported| reported.group.as_deref());
     RunPart {

@@ -8,7 +8,6 @@ const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// CPU on which the probe was.
     pub cpu: u64,
     /// Last look before, ns of CLOCK_MONOTONIC.
     pub from_ns: u64,
@@ -20,7 +19,6 @@ pub struct Gap {
 
 impl Gap {
     /// Length of what the gap has in common with a stretch of time, ns.
-    #[must_use]
     pub fn within_ns(&self, from_ns: u64, to_ns: u64) -> u64 {
         self.to_ns.min(to_ns).saturating_sub(self.from_ns.max(from_ns))
     }
@@ -36,7 +34,6 @@ pub enum Watched {
 }
 
 /// Whether a CPU was watched at a time, by the rows of a table.
-#[must_use]
 pub fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
     let Some(gaps) = gaps else { return Watched::No };
     if gaps.iter().any(|gap| gap.cpu == cpu && gap.from_ns <= at_ns) {

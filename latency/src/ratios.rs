@@ -25,7 +25,6 @@ pub fn names() -> impl Iterator<Item = String> {
 }
 
 /// The ratios of all runs that have a reference beside them.
-#[must_use]
 pub fn ratios(runs: &[RunPart]) -> Vec<Ratio> {
     let mut ratios = Vec::new();
     for ((tag, _, of, theirs), name) in COMPARED.into_iter().zip(names()) {
@@ -41,7 +40,6 @@ pub fn ratios(runs: &[RunPart]) -> Vec<Ratio> {
 
 /// The name of a ratio in a threshold file: `emulator-wakeup.p50` for `emulator-wakeup p50 / cyclictest p50`, and
 /// `drive-round-trip.p50/ping-pong-bus` for one against another reference.
-#[must_use]
 pub fn short_name(name: &str) -> String {
     let (ours, theirs) = name.split_once(" / ").unwrap_or((name, reference::TAG));
     let ours = ours.replace(' ', ".");
@@ -50,7 +48,6 @@ pub fn short_name(name: &str) -> String {
 }
 
 /// The ratio of these pairs, ours first; nothing without a pair.
-#[must_use]
 pub fn ratio(name: String, pairs_ns: Vec<(u64, u64)>) -> Option<Ratio> {
     let ratios = pairs_ns.iter().map(|(ours, theirs)| *ours as f64 / *theirs as f64).collect();
     let Median { value, interval, confidence } = median(ratios)?;

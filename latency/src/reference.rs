@@ -28,7 +28,6 @@ pub struct Reference {
 }
 
 /// The value of an option in a command line, by its letter and its long name: `-p 80`, `-p80`, `--priority 80`, `--priority=80`.
-#[must_use]
 pub fn option<'a>(command_line: &'a str, letter: char, long: &str) -> Option<&'a str> {
     let short = format!("-{letter}");
     let mut words = command_line.split_whitespace();

@@ -38,7 +38,6 @@ impl FromIterator<u64> for Samples {
 
 impl Samples {
     /// Those of a histogram with bounds of its own.
-    #[must_use]
     pub fn from_histogram(other: &Histogram<u64>) -> Self {
         let mut samples = Self::default();
         samples.add_histogram(other);
@@ -62,24 +61,20 @@ impl Samples {
         }
     }
 
-    #[must_use]
     pub fn count(&self) -> u64 {
         self.histogram.len()
     }
 
     /// The largest, ns; nothing without samples.
-    #[must_use]
     pub fn max_ns(&self) -> Option<u64> {
         (!self.histogram.is_empty()).then(|| self.histogram.max())
     }
 
-    #[must_use]
     pub fn histogram(&self) -> &Histogram<u64> {
         &self.histogram
     }
 
     /// Percentiles; one that needs more samples than there are to differ from the maximum is null.
-    #[must_use]
     pub fn percentiles_ns(&self) -> PercentilesNs {
         let count = self.count();
         let at =
@@ -96,7 +91,6 @@ impl Samples {
     }
 
     /// Bins on a logarithmic axis, ten to a decade; what is 0 stands in one from 0 to 1 ns.
-    #[must_use]
     pub fn bins(&self) -> Vec<Bin> {
         let mut bins: Vec<Bin> = Vec::new();
         for recorded in self.histogram.iter_recorded() {

@@ -5,7 +5,6 @@ use pagekit::grid::Grid;
 use std::collections::BTreeMap;
 
 /// Command age in cycles over all runs: a row for each age, a column for each axis; nothing when it was not counted.
-#[must_use]
 pub fn command_ages(runs: &[RunPart]) -> Option<Grid> {
     const AXES: [&str; 2] = ["drive", "load"];
     // Ages are sorted as numbers; what is no number, such as "more", comes last.
@@ -29,7 +28,6 @@ pub fn command_ages(runs: &[RunPart]) -> Option<Grid> {
 }
 
 /// Frames of each run that were lost, late, came twice or made no sense, at the rig and at the controllers.
-#[must_use]
 pub fn frames(runs: &[RunPart]) -> Option<Grid> {
     let mut rows = Vec::new();
     for (place, run) in runs.iter().enumerate() {

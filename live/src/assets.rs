@@ -62,7 +62,6 @@ const ASSETS: &[(&str, Asset)] = &[
     file!("vendor/uplot/uPlot.min.css", STYLE),
 ];
 
-#[must_use]
 pub fn find(path: &str) -> Option<Asset> {
     ASSETS.iter().find(|(known, _)| *known == path).map(|(_, asset)| *asset)
 }

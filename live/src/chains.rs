@@ -86,7 +86,6 @@ fn states(signal: &str) -> &'static [&'static str] {
 }
 
 /// All chains: `name`, `states`, `edges`.
-#[must_use]
 pub fn diagrams() -> Value {
     let diagram =
         |chain: &Chain| json!({ "name": chain.name, "states": states(chain.signal), "edges": chain.edges });
@@ -94,7 +93,6 @@ pub fn diagrams() -> Value {
 }
 
 /// The states of an axis by chain.
-#[must_use]
 pub fn active(status: ChainStatus) -> Value {
     let mut by_chain = Map::new();
     // Both axes' statuses have one layout.

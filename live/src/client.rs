@@ -28,7 +28,6 @@ const READ_A_TURN: usize = 16 << 10;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// It asks.
     Asking,
     /// Its request is being obeyed elsewhere.
     Waiting,
@@ -215,7 +214,6 @@ pub fn wait<'a>(
 }
 
 /// Whether a socket that does not block has nothing to say yet.
-#[must_use]
 pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }

@@ -106,7 +106,6 @@ pub struct Layout {
 
 impl Layout {
     /// From the description's columns: table and name of each.
-    #[must_use]
     pub fn new<'a>(described: impl Iterator<Item = (&'a str, &'a str)>) -> Self {
         let described: Vec<_> = described.collect();
         let place = |table: &str, name: &str| described.iter().position(|known| *known == (table, name));
@@ -125,18 +124,15 @@ impl Layout {
     }
 
     /// The measured values of a cycle.
-    #[must_use]
     pub fn measured(&self, values: &[f64]) -> [Option<f64>; MEASURED_COUNT] {
         self.measured.map(|place| values.get(place?).copied())
     }
 
-    #[must_use]
     pub fn supply_pa(&self, values: &[f64]) -> Option<f64> {
         values.get(self.supply?).copied()
     }
 
     /// The value of a column that is a sum of true ones, by the column's place.
-    #[must_use]
     pub fn truth(&self, column: usize, factor: f64, values: &[f64]) -> Option<f64> {
         let places = self.truth.get(column).filter(|places| !places.is_empty())?;
         let sum: Option<f64> = places.iter().map(|place| values.get(*place)).sum();

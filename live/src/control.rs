@@ -62,7 +62,6 @@ pub enum Order {
     Frame(Frame),
     /// A set-point by hand on the bus, once: one of both, of which the other is not to change.
     SetPoint {
-        /// Which axis it is for.
         axis: HandSetPointAxis,
         /// Where it is to go, m.
         position_m: Option<f64>,
@@ -74,7 +73,6 @@ pub enum Order {
     Save(f64),
 }
 
-/// Reads what is asked for.
 pub fn read(body: &[u8]) -> Result<Order, String> {
     let asked: Asked = serde_json::from_slice(body).map_err(|error| error.to_string())?;
     let run = |command| Order::Frame(Frame::RunControl(RunControl { command, experiment: 0 }));

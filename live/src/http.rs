@@ -10,7 +10,6 @@ use std::net::IpAddr;
 pub const LONGEST_HEAD: usize = 16 << 10;
 /// Longest body of a request, bytes.
 pub const LONGEST_BODY: usize = 64 << 10;
-/// Most header fields.
 const MOST_FIELDS: usize = 64;
 
 /// Sent with everything: the page loads nothing from elsewhere, is in no frame of another, and tells nobody where it is.
@@ -25,7 +24,6 @@ pub struct Request {
     pub method: String,
     /// Its path, without what follows a question mark.
     pub path: String,
-    /// What follows it.
     pub query: String,
     /// Whose it was, as `127.0.0.1:8080`.
     pub host: Option<String>,
@@ -40,7 +38,6 @@ pub struct Request {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress {
     Partial,
-    /// All of it.
     Whole(Request),
     /// It is none, or more than is taken: what to answer.
     Refused(Status),
@@ -78,7 +75,6 @@ impl Status {
 }
 
 /// Reads what has come of a request so far.
-#[must_use]
 pub fn parse(bytes: &[u8]) -> Progress {
     let mut fields = [httparse::EMPTY_HEADER; MOST_FIELDS];
     let mut head = httparse::Request::new(&mut fields);
@@ -126,7 +122,6 @@ pub fn parse(bytes: &[u8]) -> Progress {
 
 /// Whether a request was meant for the server at `port`, by a name that no foreign page can have: `localhost`, or an address in
 /// digits. A name of somebody's own that leads here (DNS rebinding) would make a foreign page's requests look like ours.
-#[must_use]
 pub fn is_ours(host: &str, port: u16) -> bool {
     let (name, reported) = match host.rsplit_once(':') {
         Some((name, reported)) if !reported.ends_with(']') => (name, reported),
@@ -137,7 +132,6 @@ pub fn is_ours(host: &str, port: u16) -> bool {
     reported.parse() == Ok(port) && (name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok())
 }
 
-#[must_use]
 pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     let head = format!(
         "HTTP/1.1 {}\r\nContent-Type: {content_type}\r\nContent-Length: {}\r\nCache-Control: no-store\r\n{SECURITY}\
@@ -148,19 +142,16 @@ pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     [head.as_bytes(), body].concat()
 }
 
-#[must_use]
 pub fn json_response(status: Status, value: &Value) -> Vec<u8> {
     response(status, "application/json", value.to_string().as_bytes())
 }
 
 /// What is said when something was refused or done.
-#[must_use]
 pub fn said(status: Status, message: &str) -> Vec<u8> {
     json_response(status, &json!({ "ok": status == Status::Good, "message": message }))
 }
 
 /// The head of a stream of Server-Sent Events, which ends with the connection.
-#[must_use]
 pub fn stream_head() -> Vec<u8> {
     format!(
         "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n{SECURITY}Connection: close\r\n\r\n"
@@ -168,7 +159,6 @@ pub fn stream_head() -> Vec<u8> {
     .into_bytes()
 }
 
-#[must_use]
 pub fn event(name: &str, data: &Value) -> Vec<u8> {
     // JSON without line breaks, as it is written here, is one line of data.
     format!("event: {name}\ndata: {data}\n\n").into_bytes()

@@ -65,14 +65,12 @@ pub enum LiveError {
 
 impl LiveError {
     /// The exit code that tells it.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         if matches!(self, Self::Bus(_)) { Exit::BusFailed } else { Exit::BadInput }
     }
 }
 
 /// The time of day `age_ns` ago, ns since the Unix epoch, which candump's stamps are.
-#[must_use]
 pub fn wall_clock_ns(age_ns: u64) -> u64 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     (now.as_nanos() as u64).saturating_sub(age_ns)

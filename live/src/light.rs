@@ -21,13 +21,11 @@ pub struct Light {
 
 impl Light {
     /// Of the run in this folder.
-    #[must_use]
     pub fn new(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(Path::to_path_buf), run: RunFiles::default() }
     }
 
     /// Judges anew, after so many cycles of which so many were skipped.
-    #[must_use]
     pub fn judge(&mut self, cycles: u64, skipped: u64) -> Value {
         if self.run.run.is_null() {
             // The emulator writes it when it has asked for its privileges, which is after it let viewers in.

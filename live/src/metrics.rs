@@ -6,7 +6,6 @@ use serde_json::Value;
 use std::fmt::{Display, Write as _};
 
 /// The text of `/metrics`.
-#[must_use]
 pub fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
     let state = view.state(audience);
     let mut text = String::new();

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 
 /// Longest record, s.
 pub const LONGEST_S: f64 = 60.0;
-/// Cycles that are kept.
 const CYCLES_KEPT: usize = 60_000;
 /// Frames that are kept: those of a minute, with room for noise.
 const FRAMES_KEPT: usize = 600_000;
@@ -42,7 +41,6 @@ pub struct Saved {
     cut: String,
 }
 
-/// How the rig is set up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetUp {
     pub linked: bool,
@@ -77,7 +75,6 @@ impl Minute {
 
     /// The last so many seconds, to be written to a folder of their own in `folder`. A record tells one set-up for all of it,
     /// which is that of its end: it begins no earlier than the last change.
-    #[must_use]
     pub fn last(&self, seconds: f64, folder: &Path, interface: &str, set_up: SetUp) -> Saved {
         let newest = self.cycles.back().map_or(0, |measured| measured.cycle);
         let oldest = self.cycles.front().map_or(0, |measured| measured.cycle);

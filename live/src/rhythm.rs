@@ -46,7 +46,6 @@ impl Rhythm {
     }
 
     /// Percentiles of all that was heard, us; null where there are too few samples for one.
-    #[must_use]
     pub fn percentiles(&self) -> Value {
         let us = |ns: Option<u64>| ns.map(|ns| ns as f64 / 1e3);
         let reported = |distribution: &Distribution| {
@@ -64,7 +63,6 @@ impl Rhythm {
     }
 
     /// Bins on a logarithmic axis: upper end in us, and samples.
-    #[must_use]
     pub fn histograms(&self) -> Value {
         let bins = |samples: &Samples| -> Value {
             samples.bins().iter().map(|bin| json!([bin.to_ns as f64 / 1e3, bin.count])).collect()

@@ -17,7 +17,6 @@ const KEPT: usize = 6000;
 const PATIENCE_CYCLES: u64 = 30;
 /// Most cycles between two values of a controller that a straight line is drawn through: one of them may be lost.
 const BRIDGED_CYCLES: u64 = 20;
-/// Values that are kept of a controller.
 const VALUES_KEPT: usize = 32;
 
 /// A row of the charts; values as the page gets them, to seven digits.
@@ -84,13 +83,11 @@ impl Rows {
     }
 
     /// The rows of the last so many seconds.
-    #[must_use]
     pub fn last(&self, seconds: f64) -> Value {
         let rows = (seconds * 1000.0 / SPACING_CYCLES as f64) as usize;
         table(self.kept.range(self.kept.len().saturating_sub(rows)..))
     }
 
-    #[must_use]
     pub fn newest(&self) -> Map<String, Value> {
         let Some(row) = self.kept.back() else { return Map::new() };
         let values = row.values.iter().map(|value| json!(value.map(short)));
@@ -122,7 +119,6 @@ fn short(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }
 
-/// Rows as columns.
 fn table<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Value {
     let time_s: Vec<f64> = rows.clone().map(|row| row.cycle as f64 / 1000.0).collect();
     let column = |place: usize| rows.clone().map(|row| row.values[place].map(short)).collect::<Vec<_>>();

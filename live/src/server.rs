@@ -407,16 +407,12 @@ impl Server {
                 // A peer does not hear itself.
                 self.view.sent(encoded, wall_clock_ns(0));
                 if let Frame::ConsoleEmergencyStop(stop) = frame {
-                    self.note_stop(*stop, now_ms);
+                    self.view.wire.note_stop(CONSOLE, *stop, now_ms);
                 }
                 said(Status::Good, "on the bus")
             }
             Err(error) => said(Status::Busy, &error.to_string()),
         }
-    }
-
-    fn note_stop(&mut self, stop: EmergencyStop, now_ms: u64) {
-        self.view.wire.note_stop(CONSOLE, stop, now_ms);
     }
 
     /// Sends the console's stop again, as `rig.dbc` has it while its cause lasts; also to a rig that was not there before.

@@ -10,7 +10,7 @@ use super::wire::{News, Wire};
 use protocol::can::CanFrame;
 use runlog::candump::FrameRecord;
 use runlog::telemetry::Packet;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 
@@ -64,7 +64,6 @@ pub struct Audience {
 
 impl View {
     /// Nothing heard yet.
-    #[must_use]
     pub fn new(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(Path::to_path_buf), light: Light::new(folder), ..Self::default() }
     }
@@ -246,13 +245,11 @@ impl View {
         self.claim = self.light.judge(newest, self.skipped);
     }
 
-    #[must_use]
     pub fn run_folder(&self) -> Option<PathBuf> {
         self.folder.clone().or_else(|| self.description["out"].as_str().map(PathBuf::from))
     }
 
     /// How the rig is set up in the newest cycles.
-    #[must_use]
     pub fn set_up(&self) -> SetUp {
         self.set_up
     }
@@ -273,7 +270,6 @@ impl View {
     }
 
     /// What does not change while a run goes on.
-    #[must_use]
     pub fn description(&self, control: bool) -> Value {
         let described = &self.description;
         let column = |column: &super::columns::Column| json!({ "name": column.name, "unit": column.unit });
@@ -294,8 +290,6 @@ impl View {
         })
     }
 
-    /// What is so now.
-    #[must_use]
     pub fn state(&self, audience: Audience) -> Value {
         let status = self.wire.status();
         let mut timing = self.rhythm.percentiles();
@@ -324,7 +318,6 @@ impl View {
     }
 
     /// The same, and the last messages, for who comes later.
-    #[must_use]
     pub fn state_with_messages(&self, audience: Audience) -> Value {
         let mut state = self.state(audience);
         if let Value::Object(state) = &mut state {
@@ -342,19 +335,10 @@ impl View {
 /// The table of faults in the words of the page.
 fn faults(listed: &Value) -> Value {
     let number = |key: &Value| {
-        let mut reported = Map::new();
-        for (name, of) in [
-            ("name", "key"),
-            ("unit", "unit"),
-            ("low", "min"),
-            ("high", "max"),
-            ("default", "default"),
-            ("whole", "whole"),
-            ("about", "meaning"),
-        ] {
-            reported.insert(name.into(), key[of].clone());
-        }
-        reported
+        json!({
+            "name": key["key"], "unit": key["unit"], "low": key["min"], "high": key["max"],
+            "default": key["default"], "whole": key["whole"], "about": key["meaning"],
+        })
     };
     let fault = |fault: &Value| {
         let numbers = fault["keys"].as_array().into_iter().flatten().map(number);

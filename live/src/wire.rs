@@ -4,8 +4,8 @@ use super::columns::{AXES, MEASURED, MEASURED_COUNT};
 use protocol::bus_load::worst_case_bits;
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ALIVE_RANGE, BIT_RATE_PER_S, ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, HandSetPoint,
-    HandSetPointAxis, MESSAGES, RigStatus, Sensors, Tick,
+    ALIVE_RANGE, BIT_RATE_PER_S, ChainStatus, ChainValues, DecodeError, ECHO_RANGE, EmergencyStop, Frame,
+    HandSetPoint, HandSetPointAxis, MESSAGES, RigStatus, Sensors, Tick,
 };
 use serde_json::{Map, Value, json};
 
@@ -15,8 +15,6 @@ const STOP_HOLDS_MS: u64 = 500;
 const STATUS_HOLDS_MS: u64 = 1000;
 /// Values of the tick's count of skipped cycles.
 const SKIPPED_RANGE: u64 = 1 << 16;
-/// Values of the echo in a command.
-const ECHO_RANGE: u64 = 1 << 12;
 /// Senders of emergency stops.
 pub const STOPPERS: [&str; 4] = ["console", "rig", "drive", "load"];
 /// Place of the console among them, whose frames are sent from here too.
@@ -176,7 +174,6 @@ impl Wire {
 
     /// A set-point by hand. The frame has room for a position and a force, and the axis follows the one that it controls: what
     /// was not given is what its controller reported last, and leads nowhere. `None` as long as no controller of it was heard.
-    #[must_use]
     pub fn hand_set_point(
         &self,
         axis: HandSetPointAxis,
@@ -196,19 +193,16 @@ impl Wire {
         self.stops[stopper] = (!stop.release).then_some(now_ms);
     }
 
-    #[must_use]
     pub fn status(&self) -> Option<&RigStatus> {
         self.status.as_ref()
     }
 
     /// What sensors and valves show.
-    #[must_use]
     pub fn measured(&self) -> &[Option<f64>; MEASURED_COUNT] {
         &self.measured
     }
 
     /// The emergency stop: whether it is tripped, and who holds it.
-    #[must_use]
     pub fn emergency_stop(&self, now_ms: u64) -> Value {
         let holds = |at: &Option<u64>| at.is_some_and(|at_ms| now_ms.saturating_sub(at_ms) < STOP_HOLDS_MS);
         let senders = STOPPERS.iter().zip(&self.stops).filter(|(_, at)| holds(at));
@@ -217,7 +211,6 @@ impl Wire {
     }
 
     /// The states of the chains of both axes; null of a controller that is silent.
-    #[must_use]
     pub fn chains(&self, now_ms: u64) -> Value {
         let fresh = self.chains.map(|heard| {
             heard
@@ -237,7 +230,6 @@ impl Wire {
     }
 
     /// How full the bus is, by frame, and what was lost here.
-    #[must_use]
     pub fn load(&self) -> Value {
         let counts = &self.frames;
         let seconds = counts.last_ms as f64 / 1000.0;

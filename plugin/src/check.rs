@@ -10,7 +10,6 @@ use std::hint::black_box;
 /// Keys of a program file's table `[algorithm]` that are not parameters.
 const TAKEN: [&str; 3] = ["name", "library", "every_cycles"];
 
-/// Steps of a trial.
 const TRIAL_STEPS: u32 = 100;
 
 /// What an algorithm controls, by its number in the header.

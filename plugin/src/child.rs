@@ -78,8 +78,8 @@ impl Trier {
     }
 }
 
-/// The child's side: tries the library and writes the verdict to standard output.
-pub(super) fn run(library: &Path) -> Exit {
+/// The child's side: tries the library in this process, which may not survive it, and writes the verdict to standard output.
+pub fn run(library: &Path) -> Exit {
     // A line feed first: the library may have printed half a line.
     let say = |text: &str| {
         let mut out = io::stdout().lock();

@@ -1,6 +1,7 @@
 //! The commands `check-library` and `probe-library`.
 
-use crate::child::{self, Trier};
+use crate::child::Trier;
+pub use crate::child::run as probe_library;
 use crate::{Description, PluginError, describe};
 use protocol::exit::Exit;
 use settings::parameters::Parameter;
@@ -16,12 +17,6 @@ pub fn check_library(library: &Path) -> Result<Exit, PluginError> {
     // A closed pipe is the reader's wish.
     let _ = write!(io::stdout(), "{description}");
     Ok(Exit::Good)
-}
-
-/// Tries the library in this process, which may not survive it; tells the process that asked.
-#[must_use]
-pub fn probe_library(library: &Path) -> Exit {
-    child::run(library)
 }
 
 impl fmt::Display for Description {

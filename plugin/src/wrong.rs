@@ -17,7 +17,6 @@ pub struct PluginError {
 
 const REBUILD: &str = "build it again with this airbench's airbench_algorithm.h";
 
-/// What is wrong with a library.
 #[derive(Debug, thiserror::Error)]
 pub enum Wrong {
     #[error("cannot be opened: {0}; give the path of a shared library")]

@@ -64,7 +64,8 @@ fn payload(out: &mut String, payload: &Payload, catalogue: &Catalogue) {
             Kind::Table(table) => &catalogue.tables[table].name,
         };
         let (comment, field) = (doc(&signal.comment), &signal.field);
-        *out += &format!("    /// {comment}{}\n    {index} {field}: {kind},\n", range(signal));
+        let spec = signal_spec(signal, &catalogue.tables);
+        *out += &format!("    /// {comment}{}\n    {index} {field}: {kind} {{ {spec} }},\n", range(signal));
     }
     *out += "} }\n\n";
     if let Some(bytes) = plain_bytes(first) {
@@ -107,36 +108,29 @@ fn frames(out: &mut String, catalogue: &Catalogue) {
         comment: {comment:?},
         sender: {sender:?}, send_type: {send_type:?}, cycle_time_ms: {cycle_time_ms}, \
              length: {length}, checksum_start: {checksum_start:?}, reserved: {reserved:#X},
-        signals: &[\n",
+        signals: &{payload}::signals({}),
+    }},\n",
             doc(comment),
             constant(name),
+            receivers(&message.signals),
         );
-        for signal in &message.signals {
-            *out += &format!("            SignalSpec {{ {} }},\n", signal_spec(signal, &catalogue.tables));
-        }
-        *out += "        ],\n    },\n";
     }
     *out += "} }\n";
 }
 
+/// Who listens to each signal: mostly all listen to the whole message.
+fn receivers(signals: &[Signal]) -> String {
+    let each: Vec<_> = signals.iter().map(|signal| format!("&{:?}", signal.receivers)).collect();
+    match &each[..] {
+        [first, rest @ ..] if rest.iter().all(|other| other == first) => format!("[{first}; {}]", each.len()),
+        _ => format!("[{}]", each.join(", ")),
+    }
+}
+
+/// What all messages of a payload say of a signal.
 fn signal_spec(signal: &Signal, tables: &[Table]) -> String {
-    let Signal {
-        name,
-        start,
-        length,
-        signed,
-        factor,
-        offset,
-        raw_min,
-        raw_max,
-        min,
-        max,
-        unit,
-        comment,
-        field,
-        kind,
-        receivers,
-    } = signal;
+    let Signal { name, start, length, signed, factor, offset, kind, .. } = signal;
+    let Signal { raw_min, raw_max, min, max, unit, comment, .. } = signal;
     let values: Vec<_> = match kind {
         Kind::Table(index) => tables[*index].values.iter().map(|(_, text)| text.as_str()).collect(),
         _ => Vec::new(),
@@ -148,9 +142,9 @@ fn signal_spec(signal: &Signal, tables: &[Table]) -> String {
         Kind::Table(_) => "Table",
     };
     format!(
-        "name: {name:?}, field: {field:?}, unit: {unit:?}, comment: {comment:?}, start: {start}, length: {length}, \
+        "name: {name:?}, unit: {unit:?}, comment: {comment:?}, start: {start}, length: {length}, \
          signed: {signed}, factor: {factor:?}, offset: {offset:?}, raw_min: {raw_min}, raw_max: {raw_max}, min: {min:?}, \
-         max: {max:?}, values: &{values:?}, receivers: &{receivers:?}, kind: SignalKind::{kind}"
+         max: {max:?}, values: &{values:?}, kind: SignalKind::{kind}"
     )
 }
 

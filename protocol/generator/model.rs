@@ -36,7 +36,6 @@ pub(crate) struct Catalogue {
     pub(crate) tables: Vec<Table>,
 }
 
-/// One identifier.
 pub(crate) struct Message {
     pub(crate) name: String,
     pub(crate) id: u16,
@@ -54,7 +53,6 @@ pub(crate) struct Message {
     line: usize,
 }
 
-/// One signal of one message.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Signal {
     pub(crate) name: String,
@@ -81,7 +79,6 @@ pub(crate) enum Kind {
     Physical,
     /// Counts in the smallest integer that holds them.
     Integer(&'static str),
-    /// One bit.
     Flag,
     /// An enum, by index into the tables.
     Table(usize),

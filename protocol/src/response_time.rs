@@ -154,7 +154,6 @@ struct Level<'a> {
     own: &'a Stream,
     line: &'a Line,
     blocking_ns: u64,
-    /// What one error costs.
     error_ns: u64,
 }
 

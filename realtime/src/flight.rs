@@ -27,7 +27,7 @@
 //! }
 //!
 //! let limit = Lateness { limit: Duration::from_micros(500), period: Duration::from_millis(1) };
-//! let mut flight: FlightRecorder<Row, Row> = FlightRecorder::new();
+//! let mut flight: FlightRecorder<Row, Row> = FlightRecorder::default();
 //! let late = CycleStages { cycle: 7, due_ns: 7_000_000, woke_ns: 7_600_000, done_ns: 7_650_000, ..Default::default() };
 //! flight.row(Row(late.woke_ns));
 //! if let Some(trigger) = limit.judge(&late) {
@@ -229,18 +229,6 @@ pub struct FlightRecorder<R, F> {
 }
 
 impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
-    /// An empty ring, its memory taken.
-    #[must_use]
-    pub fn new() -> Self {
-        Self {
-            rows: VecDeque::with_capacity(ROWS),
-            frames: VecDeque::with_capacity(FRAMES),
-            pending: VecDeque::new(),
-            kept: Vec::with_capacity(MOST_DUMPS),
-            dropped: 0,
-        }
-    }
-
     /// Takes a row.
     pub fn row(&mut self, row: R) {
         push(&mut self.rows, row, ROWS);
@@ -335,8 +323,15 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
 }
 
 impl<R: Stamped, F: Stamped> Default for FlightRecorder<R, F> {
+    /// An empty ring, its memory taken.
     fn default() -> Self {
-        Self::new()
+        Self {
+            rows: VecDeque::with_capacity(ROWS),
+            frames: VecDeque::with_capacity(FRAMES),
+            pending: VecDeque::new(),
+            kept: Vec::with_capacity(MOST_DUMPS),
+            dropped: 0,
+        }
     }
 }
 

@@ -38,7 +38,7 @@ pub struct WallClockWatch {
 impl WallClockWatch {
     /// Begins watching.
     #[must_use]
-    pub fn new() -> Self {
+    pub fn begin() -> Self {
         let (began, offset_ns) = offset_ns();
         Self { began, offset_ns }
     }
@@ -54,12 +54,6 @@ impl WallClockWatch {
         let at_s = now.saturating_duration_since(self.began).as_secs_f64();
         (step_ns.unsigned_abs() > u128::from(LEAST_STEP_NS))
             .then_some(WallClockStep { at_s, step_s: step_ns as f64 * 1e-9 })
-    }
-}
-
-impl Default for WallClockWatch {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -101,7 +95,7 @@ mod tests {
 
     #[test]
     fn an_untouched_clock_does_not_step() {
-        let mut watch = WallClockWatch::new();
+        let mut watch = WallClockWatch::begin();
         assert_eq!((0..100).filter_map(|_| watch.look()).count(), 0);
     }
 }

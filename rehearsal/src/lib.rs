@@ -31,7 +31,6 @@ use std::time::Duration;
 /// Rows and news of a cycle: two and some.
 const OUTLET_ROOM: usize = 64;
 
-/// What a rehearsal is made of.
 pub struct RehearsalParts<'a> {
     pub rig: &'a RigParameters,
     /// How it is set up, and what people do to it.

@@ -6,7 +6,6 @@ use plant::scene::RigCall;
 use protocol::commands::CommandIntake;
 use protocol::frames::{ALIVE_RANGE, EmergencyStop, Frame, RIG_STATUS, RigStatus, Sensors, Tick};
 
-/// Sensors of one axis in `cycle`.
 pub(crate) fn sensors(readings: &AxisReadings, cycle: u64) -> Sensors {
     Sensors {
         position_m: readings.position.value,

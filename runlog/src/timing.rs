@@ -55,59 +55,43 @@ pub struct CycleTiming {
     pub vitals: VitalCounts,
 }
 
-/// Columns in their order, as the head line names them. The only place where they stand.
-pub const COLUMNS: [&str; 21] = [
-    "cycle",
-    "skipped",
-    "due_ns",
-    "woke_ns",
-    "receive_ns",
-    "step_ns",
-    "send_ns",
-    "done_ns",
-    "drive_sensors_ns",
-    "drive_command_ns",
-    "drive_answers_cycle",
-    "load_sensors_ns",
-    "load_command_ns",
-    "load_answers_cycle",
-    "minor_faults",
-    "major_faults",
-    "voluntary_switches",
-    "involuntary_switches",
-    "run_delay_ns",
-    "continued",
-    "cpu",
+/// A column: its name in the head line, and the number that it holds.
+type Column = (&'static str, fn(&mut CycleTiming) -> &mut u64);
+
+/// Columns in their order. The only place where they stand.
+const COLUMNS: [Column; 21] = [
+    ("cycle", |row| &mut row.cycle),
+    ("skipped", |row| &mut row.skipped),
+    ("due_ns", |row| &mut row.due_ns),
+    ("woke_ns", |row| &mut row.woke_ns),
+    ("receive_ns", |row| &mut row.receive_ns),
+    ("step_ns", |row| &mut row.step_ns),
+    ("send_ns", |row| &mut row.send_ns),
+    ("done_ns", |row| &mut row.done_ns),
+    ("drive_sensors_ns", |row| &mut row.drive.sensors_ns),
+    ("drive_command_ns", |row| &mut row.drive.command_ns),
+    ("drive_answers_cycle", |row| &mut row.drive.answers),
+    ("load_sensors_ns", |row| &mut row.load.sensors_ns),
+    ("load_command_ns", |row| &mut row.load.command_ns),
+    ("load_answers_cycle", |row| &mut row.load.answers),
+    ("minor_faults", |row| &mut row.vitals.minor_faults),
+    ("major_faults", |row| &mut row.vitals.major_faults),
+    ("voluntary_switches", |row| &mut row.vitals.voluntary_switches),
+    ("involuntary_switches", |row| &mut row.vitals.involuntary_switches),
+    ("run_delay_ns", |row| &mut row.vitals.run_delay_ns),
+    ("continued", |row| &mut row.vitals.continued),
+    ("cpu", |row| &mut row.vitals.cpu),
 ];
+
+fn names() -> [&'static str; COLUMNS.len()] {
+    COLUMNS.map(|(name, _)| name)
+}
 
 impl CycleTiming {
     /// The values in the order of [`COLUMNS`].
     #[must_use]
-    pub fn values(&self) -> [u64; COLUMNS.len()] {
-        let Self { drive, load, vitals, .. } = self;
-        [
-            self.cycle,
-            self.skipped,
-            self.due_ns,
-            self.woke_ns,
-            self.receive_ns,
-            self.step_ns,
-            self.send_ns,
-            self.done_ns,
-            drive.sensors_ns,
-            drive.command_ns,
-            drive.answers,
-            load.sensors_ns,
-            load.command_ns,
-            load.answers,
-            vitals.minor_faults,
-            vitals.major_faults,
-            vitals.voluntary_switches,
-            vitals.involuntary_switches,
-            vitals.run_delay_ns,
-            vitals.continued,
-            vitals.cpu,
-        ]
+    pub fn values(mut self) -> [u64; COLUMNS.len()] {
+        COLUMNS.map(|(_, number)| *number(&mut self))
     }
 
     /// The stages of the cycle.
@@ -120,30 +104,9 @@ impl CycleTiming {
     /// The row with these values.
     #[must_use]
     pub fn from_values(values: &[u64; COLUMNS.len()]) -> Self {
-        let [cycle, skipped, due_ns, woke_ns, receive_ns, step_ns, send_ns, done_ns, rest @ ..] = *values;
-        let [d_sensors, d_command, d_answers, l_sensors, l_command, l_answers, vitals @ ..] = rest;
-        let [minor, major, voluntary, involuntary, run_delay_ns, continued, cpu] = vitals;
-        Self {
-            cycle,
-            skipped,
-            due_ns,
-            woke_ns,
-            receive_ns,
-            step_ns,
-            send_ns,
-            done_ns,
-            drive: Exchange { sensors_ns: d_sensors, command_ns: d_command, answers: d_answers },
-            load: Exchange { sensors_ns: l_sensors, command_ns: l_command, answers: l_answers },
-            vitals: VitalCounts {
-                minor_faults: minor,
-                major_faults: major,
-                voluntary_switches: voluntary,
-                involuntary_switches: involuntary,
-                run_delay_ns,
-                continued,
-                cpu,
-            },
-        }
+        let mut row = Self::default();
+        COLUMNS.iter().zip(values).for_each(|((_, number), value)| *number(&mut row) = *value);
+        row
     }
 }
 
@@ -152,7 +115,7 @@ impl CycleTiming {
 /// # Errors
 /// What `out` says.
 pub fn write_head(out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "{}", COLUMNS.join(","))
+    writeln!(out, "{}", names().join(","))
 }
 
 /// Writes a row.
@@ -203,7 +166,7 @@ pub fn read(text: &str) -> Result<Vec<CycleTiming>, TableError> {
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     let mut lines = whole.lines().enumerate();
     let head = lines.next().map_or("", |(_, head)| head);
-    if !head.split(',').eq(COLUMNS) {
+    if !head.split(',').eq(names()) {
         return Err(TableError::Head(head.chars().take(200).collect()));
     }
     lines.map(|(index, line)| read_row(line, index + 1)).collect()
@@ -215,7 +178,7 @@ fn read_row(text: &str, line: usize) -> Result<CycleTiming, TableError> {
     if found != COLUMNS.len() {
         return Err(TableError::Width { line, found });
     }
-    for ((value, column), cell) in values.iter_mut().zip(COLUMNS).zip(text.split(',')) {
+    for ((value, column), cell) in values.iter_mut().zip(names()).zip(text.split(',')) {
         *value = cell.parse().map_err(|reason| TableError::Value { line, column, reason })?;
     }
     Ok(CycleTiming::from_values(&values))
@@ -243,7 +206,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told_with_its_place() {
         assert!(matches!(read("a,b\n"), Err(TableError::Head(_))));
-        let head = COLUMNS.join(",");
+        let head = names().join(",");
         let reported = read(&format!("{head}\n1,2\n")).unwrap_err().to_string();
         assert!(reported.starts_with("line 2: 2 values"), "{reported}");
         let values = ["1"; COLUMNS.len()].join(",").replacen("1,", "x,", 1);

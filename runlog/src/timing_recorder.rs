@@ -165,7 +165,7 @@ impl TimingRecorder {
             Ok::<_, io::Error>(table)
         });
         let period = if due == Due::EveryPeriod { PERIOD } else { Duration::ZERO };
-        let flight = setup.flight_late.map(|limit| (Ring::new(), Lateness { limit, period }));
+        let flight = setup.flight_late.map(|limit| (Ring::default(), Lateness { limit, period }));
         Ok(Self {
             folder,
             process,

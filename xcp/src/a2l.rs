@@ -25,7 +25,6 @@ use nominal::Axis;
 use protocol::frames::BIT_RATE_PER_S;
 use settings::parameters::Parameter;
 
-/// What the file describes.
 pub struct Described<'a> {
     pub axis: Axis,
     pub title: &'a str,
@@ -62,7 +61,6 @@ pub fn epk(described: &Described<'_>) -> String {
     format!("airbench {} {} {sum:08X}", env!("CARGO_PKG_VERSION"), described.axis.name())
 }
 
-/// Name of the file.
 pub fn file_name(axis: Axis) -> String {
     format!("controller-{}.a2l", axis.name())
 }

@@ -9,7 +9,6 @@ use serde::Deserialize;
 use settings::parameters::Parameter;
 use std::path::{Path, PathBuf};
 
-/// Bytes of a key.
 const KEY_BYTES: std::ops::RangeInclusive<usize> = 16..=64;
 
 static DAQ_PACKETS: Parameter = Parameter::new(
@@ -25,7 +24,6 @@ static DAQ_PACKETS: Parameter = Parameter::new(
 #[error("{0}")]
 pub struct ConfigError(String);
 
-/// What was asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct XcpConfig {
     /// Secret of the write protection; `None`: nothing can be written.

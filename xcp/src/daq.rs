@@ -25,7 +25,6 @@ pub const ODTS: usize = 32;
 pub const ENTRIES: usize = 7;
 /// Longest entry, bytes.
 pub const LONGEST_ENTRY: u8 = 7;
-/// Bytes of a time stamp.
 pub const STAMP_BYTES: usize = 2;
 /// Packets that may wait to leave.
 const ROOM: usize = 2 * ODTS;
@@ -91,7 +90,6 @@ pub struct Daq {
     pub(crate) dropped: u64,
 }
 
-/// How a list is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ListMode {
     /// Bits as they are reported.

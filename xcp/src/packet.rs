@@ -6,7 +6,6 @@
 
 /// Bytes of a packet: MAX_CTO and MAX_DTO.
 pub const BYTES: usize = 8;
-/// A packet as it is sent.
 pub type Packet = [u8; BYTES];
 
 /// First byte of a good answer.
@@ -79,7 +78,6 @@ pub enum Refusal {
     MemoryOverflow = 0x30,
 }
 
-/// The fields of a command.
 #[derive(Clone, Copy)]
 pub struct Fields<'a>(pub &'a [u8]);
 

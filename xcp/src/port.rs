@@ -29,7 +29,6 @@ pub const INBOX: usize = 64;
 /// Commands that are answered at a time.
 pub const COMMANDS: usize = 8;
 
-/// What a port counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PortCounters {
     #[serde(flatten)]

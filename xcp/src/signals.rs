@@ -18,7 +18,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// Bytes of a value.
     pub const fn bytes(self) -> usize {
         match self {
             Self::Byte => 1,
@@ -55,7 +54,6 @@ impl Format {
 pub struct View<'a> {
     /// What its program was given.
     pub ready: &'a Ready,
-    /// The sensors that it answered.
     pub sensors: &'a Sensors,
     /// The row of its record.
     pub record: AxisRecord,
@@ -99,7 +97,6 @@ const fn names(chain: usize) -> &'static [&'static str] {
 
 const NO_YES: &[&str] = &["no", "yes"];
 
-/// How many signals there are.
 pub const COUNT: usize = SIGNALS.len();
 
 /// All signals; a place in this table is what the trigger buffer calls a source or a channel.

@@ -59,7 +59,6 @@ pub struct Texts {
     pub event: (u32, u32),
 }
 
-/// What a slave is made of.
 pub struct SlaveParts {
     pub image: Image,
     pub texts: Texts,
@@ -68,7 +67,6 @@ pub struct SlaveParts {
     pub daq_per_cycle: u32,
 }
 
-/// What a slave counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct SlaveCounters {
     pub sessions: u64,
@@ -89,7 +87,6 @@ struct Block {
     whole: usize,
 }
 
-/// The slave of one axis.
 #[derive(Clone)]
 pub struct Slave {
     image: Image,
@@ -150,7 +147,6 @@ impl Slave {
         self.image.restart();
     }
 
-    /// The next DAQ packet to be sent.
     pub fn next_daq(&mut self) -> Option<Packet> {
         let packet = self.daq.next_packet()?;
         self.counters.daq_packets += 1;

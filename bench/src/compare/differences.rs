@@ -4,18 +4,17 @@
 //! fifth; time begins with the experiment. What two runs with equal models differ by (noise, the play of two controllers) is
 //! no gap and is not taken off.
 
-use super::change;
+use super::{change, overlay};
 use crate::drawing::{COLOURS, Curve, Panel, Picture};
 use crate::runs::Run;
 use figures::record::MEASURED;
-use figures::series::{Series, Span};
+use figures::series::Series;
 use pagekit::grid::Grid;
 use pagekit::number::in_use;
 
 /// Length of the means, s.
 const MEAN_S: f64 = 0.02;
 
-/// A quantity as it is shown.
 struct Shown {
     /// Column of `measurement.csv`.
     column: &'static str,
@@ -51,7 +50,6 @@ fn difference(first: &Run, run: &Run, column: &str) -> Series {
 }
 
 /// The rms of each signal's difference from the first run; changes are against the second.
-#[must_use]
 pub fn table(runs: &[Run]) -> Grid {
     let Some((first, others)) = runs.split_first() else { return Grid::default() };
     let mut head = vec![format!("rms difference from {}", first.name)];
@@ -81,11 +79,8 @@ pub fn table(runs: &[Run]) -> Grid {
 }
 
 /// The picture: a panel for each signal, a curve for each run but the first.
-#[must_use]
 pub fn pictures(runs: &[Run]) -> Vec<Picture> {
     let Some((first, others)) = runs.split_first() else { return Vec::new() };
-    let length = |run: &Run| run.record.experiments().last().map(|span| span.to_s - run.start_s());
-    let longest_s = runs.iter().filter_map(length).fold(1e-3, f64::max);
     let panels = shown().map(|quantity| {
         let curves = others.iter().enumerate().map(|(place, run)| Curve {
             name: format!("{} - {}", run.name, first.name),
@@ -96,15 +91,8 @@ pub fn pictures(runs: &[Run]) -> Vec<Picture> {
         });
         Panel { title: quantity.title.clone(), curves: curves.collect() }
     });
-    vec![Picture {
-        title: format!("{}: differences from {}", first.title(), first.name),
-        caption: String::new(),
-        time_name: "time since the experiment's begin, s".into(),
-        range: Span { from_s: 0.0, to_s: longest_s },
-        mark_s: None,
-        bands: Vec::new(),
-        panels: panels.collect(),
-    }]
+    let title = format!("{}: differences from {}", first.title(), first.name);
+    vec![overlay::whole(title, runs, panels.collect())]
 }
 
 #[cfg(test)]

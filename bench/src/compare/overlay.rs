@@ -58,19 +58,9 @@ const QUANTITIES: &[Quantity] = &[
 ];
 
 /// The whole experiment, and what is around its step if it has one.
-pub(super) fn pictures(runs: &[Run]) -> Vec<Picture> {
+pub fn pictures(runs: &[Run]) -> Vec<Picture> {
     let Some(first) = runs.first() else { return Vec::new() };
-    let length = |run: &Run| run.record.experiments().last().map(|span| span.to_s - run.start_s());
-    let longest_s = runs.iter().filter_map(length).fold(1e-3, f64::max);
-    let whole = Picture {
-        title: first.title(),
-        caption: String::new(),
-        time_name: "time since the experiment's begin, s".into(),
-        range: Span { from_s: 0.0, to_s: longest_s },
-        mark_s: None,
-        bands: Vec::new(),
-        panels: panels(runs, Run::start_s),
-    };
+    let whole = whole(first.title(), runs, panels(runs, Run::start_s));
     let Some((what, _)) = picture::step(&first.record) else { return vec![whole] };
     let at_s = |run: &Run| picture::step(&run.record).map_or(run.start_s(), |(_, at_s)| at_s);
     let step = Picture {
@@ -82,6 +72,20 @@ pub(super) fn pictures(runs: &[Run]) -> Vec<Picture> {
         ..whole.clone()
     };
     vec![whole, step]
+}
+
+/// The picture of all of the longest experiment.
+pub(super) fn whole(title: String, runs: &[Run], panels: Vec<Panel>) -> Picture {
+    let length = |run: &Run| run.record.experiments().last().map(|span| span.to_s - run.start_s());
+    Picture {
+        title,
+        caption: String::new(),
+        time_name: "time since the experiment's begin, s".into(),
+        range: Span { from_s: 0.0, to_s: runs.iter().filter_map(length).fold(1e-3, f64::max) },
+        mark_s: None,
+        bands: Vec::new(),
+        panels,
+    }
 }
 
 /// A panel for each quantity; each run's time begins at its `zero_s`.

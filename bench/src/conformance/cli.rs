@@ -18,7 +18,6 @@ pub enum CheckedAxis {
 
 impl CheckedAxis {
     /// The frame of its valve commands.
-    #[must_use]
     pub fn command(self) -> &'static MessageSpec {
         match self {
             Self::Drive => DRIVE_VALVE_COMMAND,
@@ -27,7 +26,6 @@ impl CheckedAxis {
     }
 
     /// The frame of its sensors.
-    #[must_use]
     pub fn sensors(self) -> &'static MessageSpec {
         match self {
             Self::Drive => DRIVE_SENSORS,

@@ -67,7 +67,6 @@ pub struct Session {
 
 impl Session {
     /// A client that was greeted at `now_ms`, of a clock of the caller's choice; one that is `read_only` sends nothing.
-    #[must_use]
     pub fn new(now_ms: u64, read_only: bool) -> Self {
         Self { state: State::Greeted, parser: Parser::default(), began_ms: now_ms, refused: 0, read_only }
     }
@@ -87,13 +86,11 @@ impl Session {
     }
 
     /// Whether frames of the bus are queued for this client: it is in raw mode.
-    #[must_use]
     pub fn is_raw(&self) -> bool {
         matches!(self.state, State::Raw { .. })
     }
 
     /// Whether what is queued after the answer to `< rawmode >` may be written.
-    #[must_use]
     pub fn pause_is_over(&self, now_ms: u64) -> bool {
         match self.state {
             State::Raw { since_ms } => now_ms.saturating_sub(since_ms) >= PAUSE_MS,
@@ -102,14 +99,12 @@ impl Session {
     }
 
     /// Whether the client has taken too long to get to raw mode.
-    #[must_use]
     pub fn is_overdue(&self, now_ms: u64) -> bool {
         matches!(self.state, State::Greeted | State::Opened)
             && now_ms.saturating_sub(self.began_ms) >= PATIENCE_MS
     }
 
     /// Requests refused so far.
-    #[must_use]
     pub fn refused(&self) -> u64 {
         self.refused
     }

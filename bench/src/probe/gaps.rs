@@ -9,29 +9,17 @@
 //! Without a switch the thread *was* running, and the CPU under it stood still: a hypervisor, the firmware (SMI), or the
 //! kernel's own interrupt work.
 
-use std::ops::AddAssign;
+use realtime::VitalCounts;
 
 /// How often the counts are read when nothing happens, so that they tell of a gap and of little before it.
 const REFRESH_NS: u64 = 1_000_000;
 
-/// What the kernel counted of the watching thread since it was last asked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Times the thread gave the CPU away. It never does by itself: somebody stopped the process.
-    pub voluntary_switches: u64,
-    /// Times another thread took it.
-    pub involuntary_switches: u64,
-    /// Time that the thread waited for the CPU, ns; 0 where the kernel does not tell.
-    pub run_delay_ns: u64,
-}
-
-impl Counts {
-    /// Whether something other than the thread had the CPU for most of `length_ns`.
-    fn explain(&self, length_ns: u64) -> bool {
-        let untold = self.run_delay_ns == 0;
-        self.voluntary_switches > 0
-            || (self.involuntary_switches > 0 && (untold || self.run_delay_ns >= length_ns / 2))
-    }
+/// Whether something other than the watching thread had the CPU for most of `length_ns`. The thread never gives it away by
+/// itself: somebody stopped the process.
+fn explain(counted: &VitalCounts, length_ns: u64) -> bool {
+    let untold = counted.run_delay_ns == 0;
+    counted.voluntary_switches > 0
+        || (counted.involuntary_switches > 0 && (untold || counted.run_delay_ns >= length_ns / 2))
 }
 
 /// A gap on one CPU, on CLOCK_MONOTONIC.
@@ -55,13 +43,12 @@ pub struct GapWatch {
 
 impl GapWatch {
     /// A watch whose first look is at `now_ns`.
-    #[must_use]
     pub fn new(gap_ns: u64, now_ns: u64) -> Self {
         Self { gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
     }
 
     /// The next look. `counts` tells what was counted since it was last called.
-    pub fn look(&mut self, now_ns: u64, counts: impl FnOnce() -> Counts) -> Option<Gap> {
+    pub fn look(&mut self, now_ns: u64, counts: impl FnOnce() -> VitalCounts) -> Option<Gap> {
         let from_ns = std::mem::replace(&mut self.last_ns, now_ns);
         let length_ns = now_ns - from_ns;
         let is_gap = length_ns > self.gap_ns;
@@ -69,7 +56,7 @@ impl GapWatch {
             return None;
         }
         self.refreshed_ns = now_ns;
-        let another_ran = counts().explain(length_ns);
+        let another_ran = explain(&counts(), length_ns);
         is_gap.then_some(Gap { from_ns, to_ns: now_ns, another_ran })
     }
 }
@@ -78,14 +65,12 @@ impl GapWatch {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Total {
     pub count: u64,
-    /// The longest, ns.
     pub longest_ns: u64,
-    /// All of them together, ns.
     pub together_ns: u64,
 }
 
-impl AddAssign<&Gap> for Total {
-    fn add_assign(&mut self, gap: &Gap) {
+impl Total {
+    pub fn add(&mut self, gap: &Gap) {
         let length_ns = gap.to_ns - gap.from_ns;
         self.count += 1;
         self.longest_ns = self.longest_ns.max(length_ns);
@@ -99,17 +84,17 @@ mod tests {
 
     const GAP_NS: u64 = 100_000;
 
-    fn counts(voluntary_switches: u64, involuntary_switches: u64, run_delay_ns: u64) -> Counts {
-        Counts { voluntary_switches, involuntary_switches, run_delay_ns }
+    fn counts(voluntary_switches: u64, involuntary_switches: u64, run_delay_ns: u64) -> VitalCounts {
+        VitalCounts { voluntary_switches, involuntary_switches, run_delay_ns, ..VitalCounts::default() }
     }
 
     #[test]
     fn only_a_pause_longer_than_asked_is_a_gap_and_it_goes_from_look_to_look() {
         let mut watch = GapWatch::new(GAP_NS, 1_000);
-        assert_eq!(watch.look(1_000 + GAP_NS, Counts::default), None);
-        let gap = watch.look(1_001 + 2 * GAP_NS, Counts::default).expect("a nanosecond too long");
+        assert_eq!(watch.look(1_000 + GAP_NS, VitalCounts::default), None);
+        let gap = watch.look(1_001 + 2 * GAP_NS, VitalCounts::default).expect("a nanosecond too long");
         assert_eq!(gap, Gap { from_ns: 1_000 + GAP_NS, to_ns: 1_001 + 2 * GAP_NS, another_ran: false });
-        assert_eq!(watch.look(gap.to_ns + 50, Counts::default), None, "a gap is told once");
+        assert_eq!(watch.look(gap.to_ns + 50, VitalCounts::default), None, "a gap is told once");
     }
 
     #[test]
@@ -152,7 +137,7 @@ mod tests {
     fn totals_add_up() {
         let mut total = Total::default();
         for (from_ns, to_ns) in [(0, 200_000), (500_000, 1_000_000)] {
-            total += &Gap { from_ns, to_ns, another_ran: false };
+            total.add(&Gap { from_ns, to_ns, another_ran: false });
         }
         assert_eq!(total, Total { count: 2, longest_ns: 500_000, together_ns: 700_000 });
     }

@@ -42,7 +42,6 @@ pub struct NotToBeLeftOut(String);
 
 impl Kind {
     /// Of a frame, by its identifier: a malformed frame of the rig is still one that only a rig sends.
-    #[must_use]
     pub fn of(frame: &CanFrame) -> Self {
         if frame.raw_id() & ERROR_FLAG != 0 {
             return Self::Error;
@@ -56,7 +55,6 @@ impl Kind {
 }
 
 impl LeftOut {
-    #[must_use]
     pub fn names(self, frame: &CanFrame) -> bool {
         match self {
             Self::Commands => Kind::of(frame) == Kind::Command,

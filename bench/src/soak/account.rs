@@ -14,11 +14,9 @@
 //! commands (4 bits) and from the rig's ticks (how many sensor frames it has sent), without anything that host or kernel say.
 //! No tolerance anywhere: a host counts what passed while a peer was not there, so the ends of a connection are exact too.
 
+use protocol::frames::ALIVE_RANGE;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// Senders count valve commands modulo this.
-const COUNTER_RANGE: u64 = 16;
 
 /// Frames by the name of their identifier.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,7 +24,6 @@ const COUNTER_RANGE: u64 = 16;
 pub struct Counts(BTreeMap<String, u64>);
 
 impl Counts {
-    #[must_use]
     pub fn of(&self, id: &str) -> u64 {
         self.0.get(id).copied().unwrap_or(0)
     }
@@ -39,7 +36,6 @@ impl Counts {
         other.0.iter().for_each(|(id, frames)| self.add(id, *frames));
     }
 
-    #[must_use]
     pub fn total(&self) -> u64 {
         self.0.values().sum()
     }
@@ -97,12 +93,11 @@ pub enum Gaps {
 
 impl Gaps {
     /// All that is missing, when `sent` were sent; sums to the frame.
-    #[must_use]
     pub fn missing(&self, sent: u64) -> u64 {
         match *self {
             Self::Commands { lost, first, last, .. } => {
-                let before = (u64::from(first) + COUNTER_RANGE - 1) % COUNTER_RANGE;
-                let after = (sent % COUNTER_RANGE + COUNTER_RANGE - u64::from(last)) % COUNTER_RANGE;
+                let before = (u64::from(first) + ALIVE_RANGE - 1) % ALIVE_RANGE;
+                let after = (sent % ALIVE_RANGE + ALIVE_RANGE - u64::from(last)) % ALIVE_RANGE;
                 before + lost + after
             }
             Self::Sensors { lost, before } => lost + before,
@@ -196,7 +191,6 @@ impl Row {
 }
 
 /// Adds up who sent and who received what. `wire`: on the embedded bus.
-#[must_use]
 pub fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
     let mut account = Account::default();
     let senders = senders(parties, wire);

@@ -45,7 +45,6 @@ fn read_json<T: DeserializeOwned + Default>(path: &Path, damaged: &mut Vec<Strin
 }
 
 /// Counts by the names of identifiers, unknown ones together.
-#[must_use]
 pub fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts {
     let mut counts = Counts::default();
     by_name.into_iter().for_each(|(id, frames)| counts.add(&known_name(&id), frames));
@@ -53,7 +52,6 @@ pub fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts {
 }
 
 impl Evidence {
-    #[must_use]
     pub fn read(spec: &Spec, folder: &Path) -> Self {
         let names: &[&str] =
             if spec.two_processes { &["controller-drive", "controller-load"] } else { &["controller"] };
@@ -149,7 +147,6 @@ impl Evidence {
         Ok(wire)
     }
 
-    #[must_use]
     pub fn figures(&self) -> Figures {
         let axes = self.controllers.values().flat_map(|reported| reported.axes.values());
         let drive = self.drive();
@@ -167,7 +164,6 @@ impl Evidence {
         }
     }
 
-    #[must_use]
     pub fn drive(&self) -> Option<&AxisReport> {
         self.controllers.values().find_map(|reported| reported.axes.get("drive"))
     }

@@ -48,7 +48,6 @@ pub fn read(path: &Path) -> io::Result<FrameLog> {
 }
 
 /// The name of an identifier as peers count it: what `rig.dbc` does not know stands together.
-#[must_use]
 pub fn known_name(name: &str) -> String {
     let known = name.len() == 3
         && u16::from_str_radix(name, 16).is_ok_and(|id| MESSAGES.iter().any(|spec| spec.id == id));

@@ -24,7 +24,6 @@ pub struct Judged {
     pub machine: Value,
 }
 
-#[must_use]
 pub fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: bool) -> Judged {
     let evidence = Evidence::read(spec, folder);
     let account = evidence.account(outcome);

@@ -3,7 +3,6 @@
 use super::model::{Check, CheckResult, Segment, Soak};
 use crate::junit::Case;
 
-#[must_use]
 pub fn text(soak: &Soak) -> String {
     let mut cases: Vec<_> = soak.segments.iter().flat_map(cases).collect();
     let result = if soak.trusted { CheckResult::Passed } else { CheckResult::Failed };

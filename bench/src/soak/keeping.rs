@@ -82,12 +82,10 @@ impl Keeping {
         Ok(())
     }
 
-    #[must_use]
     pub fn out(&self) -> &Path {
         &self.out
     }
 
-    #[must_use]
     pub fn next_number(&self) -> u32 {
         self.soak.segments.iter().map(|segment| segment.spec.number).max().unwrap_or(0) + 1
     }
@@ -115,7 +113,6 @@ impl Keeping {
 }
 
 /// Seconds since 1970.
-#[must_use]
 pub fn unix_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }

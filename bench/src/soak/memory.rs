@@ -59,7 +59,6 @@ pub struct Memory {
 
 impl Memory {
     /// Of a record in the order of time.
-    #[must_use]
     pub fn of(record: &[Sample]) -> Self {
         let Some((first, last)) = record.first().zip(record.last()) else { return Self::default() };
         let start_s = first.at_s + START_S.min((last.at_s - first.at_s) / 4.0);
@@ -84,7 +83,6 @@ impl Memory {
     }
 
     /// Whether it is flat; `None` when the record is too short to tell.
-    #[must_use]
     pub fn is_flat(&self) -> Option<bool> {
         let slope_kept = self.slope_kib_per_h.is_none_or(|slope| slope < SLOPE_LIMIT_KIB_PER_H);
         let small = |growth_percent: f64| {

@@ -6,6 +6,7 @@ use base64::engine::general_purpose::STANDARD;
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 use hdrhistogram::serialization::{Deserializer, Serializer, V2DeflateSerializer};
+use latency::hlog::decode;
 use realtime::{Recorder, write_hlog};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -56,7 +57,8 @@ impl Merged {
             for entry in IntervalLogIterator::new(&line) {
                 if let Ok(LogEntry::Interval(interval)) = entry {
                     let tag = interval.tag().map_or("", |tag| tag.as_str());
-                    self.add(tag, &decode(interval.encoded_histogram(), &mut deserializer)?)?;
+                    let histogram = decode(interval.encoded_histogram(), &mut deserializer);
+                    self.add(tag, &histogram.map_err(io::Error::other)?)?;
                 }
             }
             line.clear();
@@ -72,13 +74,11 @@ impl Merged {
     }
 
     /// Takes up what an earlier start kept.
-    ///
-    /// # Errors
-    /// A histogram that is none.
     pub fn from_kept(kept: &BTreeMap<String, Kept>) -> io::Result<Self> {
         let mut merged = Self::default();
         for (tag, kept) in kept {
-            merged.add(tag, &decode(&kept.hdr_v2_base64, &mut Deserializer::new())?)?;
+            let histogram = decode(&kept.hdr_v2_base64, &mut Deserializer::new());
+            merged.add(tag, &histogram.map_err(io::Error::other)?)?;
         }
         Ok(merged)
     }
@@ -99,11 +99,6 @@ impl Merged {
         write_hlog(&temporary, &parts, started_unix_s, length)?;
         std::fs::rename(&temporary, path)
     }
-}
-
-fn decode(text: &str, deserializer: &mut Deserializer) -> io::Result<Histogram<u64>> {
-    let bytes = STANDARD.decode(text).map_err(io::Error::other)?;
-    deserializer.deserialize(&mut bytes.as_slice()).map_err(io::Error::other)
 }
 
 fn kept(histogram: &Histogram<u64>) -> io::Result<Kept> {

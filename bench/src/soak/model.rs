@@ -64,7 +64,6 @@ pub struct Settings {
 
 impl Settings {
     /// What differs from another, a few words each.
-    #[must_use]
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let tables = [self, other].map(|settings| serde_json::to_value(settings).unwrap_or_default());
         let keys = tables[0].as_object().into_iter().flatten().map(|(key, _)| key);
@@ -178,7 +177,6 @@ pub struct Figures {
 
 impl Segment {
     /// One that was running when the soak was killed.
-    #[must_use]
     pub fn cut_off(number: u32, experiment: &str, folder: &str) -> Self {
         Self {
             spec: Spec { number, experiment: experiment.into(), ..Spec::default() },
@@ -189,7 +187,6 @@ impl Segment {
     }
 
     /// Whether a check was broken.
-    #[must_use]
     pub fn failed(&self) -> bool {
         self.checks.iter().any(|check| check.result == CheckResult::Failed)
     }
@@ -200,7 +197,6 @@ impl Segment {
 }
 
 impl Totals {
-    #[must_use]
     pub fn of(segments: &[Segment]) -> Self {
         let mut totals = Self::default();
         for segment in segments {

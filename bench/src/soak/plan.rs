@@ -43,7 +43,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    #[must_use]
     pub fn segment(&self, number: u32) -> Spec {
         let place = number - 1;
         let count = self.experiments.len() as u32;
@@ -59,13 +58,11 @@ impl Plan {
 }
 
 impl Spec {
-    #[must_use]
     pub fn folder(&self) -> String {
         format!("{:04}-{}", self.number, self.experiment)
     }
 
     /// What sets it apart, in words.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let mut words =
             vec![if self.two_processes { "two controllers" } else { "one controller" }.to_owned()];
@@ -76,13 +73,11 @@ impl Spec {
 }
 
 /// Length of a segment with all around it, for a soak of `planned_s`.
-#[must_use]
 pub fn segment_s(asked_s: Option<f64>, planned_s: f64) -> f64 {
     asked_s.unwrap_or_else(|| (planned_s / f64::from(WAYS)).clamp(SHORTEST_SEGMENT_S, USUAL_SEGMENT_S))
 }
 
 /// How long the rig runs in the next segment, of `segment_s` with all around it; `None` when too little of the soak is left.
-#[must_use]
 pub fn rig_s(segment_s: f64, left_s: f64) -> Option<f64> {
     // The last one may be shorter or longer than the others by a part that would be none of its own.
     let with_rest = if left_s < segment_s + SHORTEST_SEGMENT_S { left_s } else { segment_s };

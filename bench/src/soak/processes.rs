@@ -41,7 +41,6 @@ impl Running {
         Ok(Self { name: name.into(), child, ended: None })
     }
 
-    #[must_use]
     pub fn pid(&self) -> u32 {
         self.child.id()
     }
@@ -99,7 +98,6 @@ impl Drop for Running {
     }
 }
 
-#[must_use]
 pub fn end_in_words(status: Option<ExitStatus>) -> String {
     match status.map(|status| (status.code(), status.signal())) {
         Some((Some(code), _)) => format!("exit code {code}"),

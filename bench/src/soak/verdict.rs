@@ -9,7 +9,6 @@ const NAMED: usize = 4;
 const QUOTED: usize = 120;
 
 /// Whether the soak may be trusted, and the line that says so.
-#[must_use]
 pub fn of(soak: &Soak) -> (bool, String) {
     let totals = &soak.totals;
     if totals.segments == 0 {
@@ -67,8 +66,6 @@ fn named_broken(segment: &Segment) -> Vec<String> {
     segment.broken().map(|check| format!("{} {}: {}", segment.folder, check.name, check.detail)).collect()
 }
 
-/// `soak.md`.
-#[must_use]
 pub fn page(soak: &Soak) -> String {
     let mut page = format!("# Soak\n\n**{}**\n\n", soak.verdict);
     let settings = &soak.settings;

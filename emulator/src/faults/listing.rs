@@ -11,9 +11,6 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 
 /// Prints the table, or checks a script.
-///
-/// # Errors
-/// [`RunError::Input`] for a script that is none.
 pub fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
     let text = if let Some(path) = &arguments.check {
         let text = std::fs::read_to_string(path)
@@ -63,29 +60,17 @@ fn as_json() -> Value {
 }
 
 /// Every fault, as programs read it.
-#[must_use]
 pub fn faults() -> Vec<Value> {
     all().map(fault).collect()
 }
 
 fn fault(spec: &FaultSpec) -> Value {
-    let number = |key: &FaultKey| {
-        json!({
-            "key": key.name,
-            "unit": key.unit,
-            "min": key.min,
-            "max": key.max,
-            "whole": key.whole,
-            "default": key.default,
-            "meaning": key.meaning,
-        })
-    };
     json!({
         "fault": spec.name,
         "group": spec.group.name(),
         "about": spec.about,
         "places": spec.places.names(),
-        "keys": spec.keys.iter().map(number).collect::<Vec<_>>(),
+        "keys": spec.keys,
     })
 }
 

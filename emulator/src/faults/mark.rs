@@ -7,27 +7,21 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::io::{self, Write};
 
-/// Columns of `faults.csv`.
 pub const COLUMNS: &str = "time_s,number,what,fault,at,numbers,cause";
 
 /// Who asked for a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The script, in this line.
     Script {
         /// Line, from 1.
         line: u32,
     },
-    /// Somebody at the console.
     Console,
 }
 
-/// What happened to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
-    /// It is there.
     Begins,
-    /// It is gone.
     Ends,
     /// Its time passed, and its condition never held.
     NeverBegan,
@@ -40,7 +34,6 @@ pub enum What {
 pub struct Mark {
     /// Its number in this run; the script's are those of the file, from 1.
     pub number: u16,
-    /// What happened.
     pub what: What,
     pub fault: Fault,
     /// Who asked for it.
@@ -49,7 +42,6 @@ pub struct Mark {
 
 impl What {
     /// As in `faults.csv`.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Begins => "begins",
@@ -77,9 +69,6 @@ impl Mark {
     }
 
     /// Writes a row of `faults.csv`.
-    ///
-    /// # Errors
-    /// What `out` says.
     pub fn write(&self, out: &mut impl Write, cycle: u64) -> io::Result<()> {
         let Self { number, what, fault, cause } = self;
         let (name, at, numbers) = (fault.spec.name, fault.place(), self.numbers(";"));

@@ -18,11 +18,9 @@ const M3_PER_S_PER_NL_PER_MIN: f64 = 1e-3 / 60.0;
 /// What all active faults together do.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Overlay {
-    /// To the plant.
     pub plant: Faults,
     /// To the sensors of drive and load: position, force, pressure a, pressure b.
     pub sensors: [[SensorFault; 4]; 2],
-    /// From outside.
     pub hands: HandForces,
 }
 
@@ -72,7 +70,6 @@ impl Overlay {
 }
 
 /// The fault as the wire knows it, and the frames that it concerns; `None` for one that is none of the wire's.
-#[must_use]
 pub fn on_wire(fault: &Fault) -> Option<(WireFault, Frames)> {
     let Kind::Bus(kind) = fault.spec.kind else { return None };
     let place = fault.place_index();

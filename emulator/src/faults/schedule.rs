@@ -64,7 +64,6 @@ pub struct Broken<'a> {
 impl FaultSchedule {
     /// The faults of a script, and room for those of people when `by_hand`. `orders` is the way to the bus's host, where there
     /// is one.
-    #[must_use]
     pub fn new(script: Option<&FaultScript>, by_hand: bool, orders: Option<WireOrders>) -> Self {
         let planned = script.map_or(&[][..], |script| &script.faults);
         let possible = script.is_some() || by_hand;
@@ -90,25 +89,21 @@ impl FaultSchedule {
     }
 
     /// None, and none to come.
-    #[must_use]
     pub fn none() -> Self {
         Self::new(None, false, None)
     }
 
     /// Whether there can be any in this run.
-    #[must_use]
     pub fn possible(&self) -> bool {
         self.possible
     }
 
     /// Seed of everything that is random.
-    #[must_use]
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
     /// Number of active faults.
-    #[must_use]
     pub fn active(&self) -> usize {
         if !self.busy {
             return 0;
@@ -117,7 +112,6 @@ impl FaultSchedule {
     }
 
     /// What is pushed from outside, in +x.
-    #[must_use]
     pub fn hands(&self) -> HandForces {
         self.overlay.hands
     }

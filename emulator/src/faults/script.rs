@@ -36,14 +36,12 @@ const MOST_FAULTS: usize = 1000;
 pub struct FaultScript {
     /// Seed of everything that is random.
     pub seed: u64,
-    /// In the order of the file.
     pub faults: Vec<Planned>,
 }
 
 /// A fault with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Planned {
-    /// What.
     pub fault: Fault,
     /// Line of its head, from 1.
     pub line: u32,
@@ -51,14 +49,13 @@ pub struct Planned {
     pub from: u64,
     /// What has to hold as well.
     pub when: Option<Condition>,
-    /// When it ends; `None`: never.
+    /// `None`: never.
     pub until: Option<Until>,
 }
 
 /// When a fault ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Until {
-    /// Before this cycle.
     Cycle(u64),
     /// So many cycles after it began.
     After(u64),
@@ -98,29 +95,23 @@ pub fn signals() -> impl Iterator<Item = &'static str> {
 
 impl Condition {
     /// Whether it holds, given the truth and the commands that act.
-    #[must_use]
     pub fn holds(&self, truth: &Truth, valve: [f64; 2]) -> bool {
         let value = SIGNALS[self.signal].1(truth, valve);
         if self.above { value > self.threshold } else { value < self.threshold }
     }
 }
 
-/// Why a script is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}: {problem}")]
 pub struct ScriptError {
-    /// File as given by the caller.
     pub file: String,
-    /// Line, from 1.
     pub line: usize,
     /// What is wrong, with key, value and what is allowed.
     pub problem: Problem,
 }
 
-/// What is wrong with a script.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
-    /// Not TOML.
     #[error("not TOML: {0}")]
     Syntax(String),
     /// Not as the table of faults says.
@@ -128,13 +119,7 @@ pub enum Problem {
     Fault(#[from] FaultError),
     /// A key that no script has, or a value of the wrong type or out of range.
     #[error("{key} = {value}: allowed: {allowed}")]
-    Value {
-        key: String,
-        /// The value as written.
-        value: String,
-        /// Allowed values.
-        allowed: String,
-    },
+    Value { key: String, value: String, allowed: String },
     /// Something is missing, or does not go with something else.
     #[error("{0}")]
     Rule(String),
@@ -145,9 +130,6 @@ const OWN_KEYS: [&str; 8] = ["name", "at", "from_s", "to_s", "for_s", "when", "a
 
 impl FaultScript {
     /// The script in `text`; `file` is for messages.
-    ///
-    /// # Errors
-    /// [`ScriptError`] with file, line, key, value and what is allowed.
     pub fn from_toml(text: &str, file: &str) -> Result<Self, ScriptError> {
         Reader { text, file }.read()
     }
@@ -171,7 +153,6 @@ impl Reader<'_> {
         settings::written(self.text, value.span())
     }
 
-    /// The value is none that is allowed.
     fn bad_value(&self, key: &str, value: &Spanned<DeValue<'_>>, allowed: impl Into<String>) -> ScriptError {
         let (key, allowed) = (key.to_owned(), allowed.into());
         let problem = Problem::Value { key, value: self.written(value), allowed };
@@ -283,7 +264,6 @@ impl Reader<'_> {
         self.refuse(value.span().start, Problem::Rule(format!("{key} = {}: {rule}", self.written(value))))
     }
 
-    /// A time as a cycle.
     fn cycle(&self, table: &DeTable<'_>, key: &str, least_s: f64) -> Result<Option<u64>, ScriptError> {
         let Some(value) = table.get(key) else { return Ok(None) };
         let time_s = number(value.get_ref()).filter(|time_s| (least_s..=LONGEST_S).contains(time_s));

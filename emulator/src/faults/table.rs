@@ -8,6 +8,7 @@ mod rows;
 use plant::faults::SensorFault;
 use protocol::bus::WireNode;
 use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_SENSORS, LOAD_VALVE_COMMAND, MESSAGES};
+use serde::Serialize;
 
 /// Most numbers that a fault has.
 pub const MOST_KEYS: usize = 3;
@@ -17,33 +18,27 @@ pub const MOST_KEYS: usize = 3;
 pub struct FaultSpec {
     /// Name, as in scripts and at the console.
     pub name: &'static str,
-    /// What it concerns.
     pub group: Group,
-    /// Where it can be.
     pub places: Places,
     pub keys: &'static [FaultKey],
     /// What happens, in a sentence.
     pub about: &'static str,
-    /// What it is to the code.
     pub kind: Kind,
 }
 
 /// A number of a fault.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FaultKey {
-    /// Name, ending in its unit.
+    /// Ending in its unit.
+    #[serde(rename = "key")]
     pub name: &'static str,
     /// Unit; `1` for a plain number.
     pub unit: &'static str,
-    /// Least allowed value.
     pub min: f64,
-    /// Largest allowed value.
     pub max: f64,
     /// Value when nothing is said; without one it has to be.
     pub default: Option<f64>,
-    /// Whether it is a whole number.
     pub whole: bool,
-    /// What it is.
     pub meaning: &'static str,
 }
 
@@ -52,13 +47,10 @@ pub struct FaultKey {
 pub enum Group {
     Sensor,
     Valve,
-    /// The supply of air.
     Supply,
     /// A chamber or its hose.
     Air,
-    /// What moves.
     Mechanics,
-    /// Frames and nodes.
     Bus,
 }
 
@@ -69,17 +61,12 @@ pub enum Places {
     Axis,
     /// A chamber, or its sensor.
     Chamber,
-    /// The supply of both axes.
     Supply,
-    /// What joins the rods.
     Linkage,
     /// All frames, or those of one identifier by its name in `rig.dbc`.
     Frames,
-    /// Frames that have a counter.
     Counted,
-    /// The bus itself.
     Bus,
-    /// A node on it.
     Node,
 }
 
@@ -88,7 +75,6 @@ pub enum Places {
 pub enum Kind {
     /// Of a sensor: which channel of the axis, or that of the chamber.
     Sensor(Channel, SensorKind),
-    /// The spool stays.
     ValveStuck,
     /// A lag before the spool.
     ValveSlow,
@@ -96,34 +82,24 @@ pub enum Kind {
     ValveOffset,
     /// The most opening.
     ValveLimited,
-    /// No command arrives.
     ValveDead,
-    /// Less pressure at the node.
     SupplySag,
-    /// No pressure at the node.
     SupplyLoss,
     /// A gap to the atmosphere.
     Leak,
     /// A hole to the atmosphere.
     Burst,
-    /// Friction times a factor.
     FrictionRise,
-    /// The rods part.
     Unlink,
-    /// Mass on top.
     AddedMass,
     /// A push to an end of the stroke.
     EndStopHit,
-    /// Frames or nodes.
     Bus(BusKind),
 }
 
-/// Channels of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Position.
     Position,
-    /// Force.
     Force,
     /// Pressure of the chamber that the place names.
     Pressure,
@@ -132,43 +108,30 @@ pub enum Channel {
 /// What is broken in a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorKind {
-    /// Shows one value.
     Stuck,
     /// An error that grows.
     Drift,
-    /// A constant error.
     Offset,
     Gain,
-    /// Random errors.
     Noise,
     /// The low end of the range.
     Dropout,
     /// Errors of single samples.
     Spike,
-    /// Coarse steps.
     Quantisation,
 }
 
 /// What is broken on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BusKind {
-    /// Frames are lost.
     Loss,
-    /// They come later.
     Delay,
-    /// They come more than once.
     Duplication,
-    /// They overtake each other.
     Reordering,
-    /// Bits are inverted.
     Corruption,
-    /// Too short or too long.
     WrongLength,
-    /// A counter is off.
     WrongCounter,
-    /// A node babbles.
     Babbling,
-    /// A node is off the bus.
     BusOff,
 }
 
@@ -180,8 +143,6 @@ pub const NODES: [(&str, WireNode); 3] = [
 ];
 
 impl Places {
-    /// All places, by name.
-    #[must_use]
     pub fn names(self) -> Vec<String> {
         let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         let frame = |name: &str| format!("bus.{name}");
@@ -200,13 +161,11 @@ impl Places {
     }
 
     /// Whether the first place is meant when none is named.
-    #[must_use]
     pub fn has_usual_place(self) -> bool {
         matches!(self, Self::Supply | Self::Linkage | Self::Bus | Self::Frames)
     }
 
     /// The identifier that a place of frames names; `None` for all frames.
-    #[must_use]
     pub fn frame_id(self, place: usize) -> Option<u16> {
         match self {
             Self::Frames => place.checked_sub(1).map(|message| MESSAGES[message].id),
@@ -225,13 +184,10 @@ const COUNTED: [(&str, u16); 4] = [
 
 impl FaultKey {
     /// Whether the value is one; a NaN lies in no range.
-    #[must_use]
     pub fn allows(&self, value: f64) -> bool {
         (self.min..=self.max).contains(&value) && (!self.whole || value == value.trunc())
     }
 
-    /// The allowed values in words.
-    #[must_use]
     pub fn range(&self) -> String {
         let whole = if self.whole { "whole numbers from " } else { "" };
         let unit = if self.unit == "1" { "" } else { self.unit };
@@ -240,8 +196,6 @@ impl FaultKey {
 }
 
 impl Group {
-    /// In words, as a heading.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Sensor => "sensor",
@@ -256,13 +210,10 @@ impl Group {
 
 pub use rows::TABLE;
 
-/// All rows.
 pub fn all() -> impl Iterator<Item = &'static FaultSpec> {
     TABLE.iter().flat_map(|rows| rows.iter())
 }
 
-/// The row of a name.
-#[must_use]
 pub fn spec(name: &str) -> Option<&'static FaultSpec> {
     all().find(|spec| spec.name == name)
 }

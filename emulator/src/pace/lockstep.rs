@@ -16,9 +16,6 @@ const LAST_TURN: Duration = Duration::from_millis(500);
 const CYCLE_NS: u64 = 1_000_000;
 
 /// Runs the rig in the barrier; `simulated_ns` is the clock that stamps its frames.
-///
-/// # Errors
-/// [`BusError::NoBarrier`] on a bus without one.
 pub fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Result<RunOutcome, BusError> {
     context.bus.join_lockstep(Role::Rig, "rig")?;
     let mut posted = Vec::new();

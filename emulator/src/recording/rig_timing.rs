@@ -49,9 +49,6 @@ pub struct RigTiming {
 
 impl RigTiming {
     /// Opens the files.
-    ///
-    /// # Errors
-    /// Names the file that cannot be made.
     pub fn create(setup: TimingSetup) -> io::Result<Self> {
         let mut recorder = TimingRecorder::create(setup)?;
         let round_trip = AXES.map(|axis| recorder.add(&format!("{axis}-round-trip")));
@@ -62,15 +59,12 @@ impl RigTiming {
             trips: VecDeque::new(),
             command_age,
             ages: CommandAges::default(),
-            wall_clock: WallClockWatch::new(),
+            wall_clock: WallClockWatch::begin(),
             steps: Vec::new(),
         })
     }
 
     /// Records what the loop measured.
-    ///
-    /// # Errors
-    /// What the system says when a file cannot be written.
     pub fn timing(&mut self, record: &TimingRecord) -> io::Result<()> {
         match record {
             TimingRecord::Cycle { row, axes } => self.cycle(row, axes),
@@ -123,9 +117,6 @@ impl RigTiming {
     }
 
     /// What is due at `now`, after everything was taken; `asked` when a signal asked for a dump.
-    ///
-    /// # Errors
-    /// What the system says when a file cannot be written.
     pub fn poll(&mut self, now: realtime::Instant, asked: bool) -> io::Result<()> {
         if asked {
             self.recorder.signal(now);
@@ -141,9 +132,6 @@ impl RigTiming {
     }
 
     /// Writes the table out.
-    ///
-    /// # Errors
-    /// What the system says.
     pub fn flush(&mut self) -> io::Result<()> {
         self.recorder.write_out()
     }

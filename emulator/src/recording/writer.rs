@@ -75,7 +75,6 @@ pub struct WriterReport {
 /// The open files of a run.
 pub struct Writer {
     setup: WriterSetup,
-    telemetry: Option<Telemetry>,
     bus_log: LineFile,
     measurement: LineFile,
     truth: LineFile,
@@ -89,9 +88,6 @@ pub struct Writer {
 
 impl Writer {
     /// Opens the files and writes their heads.
-    ///
-    /// # Errors
-    /// Names the file that cannot be made.
     pub fn create(mut setup: WriterSetup) -> io::Result<Self> {
         let open = |name: &str| LineFile::create(&setup.folder.join(name));
         let (bus_log, mut measurement, mut truth) =
@@ -103,26 +99,21 @@ impl Writer {
             writeln!(faults.lines(), "{}", mark::COLUMNS)?;
         }
         let timing = setup.timing.take().map(RigTiming::create).transpose()?;
-        let pending = Vec::new();
-        let report = WriterReport::default();
-        let telemetry = setup.telemetry.take();
         Ok(Self {
             setup,
-            telemetry,
             bus_log,
             measurement,
             truth,
             faults,
             timing,
-            pending,
+            pending: Vec::new(),
             reported: HashMap::new(),
             untold: Untold::default(),
-            report,
+            report: WriterReport::default(),
         })
     }
 
     /// Writes until the sending ends are gone and the queues are empty.
-    #[must_use]
     pub fn run(mut self, records: &Records, shared: &Shared) -> WriterReport {
         let mut last_flush = Instant::now();
         loop {
@@ -159,7 +150,7 @@ impl Writer {
 
     fn drain(&mut self, records: &Records) -> io::Result<()> {
         for record in a_turn(&records.cycles) {
-            if let Some(telemetry) = &mut self.telemetry {
+            if let Some(telemetry) = &mut self.setup.telemetry {
                 telemetry.cycle(&record);
             }
             tables::write_measurement(self.measurement.lines(), &record)?;
@@ -196,7 +187,7 @@ impl Writer {
 
     /// Lets viewers have what there is for them.
     fn serve(&mut self) {
-        let Some(telemetry) = &mut self.telemetry else { return };
+        let Some(telemetry) = &mut self.setup.telemetry else { return };
         if let Some(timing) = &mut self.timing {
             telemetry.histograms(&timing.new_lines());
         }
@@ -231,7 +222,7 @@ impl Writer {
     /// thousands, and must hide nothing else.
     fn tell(&mut self, event: Event) -> io::Result<()> {
         self.report.event_count += 1;
-        if let Some(telemetry) = &mut self.telemetry {
+        if let Some(telemetry) = &mut self.setup.telemetry {
             telemetry.event(&event);
         }
         if let (Some(faults), EventKind::Fault(mark)) = (&mut self.faults, &event.kind) {

@@ -22,11 +22,9 @@ use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What is described.
 pub struct Described<'a> {
     /// How the emulator was started.
     pub arguments: &'a RunArguments,
-    /// What it read.
     pub inputs: &'a Inputs,
     /// Columns of `truth.csv` after the baseline's.
     pub terms: &'a [String],
@@ -36,7 +34,6 @@ pub struct Described<'a> {
 
 impl Described<'_> {
     /// Whether viewers get what only a simulation knows. Of sealed effects nothing but `truth.csv` may tell.
-    #[must_use]
     pub fn with_truth(&self) -> bool {
         !self.inputs.sealed
     }
@@ -50,8 +47,6 @@ impl Described<'_> {
     }
 }
 
-/// The description as JSON.
-#[must_use]
 pub fn description(run: &Described<'_>) -> Value {
     let Described { arguments, inputs, started_unix_s, .. } = run;
     let (cylinder, supply, mass) = (inputs.rig.cylinder(), inputs.rig.supply(), inputs.rig.mass());

@@ -45,7 +45,6 @@ pub(super) const FAMILY: Family = Family {
 };
 
 /// When the first emergency stop of the run was tripped.
-#[must_use]
 pub fn first_trip_s(record: &Record) -> Option<f64> {
     Some(trip_s(record.truth.numbers("supply_pressure_Pa"), first_shut(record)?.from_s))
 }

@@ -99,13 +99,11 @@ fn maxima(error: &Series) -> Option<f64> {
 }
 
 /// Dynamic error, m: what a controller that kept no account of it would have reported.
-#[must_use]
 pub fn error_dynamic_m(record: &Record) -> Option<f64> {
     record.position_error().within_all(&record.moves()).largest()
 }
 
 /// Static error, m: as [`error_dynamic_m`].
-#[must_use]
 pub fn error_static_m(record: &Record) -> Option<f64> {
     let size = record.position_error().map(f64::abs);
     let rests = crate::record::common(&record.rests(), &record.experiments());

@@ -74,7 +74,6 @@ pub struct Told {
     pub evidence: Vec<String>,
 }
 
-#[must_use]
 pub fn cause(seen: &Seen) -> Told {
     let cause = first_that_holds(seen);
     Told { cause, sentence: sentence(cause, seen), evidence: evidence(seen) }
@@ -122,7 +121,6 @@ impl Seen {
 
     /// Whether something shows that the machine ran: a thread that kept the probe away, a process on another CPU, or that the
     /// rig, which its own CPU's timer wakes, was ready for half of it.
-    #[must_use]
     pub fn machine_ran(&self) -> bool {
         self.another_ns.saturating_mul(2) >= self.bad_ns()
             || self.ran_elsewhere
@@ -147,7 +145,6 @@ impl Seen {
 }
 
 /// A length of time as a person reads it.
-#[must_use]
 pub fn in_words(ns: u64) -> String {
     match ns {
         0..1_000 => format!("{ns} ns"),

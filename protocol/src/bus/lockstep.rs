@@ -47,7 +47,6 @@ pub(super) struct Release {
     pub(super) frames: Vec<(CanFrame, PeerId)>,
     /// Who may act next.
     pub(super) go: Vec<PeerId>,
-    /// In which cycle.
     pub(super) cycle: u32,
 }
 
@@ -84,7 +83,6 @@ struct Posted {
     sender: String,
 }
 
-/// State of the barrier.
 pub(super) struct Barrier {
     /// Controllers that have to join by name before the first cycle.
     expected: usize,
@@ -112,7 +110,6 @@ impl Barrier {
         }
     }
 
-    /// The cycle that the barrier is in.
     pub(super) fn cycle(&self) -> u32 {
         self.cycle
     }
@@ -159,7 +156,6 @@ impl Barrier {
         }
     }
 
-    /// A peer posts a frame.
     pub(super) fn post(&mut self, from: PeerId, frame: CanFrame) {
         if self.rig == Some(from) {
             self.from_rig.push(Posted { frame, from, sender: String::new() });

@@ -58,7 +58,6 @@ pub(super) struct SocketPeer<L> {
 }
 
 impl<L: Link> SocketPeer<L> {
-    /// Opens the bus now.
     pub(super) fn open(link: L, url: &BusUrl, clock: StampClock) -> Result<Self, BusError> {
         let mut peer = Self::new(link, url, clock);
         match peer.connect() {
@@ -112,9 +111,13 @@ impl<L: Link> SocketPeer<L> {
         Ok(())
     }
 
+    /// Opens a bus that is gone, if an attempt is due.
     fn try_again(&mut self) {
+        if self.left || self.socket.is_some() {
+            return;
+        }
         let now = Instant::now();
-        if !self.left && now >= self.next_attempt && self.connect().is_err() {
+        if now >= self.next_attempt && self.connect().is_err() {
             self.next_attempt = now + RETRY_PERIOD;
         }
     }
@@ -178,9 +181,7 @@ impl<L: Link> SocketPeer<L> {
 
     /// Receives the next batch; false when there is none.
     fn fill(&mut self) -> bool {
-        if self.socket.is_none() {
-            self.try_again();
-        }
+        self.try_again();
         let Some(socket) = &self.socket else { return false };
         let wait = if self.joined.is_some() { Wait::UntilTimeout } else { Wait::No };
         let Err(error) = self.inbox.fill(socket.as_fd(), wait, &self.clock) else { return true };
@@ -202,9 +203,7 @@ impl<L: Link> SocketPeer<L> {
 
     /// Posts a member's packet; while the bus is down it is dropped, so that nothing old is sent later.
     fn post(&mut self, bytes: &[u8]) -> Result<(), SendError> {
-        if self.socket.is_none() {
-            self.try_again();
-        }
+        self.try_again();
         if self.socket.is_none() {
             return Err(SendError::Down);
         }
@@ -216,9 +215,7 @@ impl<L: Link> SocketPeer<L> {
     }
 
     fn send_packet(&mut self, bytes: &[u8]) -> Result<(), SendError> {
-        if self.socket.is_none() {
-            self.try_again();
-        }
+        self.try_again();
         let Some(socket) = &self.socket else { return Err(SendError::Down) };
         match send(socket, bytes, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
             Ok(_) => {
@@ -264,11 +261,10 @@ impl<L: Link> Bus for SocketPeer<L> {
     fn receive(&mut self) -> Received {
         loop {
             while let Some(packet) = self.inbox.take() {
-                if packet.len == 0 && self.left {
-                    return Received::Nothing;
-                }
                 if packet.len == 0 {
-                    self.went_away(rustix::io::Errno::CONNRESET);
+                    if !self.left {
+                        self.went_away(rustix::io::Errno::CONNRESET);
+                    }
                     return Received::Nothing;
                 }
                 if packet.stamp_ns > self.lost_ns {

@@ -30,7 +30,6 @@ const NS_PER_S: u64 = 1_000_000_000;
 /// Nanoseconds of simulated time in a cycle of the barrier.
 pub(super) const CYCLE_NS: u64 = 1_000_000;
 
-/// How a node is reported.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Reported {
     /// The rig that lives in the host's process.
@@ -89,7 +88,6 @@ impl TimedWire {
         self.nodes.iter().find(|(_, of_peer)| **of_peer == node).map(|(peer, _)| *peer)
     }
 
-    /// Whether a peer is on the wire.
     pub(super) fn knows(&self, peer: PeerId) -> bool {
         self.nodes.contains_key(&peer)
     }

@@ -73,10 +73,12 @@ impl WireOrders {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Fate {
     /// It goes to everyone but its sender and the deaf.
-    Carried { frame: CanFrame, from: PeerId, deaf: Vec<PeerId> },
-    /// It is lost for all.
+    Carried {
+        frame: CanFrame,
+        from: PeerId,
+        deaf: Vec<PeerId>,
+    },
     Lost(CanFrame),
-    /// It comes later.
     Held(CanFrame),
 }
 

@@ -183,9 +183,11 @@ macro_rules! value_table {
 }
 pub(super) use value_table;
 
-/// The struct of a payload, from `index field: type` for each signal.
+/// The struct of a payload, from `index field: type { rest of its SignalSpec }` for each signal.
 macro_rules! payload {
-    ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $index:literal $field:ident: $kind:ty,)* }) => {
+    ($(#[$doc:meta])* $name:ident { $(
+        $(#[$field_doc:meta])* $index:literal $field:ident: $kind:ty { $($spec:tt)* },
+    )* }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
         pub struct $name {
@@ -193,6 +195,13 @@ macro_rules! payload {
         }
 
         impl $name {
+            /// The signals of a message that carries it, given who listens to each.
+            pub(super) const fn signals(
+                receivers: [&'static [&'static str]; [$($index),*].len()],
+            ) -> [SignalSpec; [$($index),*].len()] {
+                [$(SignalSpec { field: stringify!($field), receivers: receivers[$index], $($spec)* },)*]
+            }
+
             pub(super) fn pack(&self, message: &'static MessageSpec) -> Result<u64, EncodeError> {
                 let mut word = 0;
                 $(word |= self.$field.put(message, $index)?;)*

@@ -21,7 +21,6 @@ pub const WORST_ERROR_BITS: u32 = ERROR_BITS + SUSPEND_BITS;
 /// Makes the draws differ from those of injected loss, which begin with the same seed.
 const STREAM: u64 = 0x5749_5245; // "WIRE"
 
-/// Draws the errors.
 pub(super) struct Errors {
     /// An attempt is hit when the next 64 random bits are not above this; `None` draws nothing.
     threshold: Option<u64>,

@@ -41,7 +41,6 @@ pub enum WireEvent {
     },
 }
 
-/// What is on the wire.
 struct Sending {
     queued: Queued,
     from: NodeId,

@@ -93,7 +93,6 @@ pub(super) struct Node {
     pub(super) counted: Counted,
 }
 
-/// What is counted of a node.
 #[derive(Clone, Default)]
 pub(super) struct Counted {
     pub(super) sent: u64,
@@ -145,14 +144,12 @@ impl Node {
         self.passive
     }
 
-    /// It has sent a frame.
     pub(super) fn has_sent(&mut self) -> Option<Change> {
         self.counted.sent += 1;
         self.tec = self.tec.saturating_sub(1);
         self.confine()
     }
 
-    /// It has received a frame.
     pub(super) fn has_received(&mut self) -> Option<Change> {
         self.rec = if self.rec >= PASSIVE_FROM { REC_AFTER_PASSIVE } else { self.rec.saturating_sub(1) };
         self.confine()

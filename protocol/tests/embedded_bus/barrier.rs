@@ -286,18 +286,12 @@ fn what_a_member_posts_while_the_bus_is_down_is_dropped_and_never_sent() {
     let first = RunningHost::plain(&path);
     let mut member = joined(&path, Role::Member, "drive");
     first.stop();
-    wait_for("the member to see that the host is gone", || {
-        member.receive();
-        (!member.is_up()).then_some(())
-    });
+    wait_until_down(member.as_mut());
     assert_eq!(member.send(&frame(0x110, 0, 0)), Err(SendError::Down));
     assert_eq!((member.counters().sent, member.counters().dropped_on_send), (0, 1));
     let second = RunningHost::plain(&path);
     let mut listener = open(&path);
-    wait_for("the member to come back", || {
-        member.receive();
-        member.is_up().then_some(())
-    });
+    wait_until_up(member.as_mut());
     send_fence(member.as_mut());
     member.done(1);
     assert_eq!(frames_until_fence(listener.as_mut()), []);

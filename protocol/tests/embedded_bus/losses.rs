@@ -91,9 +91,7 @@ fn a_listener_that_does_not_read_loses_frames_that_are_accounted_for_and_nobody_
     /// Far more than the 2 MiB of a queue hold at some 750 bytes a frame, twice over for the kernel's doubling.
     const FRAMES: usize = 14_000;
     const ROUND: usize = FITS_ANY_QUEUE / 2;
-    let place = Place::new();
-    let host = RunningHost::plain(&place.socket());
-    let [mut listener, mut reader, mut sender] = connected(&place.socket());
+    let (_place, host, [mut listener, mut reader, mut sender]) = served();
     let sent: Vec<_> = (0..FRAMES).map(|number| numbered(IDS[number % 3], number)).collect();
     // The reader paces the sender: it must never be the one whose queue is full.
     for round in sent.chunks(ROUND) {

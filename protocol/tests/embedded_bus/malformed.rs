@@ -3,7 +3,6 @@
 use super::support::*;
 use protocol::bus::Received;
 use protocol::can::{CAN_FRAME_BYTES, CanFrame};
-use rustix::net::SocketAddrUnix;
 
 /// Packets of every length that is no frame, and frames of every length byte that classic CAN does not have.
 fn malformed_packets() -> Vec<Vec<u8>> {
@@ -18,9 +17,7 @@ fn malformed_packets() -> Vec<Vec<u8>> {
 
 #[test]
 fn the_host_counts_malformed_packets_and_passes_none_on() {
-    let place = Place::new();
-    let host = RunningHost::plain(&place.socket());
-    let [mut listener, _other] = connected(&place.socket());
+    let (place, host, [mut listener, _other]) = served();
     let client = raw_client(&place.socket());
     let packets = malformed_packets();
     for packet in &packets {
@@ -36,9 +33,7 @@ fn the_host_counts_malformed_packets_and_passes_none_on() {
 
 #[test]
 fn a_packet_without_bytes_ends_its_senders_connection_and_no_other() {
-    let place = Place::new();
-    let host = RunningHost::plain(&place.socket());
-    let [mut one, mut two] = connected(&place.socket());
+    let (place, host, [mut one, mut two]) = served();
     let client = raw_client(&place.socket());
     // A socket cannot tell it from a peer that closed.
     send_raw(&client, &[]);
@@ -51,12 +46,7 @@ fn a_packet_without_bytes_ends_its_senders_connection_and_no_other() {
 
 #[test]
 fn a_peer_counts_what_a_foreign_host_sends_malformed() {
-    let place = Place::new();
-    let listener = raw_socket();
-    rustix::net::bind(&listener, &SocketAddrUnix::new(place.socket()).unwrap()).unwrap();
-    rustix::net::listen(&listener, 1).unwrap();
-    let mut peer = open(&place.socket());
-    let host = rustix::net::accept(&listener).unwrap();
+    let (_place, mut peer, host) = foreign_host();
     let packets = malformed_packets();
     // In rounds that fit the queue, so that sending never waits for a peer that is not read in between.
     for round in packets.chunks(FITS_ANY_QUEUE / 2) {

@@ -3,14 +3,11 @@
 use super::support::*;
 use protocol::bus::{Bus, Received, SendError};
 use protocol::can::CanFrame;
-use rustix::net::SocketAddrUnix;
 use std::time::Duration;
 
 #[test]
 fn a_sender_does_not_hear_itself_and_everyone_else_does() {
-    let place = Place::new();
-    let host = RunningHost::plain(&place.socket());
-    let [mut sender, mut other, mut third] = connected(&place.socket());
+    let (_place, host, [mut sender, mut other, mut third]) = served();
     let frame = CanFrame::new(0x123, &[1, 2, 3]);
     sender.send(&frame).unwrap();
     for peer in [&mut other, &mut third] {
@@ -28,9 +25,7 @@ fn a_sender_does_not_hear_itself_and_everyone_else_does() {
 fn all_peers_hear_the_same_frames_in_the_same_order() {
     const SENDERS: usize = 3;
     const EACH: usize = FITS_ANY_QUEUE / (SENDERS + 1);
-    let place = Place::new();
-    let host = RunningHost::plain(&place.socket());
-    let [mut one, mut two, a, b, c] = connected(&place.socket());
+    let (_place, host, [mut one, mut two, a, b, c]) = served();
     let senders = [a, b, c];
     std::thread::scope(|scope| {
         for (id, mut sender) in (0x100..).zip(senders) {
@@ -67,10 +62,8 @@ fn all_peers_hear_the_same_frames_in_the_same_order() {
 
 #[test]
 fn a_frame_is_stamped_when_it_arrives_and_not_when_it_is_read() {
-    let place = Place::new();
-    let _host = RunningHost::plain(&place.socket());
     // The host serves peers in the order of connecting: what the witness has heard is in the reader's queue.
-    let [mut reader, mut witness, mut sender] = connected(&place.socket());
+    let (_place, _host, [mut reader, mut witness, mut sender]) = served();
     let before_ns = now_ns();
     let sent_ns = sender.send(&CanFrame::new(0x42, &[])).unwrap();
     let after_send_ns = now_ns();
@@ -94,10 +87,7 @@ fn a_peer_opened_before_its_host_connects_when_the_host_comes() {
     assert!(!early.is_up());
     assert_eq!(early.send(&CanFrame::new(0x99, &[])), Err(SendError::Down));
     let host = RunningHost::plain(&place.socket());
-    wait_for("the early peer to connect", || {
-        early.receive();
-        early.is_up().then_some(())
-    });
+    wait_until_up(early.as_mut());
     let mut late = open(&place.socket());
     send_fence(late.as_mut());
     assert_eq!(frames_until_fence(early.as_mut()), []);
@@ -113,25 +103,17 @@ fn a_peer_opened_before_its_host_connects_when_the_host_comes() {
 #[test]
 fn a_host_that_went_and_came_back_is_counted_and_nothing_is_replayed() {
     const DROPPED: u64 = 5;
-    let place = Place::new();
-    let first = RunningHost::plain(&place.socket());
-    let [mut a, mut b] = connected(&place.socket());
+    let (place, first, [mut a, mut b]) = served();
     first.stop();
     for peer in [&mut a, &mut b] {
-        wait_for("the peer to see that the host is gone", || {
-            peer.receive();
-            (!peer.is_up()).then_some(())
-        });
+        wait_until_down(peer.as_mut());
     }
     for number in 0..DROPPED {
         assert_eq!(a.send(&CanFrame::new(0x99, &[number as u8])), Err(SendError::Down));
     }
     let second = RunningHost::plain(&place.socket());
     for peer in [&mut a, &mut b] {
-        wait_for("the peer to come back", || {
-            peer.receive();
-            peer.is_up().then_some(())
-        });
+        wait_until_up(peer.as_mut());
     }
     // `a` came back first and `b` is heard by it, so both are in.
     send_fence(b.as_mut());
@@ -151,9 +133,7 @@ fn a_host_that_went_and_came_back_is_counted_and_nothing_is_replayed() {
 
 #[test]
 fn waiting_ends_at_once_while_frames_wait_to_be_taken() {
-    let place = Place::new();
-    let _host = RunningHost::plain(&place.socket());
-    let [mut reader, mut witness, mut sender] = connected(&place.socket());
+    let (_place, _host, [mut reader, mut witness, mut sender]) = served();
     // All are in the reader's queue when the witness, who connected later, has the last.
     for number in 0..3 {
         sender.send(&numbered(0x77, number)).unwrap();
@@ -173,15 +153,10 @@ fn waiting_ends_at_once_while_frames_wait_to_be_taken() {
 /// above all, must not end the new one.
 #[test]
 fn a_peer_that_comes_back_by_sending_stays() {
-    let place = Place::new();
-    let first = RunningHost::plain(&place.socket());
-    let [mut a, b] = connected(&place.socket());
+    let (place, first, [mut a, b]) = served();
     drop(b);
     first.stop();
-    wait_for("the peer to see that the host is gone", || {
-        a.receive();
-        (!a.is_up()).then_some(())
-    });
+    wait_until_down(a.as_mut());
     let second = RunningHost::plain(&place.socket());
     wait_for("the peer to come back by sending", || {
         a.send(&CanFrame::new(HELLO_ID, &[])).is_ok().then_some(())
@@ -203,10 +178,8 @@ fn a_peer_that_comes_back_by_sending_stays() {
 
 #[test]
 fn what_a_host_delivered_before_it_went_can_still_be_read() {
-    let place = Place::new();
-    let host = RunningHost::plain(&place.socket());
     // What the witness has heard is in the reader's queue, the host serving peers in the order of connecting.
-    let [mut reader, mut witness, mut sender] = connected(&place.socket());
+    let (_place, host, [mut reader, mut witness, mut sender]) = served();
     let sent: Vec<_> = (0..20).map(|number| numbered(0x77, number)).collect();
     for frame in &sent {
         sender.send(frame).unwrap();
@@ -215,22 +188,14 @@ fn what_a_host_delivered_before_it_went_can_still_be_read() {
     assert_eq!(frames_until_fence(witness.as_mut()), sent);
     host.stop();
     assert_eq!(frames_until_fence(reader.as_mut()), sent);
-    wait_for("the reader to see that the host is gone", || {
-        reader.receive();
-        (!reader.is_up()).then_some(())
-    });
+    wait_until_down(reader.as_mut());
 }
 
 /// The kernel tells of a connection that was closed with unread packets before it hands out what came over it. A peer that
 /// took this for the end once lost the rig's farewell to a host that stopped while a command was under way.
 #[test]
 fn what_a_host_sent_is_read_even_if_it_died_with_packets_unread() {
-    let place = Place::new();
-    let listener = raw_socket();
-    rustix::net::bind(&listener, &SocketAddrUnix::new(place.socket()).unwrap()).unwrap();
-    rustix::net::listen(&listener, 1).unwrap();
-    let mut peer = open(&place.socket());
-    let host = rustix::net::accept(&listener).unwrap();
+    let (_place, mut peer, host) = foreign_host();
     peer.send(&CanFrame::new(0x110, &[])).unwrap();
     send_raw(&host, &CanFrame::new(0x120, &[]).to_bytes());
     drop(host);

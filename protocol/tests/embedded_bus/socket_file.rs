@@ -40,9 +40,7 @@ fn a_socket_that_a_dead_host_left_is_taken_over() {
 
 #[test]
 fn a_live_host_is_neither_replaced_nor_disturbed() {
-    let place = Place::new();
-    let host = RunningHost::plain(&place.socket());
-    let [mut one, mut two] = connected(&place.socket());
+    let (place, host, [mut one, mut two]) = served();
     let Err(BusError::HostExists { lock, .. }) = Host::bind(&place.socket(), WireOptions::default(), None)
     else {
         panic!("a second host was let in");

@@ -91,6 +91,25 @@ pub(crate) fn connected<const N: usize>(path: &Path) -> [Box<dyn Bus>; N] {
     peers
 }
 
+/// A host on a bus of its own, and `N` peers that are in.
+pub(crate) fn served<const N: usize>() -> (Place, RunningHost, [Box<dyn Bus>; N]) {
+    let place = Place::new();
+    let host = RunningHost::plain(&place.socket());
+    let peers = connected(&place.socket());
+    (place, host, peers)
+}
+
+/// A host without any of our code, and a peer that is connected to it.
+pub(crate) fn foreign_host() -> (Place, Box<dyn Bus>, OwnedFd) {
+    let place = Place::new();
+    let listener = raw_socket();
+    rustix::net::bind(&listener, &SocketAddrUnix::new(place.socket()).unwrap()).unwrap();
+    rustix::net::listen(&listener, 1).unwrap();
+    let peer = open(&place.socket());
+    let host = rustix::net::accept(&listener).unwrap();
+    (place, peer, host)
+}
+
 /// A connection without any of our code on this side.
 pub(crate) fn raw_client(path: &Path) -> OwnedFd {
     let socket = raw_socket();
@@ -108,7 +127,6 @@ pub(crate) fn is_served(path: &Path) -> bool {
     rustix::net::connect(raw_socket(), &SocketAddrUnix::new(path).unwrap()).is_ok()
 }
 
-/// Sends one packet as it is.
 pub(crate) fn send_raw(socket: &OwnedFd, bytes: &[u8]) {
     assert_eq!(rustix::net::send(socket, bytes, SendFlags::NOSIGNAL).unwrap(), bytes.len());
 }
@@ -128,7 +146,22 @@ pub(crate) fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T 
     }
 }
 
-/// What the peer receives next.
+/// Waits until the peer sees that its host is there.
+pub(crate) fn wait_until_up(peer: &mut dyn Bus) {
+    wait_for("the peer to connect", || {
+        peer.receive();
+        peer.is_up().then_some(())
+    });
+}
+
+/// Waits until the peer sees that its host is gone.
+pub(crate) fn wait_until_down(peer: &mut dyn Bus) {
+    wait_for("the peer to see that the host is gone", || {
+        peer.receive();
+        (!peer.is_up()).then_some(())
+    });
+}
+
 pub(crate) fn next(peer: &mut dyn Bus) -> Received {
     let started = Instant::now();
     loop {
@@ -140,7 +173,6 @@ pub(crate) fn next(peer: &mut dyn Bus) -> Received {
     }
 }
 
-/// The next frame and its stamp.
 pub(crate) fn next_frame(peer: &mut dyn Bus) -> (CanFrame, u64) {
     match next(peer) {
         Received::Frame(frame, stamp_ns) => (frame, stamp_ns),
@@ -167,7 +199,6 @@ pub(crate) fn frames_until_fence(peer: &mut dyn Bus) -> Vec<CanFrame> {
     frames_until(peer, |frame| frame.standard_id() == Some(FENCE_ID))
 }
 
-/// Sends a fence.
 pub(crate) fn send_fence(peer: &mut dyn Bus) {
     peer.send(&CanFrame::new(FENCE_ID, &[])).expect("a connected peer sends");
 }

@@ -27,7 +27,7 @@ fn at(ms: u64) -> Instant {
 
 /// A recorder with a row each millisecond up to `ms`.
 fn fed(ms: u64) -> Recorder {
-    let mut flight = Recorder::new();
+    let mut flight = Recorder::default();
     (0..=ms).for_each(|ms| flight.row(At(ms * MS)));
     flight
 }
@@ -95,7 +95,7 @@ fn after_a_stall_of_any_length_the_rows_before_it_are_there() {
 
 #[test]
 fn a_signal_too_many_is_known_before_anything_is_promised() {
-    let mut flight = Recorder::new();
+    let mut flight = Recorder::default();
     let mut written = 0;
     for n in 0..=MOST_DUMPS as u64 {
         flight.trigger(Trigger::other(Severity::Signal, n, at(10_000 * n)));
@@ -111,7 +111,7 @@ fn a_signal_too_many_is_known_before_anything_is_promised() {
 
 #[test]
 fn a_signal_takes_the_place_of_less_severe_dumps() {
-    let mut flight = Recorder::new();
+    let mut flight = Recorder::default();
     for n in 0..MOST_DUMPS as u64 {
         flight.trigger(overrun(10_000 * (n + 1), 1));
         flight.finish(|_| ());
@@ -125,7 +125,7 @@ fn a_signal_takes_the_place_of_less_severe_dumps() {
 
 #[test]
 fn of_more_dumps_than_are_kept_the_least_severe_goes() {
-    let mut flight = Recorder::new();
+    let mut flight = Recorder::default();
     let mut gone = Vec::new();
     let mut written = Vec::new();
     for late_ms in (1..=MOST_DUMPS as u64).chain([1, 30]) {

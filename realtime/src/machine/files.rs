@@ -18,7 +18,6 @@ impl Root {
         (!text.is_empty()).then(|| text.to_owned())
     }
 
-    /// Bytes of a file.
     pub(super) fn bytes(&self, path: &str) -> Option<Vec<u8>> {
         fs::read(self.0.join(path)).ok()
     }

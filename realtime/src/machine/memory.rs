@@ -67,7 +67,6 @@ impl Limits {
     }
 }
 
-/// Load averages of 1, 5 and 15 minutes.
 pub(super) fn load_average(root: &Root) -> String {
     let text = root.fact("proc/loadavg");
     if text.starts_with("unknown") {

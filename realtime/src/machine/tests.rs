@@ -7,7 +7,6 @@ use std::fs;
 use std::io::Write;
 use tempfile::TempDir;
 
-/// A machine of these files.
 fn machine_of(files: &[(&str, &str)]) -> (TempDir, Machine) {
     let folder = tempfile::tempdir().unwrap();
     for (path, text) in files {

@@ -160,7 +160,6 @@ fn with_counter_off(frame: &CanFrame, step: u8) -> Option<CanFrame> {
     decoded.encode().ok()
 }
 
-/// The draws of one fault.
 pub(super) struct Draw(Pcg64Mcg);
 
 impl Draw {
