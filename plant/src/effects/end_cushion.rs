@@ -31,7 +31,6 @@ use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EndCushion {
     /// K_V of the cushion's orifice.
@@ -57,10 +56,9 @@ impl Effect for EndCushion {
                 min: 0.005,
                 max: 100.0,
                 drawn: [0.02, 0.3],
-                signed: false,
-                default: None,
                 neutral: Some(f64::INFINITY),
                 meaning: "K_V of the cushion's orifice; a chamber that fills goes past it",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "length_mm",

@@ -16,7 +16,6 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorOffset {
     /// o, what it reads too much, beside the load sensor's own offset.
@@ -38,9 +37,8 @@ impl Effect for PositionSensorOffset {
             max: 10.0,
             drawn: [0.1, 2.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "o, what it reads too much, beside the load sensor's own offset",
+            ..EffectKey::USUAL
         }],
     };
 

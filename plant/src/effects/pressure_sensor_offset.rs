@@ -16,7 +16,6 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressureSensorOffset {
     /// o, what it reads too much.
@@ -38,9 +37,8 @@ impl Effect for PressureSensorOffset {
             max: 500.0,
             drawn: [10.0, 100.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "o, what it reads too much",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -20,7 +20,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StribeckFriction {
     /// v_s, Stribeck velocity.
@@ -46,10 +45,8 @@ impl Effect for StribeckFriction {
                 min: 0.01,
                 max: 200.0,
                 drawn: [2.0, 50.0],
-                signed: false,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "v_s, Stribeck velocity",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "exponent",
