@@ -20,7 +20,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CouplingBacklash {
-    /// s, gap in all, in place of linkage.gap_mm.
     pub(crate) gap_m: f64,
 }
 

@@ -21,9 +21,7 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CouplingCompliance {
-    /// k', in place of linkage.stiffness_n_per_m.
     pub(crate) stiffness_n_per_m: f64,
-    /// c', in place of linkage.damping_n_s_per_m.
     pub(crate) damping_n_s_per_m: f64,
 }
 

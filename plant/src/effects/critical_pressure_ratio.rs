@@ -27,7 +27,6 @@ use crate::valve::single_edge_flow;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CriticalPressureRatio {
-    /// b, the pressure ratio below which the flow is choked.
     pub(crate) critical_ratio: f64,
 }
 

@@ -20,7 +20,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DeadVolume {
-    /// V_own.
     pub(crate) volume_m3: f64,
 }
 

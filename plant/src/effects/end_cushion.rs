@@ -33,11 +33,9 @@ use crate::valve::FLOW_PER_KV;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EndCushion {
-    /// K_V of the cushion's orifice.
     pub(crate) cushion_kv_m3_per_h: f64,
     /// Length of the cushion before each end.
     pub(crate) length_m: f64,
-    /// k_stop of the elastic stop over the last millimetre.
     pub(crate) stop_stiffness_n_per_m: f64,
 }
 

@@ -18,7 +18,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceSensorGain {
-    /// g, what it reads too much, of the force.
     pub(crate) gain: f64,
 }
 

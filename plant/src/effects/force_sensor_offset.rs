@@ -18,7 +18,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceSensorOffset {
-    /// o, what it reads too much.
     pub(crate) offset_n: f64,
 }
 

@@ -21,7 +21,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrictionAsymmetry {
-    /// a: times 1 + a as the rod extends, times 1 - a as it retracts.
     pub(crate) asymmetry: f64,
 }
 

@@ -20,7 +20,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Inclination {
-    /// F_g, force in +x of the rig.
     pub(crate) force_n: f64,
 }
 

@@ -21,7 +21,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LineDelay {
-    /// l, length of each line between valve and chamber.
     pub(crate) length_m: f64,
 }
 

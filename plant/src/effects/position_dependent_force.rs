@@ -24,7 +24,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionDependentForce {
-    /// F_c, force at x = 0, falling in a straight line to its negative at the other end; positive centres.
     pub(crate) spring_n: f64,
     /// F_r and P, amplitude and period of the cogging.
     ripple: Ripple,

@@ -29,13 +29,9 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionDependentFriction {
-    /// F_b, height of the bump.
     pub(crate) bump_n: f64,
-    /// c, extension at which the bump is highest.
     pub(crate) centre_m: f64,
-    /// w, half-width of the bump at 1/e.
     pub(crate) width_m: f64,
-    /// F_s, growth from mid-stroke to the rod fully out.
     pub(crate) slope_n: f64,
     /// F_r and P, amplitude and period of the ripple.
     ripple: Ripple,

@@ -24,7 +24,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorLag {
-    /// tau, time constant.
     pub(crate) time_constant_s: f64,
 }
 

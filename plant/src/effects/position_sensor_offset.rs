@@ -18,7 +18,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorOffset {
-    /// o, what it reads too much, beside the load sensor's own offset.
     pub(crate) offset_m: f64,
 }
 

@@ -75,7 +75,6 @@ const NEWTON_STEPS: u32 = 4;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Presliding {
-    /// s_0, stiffness of the bristles.
     pub(crate) stiffness_n_per_m: f64,
 }
 

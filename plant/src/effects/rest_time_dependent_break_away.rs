@@ -23,9 +23,7 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RestTimeDependentBreakAway {
-    /// g, growth of the break-away force after 10 s at rest.
     pub(crate) growth: f64,
-    /// t_0 of ln(1 + t / t_0).
     pub(crate) onset_s: f64,
     /// F_stat g / ln(1 + 10 s / t_0).
     pub(crate) per_fold_n: f64,

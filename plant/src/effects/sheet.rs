@@ -231,9 +231,8 @@ pub struct Switched {
     pub numbers: Vec<f64>,
 }
 
-/// An effect of the catalogue; its fields are its numbers at one place, in SI.
+/// An effect of the catalogue; its fields are the numbers of its sheet at one place, in SI.
 pub(crate) trait Effect: Sized {
-    /// Its data sheet.
     const SHEET: Sheet;
 
     /// The effect at one place: `numbers` in SI, one for each key, already checked against the sheet.

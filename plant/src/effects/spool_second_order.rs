@@ -28,7 +28,6 @@ use crate::parameters::table::Unit;
 pub(crate) struct SpoolSecondOrder {
     /// f, w / 2 pi.
     pub(crate) natural_frequency_hz: f64,
-    /// z, share of critical damping.
     pub(crate) damping: f64,
 }
 

@@ -22,7 +22,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StribeckFriction {
-    /// v_s, Stribeck velocity.
     pub(crate) velocity_m_per_s: f64,
     /// d, how sharply friction falls.
     pub(crate) exponent: f64,

@@ -21,7 +21,6 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TimeSkew {
-    /// d, how old the value is when it is sampled.
     pub(crate) delay_s: f64,
 }
 

@@ -17,7 +17,6 @@ use crate::parameters::RigParameters;
 #[error("{0}")]
 pub struct SceneError(String);
 
-/// What is read of an experiment file.
 #[derive(Deserialize)]
 struct ExperimentFile {
     #[serde(default)]
