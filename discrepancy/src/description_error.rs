@@ -15,7 +15,6 @@ pub enum DescriptionError {
 }
 
 impl DescriptionError {
-    /// The text of a file.
     pub(crate) fn read(what: &'static str, file: &Path) -> Result<String, Self> {
         std::fs::read_to_string(file).map_err(|error| Self::Open {
             what,
