@@ -43,7 +43,6 @@ pub struct CommonArguments {
 /// Arguments of `plan`.
 #[derive(Args, Debug)]
 pub struct PlanArguments {
-    /// The campaign.
     #[command(flatten)]
     pub common: CommonArguments,
     /// How many runs are reported.
@@ -57,7 +56,6 @@ pub struct PlanArguments {
 /// Arguments of `run`.
 #[derive(Args, Debug)]
 pub struct RunArguments {
-    /// The campaign.
     #[command(flatten)]
     pub common: CommonArguments,
     /// Folder of its parts and results; default: runs/campaigns/NAME.
@@ -77,7 +75,6 @@ pub struct RunArguments {
 /// Arguments of `merge`.
 #[derive(Args, Debug)]
 pub struct MergeArguments {
-    /// The campaign.
     #[command(flatten)]
     pub common: CommonArguments,
     /// Folders with its parts; default: runs/campaigns/NAME.
@@ -93,7 +90,6 @@ pub struct MergeArguments {
 /// Arguments of `repeat`.
 #[derive(Args, Debug)]
 pub struct RepeatArguments {
-    /// The campaign.
     #[command(flatten)]
     pub common: CommonArguments,
     /// Number of the run.

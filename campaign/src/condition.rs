@@ -44,7 +44,6 @@ pub struct ConditionError {
     pub message: String,
 }
 
-/// The condition of a run.
 pub fn condition<'s>(
     shelf: &'s Shelf,
     points: &Points,

@@ -45,7 +45,6 @@ pub enum EngineError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
-/// What a start does.
 pub struct Start<'a> {
     pub campaign: &'a Campaign,
     pub out: &'a Path,

@@ -36,9 +36,7 @@ pub enum Changes {
     Rig(String),
     /// A number of the experiment file, by its path.
     Experiment(String),
-    /// A variable of a controller.
     Variable(String),
-    /// A number of a fault.
     Fault(FaultNumber),
     /// A file as a whole.
     File(FileChoice),
@@ -64,13 +62,9 @@ pub struct FaultNumber {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FileChoice {
-    /// What is done.
     Experiment,
-    /// What it is done with.
     Rig,
-    /// Who leads the drive.
     DriveProgram,
-    /// Who leads the load.
     LoadProgram,
 }
 

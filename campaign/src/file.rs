@@ -35,7 +35,6 @@ use toml::Spanned;
 pub struct CampaignFile {
     pub path: PathBuf,
     pub text: String,
-    /// What it is about.
     pub title: String,
     pub kind: Kind,
     pub programs: Vec<String>,
@@ -45,7 +44,6 @@ pub struct CampaignFile {
     pub seed: u64,
     /// Runs that are written together; by the number of runs where it is left out.
     pub runs_per_part: Option<u64>,
-    /// What is varied.
     pub factors: Vec<Factor>,
     /// Columns that are collected; of an experiment all figures when there are none.
     pub figures: Vec<String>,
@@ -95,6 +93,12 @@ pub struct FileError {
     pub message: String,
 }
 
+impl FileError {
+    fn of(path: &Path, error: &std::io::Error) -> Self {
+        FileError { file: path.display().to_string(), line: 1, message: error.to_string() }
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Form {
@@ -134,13 +138,8 @@ const MOST_DRAWS: u64 = 1_000_000_000;
 const MOST_PER_PART: u64 = 100_000;
 
 impl CampaignFile {
-    /// Reads a campaign file.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|error| FileError {
-            file: path.display().to_string(),
-            line: 1,
-            message: error.to_string(),
-        })?;
+        let text = std::fs::read_to_string(path).map_err(|error| FileError::of(path, &error))?;
         Self::from_toml(&text, path)
     }
 
@@ -191,11 +190,7 @@ impl CampaignFile {
     /// [`FileError`] where the system does not tell where this process is.
     pub fn folder(&self) -> Result<PathBuf, FileError> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-        std::path::absolute(folder).map_err(|error| FileError {
-            file: self.path.display().to_string(),
-            line: 1,
-            message: error.to_string(),
-        })
+        std::path::absolute(folder).map_err(|error| FileError::of(&self.path, &error))
     }
 
     /// What the page shows is among what is varied or collected.

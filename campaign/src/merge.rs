@@ -22,13 +22,7 @@ pub enum MergeError {
     #[error(
         "part {part} is in {one} and in {other}: one run would count twice; name one folder once, or delete one of them"
     )]
-    Doubled {
-        part: u64,
-        /// In this folder.
-        one: String,
-        /// And in this.
-        other: String,
-    },
+    Doubled { part: u64, one: String, other: String },
     /// A part is none of ours, or not whole.
     #[error(transparent)]
     Part(#[from] PartError),
@@ -207,7 +201,6 @@ impl Results {
         self.unfinished.is_empty() && !self.numbers("passed").unwrap_or_default().contains(&0.0)
     }
 
-    /// A column of words.
     #[must_use]
     pub fn words(&self, name: &str) -> Option<&Words> {
         self.words.get(name)

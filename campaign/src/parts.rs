@@ -45,13 +45,7 @@ pub enum PartError {
     #[error(
         "{path}: was made by another version of the programs ({theirs}, this is {ours}); use that version, or another --out"
     )]
-    OtherProgram {
-        path: String,
-        /// Who made it.
-        theirs: String,
-        /// Who reads it.
-        ours: String,
-    },
+    OtherProgram { path: String, theirs: String, ours: String },
     #[error("{path}: {what}; delete it, and run the campaign again: it does only what is missing")]
     Unreadable { path: String, what: String },
 }
@@ -69,7 +63,6 @@ const USUAL_PARTS: u64 = 1024;
 /// Runs of a part when the file does not say.
 const USUAL_RUNS: Range<u64> = 8..1001;
 
-/// Runs of a part when the file does not say.
 #[must_use]
 pub fn usual_runs_per_part(runs: u64) -> u64 {
     (runs / USUAL_PARTS).clamp(USUAL_RUNS.start, USUAL_RUNS.end - 1)
@@ -182,12 +175,7 @@ pub fn beside(folder: &Path) -> io::Result<NamedTempFile> {
 /// SHA-256 in hexadecimal.
 #[must_use]
 pub fn hash(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(64);
-    for byte in Sha256::digest(bytes) {
-        // Writing to a text cannot fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -68,7 +68,6 @@ impl Points {
         self.combinations
     }
 
-    /// What is varied.
     #[must_use]
     pub fn factors(&self) -> &[Factor] {
         &self.factors

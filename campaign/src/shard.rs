@@ -41,7 +41,6 @@ pub struct Asked {
 }
 
 impl Shard {
-    /// The campaign as a whole.
     pub const WHOLE: Shard = Shard { index: 0, count: 1 };
 
     /// Whether the part of this number is of this shard.

@@ -201,7 +201,6 @@ impl Candidate {
         self.scale(key).slope(coordinate)
     }
 
-    /// The coordinate of a number of a key.
     pub(crate) fn coordinate(&self, key: usize, number: f64) -> f64 {
         self.scale(key).coordinate(number)
     }

@@ -29,7 +29,6 @@ pub(crate) use grid::SPARSEST;
 use notes::Notes;
 use plant::{Axis, RigParameters};
 use records::{Channel, Record, Signal};
-use std::collections::BTreeMap;
 pub(crate) use time::FEWEST_ROWS;
 
 /// Kind of the finding that an axis stood at the end of its stroke all the time.
@@ -57,14 +56,8 @@ impl Checked {
     /// A record that can be read and still cannot be simulated.
     pub fn refuse(&mut self, column: Option<&str>, text: String) {
         self.report.usable = false;
-        let column = column.map(str::to_owned);
-        self.report.findings.push(Finding {
-            kind: "not-simulated".into(),
-            column,
-            line: None,
-            fatal: true,
-            text,
-        });
+        let (kind, column) = ("not-simulated".into(), column.map(str::to_owned));
+        self.report.findings.push(Finding { kind, column, fatal: true, text, ..Finding::default() });
     }
 
     /// Standard deviation of a channel's noise, rounding included; `None` when unknown.
@@ -85,13 +78,8 @@ impl Checked {
 pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     let mut notes = Notes::new(record);
     for warning in record.warnings() {
-        notes.findings.push(Finding {
-            kind: "reader".into(),
-            column: None,
-            line: warning.line,
-            fatal: false,
-            text: warning.text.clone(),
-        });
+        let (kind, line, text) = ("reader".into(), warning.line, warning.text.clone());
+        notes.findings.push(Finding { kind, line, text, ..Finding::default() });
     }
     time::check(&mut notes);
     let grid = Grid::of(record, &notes);
@@ -104,7 +92,16 @@ pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     if !notes.is_fatal() {
         signs::check(&mut notes, rig, &grid);
     }
-    notes.into_checked(channels)
+    let time_s = record.time_s();
+    let report = RecordCheck {
+        file: record.file().display().to_string(),
+        usable: !notes.is_fatal(),
+        rows: record.len(),
+        length_s: time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0),
+        findings: notes.findings,
+        channels,
+    };
+    Checked { report, unusable: notes.unusable }
 }
 
 /// Noise, quantum and share of bad samples of a channel.
@@ -114,23 +111,4 @@ fn channel_check(channel: Channel, notes: &Notes, grid: &Grid) -> ChannelCheck {
     // A command has steps and no noise.
     let noise = if matches!(channel, Channel::Of(_, Signal::Valve)) { None } else { noise::of(&values) };
     ChannelCheck { noise, quantum: quantum::of(&present), unusable: notes.share_unusable(channel) }
-}
-
-/// A record's channels by their columns.
-type Channels = BTreeMap<String, ChannelCheck>;
-
-impl Notes<'_> {
-    fn into_checked(self, channels: Channels) -> Checked {
-        let record = self.record;
-        let time_s = record.time_s();
-        let report = RecordCheck {
-            file: record.file().display().to_string(),
-            usable: !self.is_fatal(),
-            rows: record.len(),
-            length_s: time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0),
-            findings: self.findings,
-            channels,
-        };
-        Checked { report, unusable: self.unusable }
-    }
 }

@@ -48,7 +48,6 @@ pub struct RecordArguments {
     /// the other steps write no files.
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// How they are read.
     #[command(flatten)]
     pub(crate) read: ReadArguments,
     /// Threads; the results do not depend on them. Default: all cores.
@@ -123,7 +122,6 @@ pub struct VerifyArguments {
     /// The held-out record.
     #[arg(long)]
     pub test: PathBuf,
-    /// How it is read.
     #[command(flatten)]
     pub(crate) read: ReadArguments,
     /// Folder for verification.json, made if missing; without it nothing is written.

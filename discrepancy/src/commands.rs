@@ -53,14 +53,8 @@ pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
         Command::Close(arguments) => close_command(&arguments.name, &arguments.test),
         Command::Name(arguments) => close_command(arguments, &[]),
         Command::Check(arguments) => check_command(arguments),
-        Command::Calibrate(arguments) => {
-            threads(arguments.threads);
-            calibrate_command(arguments)
-        }
-        Command::Locate(arguments) => {
-            threads(arguments.threads);
-            locate_command(arguments)
-        }
+        Command::Calibrate(arguments) => calibrate_command(arguments),
+        Command::Locate(arguments) => locate_command(arguments),
         Command::Extend(arguments) => extend_command(arguments),
         Command::Verify(arguments) => verify_command(arguments),
         Command::Next(arguments) => next_command(arguments),
@@ -359,6 +353,7 @@ fn next_command(arguments: &NextArguments) -> Result<Exit, CommandError> {
 }
 
 fn gridded_records(arguments: &RecordArguments) -> Result<(RigFile, Vec<GriddedRecord>), CommandError> {
+    threads(arguments.threads);
     never_seen(&arguments.train, &[])?;
     let rig_file = RigFile::read(&arguments.rig)?;
     let mut all = Vec::new();

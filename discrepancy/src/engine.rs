@@ -183,7 +183,6 @@ impl<'a> Engine<'a> {
         residual.chunks_exact(self.rows).map(|window| dot(window, window)).collect()
     }
 
-    /// The products of a residual with columns.
     pub(crate) fn products<C: AsRef<[f64]>>(&self, residual: &[f64], columns: &[C]) -> Products {
         Products::new(residual, columns, &self.scaled_dof, self.rows)
     }

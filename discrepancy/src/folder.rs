@@ -68,12 +68,10 @@ impl Folder {
         }
     }
 
-    /// Writes a text.
     pub(crate) fn write(&self, name: impl AsRef<Path>, text: &str) -> Result<(), FolderError> {
         write(&self.file(name)?, text)
     }
 
-    /// Writes a value as JSON.
     pub(crate) fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), FolderError> {
         let mut text = serde_json::to_string_pretty(value).expect("reports hold nothing that JSON does not");
         text.push('\n');

@@ -24,7 +24,6 @@ pub(crate) use subsample::searched_share;
 
 /// Simulated channels of an axis: position, force, pressures a and b.
 pub(crate) const CHANNELS: usize = 4;
-/// Their signals.
 pub(crate) const SIGNALS: [Signal; CHANNELS] =
     [Signal::Position, Signal::Force, Signal::PressureA, Signal::PressureB];
 /// Samples to each side of a local parabola of the position.
@@ -43,8 +42,7 @@ const JITTER_SPEED_M_PER_S: f64 = 0.1;
 /// Longest run of missing commands in a window.
 pub(crate) const HELD_LONGEST: usize = 3;
 
-/// A record on its grid.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct GriddedRecord {
     pub name: String,
     pub linked: bool,
@@ -160,10 +158,8 @@ impl GriddedRecord {
             inputs: vec![Inputs::default(); length],
             samples: vec![[[None; CHANNELS]; 2]; length],
             points: vec![[Point::default(); 2]; length],
-            noise: [[0.0; CHANNELS]; 2],
-            memory: [[0.0; CHANNELS]; 2],
-            jitter_s: 0.0,
             gaps: vec![false; length],
+            ..GriddedRecord::default()
         };
         for axis in Axis::ALL {
             if measured[axis.index()] {
@@ -194,23 +190,19 @@ impl GriddedRecord {
         let sensors = rig.sensors();
         let offset_m = if axis == Axis::Load { sensors.load_position_offset_m } else { 0.0 };
         let mut commands = vec![None; self.len()];
-        let valve = Channel::Of(axis, Signal::Valve);
-        let channels = [Signal::Valve].into_iter().chain(SIGNALS).map(|signal| Channel::Of(axis, signal));
-        let channels: Vec<Channel> = channels.collect();
         for (row, place) in places.iter().enumerate() {
+            let value = |signal: Signal| {
+                let channel = Channel::Of(axis, signal);
+                record.value(channel, row).filter(|_| checked.is_usable(channel, row))
+            };
             // An empty row must not replace a full one.
-            if !channels
-                .iter()
-                .any(|channel| record.value(*channel, row).is_some() && checked.is_usable(*channel, row))
-            {
+            if ![Signal::Valve].into_iter().chain(SIGNALS).any(|signal| value(signal).is_some()) {
                 continue;
             }
-            commands[*place] = record.value(valve, row).filter(|_| checked.is_usable(valve, row));
+            commands[*place] = value(Signal::Valve);
             for (at, signal) in SIGNALS.into_iter().enumerate() {
-                let channel = Channel::Of(axis, signal);
-                let value = record.value(channel, row).filter(|_| checked.is_usable(channel, row));
                 let offset = if signal == Signal::Position { offset_m } else { 0.0 };
-                self.samples[*place][i][at] = value.map(|value| value - offset);
+                self.samples[*place][i][at] = value(signal).map(|value| value - offset);
             }
         }
         let steps = [

@@ -73,7 +73,6 @@ const fn variable(name: &'static str, unit: &'static str, costs: usize, nodes: u
 /// Where baseline and records disagree.
 #[derive(Clone, Debug)]
 pub struct Located {
-    /// For the report.
     pub location: Location,
     /// Unknown inputs, one series for each observable balance.
     pub unknowns: Vec<UnknownSeries>,
@@ -182,13 +181,8 @@ fn cells(series: &UnknownSeries) -> Vec<RegimeCell> {
 /// Decimates a series for a picture by weighted means of neighbours.
 fn thinned(series: &UnknownSeries) -> UnknownInput {
     let join = series.points.len().div_ceil(SERIES).max(1);
-    let mut thin = UnknownInput {
-        balance: series.balance.clone(),
-        unit: series.unit.to_owned(),
-        time_s: Vec::new(),
-        value: Vec::new(),
-        noise: 0.0,
-    };
+    let (balance, unit) = (series.balance.clone(), series.unit.to_owned());
+    let mut thin = UnknownInput { balance, unit, ..UnknownInput::default() };
     let mut variances = 0.0;
     for points in series.points.chunks(join) {
         let (mut weights, mut values, mut times_s) = (0.0, 0.0, 0.0);

@@ -92,10 +92,7 @@ impl Found<'_> {
             surface: pair.map(|pair| surface(self.series, pair)),
             formula,
             variables,
-            added: false,
-            why_not: None,
-            tables: Vec::new(),
-            share_explained: None,
+            ..Outside::default()
         }
     }
 

@@ -50,7 +50,6 @@ pub struct Placed {
 #[derive(Clone, Debug)]
 pub struct Refit {
     pub placed: Vec<Placed>,
-    /// Factors of the parameters.
     pub factors: [f64; COUNT],
     /// The loss, priors and a penalty for each number of an effect and each parameter that is off included.
     pub loss: f64,
@@ -67,7 +66,6 @@ pub struct Refit {
 pub struct Linearisation {
     /// Sensitivities to the parameters.
     pub columns: Vec<Vec<f64>>,
-    /// Factors at that point.
     pub factors: [f64; COUNT],
 }
 

@@ -10,10 +10,11 @@ use std::collections::BTreeMap;
 /// Version of the schema; a new optional field does not change it.
 pub const SCHEMA_VERSION: u32 = 1;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// No effect is missing above the detection limits.
+    #[default]
     NothingMissing,
     /// Only baseline parameters are off.
     ParametersOnly,
@@ -27,7 +28,7 @@ pub enum Verdict {
     BadData,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     pub schema_version: u32,
     pub verdict: Verdict,
@@ -64,9 +65,7 @@ pub struct Report {
 /// Files of a run of the workflow.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct InputFiles {
-    /// The rig file.
     pub rig: String,
-    /// Training records.
     pub train: Vec<String>,
     /// Axes that all of them show, drive or load; empty for a model of one balance and for records that cannot be used.
     #[serde(default)]
@@ -86,7 +85,6 @@ impl Default for InputFiles {
     }
 }
 
-/// Where an effect is.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Where {
     /// drive, load, linkage or supply.
@@ -172,7 +170,7 @@ pub(crate) struct DetectionLimit {
 }
 
 /// A disagreement that no effect of the catalogue explains.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Outside {
     /// As in [`BalanceBar::balance`].
     pub balance: String,
@@ -221,13 +219,11 @@ pub struct Dependence {
 }
 
 /// A smooth curve with a band.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Curve {
     /// The variable, and its unit.
     pub variable: String,
-    /// Unit of the variable.
     pub(crate) variable_unit: String,
-    /// Unit of the term.
     pub unit: String,
     /// Values of the variable.
     pub at: Vec<f64>,
@@ -241,9 +237,7 @@ pub struct Curve {
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Surface {
     pub variables: [String; 2],
-    /// Their units.
     pub(crate) variable_units: [String; 2],
-    /// Unit of the term.
     pub unit: String,
     /// Values of the first variable, and of the second.
     pub at: [Vec<f64>; 2],
@@ -298,9 +292,7 @@ pub(crate) struct BeforeAfter {
 /// Where the baseline and the training records disagree.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Location {
-    /// One for each balance.
     pub balances: Vec<BalanceBar>,
-    /// One for each balance and regime.
     pub(crate) regimes: Vec<RegimeCell>,
     /// Unknown inputs over their strongest variables.
     pub(crate) maps: Vec<Curve>,
@@ -329,13 +321,12 @@ pub(crate) struct RegimeCell {
     pub balance: String,
     /// hold, onset, motion-out, motion-in, near-ends, valve-edge.
     pub(crate) regime: String,
-    /// Windows of this regime.
     pub windows: usize,
     /// As in [`BalanceBar::over_noise`].
     pub over_noise: f64,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct UnknownInput {
     /// As in [`BalanceBar::balance`].
     pub balance: String,
@@ -360,7 +351,7 @@ pub struct RecordCheck {
     pub channels: BTreeMap<String, ChannelCheck>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Finding {
     /// gap, repeated-time, jumping-time, clipped, stuck, wrong-unit, swapped-pressures, force-sign, lost-samples, …
     pub kind: String,

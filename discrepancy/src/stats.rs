@@ -18,7 +18,6 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, values.len() / 2)
 }
 
-/// Arithmetic mean.
 pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }

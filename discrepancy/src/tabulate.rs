@@ -45,7 +45,6 @@ const STEPS: usize = 5;
 const LEAST_SHARE: f64 = 0.05;
 const LEAST_SHARE_OF_SECOND: f64 = 0.15;
 
-/// Tables and parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Tables {
     pub(crate) terms: Vec<TableTerm>,
@@ -338,7 +337,6 @@ pub(crate) fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
     terms.iter().filter_map(table).collect()
 }
 
-/// The rig with additional tables.
 fn with_tables(rig: &RigParameters, tables: &[FittedTable]) -> Option<RigParameters> {
     let mut all = rig.tabulated().to_vec();
     all.extend(tables.iter().map(|fitted| fitted.table.clone()));

@@ -35,7 +35,7 @@ pub(crate) const FORCE: usize = 1;
 const COARSE_SUBSTEPS: u32 = 5;
 
 /// The windows of a record, with the subspaces that their start states span.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Windows<'a> {
     record: &'a GriddedRecord,
     rig: RigParameters,

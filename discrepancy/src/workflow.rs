@@ -35,9 +35,7 @@ use std::path::{Path, PathBuf};
 /// Inputs of the workflow.
 #[derive(Clone, Debug, Default)]
 pub struct Task {
-    /// The rig file.
     pub rig: PathBuf,
-    /// Training records.
     pub train: Vec<PathBuf>,
     /// The held-out record.
     pub test: Option<PathBuf>,
@@ -85,12 +83,10 @@ pub enum WorkflowError {
     Extend(#[from] ExtendError),
 }
 
-/// A rig file and its text.
 #[derive(Clone, Debug)]
 pub struct RigFile {
     pub file: String,
     pub text: String,
-    /// What it says.
     pub rig: RigParameters,
 }
 
@@ -383,19 +379,7 @@ mod tests {
     use super::*;
 
     fn record(name: &str, measured: [bool; 2], linked: bool) -> GriddedRecord {
-        GriddedRecord {
-            name: name.to_owned(),
-            linked,
-            added_mass_kg: 0.0,
-            measured,
-            inputs: Vec::new(),
-            samples: Vec::new(),
-            points: Vec::new(),
-            noise: [[1.0; 4]; 2],
-            memory: [[0.0; 4]; 2],
-            jitter_s: 0.0,
-            gaps: Vec::new(),
-        }
+        GriddedRecord { name: name.to_owned(), linked, measured, ..GriddedRecord::default() }
     }
 
     const DRIVE: [bool; 2] = [true, false];

@@ -1,20 +1,14 @@
 //! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
 
-use crate::record::gridded;
+use crate::record::{Hidden, gridded, hiding};
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
 use discrepancy::report::Outside;
 use plant::RigParameters;
 
-/// Name, place and numbers of an effect.
-type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
-
-fn located(effect: Option<Hidden<'_>>) -> (Located, Option<Outside>) {
+fn located(effects: &[Hidden<'_>]) -> (Located, Option<Outside>) {
     let rig = RigParameters::baseline();
-    let hidden = effect.map_or(rig.clone(), |(name, place, numbers)| {
-        rig.with_effect(name, place, numbers).expect("numbers of the sheet")
-    });
-    let records = [gridded(&hidden, &rig)];
+    let records = [gridded(&hiding(effects), &rig)];
     let located = locate(&rig, &records, &mut |_| ());
     let outside = outside(&located.unknowns, &mut |_| ());
     (located, outside)
@@ -27,7 +21,7 @@ fn over_noise(located: &Located, balance: &str) -> f64 {
 
 #[test]
 fn where_nothing_is_missing_every_balance_is_noise_and_nothing_is_outside() {
-    let (located, outside) = located(None);
+    let (located, outside) = located(&[]);
     for bar in &located.location.balances {
         // Some 500 windows: three standard errors of an rms are 0.1; the deviations themselves are good to a tenth.
         assert!((0.85..1.15).contains(&bar.over_noise), "{bar:?}");
@@ -38,7 +32,7 @@ fn where_nothing_is_missing_every_balance_is_noise_and_nothing_is_outside() {
 
 #[test]
 fn a_hidden_inclination_lifts_the_force_alone_and_is_a_constant() {
-    let (located, outside) = located(Some(("inclination", "drive", &[("force_n", 20.0)])));
+    let (located, outside) = located(&[("inclination", "drive", &[("force_n", 20.0)])]);
     assert!(over_noise(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
     for flow in ["drive.flow-a", "drive.flow-b"] {
         assert!(over_noise(&located, flow) < 1.15, "{:?}", located.location.balances);
@@ -56,7 +50,7 @@ fn a_hidden_inclination_lifts_the_force_alone_and_is_a_constant() {
 
 #[test]
 fn a_hidden_leak_lifts_its_chamber_and_not_the_force() {
-    let (located, outside) = located(Some(("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)])));
+    let (located, outside) = located(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)])]);
     assert!(over_noise(&located, "drive.flow-b") > 1.5, "{:?}", located.location.balances);
     assert!(over_noise(&located, "drive.flow-a") < 1.15, "{:?}", located.location.balances);
     assert!(over_noise(&located, "drive.force") < 1.15, "{:?}", located.location.balances);
@@ -66,7 +60,7 @@ fn a_hidden_leak_lifts_its_chamber_and_not_the_force() {
 #[test]
 fn a_hidden_spring_is_a_force_over_x() {
     let numbers = [("spring_n", 40.0)];
-    let (located, outside) = located(Some(("position-dependent-force", "drive", &numbers)));
+    let (located, outside) = located(&[("position-dependent-force", "drive", &numbers)]);
     assert!(over_noise(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
     let outside = outside.expect("something is missing");
     assert_eq!((outside.balance.as_str(), outside.variables[0].variable.as_str()), ("drive.force", "x"));
@@ -80,13 +74,13 @@ fn a_hidden_spring_is_a_force_over_x() {
 
 #[test]
 fn a_pressure_sensors_offset_moves_two_balances_in_the_ratio_of_geometry() {
-    let (located, _) = located(Some(("pressure-sensor-offset", "drive.a", &[("offset_mbar", 60.0)])));
+    let (located, _) = located(&[("pressure-sensor-offset", "drive.a", &[("offset_mbar", 60.0)])]);
     let note = located.location.sensor_ratio.expect("both stand out");
     assert!(note.contains("pressure sensor a"), "{note}");
 }
 
 #[test]
 fn the_same_records_give_the_same_bits() {
-    let tell = || format!("{:?}", located(None).0.location);
+    let tell = || format!("{:?}", located(&[]).0.location);
     assert_eq!(tell(), tell());
 }

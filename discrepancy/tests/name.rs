@@ -1,6 +1,6 @@
 //! Claims about naming, on records that the plant makes here with something hidden in it.
 
-use crate::record::gridded;
+use crate::record::{gridded, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{Found, name};
@@ -16,15 +16,6 @@ fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -
     let engine = Engine::new(&records, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
     name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())
-}
-
-/// Name, place and numbers of an effect.
-type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
-
-fn with(effects: &[Hidden<'_>]) -> RigParameters {
-    effects.iter().fold(RigParameters::baseline(), |rig, (name, place, numbers)| {
-        rig.with_effect(name, place, numbers).expect("numbers of the sheet")
-    })
 }
 
 fn names(found: &Found) -> Vec<String> {
@@ -48,7 +39,7 @@ fn rigs_side_by_side_show_what_each_shows_alone() {
     };
     // More than have room in one group, and one that does not run in lanes.
     let mut rigs: Vec<RigParameters> = (0..COUNT).map(off).collect();
-    rigs[3] = with(&[("inclination", "drive", &[("force_n", 20.0)])]);
+    rigs[3] = hiding(&[("inclination", "drive", &[("force_n", 20.0)])]);
     let windows = &engine.windows()[0];
     let together = windows.simulate_side_by_side(&rigs);
     for (rig, batched) in rigs.iter().zip(&together) {
@@ -74,7 +65,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
         [("rod-leakage", "drive.b", "leakage_nl_per_min"), ("inclination", "drive", "force_n")]
     {
         let amount = 1.5 * limit(&found, &format!("{effect} {place}"));
-        let found = self::found(&with(&[(effect, place, &[(key, amount)])]), &[]);
+        let found = self::found(&hiding(&[(effect, place, &[(key, amount)])]), &[]);
         assert_eq!(names(&found), [format!("{effect} {place}")], "{amount}");
     }
 }
@@ -90,7 +81,7 @@ fn limit(found: &Found, name: &str) -> f64 {
 
 #[test]
 fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
-    let found = found(&with(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 4.0)])]), &[]);
+    let found = found(&hiding(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 4.0)])]), &[]);
     assert_eq!(names(&found), ["rod-leakage drive.b"]);
     let placed = &found.model.placed[0];
     let leakage = placed.candidate.numbers(&placed.coordinates)[0];
@@ -101,7 +92,7 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
 
 #[test]
 fn two_hidden_effects_are_both_named() {
-    let hidden = with(&[
+    let hidden = hiding(&[
         ("inclination", "drive", &[("force_n", 12.0)]),
         ("valve-dead-zone", "drive", &[("dead_zone_percent", 2.0)]),
     ]);
@@ -113,7 +104,7 @@ fn two_hidden_effects_are_both_named() {
 #[test]
 fn an_effect_that_the_rig_file_has_is_named_where_it_is_off_and_only_there() {
     let leaking =
-        |nl_per_min: f64| with(&[("piston-leakage", "drive", &[("leakage_nl_per_min", nl_per_min)])]);
+        |nl_per_min: f64| hiding(&[("piston-leakage", "drive", &[("leakage_nl_per_min", nl_per_min)])]);
     let rig = leaking(3.0);
     assert_eq!(names(&found_beside(&rig, &rig, &[])), Vec::<String>::new());
     for truth in [0.0, 6.0] {
@@ -143,7 +134,7 @@ fn a_wrong_mass_is_a_parameter_and_no_effect() {
 
 #[test]
 fn what_is_no_candidate_is_outside_the_catalogue() {
-    let hidden = with(&[("position-dependent-force", "drive", &[("spring_n", 30.0)])]);
+    let hidden = hiding(&[("position-dependent-force", "drive", &[("spring_n", 30.0)])]);
     let found = found(&hidden, &["position-dependent-force"]);
     assert!(found.inadequate, "named {:?}", names(&found));
 }
@@ -151,7 +142,7 @@ fn what_is_no_candidate_is_outside_the_catalogue() {
 #[test]
 fn a_smaller_dead_volume_is_no_larger_machine() {
     // All else larger by as much as the volume is smaller shows the same: only what is believed of masses and areas tells.
-    let found = found(&with(&[("dead-volume", "drive", &[("volume_cm3", 16.4)])]), &[]);
+    let found = found(&hiding(&[("dead-volume", "drive", &[("volume_cm3", 16.4)])]), &[]);
     assert_eq!(names(&found), ["dead-volume drive"]);
     for (at, (factor, _)) in factors(&found).into_iter().enumerate() {
         assert!((factor - 1.0).abs() < 0.05, "parameter {at}: {factor}");

@@ -5,6 +5,16 @@ use discrepancy::workflow::{Task, open};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use std::fmt::Write;
 
+/// Name, place and numbers of an effect.
+pub(crate) type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
+
+/// The baseline with effects that nobody is told of.
+pub(crate) fn hiding(effects: &[Hidden<'_>]) -> RigParameters {
+    effects.iter().fold(RigParameters::baseline(), |rig, (name, place, numbers)| {
+        rig.with_effect(name, place, numbers).expect("numbers of the sheet")
+    })
+}
+
 /// Strokes of the records that are gridded, rad/s.
 pub(crate) const STROKES_RAD_PER_S: f64 = 1.3;
 

@@ -1,6 +1,6 @@
 //! What no effect of the catalogue explains is added to the model as a table, and closes the gap on another record.
 
-use crate::record::{STROKES_RAD_PER_S, measurement};
+use crate::record::{STROKES_RAD_PER_S, hiding, measurement};
 use discrepancy::report::Verdict;
 use discrepancy::workflow::{Outcome, Reported, RigFile, Task, close, extended};
 use plant::RigParameters;
@@ -24,9 +24,7 @@ fn closed(hidden: &RigParameters, without: &str) -> (Outcome, RigFile) {
 
 #[test]
 fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
-    let hidden = RigParameters::baseline()
-        .with_effect("position-dependent-force", "drive", &[("spring_n", 30.0)])
-        .expect("numbers of the sheet");
+    let hidden = hiding(&[("position-dependent-force", "drive", &[("spring_n", 30.0)])]);
     let (outcome, rig_file) = closed(&hidden, "position-dependent-force");
     let report = &outcome.report;
     assert_eq!(report.verdict, Verdict::OutsideCatalogue, "{}", report.summary);
@@ -55,9 +53,7 @@ fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
 
 #[test]
 fn what_a_table_cannot_add_to_is_described_and_not_added() {
-    let hidden = RigParameters::baseline()
-        .with_effect("force-sensor-offset", "drive", &[("offset_n", 25.0)])
-        .expect("numbers of the sheet");
+    let hidden = hiding(&[("force-sensor-offset", "drive", &[("offset_n", 25.0)])]);
     let (outcome, _) = closed(&hidden, "force-sensor-offset");
     let outside = outcome.report.outside.as_ref().expect("an offset is no other effect");
     assert_eq!(outside.balance, "drive.force-sensor");

@@ -210,12 +210,10 @@ impl Integrator {
         (lanes, supply_pa)
     }
 
-    /// Substeps in a period.
     pub(crate) fn substeps(&self) -> u32 {
         self.substeps
     }
 
-    /// Length of a substep, s.
     pub(crate) fn substep_s(&self) -> f64 {
         self.coarse.span_s
     }

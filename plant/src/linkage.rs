@@ -61,7 +61,6 @@ impl Linkage {
         }
     }
 
-    /// Half of the gap, m.
     pub(crate) fn half_gap_m(&self) -> f64 {
         self.half_gap_m
     }

@@ -233,11 +233,6 @@ fn check_together(entries: &Entries) -> Result<(), ParameterError> {
 
 fn inconsistent(entries: &Entries, table: &str, name: &str, rule: String) -> ParameterError {
     let entry = entries.entry(table, name);
-    ParameterError::Inconsistent {
-        file: entries.file.clone(),
-        line: entry.line,
-        key: format!("{table}.{name}"),
-        value: entry.text.clone(),
-        rule,
-    }
+    let said = format!("{table}.{name} = {} contradicts another key: {rule}", entry.text);
+    ParameterError::at(&entries.file, entry.line, &said)
 }

@@ -69,7 +69,6 @@ pub(crate) fn check_added_mass(rig: &RigParameters, value: f64) -> Result<f64, S
     if (0.0..=limit_kg).contains(&value) { Ok(value) } else { Err(SetupError::AddedMass { value, limit_kg }) }
 }
 
-/// The start state of a setup.
 pub(crate) fn start_state(rig: &RigParameters, setup: &Setup) -> Result<State, SetupError> {
     let stroke_m = rig.cylinder().stroke_m;
     let carriage_m = setup.carriage_position_m;

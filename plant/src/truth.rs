@@ -21,7 +21,6 @@ use crate::motion::side;
 use crate::state::{Inputs, State};
 use crate::valve::edge_flow;
 
-/// Columns of one axis.
 const AXIS_COLUMNS: usize = 20;
 /// Columns of both axes and of the rig.
 const COLUMNS: usize = 2 * AXIS_COLUMNS + 4;

@@ -133,14 +133,49 @@ fn a_key_with_a_default_may_be_left_out_and_any_other_is_asked_for() {
     }
 }
 
-/// Lines at the end of the shipped file, on which of them the mistake is, and the message.
-const CASES: &[(&str, usize, &str)] = &[
+/// Keys that are unknown in a table of an effect: the lines after `[effects.`, on which of them the key is, the key with its value,
+/// and what is known there.
+const UNKNOWN: &[(&str, usize, &str, &str)] = &[
+    ("piston-leak.drive]\nleakage_nl_per_min = 2.5", 0, "piston-leak = piston-leak", FIRST),
+    ("Piston-Leakage.drive]\nleakage_nl_per_min = 2.5", 0, "Piston-Leakage = ", ""),
+    ("piston-leakage]\nleakage_nl_per_min = 2.5", 1, "piston-leakage.leakage_nl_per_min = 2.5", AXES),
+    ("piston-leakage]\ndrive = 2.5", 1, "piston-leakage.drive = 2.5", AXES),
     (
-        "[effects.piston-leak.drive]\nleakage_nl_per_min = 2.5",
+        "piston-leakage.left]\nleakage_nl_per_min = 2.5",
         0,
-        "unknown key effects.piston-leak = piston-leak; known here: critical-pressure-ratio, valve-characteristic, ",
+        "piston-leakage.left = [effects.piston-leakage.left]",
+        AXES,
     ),
-    ("[effects.Piston-Leakage.drive]\nleakage_nl_per_min = 2.5", 0, "unknown key effects.Piston-Leakage = "),
+    ("piston-leakage.left]", 0, "piston-leakage.left = ", ""),
+    ("rod-leakage.drive]", 0, "rod-leakage.drive = [effects.rod-leakage.drive]", CHAMBERS),
+    (
+        "piston-leakage.drive.a]\nleakage_nl_per_min = 2.5",
+        0,
+        "piston-leakage.drive.a = [effects.piston-leakage.drive.a]",
+        "leakage_nl_per_min",
+    ),
+    (
+        "rod-leakage.drive.position]\nleakage_nl_per_min = 2.5",
+        0,
+        "rod-leakage.drive.position = [effects.rod-leakage.drive.position]",
+        CHAMBERS,
+    ),
+    ("rod-leakage.linkage.a]\nleakage_nl_per_min = 2.5", 0, "rod-leakage.linkage = linkage", CHAMBERS),
+    ("rod-leakage.drive]\nb = 2.5", 0, "rod-leakage.drive.b = 2.5", CHAMBERS),
+    ("coupling-backlash.drive]\ngap_mm = 1.0", 0, "coupling-backlash.drive", ""),
+    (
+        "piston-leakage.drive]\nleakage_nl_per_min = 2.5\nleakage_bar = 3",
+        2,
+        "piston-leakage.drive.leakage_bar = 3",
+        "leakage_nl_per_min",
+    ),
+];
+const FIRST: &str = "critical-pressure-ratio, valve-characteristic, ";
+const AXES: &str = "drive, load";
+const CHAMBERS: &str = "drive.a, drive.b, load.a, load.b";
+
+/// Other lines at the end of the shipped file, on which of them the mistake is, and the message.
+const CASES: &[(&str, usize, &str)] = &[
     (
         "[effects]\npiston-leakage = 2.5",
         1,
@@ -152,88 +187,15 @@ const CASES: &[(&str, usize, &str)] = &[
         "effects.rod-leakage = [[effects.rod-leakage]] is of the wrong type; allowed: drive.a, drive.b, load.a, load.b",
     ),
     (
-        "[effects.piston-leakage]\nleakage_nl_per_min = 2.5",
-        1,
-        "unknown key effects.piston-leakage.leakage_nl_per_min = 2.5; known here: drive, load",
-    ),
-    (
-        "[effects.piston-leakage]\ndrive = 2.5",
-        1,
-        "unknown key effects.piston-leakage.drive = 2.5; known here: drive, load",
-    ),
-    (
-        "[effects.piston-leakage.left]\nleakage_nl_per_min = 2.5",
-        0,
-        "unknown key effects.piston-leakage.left = [effects.piston-leakage.left]; known here: drive, load",
-    ),
-    ("[effects.piston-leakage.left]", 0, "unknown key effects.piston-leakage.left = "),
-    (
-        "[effects.rod-leakage.drive]",
-        0,
-        "unknown key effects.rod-leakage.drive = [effects.rod-leakage.drive]; known here: drive.a, drive.b, load.a, load.b",
-    ),
-    (
         "[effects.rod-leakage]",
         0,
         "effects.rod-leakage = [effects.rod-leakage] is of the wrong type; allowed: drive.a, ",
     ),
     (
-        "[effects.piston-leakage.drive.a]\nleakage_nl_per_min = 2.5",
-        0,
-        "unknown key effects.piston-leakage.drive.a = [effects.piston-leakage.drive.a]; known here: leakage_nl_per_min",
-    ),
-    (
-        "[effects.rod-leakage.drive.position]\nleakage_nl_per_min = 2.5",
-        0,
-        "unknown key effects.rod-leakage.drive.position = [effects.rod-leakage.drive.position]; \
-         known here: drive.a, drive.b, load.a, load.b",
-    ),
-    (
-        "[effects.rod-leakage.linkage.a]\nleakage_nl_per_min = 2.5",
-        0,
-        "unknown key effects.rod-leakage.linkage = linkage; known here: drive.a, drive.b, load.a, load.b",
-    ),
-    (
-        "[effects.rod-leakage.drive]\nb = 2.5",
-        0,
-        "unknown key effects.rod-leakage.drive.b = 2.5; known here: drive.a, drive.b, load.a, load.b",
-    ),
-    ("[effects.coupling-backlash.drive]\ngap_mm = 1.0", 0, "unknown key effects.coupling-backlash.drive"),
-    (
         "[effects.piston-leakage.drive]",
         0,
         "key effects.piston-leakage.drive.leakage_nl_per_min is missing from the table that starts here; \
          allowed: 0 to 50 Nl/min",
-    ),
-    (
-        "[effects.piston-leakage.drive]\nleakage_nl_per_min = 2.5\nleakage_bar = 3",
-        2,
-        "unknown key effects.piston-leakage.drive.leakage_bar = 3; known here: leakage_nl_per_min",
-    ),
-    (
-        "[effects.piston-leakage.drive]\nleakage_nl_per_min = 51",
-        1,
-        "effects.piston-leakage.drive.leakage_nl_per_min = 51 is out of range; allowed: 0 to 50 Nl/min",
-    ),
-    (
-        "[effects.piston-leakage.drive]\nleakage_nl_per_min = nan",
-        1,
-        "effects.piston-leakage.drive.leakage_nl_per_min = nan is out of range; allowed: 0 to 50 Nl/min",
-    ),
-    (
-        "[effects.piston-leakage.drive]\nleakage_nl_per_min = \"2\"",
-        1,
-        "effects.piston-leakage.drive.leakage_nl_per_min = \"2\" is of the wrong type; allowed: 0 to 50 Nl/min",
-    ),
-    (
-        "[effects.piston-leakage.drive]\nleakage_nl_per_min = [2.0]",
-        1,
-        "effects.piston-leakage.drive.leakage_nl_per_min = [2.0] is of the wrong type; allowed: 0 to 50 Nl/min",
-    ),
-    (
-        "[effects.piston-leakage.drive]\nleakage_nl_per_min = true",
-        1,
-        "effects.piston-leakage.drive.leakage_nl_per_min = true is of the wrong type; allowed: 0 to 50 Nl/min",
     ),
     (
         "[effects.pressure-sensor-offset.drive.a]\noffset_mbar = 1e9",
@@ -249,9 +211,26 @@ const CASES: &[(&str, usize, &str)] = &[
 
 #[test]
 fn every_mistake_is_named_with_file_line_key_value_and_what_is_allowed() {
-    for (lines, at, message) in CASES {
-        let error = refused(&with(lines));
+    let unknown = UNKNOWN.iter().map(|(lines, at, key, known)| {
+        let known = if known.is_empty() { String::new() } else { format!("; known here: {known}") };
+        (format!("[effects.{lines}"), at, format!("unknown key effects.{key}{known}"))
+    });
+    let others = CASES.iter().map(|(lines, at, message)| ((*lines).to_owned(), at, (*message).to_owned()));
+    for (lines, at, message) in unknown.chain(others) {
+        let error = refused(&with(&lines));
         let wanted = format!("my-rig.toml:{}: {message}", first_line() + at);
+        assert!(error.starts_with(&wanted), "\n   got {error}\nwanted {wanted}");
+    }
+    for (number, wrong) in [
+        ("51", "is out of range"),
+        ("nan", "is out of range"),
+        ("\"2\"", "is of the wrong type"),
+        ("[2.0]", "is of the wrong type"),
+        ("true", "is of the wrong type"),
+    ] {
+        let error = refused(&with(&format!("[effects.piston-leakage.drive]\nleakage_nl_per_min = {number}")));
+        let said = format!("effects.piston-leakage.drive.leakage_nl_per_min = {number} {wrong}");
+        let wanted = format!("my-rig.toml:{}: {said}; allowed: 0 to 50 Nl/min", first_line() + 1);
         assert!(error.starts_with(&wanted), "\n   got {error}\nwanted {wanted}");
     }
     let error = refused(&format!("effects = 3\n{}", RigParameters::BASELINE_TOML));

@@ -46,41 +46,16 @@ const NAMES: [&str; 38] = [
     "time-skew",
 ];
 
-/// Every key with its sheet.
 fn keys() -> impl Iterator<Item = (&'static Sheet, &'static EffectKey)> {
     SHEETS.iter().flat_map(|sheet| sheet.keys.iter().map(move |key| (sheet, key)))
 }
 
-/// What a key in this unit ends with, as the keys of the rig file do.
-fn ending(unit: Unit) -> &'static str {
-    match unit {
-        Unit::One => "",
-        Unit::Bits => "_bits",
-        Unit::Bar => "_bar",
-        Unit::Pascal => "_pa",
-        Unit::Kelvin => "_k",
-        Unit::Millimetre => "_mm",
-        Unit::Micrometre => "_um",
-        Unit::SquareMillimetre => "_mm2",
-        Unit::CubicCentimetre => "_cm3",
-        Unit::Second => "_s",
-        Unit::Millisecond => "_ms",
-        Unit::CubicMetrePerHour => "_m3_per_h",
-        Unit::Kilogram => "_kg",
-        Unit::Newton => "_n",
-        Unit::NewtonSecondPerMillimetre => "_n_per_mm_per_s",
-        Unit::NewtonPerMetre => "_n_per_m",
-        Unit::NewtonSecondPerMetre => "_n_s_per_m",
-        Unit::Percent => "_percent",
-        Unit::Millibar => "_mbar",
-        Unit::Metre => "_m",
-        Unit::MillimetrePerSecond => "_mm_per_s",
-        Unit::Hertz => "_hz",
-        Unit::PerSecond => "_per_s",
-        Unit::NormalLitrePerMinute => "_nl_per_min",
-        Unit::NewtonPerBar => "_n_per_bar",
-        Unit::WattPerSquareMetreKelvin => "_w_per_m2_k",
-    }
+/// What a key in this unit ends with, as the keys of the rig file do: `_n_per_mm_per_s` of `N/(mm/s)`.
+fn ending(unit: Unit) -> String {
+    let spelt = unit.name().to_lowercase().replace('%', "percent").replace('/', "_per_").replace(' ', "_");
+    // Of 1/s nothing is left before the slash.
+    let spelt = spelt.replace(['^', '(', ')'], "").trim_start_matches('1').to_owned();
+    if spelt.is_empty() || spelt.starts_with('_') { spelt } else { format!("_{spelt}") }
 }
 
 #[test]
@@ -106,7 +81,7 @@ fn keys_are_unique_in_their_sheet_and_end_with_their_unit() {
         let path = format!("{}.{}", sheet.name, key.name);
         let snake = key.name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
         assert!(snake, "{path}");
-        assert!(key.name.ends_with(ending(key.unit)), "{path}: end with {}", ending(key.unit));
+        assert!(key.name.ends_with(&ending(key.unit)), "{path}: end with {}", ending(key.unit));
         assert_eq!(sheet.keys.iter().filter(|other| other.name == key.name).count(), 1, "{path} twice");
     }
 }
@@ -114,9 +89,9 @@ fn keys_are_unique_in_their_sheet_and_end_with_their_unit() {
 #[test]
 fn a_key_without_a_unit_does_not_look_as_if_it_had_one() {
     let units = keys().map(|(_, key)| ending(key.unit)).filter(|ending| !ending.is_empty());
-    let units: Vec<&str> = units.collect();
+    let units: Vec<String> = units.collect();
     for (sheet, key) in keys().filter(|(_, key)| key.unit == Unit::One) {
-        assert!(!units.iter().any(|unit| key.name.ends_with(unit)), "{}.{}", sheet.name, key.name);
+        assert!(!units.iter().any(|unit| key.name.ends_with(unit.as_str())), "{}.{}", sheet.name, key.name);
     }
 }
 

@@ -62,43 +62,59 @@ fn edited(from: &str, to: &str) -> (String, usize) {
     (text.replacen(&format!("\n{from}\n"), &format!("\n{to}\n"), 1), line)
 }
 
-/// What the file says wrong, and the message with `LINE` for the place.
-const CASES: &[(&str, &str, &str)] = &[
+/// A key, what stands in place of its number, and what the message says of it.
+const VALUES: &[(&str, &str, &str)] = &[
+    ("supply.pressure_bar", "99", "is out of range; allowed: 3 to 12 bar"),
+    ("supply.pressure_bar", "-7.0", "is out of range; allowed: 3 to 12 bar"),
+    ("supply.pressure_bar", "nan", "is out of range; allowed: 3 to 12 bar"),
+    ("supply.pressure_bar", "inf", "is out of range; allowed: 3 to 12 bar"),
+    ("supply.pressure_bar", "\"7\"", "is of the wrong type; allowed: 3 to 12 bar"),
+    ("supply.pressure_bar", "[7.0]", "is of the wrong type; allowed: 3 to 12 bar"),
+    ("supply.pressure_bar", "true", "is of the wrong type; allowed: 3 to 12 bar"),
+    ("sensors.position_bits", "15.5", "is out of range; allowed: a whole number, 8 to 16 bits"),
+    ("valve.opening", "[0.0, 0.03, 0.2, 0.5, 1.0]", "is of the wrong type; allowed: 6 numbers, each 0 to 1"),
+    ("valve.opening", "[0.0, 0.03, 0.2, 0.5, 0.8, 1.2]", "is out of range; allowed: 6 numbers, each 0 to 1"),
     (
-        "pressure_bar = 7.0",
-        "pressure_bar = 99",
-        "supply.pressure_bar = 99 is out of range; allowed: 3 to 12 bar",
+        "valve.opening",
+        "[0.0, 0.03, 0.5, 0.2, 0.8, 1.0]",
+        "contradicts another key: the openings must start at 0, grow by at least 0.001, and end at 1",
     ),
     (
-        "pressure_bar = 7.0",
-        "pressure_bar = -7.0",
-        "supply.pressure_bar = -7.0 is out of range; allowed: 3 to 12 bar",
+        "valve.kv_supply_m3_per_h",
+        "[0.0, 0.0, 0.115, 0.36, 0.60, 0.5]",
+        "contradicts another key: K_V must be 0 at opening 0 and never fall with valve.opening",
     ),
     (
-        "pressure_bar = 7.0",
-        "pressure_bar = nan",
-        "supply.pressure_bar = nan is out of range; allowed: 3 to 12 bar",
+        "valve.kv_exhaust_m3_per_h",
+        "[0.1, 0.1, 0.2, 0.30, 0.52, 0.58]",
+        "contradicts another key: K_V must be 0 at opening 0 and never fall with valve.opening",
     ),
     (
-        "pressure_bar = 7.0",
-        "pressure_bar = inf",
-        "supply.pressure_bar = inf is out of range; allowed: 3 to 12 bar",
+        "cylinder.annulus_area_mm2",
+        "1963.5",
+        "contradicts another key: it must be below cylinder.piston_area_mm2 = 1963.5",
     ),
     (
-        "pressure_bar = 7.0",
-        "pressure_bar = \"7\"",
-        "supply.pressure_bar = \"7\" is of the wrong type; allowed: 3 to 12 bar",
+        "friction.sliding_force_n",
+        "36",
+        "contradicts another key: it must not be above friction.break_away_force_n = 35",
+    ),
+    ("mass.carriage_kg", "5", "contradicts another key: it must be below mass.drive_kg = 5.0"),
+    (
+        "supply.atmospheric_pressure_bar",
+        "1.1",
+        "contradicts another key: it must not be above supply.exhaust_pressure_bar = 1.01325",
     ),
     (
-        "pressure_bar = 7.0",
-        "pressure_bar = [7.0]",
-        "supply.pressure_bar = [7.0] is of the wrong type; allowed: 3 to 12 bar",
+        "start.rod_side_pressure_bar",
+        "8",
+        "contradicts another key: it must lie between \
+         supply.exhaust_pressure_bar = 1.01325 and supply.pressure_bar = 7.0",
     ),
-    (
-        "pressure_bar = 7.0",
-        "pressure_bar = true",
-        "supply.pressure_bar = true is of the wrong type; allowed: 3 to 12 bar",
-    ),
+];
+
+/// A line, what stands in its place, and the whole message.
+const LINES: &[(&str, &str, &str)] = &[
     (
         "pressure_bar = 7.0",
         "pressure_psi = 100",
@@ -111,83 +127,23 @@ const CASES: &[(&str, &str, &str)] = &[
         "unknown key plasma = [plasma]; known here: supply, gas, valve, cylinder, friction, mass, linkage, start, sensors",
     ),
     ("gap_mm = 0.2", "gap_mm = 0.2 mm", "not TOML: "),
-    (
-        "position_bits = 16",
-        "position_bits = 15.5",
-        "sensors.position_bits = 15.5 is out of range; allowed: a whole number, 8 to 16 bits",
-    ),
-    (
-        "opening = [0.0, 0.03, 0.2, 0.5, 0.8, 1.0]",
-        "opening = [0.0, 0.03, 0.2, 0.5, 1.0]",
-        "valve.opening = [0.0, 0.03, 0.2, 0.5, 1.0] is of the wrong type; allowed: 6 numbers, each 0 to 1",
-    ),
-    (
-        "opening = [0.0, 0.03, 0.2, 0.5, 0.8, 1.0]",
-        "opening = [0.0, 0.03, 0.2, 0.5, 0.8, 1.2]",
-        "valve.opening = [0.0, 0.03, 0.2, 0.5, 0.8, 1.2] is out of range; allowed: 6 numbers, each 0 to 1",
-    ),
-    (
-        "opening = [0.0, 0.03, 0.2, 0.5, 0.8, 1.0]",
-        "opening = [0.0, 0.03, 0.5, 0.2, 0.8, 1.0]",
-        "valve.opening = [0.0, 0.03, 0.5, 0.2, 0.8, 1.0] contradicts another key: \
-         the openings must start at 0, grow by at least 0.001, and end at 1",
-    ),
-    (
-        "kv_supply_m3_per_h = [0.0, 0.0, 0.115, 0.36, 0.60, 0.66]",
-        "kv_supply_m3_per_h = [0.0, 0.0, 0.115, 0.36, 0.60, 0.5]",
-        "valve.kv_supply_m3_per_h = [0.0, 0.0, 0.115, 0.36, 0.60, 0.5] contradicts another key: \
-         K_V must be 0 at opening 0 and never fall with valve.opening",
-    ),
-    (
-        "kv_exhaust_m3_per_h = [0.0, 0.0, 0.095, 0.30, 0.52, 0.58]",
-        "kv_exhaust_m3_per_h = [0.1, 0.1, 0.2, 0.30, 0.52, 0.58]",
-        "valve.kv_exhaust_m3_per_h = [0.1, 0.1, 0.2, 0.30, 0.52, 0.58] contradicts another key: \
-         K_V must be 0 at opening 0 and never fall with valve.opening",
-    ),
-    (
-        "annulus_area_mm2 = 1649.3",
-        "annulus_area_mm2 = 1963.5",
-        "cylinder.annulus_area_mm2 = 1963.5 contradicts another key: it must be below cylinder.piston_area_mm2 = 1963.5",
-    ),
-    (
-        "sliding_force_n = 26",
-        "sliding_force_n = 36",
-        "friction.sliding_force_n = 36 contradicts another key: it must not be above friction.break_away_force_n = 35",
-    ),
-    (
-        "carriage_kg = 3.5",
-        "carriage_kg = 5",
-        "mass.carriage_kg = 5 contradicts another key: it must be below mass.drive_kg = 5.0",
-    ),
-    (
-        "atmospheric_pressure_bar = 1.01325",
-        "atmospheric_pressure_bar = 1.1",
-        "supply.atmospheric_pressure_bar = 1.1 contradicts another key: it must not be above supply.exhaust_pressure_bar = 1.01325",
-    ),
-    (
-        "rod_side_pressure_bar = 3.5",
-        "rod_side_pressure_bar = 8",
-        "start.rod_side_pressure_bar = 8 contradicts another key: it must lie between \
-         supply.exhaust_pressure_bar = 1.01325 and supply.pressure_bar = 7.0",
-    ),
 ];
 
 #[test]
 fn every_mistake_is_named_with_file_line_key_value_and_range() {
-    for (from, to, message) in CASES {
+    let refused = |from: &str, to: &str, message: &str| {
         let (text, line) = edited(from, to);
-        match RigParameters::from_toml(&text, "my-rig.toml") {
-            Ok(_) => assert!(message.is_empty(), "{to} was taken"),
-            Err(error) => {
-                let error = error.to_string();
-                let wanted = format!("my-rig.toml:{line}: {message}");
-                assert!(
-                    !message.is_empty() && error.starts_with(&wanted),
-                    "\n   got {error}\nwanted {wanted}"
-                );
-            }
-        }
+        let error = RigParameters::from_toml(&text, "my-rig.toml").expect_err(to).to_string();
+        let wanted = format!("my-rig.toml:{line}: {message}");
+        assert!(error.starts_with(&wanted), "\n   got {error}\nwanted {wanted}");
+    };
+    for (path, value, message) in VALUES {
+        let start = format!("{} = ", path.split_once('.').expect("a table and its key").1);
+        let mut lines = RigParameters::BASELINE_TOML.lines();
+        let line = lines.find(|line| line.starts_with(&start)).expect("a line of the key");
+        refused(line, &format!("{start}{value}"), &format!("{path} = {value} {message}"));
     }
+    LINES.iter().for_each(|(from, to, message)| refused(from, to, message));
 }
 
 #[test]

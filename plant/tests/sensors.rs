@@ -14,16 +14,13 @@ fn noiseless() -> RigParameters {
     rig
 }
 
-fn all(readings: &[AxisReadings; 2]) -> [(Reading, f64); 8] {
+/// Each reading with its sensor's step.
+fn all(readings: &[AxisReadings; 2]) -> Vec<(Reading, f64)> {
     let (x, f, p) = (0.5 / 65535.0, 2000.0 / 32767.0, 1e6 / 16383.0);
     let of = |axis: &AxisReadings| {
         [(axis.position, x), (axis.force, f), (axis.pressure_a, p), (axis.pressure_b, p)]
     };
-    let [drive, load] = readings;
-    let mut both = [of(drive)[0]; 8];
-    both[..4].copy_from_slice(&of(drive));
-    both[4..].copy_from_slice(&of(load));
-    both
+    readings.iter().flat_map(of).collect()
 }
 
 #[test]

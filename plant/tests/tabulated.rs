@@ -49,8 +49,7 @@ fn whatever_is_wrong_is_named_with_line_key_value_and_what_is_allowed() {
     let first = RigParameters::BASELINE_TOML.lines().count() + 1;
     let many: Vec<String> = (0..65).map(|at| at.to_string()).collect();
     let many = format!("{HEAD}at = [{}]\nvalue_n = [1, 2]", many.join(", "));
-    let of_head = |lines: &str| format!("{HEAD}{lines}");
-    for (lines, line, message) in [
+    let whole = [
         ("tabulated = 3".to_owned(), 0, "tables, each under [[tabulated]]"),
         ("[tabulated]\nat = [0, 1]".to_owned(), 0, "is of the wrong type; allowed: tables"),
         ("[[tabulated]]\nvariable = \"x\"".to_owned(), 0, "key tabulated.balance is missing"),
@@ -65,35 +64,27 @@ fn whatever_is_wrong_is_named_with_line_key_value_and_what_is_allowed() {
             "tabulated.variable = \"dp/dt\" is of the wrong type; allowed: x, v, ",
         ),
         (HEAD.replace("\"x\"", "1"), 2, "tabulated.variable = 1 is of the wrong type"),
-        (of_head("value_n = [0, 1]"), 0, "key tabulated.at is missing"),
-        (of_head("at = [0, 1]"), 0, "key tabulated.value_n is missing"),
-        (
-            of_head("at = [0, 1]\nvalue = [0, 1]"),
-            4,
-            "unknown key tabulated.value = [0, 1]; known here: balance, ",
-        ),
-        (of_head("at = [0, 1]\nvalue_nl_per_min = [0, 1]"), 4, "unknown key tabulated.value_nl_per_min"),
-        (
-            of_head("at = [0]\nvalue_n = [1]"),
-            3,
-            "tabulated.at = [0] is out of range; allowed: 2 to 64 numbers",
-        ),
         (many, 3, "is out of range; allowed: 2 to 64 numbers"),
-        (of_head("at = [0, nan]\nvalue_n = [1, 2]"), 3, "tabulated.at = [0, nan] is out of range"),
-        (of_head("at = [0, 1]\nvalue_n = [1, nan]"), 4, "tabulated.value_n = [1, nan] is out of range"),
-        (of_head("at = [0, 1]\nvalue_n = [1, 1e9]"), 4, "2 to 64 numbers, each -2000 to 2000"),
-        (of_head("at = [0, \"1\"]\nvalue_n = [1, 2]"), 3, "tabulated.at = [0, \"1\"] is of the wrong type"),
+    ];
+    let below_head = [
+        ("value_n = [0, 1]", 0, "key tabulated.at is missing"),
+        ("at = [0, 1]", 0, "key tabulated.value_n is missing"),
+        ("at = [0, 1]\nvalue = [0, 1]", 4, "unknown key tabulated.value = [0, 1]; known here: balance, "),
+        ("at = [0, 1]\nvalue_nl_per_min = [0, 1]", 4, "unknown key tabulated.value_nl_per_min"),
+        ("at = [0]\nvalue_n = [1]", 3, "tabulated.at = [0] is out of range; allowed: 2 to 64 numbers"),
+        ("at = [0, nan]\nvalue_n = [1, 2]", 3, "tabulated.at = [0, nan] is out of range"),
+        ("at = [0, 1]\nvalue_n = [1, nan]", 4, "tabulated.value_n = [1, nan] is out of range"),
+        ("at = [0, 1]\nvalue_n = [1, 1e9]", 4, "2 to 64 numbers, each -2000 to 2000"),
+        ("at = [0, \"1\"]\nvalue_n = [1, 2]", 3, "tabulated.at = [0, \"1\"] is of the wrong type"),
         (
-            of_head("at = [1, 1]\nvalue_n = [1, 2]"),
+            "at = [1, 1]\nvalue_n = [1, 2]",
             3,
             "tabulated.at = [1, 1] contradicts another key: each number must",
         ),
-        (
-            of_head("at = [0, 1]\nvalue_n = [1, 2, 3]"),
-            4,
-            "it must hold as many numbers as tabulated.at, 2, not 3",
-        ),
-    ] {
+        ("at = [0, 1]\nvalue_n = [1, 2, 3]", 4, "it must hold as many numbers as tabulated.at, 2, not 3"),
+    ];
+    let below_head = below_head.map(|(lines, line, message)| (format!("{HEAD}{lines}"), line, message));
+    for (lines, line, message) in whole.into_iter().chain(below_head) {
         // A key before any table has to stand before the first table of the file.
         let text = if lines.starts_with("tabulated") {
             format!("{lines}\n{}", RigParameters::BASELINE_TOML)

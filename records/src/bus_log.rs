@@ -54,11 +54,9 @@ fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, R
     let whole = if candump::read_line(&text[cut..]).is_some() { text } else { &text[..cut] };
     for (line, text) in (1..).zip(whole.lines()).filter(|(_, text)| !text.trim().is_empty()) {
         let Some(read) = candump::read_line(text) else {
-            return Err(ReadError::LogLine {
-                file: file.into(),
-                line,
-                text: text.chars().take(80).collect(),
-            });
+            let text: String = text.chars().take(80).collect();
+            let said = "is no line of candump -L, such as (1700000000.123456) can0 120#0011AABB";
+            return Err(ReadError::at(file, line, format!("'{text}' {said}")));
         };
         match Frame::decode(&read.frame) {
             Ok(frame) => log.push(Logged { line, stamp_ns: read.stamp_ns, frame }),
@@ -132,13 +130,9 @@ fn expect_no_long_hole(file: &Path, log: &[Logged], cycles: &Cycles) -> Result<(
     for ((before, _), (after, line)) in lines.iter().zip(lines.iter().skip(1)) {
         let hole_s = (after - before) as f64 * PERIOD_S;
         if hole_s > LONGEST_HOLE_S as f64 {
-            let file = file.into();
-            return Err(ReadError::LongHole {
-                file,
-                line: *line,
-                seconds: hole_s,
-                at_most_s: LONGEST_HOLE_S,
-            });
+            let said = format!("{hole_s:.0} s without a frame of sensors before this line");
+            let advice = format!("{LONGEST_HOLE_S} s at most: split the log there");
+            return Err(ReadError::at(file, *line, format!("{said}, {advice}")));
         }
     }
     Ok(())
@@ -237,7 +231,10 @@ impl Row {
     ) -> Result<(), ReadError> {
         self.line.get_or_insert(line);
         match self.sensors[axis].replace(sensors) {
-            Some(before) if before != sensors => Err(ReadError::TwoRigs { file: file.into(), line, cycle }),
+            Some(before) if before != sensors => {
+                let said = format!("other sensors of cycle {cycle} than before: two rigs on one bus?");
+                Err(ReadError::at(file, line, said + " Record each alone"))
+            }
             _ => Ok(()),
         }
     }

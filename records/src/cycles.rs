@@ -27,7 +27,6 @@ pub(super) struct Logged {
     pub(super) frame: Frame,
 }
 
-/// Cycles of a log.
 pub(super) struct Cycles {
     /// The cycle of each frame of sensors, in the order of the log; `None` for other frames.
     pub(super) of: Vec<Option<u64>>,
@@ -37,7 +36,6 @@ pub(super) struct Cycles {
     pub(super) guessed: bool,
 }
 
-/// Finds the cycles of a log.
 pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
     let mut numbers: Vec<Option<i64>> = vec![None; log.len()];
     let mut known: Option<(i64, u64)> = None;
@@ -70,12 +68,9 @@ pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
                     Some((newest, _)) if anchored => {
                         let cycle = wrapped(newest, tick.cycle);
                         if cycle < newest - ROUND {
-                            return Err(ReadError::Restarted {
-                                file: file.into(),
-                                line: logged.line,
-                                cycle: u64::from(tick.cycle),
-                                before: newest.cast_unsigned(),
-                            });
+                            let cycles = format!("cycle {} after {}", tick.cycle, newest.cast_unsigned());
+                            let said = format!("the rig starts anew ({cycles}): split the log there");
+                            return Err(ReadError::at(file, logged.line, said));
                         }
                         cycle
                     }

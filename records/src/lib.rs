@@ -28,6 +28,7 @@ pub use error::ReadError;
 pub use mapping::Mapping;
 
 use plant::Axis;
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// How a record is read; the default reads everything that rig and rehearsal write.
@@ -68,11 +69,11 @@ pub enum Form {
     Measurement,
     /// `bus.log`.
     BusLog,
-    /// Foreign CSV.
     Foreign,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct RigSetup {
     /// Whether the load's eye sat in the carriage.
     pub linked: bool,

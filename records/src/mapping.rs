@@ -69,16 +69,9 @@ struct File {
     #[serde(rename = "atmospheric_pressure_Pa")]
     atmospheric_pressure_pa: f64,
     #[serde(default)]
-    setup: FileSetup,
+    setup: RigSetup,
     time: FileTime,
     channels: BTreeMap<String, FileChannel>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct FileSetup {
-    linked: bool,
-    added_mass_kg: f64,
 }
 
 #[derive(Deserialize)]
@@ -172,8 +165,8 @@ impl Mapping {
         let decimal_comma = check.decimal_comma(&read, layout.separator)?;
         let key = "atmospheric_pressure_Pa";
         let atmosphere_pa = check.above(key, read.atmospheric_pressure_pa, 5e4, "more than 50000")?;
-        let FileSetup { linked, added_mass_kg } = read.setup;
-        check.above("setup.added_mass_kg", added_mass_kg, -f64::MIN_POSITIVE, "0 or more")?;
+        let mass_kg = read.setup.added_mass_kg;
+        check.above("setup.added_mass_kg", mass_kg, -f64::MIN_POSITIVE, "0 or more")?;
         let (time, nominal_period_s) = check.time(read.time)?;
         let channels = read.channels.into_iter();
         let channels = channels.map(|(name, channel)| check.channel(&name, channel, atmosphere_pa));
@@ -185,7 +178,7 @@ impl Mapping {
             decimal_comma,
             absent,
             ignore: read.ignore,
-            setup: RigSetup { linked, added_mass_kg },
+            setup: read.setup,
             time,
             nominal_period_s,
             channels,

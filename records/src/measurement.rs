@@ -39,16 +39,16 @@ fn read_comments(table: &Table, unknown: Unknown, record: &mut Record) -> Result
                 read_setup(table, *line, word, unknown, record)?;
             }
         } else if unknown == Unknown::Refused {
-            let allowed = "one comment in the first line, # linked=true added_mass_kg=0".into();
-            return Err(ReadError::NotBlind {
-                file: table.file.clone(),
-                line: *line,
-                text: text.clone(),
-                allowed,
-            });
+            let allowed = "one comment in the first line, # linked=true added_mass_kg=0";
+            return Err(not_blind(table, *line, text, allowed));
         }
     }
     Ok(())
+}
+
+fn not_blind(table: &Table, line: u64, text: &str, allowed: &str) -> ReadError {
+    let said = format!("'{text}' is refused in a blind record; allowed are {allowed}");
+    ReadError::at(&table.file, line, said)
 }
 
 fn read_setup(
@@ -59,13 +59,7 @@ fn read_setup(
     record: &mut Record,
 ) -> Result<(), ReadError> {
     let (key, value) = word.split_once('=').unwrap_or((word, ""));
-    let refused = |allowed| ReadError::Cell {
-        file: table.file.clone(),
-        line,
-        column: key.to_owned(),
-        value: value.to_owned(),
-        allowed,
-    };
+    let refused = |allowed| table.refused(line, key, value, allowed);
     match key {
         "linked" => record.setup.linked = value.parse().map_err(|_| refused("true or false"))?,
         "added_mass_kg" => {
@@ -73,8 +67,7 @@ fn read_setup(
             record.setup.added_mass_kg = mass_kg.ok_or_else(|| refused("a number of kg, not below 0"))?;
         }
         _ if unknown == Unknown::Refused => {
-            let (file, allowed) = (table.file.clone(), "linked, added_mass_kg".into());
-            return Err(ReadError::NotBlind { file, line, text: word.to_owned(), allowed });
+            return Err(not_blind(table, line, word, "linked, added_mass_kg"));
         }
         _ => record
             .warn(line, format!("'{word}' in the first line is ignored; known are linked, added_mass_kg")),
@@ -95,9 +88,7 @@ fn channels(
             places.push((channel, place));
         } else if column != "time_s" {
             if unknown == Unknown::Refused {
-                let allowed = allowed_columns();
-                let (file, line, text) = (table.file.clone(), table.head_line, column.clone());
-                return Err(ReadError::NotBlind { file, line, text, allowed });
+                return Err(not_blind(table, table.head_line, column, &allowed_columns()));
             }
             record.warn(table.head_line, format!("column {column} is ignored: no record has it"));
         }

@@ -32,7 +32,6 @@ impl Default for Layout {
     }
 }
 
-/// An unparsed table.
 pub(super) struct Table {
     pub(super) file: PathBuf,
     /// Names of the columns.
@@ -41,7 +40,6 @@ pub(super) struct Table {
     pub(super) head_line: u64,
     /// Comment lines with their numbers.
     pub(super) comments: Vec<(u64, String)>,
-    /// Rows with their lines.
     pub(super) rows: Vec<(u64, csv::StringRecord)>,
     /// The last line, when it is not whole: somebody was killed while writing.
     pub(super) cut: Option<u64>,
@@ -108,16 +106,16 @@ impl Table {
         let expected = self.head.len();
         for (place, column) in self.head.iter().enumerate() {
             if self.head[..place].contains(column) {
-                let (file, line, column) = (self.file.clone(), self.head_line, column.clone());
-                return Err(ReadError::RepeatedColumn { file, line, column });
+                let said = format!("column {column} stands twice: delete or rename one");
+                return Err(ReadError::at(&self.file, self.head_line, said));
             }
         }
         if !whole && self.rows.last().is_some_and(|(_, row)| row.len() < expected) {
             self.cut = self.rows.pop().map(|(line, _)| line);
         }
         if let Some((line, row)) = self.rows.iter().find(|(_, row)| row.len() != expected) {
-            let (file, line, cells) = (self.file.clone(), *line, row.len());
-            return Err(ReadError::Width { file, line, cells, expected });
+            let said = format!("{} cells, but the head has {expected}", row.len());
+            return Err(ReadError::at(&self.file, *line, said));
         }
         if self.rows.is_empty() {
             return Err(ReadError::Empty { file: self.file.clone() });
@@ -125,31 +123,29 @@ impl Table {
         Ok(())
     }
 
-    /// The place of a column.
     pub(super) fn place(&self, column: &str) -> Option<usize> {
         self.head.iter().position(|name| name == column)
     }
 
     /// The place of a column that must be there.
     pub(super) fn required(&self, column: &str) -> Result<usize, ReadError> {
-        self.place(column).ok_or_else(|| ReadError::MissingColumn {
-            file: self.file.clone(),
-            line: self.head_line,
-            column: column.to_owned(),
-            found: self.head.join(", "),
+        self.place(column).ok_or_else(|| {
+            let said = format!("column {column} is missing; the file has {}", self.head.join(", "));
+            ReadError::at(&self.file, self.head_line, said)
         })
     }
 
     /// The number in a cell that is not empty.
     pub(super) fn number(&self, line: u64, place: usize, cell: &str, comma: bool) -> Result<f64, ReadError> {
         let parsed = if comma { cell.replacen(',', ".", 1).parse() } else { cell.parse::<f64>() };
-        parsed.ok().filter(|number| number.is_finite()).ok_or_else(|| ReadError::Cell {
-            file: self.file.clone(),
-            line,
-            column: self.head[place].clone(),
-            value: cell.to_owned(),
-            allowed: "a finite number, or an empty cell where there is no value",
+        parsed.ok().filter(|number| number.is_finite()).ok_or_else(|| {
+            let allowed = "a finite number, or an empty cell where there is no value";
+            self.refused(line, &self.head[place], cell, allowed)
         })
+    }
+
+    pub(super) fn refused(&self, line: u64, what: &str, value: &str, allowed: &str) -> ReadError {
+        ReadError::at(&self.file, line, format!("{what} = '{value}'; allowed is {allowed}"))
     }
 }
 

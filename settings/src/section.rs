@@ -42,8 +42,8 @@ impl<'a> Source<'a> {
         line_of(self.text, at)
     }
 
-    fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
-        written(self.text, value.span())
+    fn error_at(&self, line: usize, said: &str) -> SettingsError {
+        SettingsError(format!("{}:{line}: {said}", self.file.display()))
     }
 }
 
@@ -99,9 +99,8 @@ impl<'a> Section<'a> {
             }
             None => {
                 let Parameter { name, unit, least, most, .. } = parameter;
-                let written = self.source.written(value);
-                let allowed = format!("allowed is a number, {least} to {most} {unit}");
-                Err(self.reported(value, &format!("{name} = {written}; {}", allowed.trim_end())))
+                let allowed = format!("a number, {least} to {most} {unit}");
+                Err(self.not_allowed(value, name, allowed.trim_end()))
             }
         }
     }
@@ -145,10 +144,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.value(key) else { return Ok(None) };
         match value.get_ref().as_str() {
             Some(text) => Ok(Some(Text { text: text.into(), line: self.source.line(value.span().start) })),
-            None => {
-                let written = self.source.written(value);
-                Err(self.reported(value, &format!("{key} = {written}; allowed is a text in quotes")))
-            }
+            None => Err(self.not_allowed(value, key, "a text in quotes")),
         }
     }
 
@@ -178,8 +174,7 @@ impl<'a> Section<'a> {
         let list = value.get_ref().as_array();
         let texts = list.and_then(|list| list.iter().map(|item| item.get_ref().as_str()).collect());
         let Some(texts): Option<Vec<&str>> = texts else {
-            let written = self.source.written(value);
-            return Err(self.reported(value, &format!("{key} = {written}; allowed is a list of texts")));
+            return Err(self.not_allowed(value, key, "a list of texts"));
         };
         texts.into_iter().map(|text| self.chosen(key, text, choices)).collect()
     }
@@ -244,15 +239,14 @@ impl<'a> Section<'a> {
         let Some(name) = self.table.keys().find(unknown) else { return Ok(()) };
         let line = self.source.line(name.span().start);
         let path = self.path_of(name.get_ref());
-        let said = format!("{line}: unknown key {path}; allowed is {}", self.asked.join(", "));
-        Err(SettingsError(format!("{}:{said}", self.source.file.display())))
+        Err(self.source.error_at(line, &format!("unknown key {path}; allowed is {}", self.asked.join(", "))))
     }
 
     /// An error of the whole table.
     #[must_use]
     pub fn wrong(&self, said: &str) -> SettingsError {
         let dot = if self.path.is_empty() { "" } else { "." };
-        SettingsError(format!("{}:{}: {}{dot}{said}", self.source.file.display(), self.line(), self.path))
+        self.source.error_at(self.line(), &format!("{}{dot}{said}", self.path))
     }
 
     /// An error of the value under `key`, which begins with that key.
@@ -270,9 +264,13 @@ impl<'a> Section<'a> {
         self.wrong(&format!("{said}; the keys here are {}", keys.join(", ")))
     }
 
+    fn not_allowed(&self, value: &Spanned<DeValue<'_>>, key: &str, allowed: &str) -> SettingsError {
+        let written = written(self.source.text, value.span());
+        self.reported(value, &format!("{key} = {written}; allowed is {allowed}"))
+    }
+
     fn reported(&self, value: &Spanned<DeValue<'_>>, said: &str) -> SettingsError {
-        let line = self.source.line(value.span().start);
-        SettingsError(format!("{}:{line}: {}", self.source.file.display(), self.path_of(said)))
+        self.source.error_at(self.source.line(value.span().start), &self.path_of(said))
     }
 
     fn path_of(&self, key: &str) -> String {
@@ -289,10 +287,7 @@ impl<'a> Section<'a> {
     fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>) -> Result<Self, SettingsError> {
         let Some(table) = value.get_ref().as_table() else {
             let line = self.source.line(value.span().start);
-            return Err(SettingsError(format!(
-                "{}:{line}: {path} must be a table",
-                self.source.file.display()
-            )));
+            return Err(self.source.error_at(line, &format!("{path} must be a table")));
         };
         Ok(Self { source: self.source, path, table, at: value.span().start, asked: Vec::new() })
     }

@@ -11,38 +11,27 @@ pub(super) struct Notes<'a> {
     pub(super) unusable: Vec<Vec<bool>>,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Subject {
-    /// The column's channel; `None` for time and for the record as a whole.
-    pub(super) channel: Option<Channel>,
-    /// First row.
-    pub(super) row: Option<usize>,
-}
-
 impl<'a> Notes<'a> {
     pub(super) fn new(record: &'a Record) -> Self {
         Notes { record, findings: Vec::new(), unusable: vec![Vec::new(); Channel::COUNT] }
     }
 
-    /// Adds a finding; its text is prefixed by file, line and column.
-    pub(super) fn add(&mut self, kind: &str, subject: Subject, fatal: bool, text: &str) {
-        let line = subject.row.map(|row| self.record.line(row));
-        let column = subject.channel.map(Channel::column);
-        let file = self.record.file().display();
-        let place = line.map_or_else(|| format!("{file}"), |line| format!("{file}:{line}"));
-        let text = match &column {
-            Some(column) => format!("{place}: {column}: {text}"),
-            None => format!("{place}: {text}"),
-        };
-        self.findings.push(Finding { kind: kind.into(), column, line, fatal, text });
+    /// Adds a finding of a channel from its first row on; its text is prefixed by file, line and column.
+    pub(super) fn add(&mut self, kind: &str, channel: Channel, row: Option<usize>, fatal: bool, text: &str) {
+        self.push(kind, channel.column(), row, fatal, &format!("{channel}: {text}"));
     }
 
     /// The same for time.
     pub(super) fn add_time(&mut self, kind: &str, row: Option<usize>, fatal: bool, text: &str) {
-        self.add(kind, Subject { channel: None, row }, fatal, text);
-        if let Some(finding) = self.findings.last_mut() {
-            finding.column = Some("time_s".into());
-        }
+        self.push(kind, "time_s".into(), row, fatal, text);
+    }
+
+    fn push(&mut self, kind: &str, column: String, row: Option<usize>, fatal: bool, text: &str) {
+        let line = row.map(|row| self.record.line(row));
+        let file = self.record.file().display();
+        let place = line.map_or_else(|| format!("{file}"), |line| format!("{file}:{line}"));
+        let (kind, column, text) = (kind.into(), Some(column), format!("{place}: {text}"));
+        self.findings.push(Finding { kind, column, line, fatal, text });
     }
 
     pub(super) fn leave_out(&mut self, channel: Channel, row: usize) {

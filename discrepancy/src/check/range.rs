@@ -8,7 +8,7 @@
 
 use super::PARKED;
 use super::grid::Grid;
-use super::notes::{Notes, Subject};
+use super::notes::Notes;
 use super::quantum;
 use super::stuck::{by_chance, is_rest, runs};
 use plant::RigParameters;
@@ -48,13 +48,13 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
         let Some(first) = (0..bad.len()).find(|place| bad[*place]) else { continue };
         let clipped = bad.iter().filter(|bad| **bad).count();
         let level = values[first].unwrap_or(0.0);
-        let subject = Subject { channel: Some(channel), row: grid.rows[first] };
+        let row = grid.rows[first];
         let present: Vec<f64> = values.iter().flatten().copied().collect();
         if at_limit && is_parked(channel, &present) {
             let text = format!(
                 "the axis stands at the end of its stroke all the time ({level} m): it tells nothing here"
             );
-            notes.add(PARKED, subject, false, &text);
+            notes.add(PARKED, channel, row, false, &text);
         } else {
             let share = clipped as f64 / present.len().max(1) as f64;
             let fatal = share > MOST;
@@ -68,7 +68,7 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
                     "they are left out with their neighbours"
                 }
             );
-            notes.add("clipped", subject, fatal, &text);
+            notes.add("clipped", channel, row, fatal, &text);
         }
         for place in (0..bad.len()).filter(|place| bad[*place]) {
             let around = place.saturating_sub(NEIGHBOURS)..(place + NEIGHBOURS + 1).min(bad.len());

@@ -13,7 +13,7 @@
 //! Source: rig-model.md, One axis, and Masses and linkage; effects.md, Which pairs look alike, r_a and r_F.
 
 use super::grid::Grid;
-use super::notes::{Notes, Subject};
+use super::notes::Notes;
 use crate::stats::{means, slopes};
 use plant::{Axis, RigParameters, StaticValve};
 use records::{Channel, Signal};
@@ -111,7 +111,7 @@ fn add_finding(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usiz
         "{text}; flow and force balance correlate by {:.2} and {:.2} as the columns stand, and hold when that is changed",
         balances[0], balances[1]
     );
-    notes.add(kind, Subject { channel: Some(Channel::Of(axis, signal)), row }, true, &text);
+    notes.add(kind, Channel::Of(axis, signal), row, true, &text);
 }
 
 fn motion(notes: &Notes, rig: &RigParameters, grid: &Grid, axis: Axis, reading: Reading) -> Motion {
@@ -302,10 +302,8 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     if spread < FORCE_SHOWS * rig.sensors().force_noise_n || pairs.correlation().abs() < HOLDS {
         return;
     }
-    let subject = Subject {
-        channel: Some(Channel::Of(axis, Signal::Force)),
-        row: pairs.worst.and_then(|place| grid.rows[place]),
-    };
+    let channel = Channel::Of(axis, Signal::Force);
+    let row = pairs.worst.and_then(|place| grid.rows[place]);
     let by = if linked { "the pressures" } else { "the acceleration" };
     if pairs.correlation() < 0.0 {
         let text = format!(
@@ -313,7 +311,7 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
              multiply the column by -1",
             pairs.correlation()
         );
-        return notes.add("force-sign", subject, true, &text);
+        return notes.add("force-sign", channel, row, true, &text);
     }
     let conversion = FORCES.into_iter().find(|(_, factor)| (0.8..1.25).contains(&(pairs.slope() * factor)));
     if let Some((unit, factor)) = conversion.filter(|_| !linked) {
@@ -321,6 +319,6 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
             "a share of {:.4} of what {by} would have it be: it reads as {unit}: multiply the column by {factor}",
             pairs.slope()
         );
-        notes.add("wrong-unit", subject, true, &text);
+        notes.add("wrong-unit", channel, row, true, &text);
     }
 }

@@ -6,7 +6,7 @@
 //! is dead.
 
 use super::grid::Grid;
-use super::notes::{Notes, Subject};
+use super::notes::Notes;
 use super::quantum;
 use plant::RigParameters;
 use records::{Channel, Quantity, Signal};
@@ -62,10 +62,10 @@ fn add_finding(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Optio
                 1e3 * grid.period_s * run.places.len() as f64,
                 if fatal { "look at the sensor and its cable, and record again" } else { "left out there" }
             );
-            notes.add("stuck", Subject { channel: Some(channel), row }, fatal, &text);
+            notes.add("stuck", channel, row, fatal, &text);
         } else if number == LISTED {
             let text = format!("stuck {} more times: left out there", stuck.len() - LISTED);
-            notes.add("stuck", Subject { channel: Some(channel), row }, fatal, &text);
+            notes.add("stuck", channel, row, fatal, &text);
         }
         grid.rows[run.places.clone()].iter().flatten().for_each(|row| notes.leave_out(channel, *row));
     }

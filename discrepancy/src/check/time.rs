@@ -16,7 +16,6 @@ const SHORTEST_S: f64 = SHORTEST as f64 * PERIOD_S;
 pub(crate) const FEWEST_ROWS: usize = 50;
 /// Rows missing in a row that are a hole and not lost samples; a command is held over the latter.
 const HOLE: usize = HELD_LONGEST + 1;
-/// Holes that are listed one by one.
 const HOLES_LISTED: usize = 20;
 /// Part of a period by which times must differ to be two.
 const SAME: f64 = 0.01;
@@ -257,7 +256,7 @@ fn absent(notes: &mut Notes) {
             1e2 * share,
             if fatal { "too many, record again" } else { "they are left open" }
         );
-        notes.add("absent-values", super::notes::Subject { channel: Some(channel), row }, fatal, &text);
+        notes.add("absent-values", channel, row, fatal, &text);
     }
 }
 

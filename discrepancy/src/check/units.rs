@@ -4,7 +4,7 @@
 //! in [-1, 1]. A channel out of bounds is reported with the unit that explains it. A force has no such bounds; its sign and size
 //! are tested elsewhere.
 
-use super::notes::{Notes, Subject};
+use super::notes::Notes;
 use crate::stats::quantile;
 use plant::{Axis, RigParameters};
 use records::{Channel, Signal};
@@ -40,7 +40,7 @@ fn spread(notes: &Notes, channel: Channel) -> Option<[f64; 3]> {
 
 fn add_finding(notes: &mut Notes, channel: Channel, beyond: impl Fn(f64) -> bool, text: &str) {
     let row = (0..notes.record.len()).find(|row| notes.value(channel, *row).is_some_and(&beyond));
-    notes.add("wrong-unit", Subject { channel: Some(channel), row }, true, text);
+    notes.add("wrong-unit", channel, row, true, text);
 }
 
 fn pressure(notes: &mut Notes, rig: &RigParameters, channel: Channel) {

@@ -33,6 +33,11 @@ fn extended(text: &str, additions: &[Addition], changed: &[Quantity]) -> RigPara
     RigParameters::from_toml(&text, "rig.toml").unwrap()
 }
 
+fn refused(additions: &[Addition], changed: &[Quantity]) -> String {
+    let text = RigParameters::BASELINE_TOML;
+    extend(text, "rig.toml", additions, changed, Axis::Drive, &records()).unwrap_err().to_string()
+}
+
 /// Lines of the new text that the old one has not.
 fn new_lines<'t>(old: &str, new: &'t str) -> Vec<&'t str> {
     new.lines().filter(|line| !old.lines().any(|old| old == *line)).collect()
@@ -90,41 +95,34 @@ fn a_changed_parameter_keeps_its_comments_and_its_old_value() {
     );
 }
 
+/// Numbers of a rig that a parameter scales, each with its parameter.
+fn scaled(rig: &RigParameters) -> [(f64, &'static str); 13] {
+    let (mass, friction, valve, cylinder) = (rig.mass(), rig.friction(), rig.valve(), rig.cylinder());
+    [
+        (mass.drive_kg, "parameter:mass"),
+        (mass.carriage_kg, "parameter:mass"),
+        (mass.load_kg, "parameter:mass"),
+        (friction.viscous_n_s_per_m, "parameter:viscous-friction"),
+        (friction.sliding_force_n, "parameter:sliding-friction"),
+        (friction.break_away_force_n, "parameter:break-away-force"),
+        (rig.supply().pressure_pa, "parameter:supply-pressure"),
+        (valve.spool_time_constant_s, "parameter:spool-time-constant"),
+        (valve.flow_lag_time_constant_s, "parameter:flow-lag"),
+        (valve.kv_supply_m3_per_h[3], "parameter:kv-scale"),
+        (valve.kv_exhaust_m3_per_h[5], "parameter:kv-scale"),
+        (cylinder.piston_area_m2, "parameter:piston-area"),
+        (cylinder.annulus_area_m2, "parameter:piston-area"),
+    ]
+}
+
 #[test]
 fn each_parameter_scales_what_the_records_of_the_study_scale() {
     let base = RigParameters::baseline();
     let text = RigParameters::BASELINE_TOML;
     for name in names() {
         let rig = extended(text, &[], &[quantity(name, 1.03, "", None)]);
-        let ratios = [
-            (rig.mass().drive_kg / base.mass().drive_kg, "parameter:mass"),
-            (rig.mass().carriage_kg / base.mass().carriage_kg, "parameter:mass"),
-            (rig.mass().load_kg / base.mass().load_kg, "parameter:mass"),
-            (
-                rig.friction().viscous_n_s_per_m / base.friction().viscous_n_s_per_m,
-                "parameter:viscous-friction",
-            ),
-            (rig.friction().sliding_force_n / base.friction().sliding_force_n, "parameter:sliding-friction"),
-            (
-                rig.friction().break_away_force_n / base.friction().break_away_force_n,
-                "parameter:break-away-force",
-            ),
-            (rig.supply().pressure_pa / base.supply().pressure_pa, "parameter:supply-pressure"),
-            (
-                rig.valve().spool_time_constant_s / base.valve().spool_time_constant_s,
-                "parameter:spool-time-constant",
-            ),
-            (
-                rig.valve().flow_lag_time_constant_s / base.valve().flow_lag_time_constant_s,
-                "parameter:flow-lag",
-            ),
-            (rig.valve().kv_supply_m3_per_h[3] / base.valve().kv_supply_m3_per_h[3], "parameter:kv-scale"),
-            (rig.valve().kv_exhaust_m3_per_h[5] / base.valve().kv_exhaust_m3_per_h[5], "parameter:kv-scale"),
-            (rig.cylinder().piston_area_m2 / base.cylinder().piston_area_m2, "parameter:piston-area"),
-            (rig.cylinder().annulus_area_m2 / base.cylinder().annulus_area_m2, "parameter:piston-area"),
-        ];
-        for (ratio, of) in ratios {
-            let wanted = if of == name { 1.03 } else { 1.0 };
+        for ((value, of), (before, _)) in scaled(&rig).into_iter().zip(scaled(&base)) {
+            let (ratio, wanted) = (value / before, if of == name { 1.03 } else { 1.0 });
             assert!((ratio - wanted).abs() < 1e-12, "{name}: {of} times {ratio}");
         }
         for path in Axis::ALL.iter().flat_map(|axis| key_of_parameter(name, *axis).unwrap()) {
@@ -256,38 +254,27 @@ fn unusual_tables_keep_their_layout() {
 
 #[test]
 fn what_no_rig_can_hold_is_refused_with_what_could_be() {
-    let base = RigParameters::BASELINE_TOML;
-    let refused = |additions: &[Addition], changed: &[Quantity]| {
-        extend(base, "rig.toml", additions, changed, Axis::Drive, &records()).unwrap_err().to_string()
-    };
-    let says = |message: String, parts: &[&str]| {
+    let says = |additions: &[Addition], changed: &[Quantity], parts: &[&str]| {
+        let message = refused(additions, changed);
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     };
-    says(refused(&[addition("gremlins", "drive", &[])], &[]), &["gremlins", "piston-leakage"]);
-    says(refused(&[addition("piston-leakage", "drive.a", &[])], &[]), &["drive.a", "drive, load"]);
-    says(
-        refused(&[addition("piston-leakage", "drive", &[("size", 1.0, None)])], &[]),
-        &["size", "leakage_nl_per_min"],
-    );
-    let huge = addition("piston-leakage", "drive", &[("leakage_nl_per_min", 1e6, None)]);
-    says(
-        refused(&[huge], &[]),
-        &["effects.piston-leakage.drive.leakage_nl_per_min = 1000000.0 is out of range", "Nl/min"],
-    );
-    let nan = addition("piston-leakage", "drive", &[("leakage_nl_per_min", f64::NAN, None)]);
-    says(refused(&[nan], &[]), &["leakage_nl_per_min = NaN"]);
-    says(refused(&[leakage(), leakage()], &[]), &["piston-leakage at drive", "twice"]);
-    says(refused(&[addition("piston-leakage", "drive", &[])], &[]), &["missing", "leakage_nl_per_min"]);
-    says(refused(&[], &[quantity("parameter:colour", 1.0, "", None)]), &["colour", "parameter:mass"]);
-    says(refused(&[], &[quantity("parameter:mass", 5e3, "g", Some(5.0))]), &["\"g\"", "\"kg\""]);
-    says(
-        refused(&[], &[quantity("parameter:supply-pressure", 20.0, "bar", Some(7.0))]),
-        &["supply.pressure_bar = 20.0 is out of range; allowed: 3 to 12 bar"],
-    );
+    let leak = |numbers: &[_]| addition("piston-leakage", "drive", numbers);
+    says(&[addition("gremlins", "drive", &[])], &[], &["gremlins", "piston-leakage"]);
+    says(&[addition("piston-leakage", "drive.a", &[])], &[], &["drive.a", "drive, load"]);
+    says(&[leak(&[("size", 1.0, None)])], &[], &["size", "leakage_nl_per_min"]);
+    let out_of_range = "effects.piston-leakage.drive.leakage_nl_per_min = 1000000.0 is out of range";
+    says(&[leak(&[("leakage_nl_per_min", 1e6, None)])], &[], &[out_of_range, "Nl/min"]);
+    says(&[leak(&[("leakage_nl_per_min", f64::NAN, None)])], &[], &["leakage_nl_per_min = NaN"]);
+    says(&[leakage(), leakage()], &[], &["piston-leakage at drive", "twice"]);
+    says(&[leak(&[])], &[], &["missing", "leakage_nl_per_min"]);
+    says(&[], &[quantity("parameter:colour", 1.0, "", None)], &["colour", "parameter:mass"]);
+    says(&[], &[quantity("parameter:mass", 5e3, "g", Some(5.0))], &["\"g\"", "\"kg\""]);
+    let pressure = quantity("parameter:supply-pressure", 20.0, "bar", Some(7.0));
+    says(&[], &[pressure], &["supply.pressure_bar = 20.0 is out of range; allowed: 3 to 12 bar"]);
     let twice = quantity("parameter:flow-lag", 1.1, "", None);
-    says(refused(&[], &[twice.clone(), twice]), &["valve.flow_lag_time_constant_ms", "twice"]);
+    says(&[], &[twice.clone(), twice], &["valve.flow_lag_time_constant_ms", "twice"]);
     let broken = extend("[supply", "rig.toml", &[], &[], Axis::Drive, &[]).unwrap_err().to_string();
-    says(broken, &["rig.toml:1: not TOML"]);
+    assert!(broken.contains("rig.toml:1: not TOML"), "{broken}");
 }
 
 #[test]
@@ -352,11 +339,7 @@ fn a_number_of_the_file_is_changed_where_it_stands_and_its_neighbours_stay() {
 
 #[test]
 fn a_number_of_the_file_is_refused_where_it_is_none() {
-    let refused = |changed: &[Quantity]| {
-        extend(RigParameters::BASELINE_TOML, "rig.toml", &[], changed, Axis::Drive, &records())
-            .unwrap_err()
-            .to_string()
-    };
+    let refused = |changed: &[Quantity]| refused(&[], changed);
     let volume = quantity("cylinder.dead_volume_cm3", 24.5, "cm^3", Some(20.0));
     assert!(refused(&[volume.clone(), volume.clone()]).contains("changed twice"));
     assert!(refused(&[Quantity { unit: "l".to_owned(), ..volume.clone() }]).contains("\"cm^3\""));

@@ -15,7 +15,6 @@ const BLOCK: usize = 6;
 /// Seconds of measured axes in the search; the final fit uses all of the records.
 pub(crate) const SEARCHED_S: f64 = 20.0;
 
-/// Share of the records that is searched.
 pub(crate) fn searched_share(records: &[GriddedRecord]) -> f64 {
     let axes = |record: &GriddedRecord| record.measured.iter().filter(|measured| **measured).count();
     let all_s: f64 =
@@ -61,17 +60,12 @@ mod tests {
     fn record(periods: usize) -> GriddedRecord {
         let inputs = |at: usize| Inputs { valve: [at as f64, 0.0], ..Inputs::default() };
         GriddedRecord {
-            name: "a".to_owned(),
-            linked: false,
-            added_mass_kg: 0.0,
             measured: [true, true],
             inputs: (0..periods).map(inputs).collect(),
             samples: vec![[[None; super::super::CHANNELS]; 2]; periods],
             points: vec![[super::super::Point::default(); 2]; periods],
-            noise: [[1.0; 4]; 2],
-            memory: [[0.0; 4]; 2],
-            jitter_s: 0.0,
             gaps: vec![false; periods],
+            ..GriddedRecord::default()
         }
     }
 

@@ -32,9 +32,7 @@ pub(crate) fn map(series: &UnknownSeries, variable: usize) -> Curve {
         variable: format!("{} over {}", series.balance, VARIABLES[variable].name),
         variable_unit: VARIABLES[variable].unit.to_owned(),
         unit: series.unit.to_owned(),
-        at: Vec::new(),
-        value: Vec::new(),
-        band: Vec::new(),
+        ..Curve::default()
     };
     let places = bins(&series.points.iter().map(|point| point.variables[variable]).collect::<Vec<_>>());
     for bin in 0..BINS {

@@ -108,7 +108,6 @@ fn coordinates(placed: &[Placed]) -> usize {
 struct JointLinearisation {
     /// Sensitivities, parameters first.
     columns: Vec<Vec<f64>>,
-    /// Prior precisions.
     precisions: Vec<f64>,
     /// Deviations from the prior means.
     from: Vec<f64>,

@@ -33,7 +33,6 @@ const CLOSE: f64 = 0.02;
 const BACKLASH: &str = "coupling-backlash";
 
 pub(super) struct Contenders {
-    /// Null loss of the screening.
     null_loss: f64,
     best: Vec<Screened>,
     /// The backlash of linked rods, whatever its screened gain.

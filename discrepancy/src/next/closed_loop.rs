@@ -46,7 +46,6 @@ pub enum ClosedLoopError {
 #[derive(Clone, Debug)]
 pub struct ClosedLoopRun {
     pub linked: bool,
-    /// State at the start.
     pub start: State,
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.

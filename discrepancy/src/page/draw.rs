@@ -172,7 +172,6 @@ impl Plot {
 }
 
 pub(super) struct Bar {
-    /// What it is of.
     pub(super) label: String,
     /// Its length, over the line at 1.
     pub(super) value: f64,

@@ -68,16 +68,11 @@ fn effect(named: &NamedEffect) -> String {
     if !named.alternatives.is_empty() {
         text += &paragraph("These records do not distinguish it from:");
         let row = |other: &NamedEffect| {
-            let values: Vec<String> = other
-                .parameters
-                .iter()
-                .map(|quantity| format!("{} {}", words::key(quantity), words::quantity(quantity)))
-                .collect();
             let law = plant::effects::sheet(&other.effect).map_or("", |sheet| sheet.law);
             vec![
                 Cell::About(other.effect.clone(), law.to_owned()),
                 said(words::place(&other.effect, &other.place)),
-                said(values.join(", ")),
+                said(words::numbers(other)),
                 number(words::percent(other.share_explained)),
             ]
         };

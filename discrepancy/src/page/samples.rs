@@ -203,24 +203,16 @@ fn check(file: &str) -> RecordCheck {
     }
 }
 
-/// A report of this verdict and its pictures.
 pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
     let size = if verdict == Verdict::NothingMissing { 0.02 } else { 1.0 };
     let mut pictures = pictures(size);
     let mut report = Report {
-        schema_version: SCHEMA_VERSION,
-        verdict,
-        summary: String::new(),
         inputs: InputFiles {
             rig: "rig.toml".to_owned(),
             train: vec!["train.csv".to_owned(), "more <&>.csv".to_owned()],
             axes: vec!["drive".into()],
             searched_share: 1.0,
         },
-        named: Vec::new(),
-        parameters: Vec::new(),
-        carried: Vec::new(),
-        outside: None,
         gap: gap(),
         verification: Some(verification()),
         candidates: candidates(size),
@@ -241,7 +233,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             .collect(),
         location: Some(location(size)),
         checks: vec![check("train.csv"), check("more <&>.csv")],
-        next: None,
+        ..crate::workflow::empty(verdict, String::new())
     };
     let leakage = || {
         let value = quantity("leakage_nl_per_min", 2.513_17, 0.0412, "Nl/min", None);

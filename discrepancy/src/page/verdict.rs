@@ -65,12 +65,8 @@ fn named(named: &NamedEffect) -> Vec<String> {
 }
 
 fn one(named: &NamedEffect, before: &str) -> String {
-    let numbers: Vec<String> = named
-        .parameters
-        .iter()
-        .map(|quantity| format!("{} {}", words::key(quantity), words::quantity(quantity)))
-        .collect();
-    let numbers = if numbers.is_empty() { String::new() } else { format!(": {}", numbers.join(", ")) };
+    let numbers = words::numbers(named);
+    let numbers = if numbers.is_empty() { numbers } else { format!(": {numbers}") };
     format!(
         "{before}<b>{}</b> at the {}{}; it explains {} of the disagreement",
         escaped(&named.effect),

@@ -1,6 +1,6 @@
 //! Numbers, places and signals as a person reads them. What is no number is a dash, never NaN.
 
-use crate::report::{Quantity, Where, decimals};
+use crate::report::{NamedEffect, Quantity, Where, decimals};
 use plant::effects::sheet;
 use plant::effects::sheet::PlaceKind;
 
@@ -75,10 +75,16 @@ pub(super) fn quantity(quantity: &Quantity) -> String {
 }
 
 /// A key without the unit at its end: `leakage` of `leakage_nl_per_min`.
-pub(super) fn key(quantity: &Quantity) -> String {
+fn key(quantity: &Quantity) -> String {
     let name = quantity.name.as_str();
     let end = KEY_ENDS.iter().filter_map(|end| name.strip_suffix(end)).min_by_key(|rest| rest.len());
     end.filter(|rest| !rest.is_empty()).unwrap_or(name).replace('_', " ")
+}
+
+/// The numbers of an effect, each behind its name: `leakage 2.513 ± 0.041 Nl/min`.
+pub(super) fn numbers(named: &NamedEffect) -> String {
+    let numbers = named.parameters.iter().map(|number| format!("{} {}", key(number), quantity(number)));
+    numbers.collect::<Vec<_>>().join(", ")
 }
 
 /// What names of effects' keys end with, after their units.

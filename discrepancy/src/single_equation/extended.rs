@@ -88,7 +88,6 @@ fn entry_of(effect: &str, parameters: &[Quantity]) -> TermEntry {
     term(effect, form.unwrap_or(""), &shape)
 }
 
-/// Which forms an effect has.
 fn allowed(effect: &str, form: &str) -> bool {
     match effect {
         "friction-asymmetry" => form == "viscous",

@@ -24,7 +24,6 @@ pub(crate) enum Kind {
 /// A checked model file.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
-    /// Which balance.
     pub(crate) kind: Kind,
     /// What it is called in reports.
     pub(crate) name: String,
@@ -116,7 +115,6 @@ impl Default for Selection {
 pub(crate) struct Baseline {
     /// Viscous friction; by default of a mass.
     pub(crate) viscous: Option<bool>,
-    /// Sliding friction.
     pub(crate) sliding: bool,
     /// Constant force or flow.
     pub(crate) offset: bool,
@@ -129,13 +127,19 @@ impl Default for Baseline {
 }
 
 /// A term that was added to the model; its numbers are for information and refitted with the others.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct TermEntry {
     pub(crate) effect: String,
     /// Which form of it; empty where there is one.
+    #[serde(default)]
     pub(crate) form: String,
     /// Numbers that shape it, in the units of their names.
+    #[serde(default)]
     pub(crate) shape: BTreeMap<String, f64>,
+    /// What [`super::extended_model_text`] writes for people.
+    #[serde(default, rename = "fitted")]
+    pub(super) _fitted: toml::Table,
 }
 
 #[derive(Deserialize)]
@@ -155,20 +159,7 @@ struct File {
     #[serde(default)]
     baseline: Baseline,
     #[serde(default)]
-    terms: Vec<FileTerm>,
-}
-
-/// As [`TermEntry`], with what [`super::extended_model_text`] writes for people.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileTerm {
-    effect: String,
-    #[serde(default)]
-    form: String,
-    #[serde(default)]
-    shape: BTreeMap<String, f64>,
-    #[serde(default, rename = "fitted")]
-    _fitted: toml::Table,
+    terms: Vec<TermEntry>,
 }
 
 /// What each kind needs, and the column it is in when the file does not say.
@@ -190,7 +181,6 @@ fn needed(kind: Kind) -> &'static [(&'static str, &'static str)] {
 }
 
 impl Model {
-    /// Reads a model file.
     pub(crate) fn read(file: &Path) -> Result<Self, BalanceError> {
         Self::from_toml(&DescriptionError::read("model", file)?, file)
     }
@@ -265,9 +255,6 @@ impl Model {
         if let Some(mapping) = &read.mapping {
             Mapping::read(&folder.join(mapping)).map_err(records::ReadError::from)?;
         }
-        let terms = read.terms.into_iter();
-        let terms =
-            terms.map(|term| TermEntry { effect: term.effect, form: term.form, shape: term.shape }).collect();
         let stem = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         Ok(Self {
             kind: read.kind,
@@ -278,7 +265,7 @@ impl Model {
             processing: read.processing,
             selection: read.selection,
             baseline: read.baseline,
-            terms,
+            terms: read.terms,
         })
     }
 }

@@ -37,15 +37,9 @@ impl Study {
         let hole = hole.filter(|(_, length_s)| *length_s > 5.0 * self.model.processing.period_s);
         check.findings.extend(hole.map(|(row, length_s)| {
             let (file, line) = (record.file().display(), record.line(row + 1));
-            Finding {
-                kind: "gap".into(),
-                column: None,
-                line: Some(line),
-                fatal: false,
-                text: format!(
-                    "{file}:{line}: the longest hole has {length_s:.3} s; bridged by a straight line"
-                ),
-            }
+            let text =
+                format!("{file}:{line}: the longest hole has {length_s:.3} s; bridged by a straight line");
+            Finding { kind: "gap".into(), line: Some(line), text, ..Finding::default() }
         }));
         check.usable = !check.findings.iter().any(|finding| finding.fatal);
         check
@@ -63,6 +57,6 @@ impl Study {
              negative factor in the mapping",
             column.name, column.unit
         );
-        Some(Finding { kind: "sign".into(), column: None, line: None, fatal: true, text })
+        Some(Finding { kind: "sign".into(), fatal: true, text, ..Finding::default() })
     }
 }

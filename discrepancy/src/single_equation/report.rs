@@ -25,6 +25,12 @@ fn drive() -> Where {
     Where { axis: "drive".into(), element: None }
 }
 
+/// An effect of a balance, without alternatives.
+fn named_effect(effect: &str, parameters: Vec<Quantity>, share_explained: f64) -> NamedEffect {
+    let (effect, place) = (effect.to_owned(), place(effect));
+    NamedEffect { effect, place, parameters, share_explained, alternatives: Vec::new() }
+}
+
 /// Where an effect of a balance is: a chamber's is chamber a's.
 fn place(effect: &str) -> Where {
     let element = ["rod-leakage", "pressure-sensor-offset"].contains(&effect).then(|| "a".to_owned());
@@ -161,13 +167,8 @@ impl Study {
             let judged = &taken.judged;
             let forms = judged.ties.iter().map(|variant| (judged.place, *variant));
             let twins = forms.chain(taken.alternatives.iter().copied()).map(|twin| self.alternative(twin));
-            NamedEffect {
-                effect: entry.effect.clone(),
-                place: place(&entry.effect),
-                alternatives: twins.chain(alias(entry, &numbers, self)).collect(),
-                parameters: finite(numbers),
-                share_explained: judged.share,
-            }
+            let alternatives = twins.chain(alias(entry, &numbers, self)).collect();
+            NamedEffect { alternatives, ..named_effect(&entry.effect, finite(numbers), judged.share) }
         };
         self.taken(false).map(effect).collect()
     }
@@ -196,13 +197,7 @@ impl Study {
             let errors = self.errors(&columns, &fit);
             finite(self.quantities(entry, self.base.len(), &fit.numbers, &errors))
         });
-        NamedEffect {
-            effect: entry.effect.clone(),
-            place: place(&entry.effect),
-            parameters,
-            share_explained: first.map_or(0.0, |judged| judged.share),
-            alternatives: Vec::new(),
-        }
+        named_effect(&entry.effect, parameters, first.map_or(0.0, |judged| judged.share))
     }
 
     fn parameters(&self) -> Vec<Quantity> {
@@ -297,14 +292,8 @@ impl Study {
         let speeds: Vec<f64> =
             self.runs.iter().flat_map(|run| run.kept.iter().map(|at| run.v_m_per_s[*at])).collect();
         let cut = self.rows.in_bands("speed", &speeds, BINS);
-        let mut curve = Curve {
-            variable: "v".into(),
-            variable_unit: "m/s".into(),
-            unit: self.unit().into(),
-            at: Vec::new(),
-            value: Vec::new(),
-            band: Vec::new(),
-        };
+        let (variable, variable_unit, unit) = ("v".into(), "m/s".into(), self.unit().into());
+        let mut curve = Curve { variable, variable_unit, unit, ..Curve::default() };
         for fold in cut.folds.iter().filter(|fold| fold.len() > 2) {
             let mean = |of: &[f64]| fold.iter().map(|row| of[*row]).sum::<f64>() / fold.len() as f64;
             let value = mean(&self.base_fit.residual);
@@ -319,18 +308,9 @@ impl Study {
 
     fn outside(&self) -> Option<Outside> {
         self.found.decoy.as_ref()?;
-        let balance = self.balance_name().into();
-        Some(Outside {
-            balance,
-            variables: Vec::new(),
-            curve: self.map(),
-            surface: None,
-            formula: None,
-            added: false,
-            why_not: Some("a model of one balance takes no table".to_owned()),
-            tables: Vec::new(),
-            share_explained: None,
-        })
+        let why_not = Some("a model of one balance takes no table".to_owned());
+        let (balance, curve) = (self.balance_name().into(), self.map());
+        Some(Outside { balance, curve, why_not, ..Outside::default() })
     }
 
     fn next(&self, named: &[NamedEffect]) -> Option<Next> {
@@ -417,13 +397,7 @@ fn finite(mut quantities: Vec<Quantity>) -> Vec<Quantity> {
 
 /// Effects with an identical column, reported without a fit.
 fn alias(entry: &TermEntry, numbers: &[Quantity], study: &Study) -> Vec<NamedEffect> {
-    let named = |effect: &str, parameters: Vec<Quantity>| NamedEffect {
-        effect: effect.into(),
-        place: place(effect),
-        parameters,
-        share_explained: 0.0,
-        alternatives: Vec::new(),
-    };
+    let named = |effect: &str, parameters: Vec<Quantity>| named_effect(effect, parameters, 0.0);
     match (entry.effect.as_str(), &study.rig, numbers.first()) {
         ("dead-volume", Some(rig), Some(volume)) => {
             // A position that is read o too long makes the volume A o too large.

@@ -20,7 +20,6 @@ use super::runs::{ATMOSPHERE_PA, Run, gradient};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// A column of the baseline.
 pub(super) struct BaseColumn {
     pub(super) name: &'static str,
     pub(super) unit: &'static str,
@@ -39,10 +38,9 @@ pub(super) struct Family {
     pub(super) over_speed: bool,
 }
 
-/// A term of this name, form and shape.
 pub(super) fn term(effect: &str, form: &str, shape: &[(&str, f64)]) -> TermEntry {
     let shape = shape.iter().map(|(key, value)| ((*key).to_owned(), *value)).collect();
-    TermEntry { effect: effect.into(), form: form.into(), shape }
+    TermEntry { effect: effect.into(), form: form.into(), shape, _fitted: toml::Table::new() }
 }
 
 /// The baseline's columns, in order.

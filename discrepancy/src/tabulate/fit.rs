@@ -36,7 +36,6 @@ const CONVERGED: f64 = 1.0;
 /// Folds of the cross-validation.
 const FOLDS: usize = 5;
 
-/// A table with fitted values.
 #[derive(Clone, Debug)]
 pub(super) struct FittedTable {
     pub(super) table: Tabulated,
@@ -243,7 +242,6 @@ fn columns(
         .collect()
 }
 
-/// Linearisation of a model.
 pub(super) struct TableLinearisation {
     model: Model,
     reference_runs: Vec<ReferenceRun>,

@@ -13,7 +13,6 @@ const HIGHEST: f64 = 1.1;
 /// How far a rod may be beyond its stops, m: rounding.
 const BEYOND_M: f64 = 1e-9;
 
-/// Result of a free run.
 #[derive(Debug)]
 pub(super) struct FreeRun {
     /// Of each axis and channel, rms error in percent of the range of the readings; `None` where there are none.
@@ -22,7 +21,6 @@ pub(super) struct FreeRun {
     pub(super) unphysical: Vec<String>,
 }
 
-/// Runs a record freely.
 pub(super) fn free_run(record: &GriddedRecord, rig: &RigParameters) -> FreeRun {
     let mut plant =
         Plant::in_state(rig, &first_state(record, rig)).expect("a start state is one of the rig's");

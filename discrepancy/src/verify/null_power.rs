@@ -17,7 +17,6 @@ const SEED: u64 = 0x7e1d_0c7a_11ed_0006;
 /// 97.5th percentile of the standard normal.
 const TWO_SIDED: f64 = 1.96;
 
-/// Null figures.
 #[derive(Debug)]
 pub(super) struct NullPower {
     /// Mean sum of squares of each window and output, window by window.

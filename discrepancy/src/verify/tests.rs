@@ -11,16 +11,12 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
     const PERIODS: usize = 3000;
     let mut record = GriddedRecord {
         name: "made".to_owned(),
-        linked: false,
-        added_mass_kg: 0.0,
         measured: [true, false],
         inputs: vec![Inputs::default(); PERIODS],
-        samples: Vec::new(),
         points: vec![[Point { extension_m: 0.1, ..Point::default() }; 2]],
         noise: [noise_with_rounding(baseline), [0.0; CHANNELS]],
-        memory: [[0.0; CHANNELS]; 2],
-        jitter_s: 0.0,
         gaps: vec![false; PERIODS],
+        ..GriddedRecord::default()
     };
     for (period, inputs) in record.inputs.iter_mut().enumerate() {
         inputs.valve[0] =

@@ -177,18 +177,7 @@ impl Windows<'_> {
         let noise = self.raw_noise(random);
         let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + noise).collect();
         let points = (0..self.points.len()).map(|window| self.record.points[window * WINDOW]).collect();
-        let windows = Windows {
-            record: self.record,
-            rig: self.rig.clone(),
-            starts: self.starts.clone(),
-            points,
-            outputs: self.outputs.clone(),
-            readings,
-            valid: self.valid.clone(),
-            jitter_sensitivity: self.jitter_sensitivity.clone(),
-            bases: Vec::new(),
-        };
-        windows.estimate_starts(START_PASSES)
+        Windows { points, readings, bases: Vec::new(), ..self.clone() }.estimate_starts(START_PASSES)
     }
 
     /// Sets the measured axes of a plant to the start state of a window, with one number nudged.

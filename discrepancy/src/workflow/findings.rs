@@ -6,8 +6,7 @@ use crate::name::{Found, same};
 use crate::parameters::COUNT;
 use crate::refit::{Placed, Refit};
 use crate::report::{
-    self, DetectionLimit, EffectPlace, InputFiles, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict,
-    Where,
+    self, DetectionLimit, EffectPlace, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, Where,
 };
 
 /// Significance of a reported parameter, in standard errors.
@@ -15,7 +14,6 @@ const OFF_ERRORS: f64 = 4.0;
 /// Smallest relative deviation of a reported parameter.
 const OFF_LEAST: f64 = 0.01;
 
-/// Report of the naming.
 pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     let named = named(found);
     let (parameters, carried) = parameters(engine, &found.reported);
@@ -174,26 +172,8 @@ fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
     (not_excited, limits)
 }
 
-/// An empty report.
 pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
-    Report {
-        schema_version: SCHEMA_VERSION,
-        verdict,
-        summary,
-        inputs: InputFiles::default(),
-        named: Vec::new(),
-        parameters: Vec::new(),
-        carried: Vec::new(),
-        outside: None,
-        gap: std::collections::BTreeMap::new(),
-        verification: None,
-        candidates: Vec::new(),
-        not_excited: Vec::new(),
-        detection_limits: Vec::new(),
-        location: None,
-        checks: Vec::new(),
-        next: None,
-    }
+    Report { schema_version: SCHEMA_VERSION, verdict, summary, ..Report::default() }
 }
 
 /// The verdict in a sentence or two.

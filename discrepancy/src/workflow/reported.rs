@@ -13,7 +13,6 @@ pub struct Reported {
     /// Parameters that the model moved by less.
     #[serde(default)]
     pub(crate) carried: Vec<Quantity>,
-    /// Files.
     pub inputs: InputFiles,
     /// Term outside the catalogue.
     #[serde(default)]

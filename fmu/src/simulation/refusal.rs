@@ -7,11 +7,7 @@ use plant::{ParameterError, SetupError};
 pub enum Refusal {
     /// The call belongs into another mode.
     #[error("{call} belongs after {after}")]
-    Mode {
-        call: &'static str,
-        /// What must have been called before.
-        after: &'static str,
-    },
+    Mode { call: &'static str, after: &'static str },
     /// No variable of this type has this reference.
     #[error("value reference {0} is no {1} of this FMU; see its modelDescription.xml")]
     Reference(u32, &'static str),
@@ -20,17 +16,7 @@ pub enum Refusal {
     NotSettable(String, &'static str),
     /// The value is out of range, or none.
     #[error("{name} = {value}: allowed are {least} to {most}{}", spaced(unit))]
-    OutOfRange {
-        name: String,
-        /// What was to be set, in the variable's unit.
-        value: f64,
-        /// Smallest allowed value.
-        least: f64,
-        /// Largest allowed value.
-        most: f64,
-        /// Unit.
-        unit: &'static str,
-    },
+    OutOfRange { name: String, value: f64, least: f64, most: f64, unit: &'static str },
     /// Parameters that do not fit together.
     #[error("{0}")]
     Parameters(#[from] ParameterError),
@@ -44,10 +30,7 @@ pub enum Refusal {
     #[error(
         "the plant's state is no longer finite, at {at_s} s; reset the FMU, and look at the inputs before"
     )]
-    NotFinite {
-        /// When, s.
-        at_s: f64,
-    },
+    NotFinite { at_s: f64 },
 }
 
 /// A unit behind a number.

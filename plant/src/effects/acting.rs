@@ -102,7 +102,6 @@ impl Effects {
         self.outlets[axis].iter().any(Outlet::is_open)
     }
 
-    /// Terms of the linkage's numbers.
     pub(crate) fn linkage_terms(&self) -> (Gap, Stiffness, Damping) {
         linkage_terms(&self.on[0], &self.file_linkage)
     }
@@ -122,7 +121,6 @@ impl Effects {
         self.ways = ways;
     }
 
-    /// Remembers the commands of a period that begins.
     pub(crate) fn begin_period(&mut self, command: [f64; 2]) {
         self.memory
             .commands

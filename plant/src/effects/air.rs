@@ -24,7 +24,6 @@ impl Effects {
         SupplySide { supply_droop: moving.droop_pa }
     }
 
-    /// Ports of an axis at an instant.
     pub(crate) fn ports_at(&self, of: &Integrator, axis: usize, state: &State, air: &AirAt) -> Ports {
         let moving = &self.memory.moving;
         let exhaust = ExhaustSide { silencer_back_pressure: moving.axes[axis].silencer_pa };

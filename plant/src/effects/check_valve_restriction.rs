@@ -30,7 +30,6 @@ use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CheckValveRestriction {
     /// p_c.
@@ -51,13 +50,10 @@ impl Effect for CheckValveRestriction {
             EffectKey {
                 name: "cracking_pressure_bar",
                 unit: Unit::Bar,
-                min: 0.0,
                 max: 1.0,
                 drawn: [0.05, 0.5],
-                signed: false,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "p_c, pressure difference below which the port stays shut, either way",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "orifice_kv_m3_per_h",

@@ -16,7 +16,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CommandDeadTime {
     /// d.
@@ -34,13 +33,10 @@ impl Effect for CommandDeadTime {
         keys: &[EffectKey {
             name: "delay_ms",
             unit: Unit::Millisecond,
-            min: 0.0,
             max: 10.0,
             drawn: [0.3, 5.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "time from the command to its effect on the spool, beside the period it is latched in",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -18,10 +18,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CouplingBacklash {
-    /// s, gap in all, in place of linkage.gap_mm.
     pub(crate) gap_m: f64,
 }
 
@@ -36,13 +34,11 @@ impl Effect for CouplingBacklash {
         keys: &[EffectKey {
             name: "gap_mm",
             unit: Unit::Millimetre,
-            min: 0.0,
             max: 5.0,
             drawn: [0.05, 2.0],
-            signed: false,
-            default: None,
             neutral: Some(0.2),
             meaning: "s, gap in all, in place of linkage.gap_mm",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -19,12 +19,9 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CouplingCompliance {
-    /// k', in place of linkage.stiffness_n_per_m.
     pub(crate) stiffness_n_per_m: f64,
-    /// c', in place of linkage.damping_n_s_per_m.
     pub(crate) damping_n_s_per_m: f64,
 }
 
@@ -43,21 +40,19 @@ impl Effect for CouplingCompliance {
                 min: 10000.0,
                 max: 10000000.0,
                 drawn: [100000.0, 10000000.0],
-                signed: false,
-                default: None,
                 neutral: Some(2e6),
                 meaning: "k', in place of linkage.stiffness_n_per_m",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "damping_n_s_per_m",
                 unit: Unit::NewtonSecondPerMetre,
-                min: 0.0,
                 max: 10000.0,
                 drawn: [500.0, 5000.0],
-                signed: false,
                 default: Some(2e3),
                 neutral: Some(2e3),
                 meaning: "c', in place of linkage.damping_n_s_per_m",
+                ..EffectKey::USUAL
             },
         ],
     };

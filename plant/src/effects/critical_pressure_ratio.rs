@@ -25,10 +25,8 @@ use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::single_edge_flow;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CriticalPressureRatio {
-    /// b, the pressure ratio below which the flow is choked.
     pub(crate) critical_ratio: f64,
 }
 
@@ -46,10 +44,9 @@ impl Effect for CriticalPressureRatio {
             min: 0.05,
             max: 0.6,
             drawn: [0.15, 0.45],
-            signed: false,
-            default: None,
             neutral: Some(0.5),
             meaning: "b, the pressure ratio below which the flow is choked",
+            ..EffectKey::USUAL
         }],
     };
 

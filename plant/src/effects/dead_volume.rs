@@ -18,10 +18,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DeadVolume {
-    /// V_own.
     pub(crate) volume_m3: f64,
 }
 
@@ -39,10 +37,9 @@ impl Effect for DeadVolume {
             min: 5.0,
             max: 200.0,
             drawn: [5.0, 60.0],
-            signed: false,
-            default: None,
             neutral: Some(20.0),
             meaning: "V_own of each chamber, in place of cylinder.dead_volume_cm3",
+            ..EffectKey::USUAL
         }],
     };
 

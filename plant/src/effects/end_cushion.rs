@@ -31,14 +31,11 @@ use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EndCushion {
-    /// K_V of the cushion's orifice.
     pub(crate) cushion_kv_m3_per_h: f64,
     /// Length of the cushion before each end.
     pub(crate) length_m: f64,
-    /// k_stop of the elastic stop over the last millimetre.
     pub(crate) stop_stiffness_n_per_m: f64,
 }
 
@@ -57,10 +54,9 @@ impl Effect for EndCushion {
                 min: 0.005,
                 max: 100.0,
                 drawn: [0.02, 0.3],
-                signed: false,
-                default: None,
                 neutral: Some(f64::INFINITY),
                 meaning: "K_V of the cushion's orifice; a chamber that fills goes past it",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "length_mm",

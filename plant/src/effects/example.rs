@@ -36,9 +36,8 @@ impl Effect for Example {
             max: 1.0,
             drawn: [0.1, 1.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "size of the terms",
+            ..EffectKey::USUAL
         }],
     };
 

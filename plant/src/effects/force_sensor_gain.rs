@@ -16,10 +16,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceSensorGain {
-    /// g, what it reads too much, of the force.
     pub(crate) gain: f64,
 }
 
@@ -38,9 +36,8 @@ impl Effect for ForceSensorGain {
             max: 30.0,
             drawn: [0.5, 8.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "g, what it reads too much, of the force",
+            ..EffectKey::USUAL
         }],
     };
 

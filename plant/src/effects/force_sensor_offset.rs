@@ -16,10 +16,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceSensorOffset {
-    /// o, what it reads too much.
     pub(crate) offset_n: f64,
 }
 
@@ -38,9 +36,8 @@ impl Effect for ForceSensorOffset {
             max: 100.0,
             drawn: [1.0, 20.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "o, what it reads too much",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -70,7 +70,6 @@ impl Effects {
         }
     }
 
-    /// Terms of the viscous friction in a direction.
     pub(crate) fn viscous_term(&self, of: &Integrator, axis: usize, direction: f64) -> Viscous {
         let file = of.motion.levels().viscous_n_s_per_m[0];
         Viscous {

@@ -19,10 +19,8 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrictionAsymmetry {
-    /// a: times 1 + a as the rod extends, times 1 - a as it retracts.
     pub(crate) asymmetry: f64,
 }
 
@@ -41,9 +39,8 @@ impl Effect for FrictionAsymmetry {
             max: 90.0,
             drawn: [5.0, 60.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "a: times 1 + a as the rod extends, times 1 - a as it retracts",
+            ..EffectKey::USUAL
         }],
     };
 

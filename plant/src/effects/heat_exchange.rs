@@ -27,7 +27,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HeatExchange {
     /// h.
@@ -63,10 +62,9 @@ impl Effect for HeatExchange {
             min: 1.0,
             max: 100000.0,
             drawn: [10.0, 150.0],
-            signed: false,
-            default: None,
             neutral: Some(f64::INFINITY),
             meaning: "h, heat transfer coefficient to the wetted wall",
+            ..EffectKey::USUAL
         }],
     };
 

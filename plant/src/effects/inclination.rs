@@ -18,10 +18,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Inclination {
-    /// F_g, force in +x of the rig.
     pub(crate) force_n: f64,
 }
 
@@ -40,9 +38,8 @@ impl Effect for Inclination {
             max: 200.0,
             drawn: [2.0, 50.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "F_g, force in +x of the rig",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -21,13 +21,10 @@ impl LaminarGap {
     pub(super) const KEY: EffectKey = EffectKey {
         name: "leakage_nl_per_min",
         unit: Unit::NormalLitrePerMinute,
-        min: 0.0,
         max: 50.0,
         drawn: [0.2, 10.0],
-        signed: false,
-        default: None,
-        neutral: Some(0.0),
         meaning: "q_ref, flow from 6 bar to 1 bar absolute",
+        ..EffectKey::USUAL
     };
 
     /// The gap that passes this normal flow, m^3/s, from 6 to 1 bar absolute.

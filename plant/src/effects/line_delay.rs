@@ -19,10 +19,8 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LineDelay {
-    /// l, length of each line between valve and chamber.
     pub(crate) length_m: f64,
 }
 
@@ -37,13 +35,10 @@ impl Effect for LineDelay {
         keys: &[EffectKey {
             name: "length_m",
             unit: Unit::Metre,
-            min: 0.0,
             max: 5.0,
             drawn: [0.5, 4.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "l, length of each line between valve and chamber; 2.9 ms per metre",
+            ..EffectKey::USUAL
         }],
     };
 

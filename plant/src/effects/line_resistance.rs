@@ -23,7 +23,6 @@ use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LineResistance {
     /// dp p_ref / q_full^2, Pa^2 per (m^3/s)^2.
@@ -41,13 +40,10 @@ impl Effect for LineResistance {
         keys: &[EffectKey {
             name: "drop_bar",
             unit: Unit::Bar,
-            min: 0.0,
             max: 1.0,
             drawn: [0.05, 0.5],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "dp, drop at the full flow of the supply edge into a chamber at half the supply pressure",
+            ..EffectKey::USUAL
         }],
     };
 

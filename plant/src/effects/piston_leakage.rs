@@ -19,7 +19,6 @@ use super::laminar_gap::LaminarGap;
 use super::sheet::{Effect, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PistonLeakage {
     gap: LaminarGap,

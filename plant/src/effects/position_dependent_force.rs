@@ -22,10 +22,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionDependentForce {
-    /// F_c, force at x = 0, falling in a straight line to its negative at the other end; positive centres.
     pub(crate) spring_n: f64,
     /// F_r and P, amplitude and period of the cogging.
     ripple: Ripple,
@@ -49,9 +47,8 @@ impl Effect for PositionDependentForce {
                 max: 200.0,
                 drawn: [2.0, 60.0],
                 signed: true,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "F_c, force at x = 0, falling in a straight line to its negative at the other end; positive centres",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "ripple_n",
@@ -59,10 +56,9 @@ impl Effect for PositionDependentForce {
                 min: -100.0,
                 max: 100.0,
                 drawn: [2.0, 30.0],
-                signed: false,
                 default: Some(0.0),
-                neutral: Some(0.0),
                 meaning: "F_r, amplitude of the cogging",
+                ..EffectKey::USUAL
             },
             Ripple::PITCH,
         ],

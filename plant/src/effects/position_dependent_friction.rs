@@ -27,16 +27,11 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionDependentFriction {
-    /// F_b, height of the bump.
     pub(crate) bump_n: f64,
-    /// c, extension at which the bump is highest.
     pub(crate) centre_m: f64,
-    /// w, half-width of the bump at 1/e.
     pub(crate) width_m: f64,
-    /// F_s, growth from mid-stroke to the rod fully out.
     pub(crate) slope_n: f64,
     /// F_r and P, amplitude and period of the ripple.
     ripple: Ripple,
@@ -59,21 +54,18 @@ impl Effect for PositionDependentFriction {
                 min: -100.0,
                 max: 100.0,
                 drawn: [2.0, 40.0],
-                signed: false,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "F_b, height of the bump",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "centre_mm",
                 unit: Unit::Millimetre,
-                min: 0.0,
                 max: 500.0,
                 drawn: [100.0, 400.0],
-                signed: false,
                 default: Some(250.0),
                 neutral: None,
                 meaning: "c, extension at which the bump is highest",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "width_mm",
@@ -103,10 +95,9 @@ impl Effect for PositionDependentFriction {
                 min: -100.0,
                 max: 100.0,
                 drawn: [2.0, 20.0],
-                signed: false,
                 default: Some(0.0),
-                neutral: Some(0.0),
                 meaning: "F_r, amplitude of the ripple",
+                ..EffectKey::USUAL
             },
             Ripple::PITCH,
         ],

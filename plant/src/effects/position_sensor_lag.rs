@@ -22,10 +22,8 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorLag {
-    /// tau, time constant.
     pub(crate) time_constant_s: f64,
 }
 
@@ -40,13 +38,10 @@ impl Effect for PositionSensorLag {
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,
-            min: 0.0,
             max: 20.0,
             drawn: [0.5, 8.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "tau, time constant of the position sensor",
+            ..EffectKey::USUAL
         }],
     };
 

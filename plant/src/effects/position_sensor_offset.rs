@@ -16,10 +16,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorOffset {
-    /// o, what it reads too much, beside the load sensor's own offset.
     pub(crate) offset_m: f64,
 }
 
@@ -38,9 +36,8 @@ impl Effect for PositionSensorOffset {
             max: 10.0,
             drawn: [0.1, 2.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "o, what it reads too much, beside the load sensor's own offset",
+            ..EffectKey::USUAL
         }],
     };
 

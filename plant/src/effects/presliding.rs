@@ -73,10 +73,8 @@ const LEAST_LEVEL_N: f64 = 1e-2;
 /// Steps of Newton's method, after one for the prediction: the test `the_balance_is_solved` says what they leave.
 const NEWTON_STEPS: u32 = 4;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Presliding {
-    /// s_0, stiffness of the bristles.
     pub(crate) stiffness_n_per_m: f64,
 }
 
@@ -118,10 +116,9 @@ impl Effect for Presliding {
             min: 30000.0,
             max: 30000000.0,
             drawn: [100000.0, 10000000.0],
-            signed: false,
-            default: None,
             neutral: Some(f64::INFINITY),
             meaning: "s_0, stiffness of the bristles",
+            ..EffectKey::USUAL
         }],
     };
 

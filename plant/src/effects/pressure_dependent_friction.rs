@@ -19,7 +19,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressureDependentFriction {
     /// c, friction force per pascal of the sum.
@@ -37,13 +36,10 @@ impl Effect for PressureDependentFriction {
         keys: &[EffectKey {
             name: "slope_n_per_bar",
             unit: Unit::NewtonPerBar,
-            min: 0.0,
             max: 20.0,
             drawn: [0.2, 10.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "c, friction force per bar of the sum",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -16,10 +16,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressureSensorGain {
-    /// g, what it reads too much, of the absolute pressure.
     pub(crate) gain: f64,
 }
 
@@ -38,9 +36,8 @@ impl Effect for PressureSensorGain {
             max: 10.0,
             drawn: [0.25, 2.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "g, what it reads too much, of the absolute pressure",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -16,10 +16,8 @@ use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressureSensorOffset {
-    /// o, what it reads too much.
     pub(crate) offset_pa: f64,
 }
 
@@ -38,9 +36,8 @@ impl Effect for PressureSensorOffset {
             max: 500.0,
             drawn: [10.0, 100.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "o, what it reads too much",
+            ..EffectKey::USUAL
         }],
     };
 

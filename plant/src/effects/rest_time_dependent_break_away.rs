@@ -21,12 +21,9 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RestTimeDependentBreakAway {
-    /// g, growth of the break-away force after 10 s at rest.
     pub(crate) growth: f64,
-    /// t_0 of ln(1 + t / t_0).
     pub(crate) onset_s: f64,
     /// F_stat g / ln(1 + 10 s / t_0).
     pub(crate) per_fold_n: f64,
@@ -44,13 +41,10 @@ impl Effect for RestTimeDependentBreakAway {
             EffectKey {
                 name: "growth_percent",
                 unit: Unit::Percent,
-                min: 0.0,
                 max: 100.0,
                 drawn: [10.0, 50.0],
-                signed: false,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "g, growth of the break-away force after 10 s at rest",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "onset_s",

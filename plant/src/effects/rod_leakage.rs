@@ -17,7 +17,6 @@ use super::laminar_gap::LaminarGap;
 use super::sheet::{Effect, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 
-/// The numbers of this effect at one chamber.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RodLeakage {
     gap: LaminarGap,

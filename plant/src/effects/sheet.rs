@@ -53,6 +53,19 @@ pub struct EffectKey {
 }
 
 impl EffectKey {
+    /// What most numbers have alike: from 0, where the rig is the baseline, of one sign, and asked for.
+    pub(super) const USUAL: EffectKey = EffectKey {
+        name: "",
+        unit: Unit::One,
+        min: 0.0,
+        max: f64::NAN,
+        drawn: [f64::NAN; 2],
+        signed: false,
+        default: None,
+        neutral: Some(0.0),
+        meaning: "",
+    };
+
     /// The allowed values in words, as `0 to 10 %`.
     #[must_use]
     pub fn range(&self) -> String {
@@ -218,9 +231,8 @@ pub struct Switched {
     pub numbers: Vec<f64>,
 }
 
-/// An effect of the catalogue.
+/// An effect of the catalogue; its fields are the numbers of its sheet at one place, in SI.
 pub(crate) trait Effect: Sized {
-    /// Its data sheet.
     const SHEET: Sheet;
 
     /// The effect at one place: `numbers` in SI, one for each key, already checked against the sheet.

@@ -22,7 +22,6 @@ use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SilencerBackPressure {
     node: Node,
@@ -43,10 +42,9 @@ impl Effect for SilencerBackPressure {
                 min: 0.1,
                 max: 100.0,
                 drawn: [0.3, 3.0],
-                signed: false,
-                default: None,
                 neutral: Some(f64::INFINITY),
                 meaning: "n, K_V of the silencer in units of the exhaust edge's largest",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "volume_cm3",

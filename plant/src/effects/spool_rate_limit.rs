@@ -18,7 +18,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SpoolRateLimit {
     /// Largest |ds/dt|.
@@ -39,10 +38,9 @@ impl Effect for SpoolRateLimit {
             min: 5.0,
             max: 2000.0,
             drawn: [20.0, 200.0],
-            signed: false,
-            default: None,
             neutral: Some(f64::INFINITY),
             meaning: "largest |ds/dt|; full opening counts 1",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -24,12 +24,10 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SpoolSecondOrder {
     /// f, w / 2 pi.
     pub(crate) natural_frequency_hz: f64,
-    /// z, share of critical damping.
     pub(crate) damping: f64,
 }
 
@@ -48,10 +46,9 @@ impl Effect for SpoolSecondOrder {
                 min: 20.0,
                 max: 400.0,
                 drawn: [60.0, 120.0],
-                signed: false,
-                default: None,
                 neutral: None,
                 meaning: "f, natural frequency of the spool with its control",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "damping",

@@ -20,10 +20,8 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StribeckFriction {
-    /// v_s, Stribeck velocity.
     pub(crate) velocity_m_per_s: f64,
     /// d, how sharply friction falls.
     pub(crate) exponent: f64,
@@ -46,10 +44,8 @@ impl Effect for StribeckFriction {
                 min: 0.01,
                 max: 200.0,
                 drawn: [2.0, 50.0],
-                signed: false,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "v_s, Stribeck velocity",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "exponent",

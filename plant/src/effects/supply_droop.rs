@@ -24,7 +24,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at the supply.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SupplyDroop {
     /// None where nothing droops.
@@ -43,13 +42,10 @@ impl Effect for SupplyDroop {
             EffectKey {
                 name: "droop_bar",
                 unit: Unit::Bar,
-                min: 0.0,
                 max: 2.0,
                 drawn: [0.1, 1.0],
-                signed: false,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "dp, fall of the node while one full supply edge draws steadily",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "volume_cm3",

@@ -49,7 +49,6 @@ impl Terms {
     }
 }
 
-/// One term at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Term {
     pub(crate) part: Part,

@@ -19,10 +19,8 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TimeSkew {
-    /// d, how old the value is when it is sampled.
     pub(crate) delay_s: f64,
 }
 
@@ -37,13 +35,10 @@ impl Effect for TimeSkew {
         keys: &[EffectKey {
             name: "delay_ms",
             unit: Unit::Millisecond,
-            min: 0.0,
             max: 10.0,
             drawn: [0.3, 6.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "d, how old the value is when it is sampled",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -23,7 +23,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ValveCharacteristic {
     /// c, share.
@@ -48,9 +47,8 @@ impl Effect for ValveCharacteristic {
                 max: 40.0,
                 drawn: [5.0, 25.0],
                 signed: true,
-                default: None,
-                neutral: Some(0.0),
                 meaning: "c of K_V(o + 2 c o (1 - o)): more passes at half opening if positive",
+                ..EffectKey::USUAL
             },
             EffectKey {
                 name: "edge_ratio_percent",

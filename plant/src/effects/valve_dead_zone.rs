@@ -19,7 +19,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ValveDeadZone {
     /// d, share of full opening.
@@ -37,13 +36,10 @@ impl Effect for ValveDeadZone {
         keys: &[EffectKey {
             name: "dead_zone_percent",
             unit: Unit::Percent,
-            min: 0.0,
             max: 20.0,
             drawn: [0.5, 5.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "d, of full opening, beside the tables' own dead band",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -18,7 +18,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ValveHysteresis {
     /// h, share of full command.
@@ -36,13 +35,10 @@ impl Effect for ValveHysteresis {
         keys: &[EffectKey {
             name: "half_width_percent",
             unit: Unit::Percent,
-            min: 0.0,
             max: 10.0,
             drawn: [0.2, 3.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "h, of full command",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -19,7 +19,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ValveNullLeakage {
     /// e, share of the edge's largest K_V.
@@ -37,13 +36,10 @@ impl Effect for ValveNullLeakage {
         keys: &[EffectKey {
             name: "leakage_percent",
             unit: Unit::Percent,
-            min: 0.0,
             max: 10.0,
             drawn: [0.2, 2.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
             meaning: "floor of each edge, of its own largest K_V",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -16,7 +16,6 @@ use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ValveOffset {
     /// u_0, share of full command.
@@ -38,9 +37,8 @@ impl Effect for ValveOffset {
             max: 10.0,
             drawn: [0.5, 3.0],
             signed: true,
-            default: None,
-            neutral: Some(0.0),
             meaning: "u_0, of full command",
+            ..EffectKey::USUAL
         }],
     };
 

@@ -13,87 +13,16 @@ use super::{switched, tabulated};
 use crate::effects::sheet::Switched;
 use crate::effects::tabulated::Tabulated;
 
-/// Why a rig file is refused; every message gives the place, the key, the value and what is allowed.
+/// Why a rig file is refused: the place, the key, the value and what is allowed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ParameterError {
-    /// The file is not TOML.
-    #[error("{file}:{line}: not TOML: {message}")]
-    Syntax {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// What the TOML reader says.
-        message: String,
-    },
-    /// A key or table that no rig has.
-    #[error("{file}:{line}: unknown key {key} = {value}; known here: {known}")]
-    UnknownKey {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// `table.key` as written.
-        key: String,
-        /// Value as written.
-        value: String,
-        /// The keys that are known at this place.
-        known: String,
-    },
-    /// A key that every rig has is not there.
-    #[error("{file}:{line}: key {key} is missing from the table that starts here; allowed: {range}")]
-    MissingKey {
-        /// File as given by the caller.
-        file: String,
-        /// Line of the table's header, or 1 if the whole table is missing.
-        line: usize,
-        /// `table.key`.
-        key: String,
-        /// Allowed values.
-        range: String,
-    },
-    /// The value is no number, or not as many numbers as the key holds.
-    #[error("{file}:{line}: {key} = {value} is of the wrong type; allowed: {range}")]
-    WrongType {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// `table.key`.
-        key: String,
-        /// Value as written.
-        value: String,
-        /// Allowed values.
-        range: String,
-    },
-    /// The value lies outside its range, or is not finite.
-    #[error("{file}:{line}: {key} = {value} is out of range; allowed: {range}")]
-    OutOfRange {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// `table.key`.
-        key: String,
-        /// Value as written.
-        value: String,
-        /// Allowed values.
-        range: String,
-    },
-    /// Each value is in its range, but together they make no rig.
-    #[error("{file}:{line}: {key} = {value} contradicts another key: {rule}")]
-    Inconsistent {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// `table.key`.
-        key: String,
-        /// Value as written.
-        value: String,
-        /// The rule that is broken, with the other value.
-        rule: String,
-    },
+#[error("{0}")]
+pub struct ParameterError(String);
+
+impl ParameterError {
+    /// Of a line, from 1, of a file.
+    pub(super) fn at(file: &str, line: usize, said: &str) -> Self {
+        ParameterError(format!("{file}:{line}: {said}"))
+    }
 }
 
 /// One value as read: the numbers in the file's unit, the text and the line for messages.
@@ -158,13 +87,8 @@ impl Entries {
         };
         let Some(key) = KEYS.iter().find(|key| key.path() == path) else {
             let known = KEYS.iter().map(Key::path).collect::<Vec<_>>().join(", ");
-            return Err(ParameterError::UnknownKey {
-                file: self.file.clone(),
-                line: 0,
-                key: path.to_owned(),
-                value: text,
-                known,
-            });
+            let said = format!("unknown key {path} = {text}; known here: {known}");
+            return Err(ParameterError::at(&self.file, 0, &said));
         };
         let line = self.entries[&(key.table, key.name)].line;
         let entry = Entry { numbers: numbers.to_vec(), text, line };
@@ -204,13 +128,7 @@ impl Entries {
         let in_file = Place { text, file };
         let root = in_file.parse()?;
         if let Some((name, value)) = root.get_ref().iter().find(|(name, _)| name.get_ref() != "effects") {
-            return Err(ParameterError::UnknownKey {
-                file: file.to_owned(),
-                line: in_file.line(name.span().start),
-                key: name.get_ref().to_string(),
-                value: in_file.written(value),
-                known: "effects".to_owned(),
-            });
+            return Err(in_file.unknown(name, name.get_ref(), value, "effects"));
         }
         let mut changed = self.clone();
         for effect in switched::read(root.get_ref(), &in_file)? {
@@ -225,15 +143,14 @@ impl Entries {
 /// Text and name of the file being read.
 pub(super) struct Place<'t> {
     text: &'t str,
-    pub(super) file: &'t str,
+    file: &'t str,
 }
 
 impl<'t> Place<'t> {
     fn parse(&self) -> Result<Spanned<DeTable<'t>>, ParameterError> {
-        DeTable::parse(self.text).map_err(|error| ParameterError::Syntax {
-            file: self.file.to_owned(),
-            line: self.line(error.span().map_or(0, |span| span.start)),
-            message: error.message().to_owned(),
+        DeTable::parse(self.text).map_err(|error| {
+            let line = self.line(error.span().map_or(0, |span| span.start));
+            self.refused(line, &format!("not TOML: {}", error.message()))
         })
     }
 }
@@ -244,20 +161,52 @@ impl Place<'_> {
     }
 
     /// The value as the file writes it.
-    pub(super) fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
+    fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
         settings::written(self.text, value.span())
     }
 
+    fn refused(&self, line: usize, said: &str) -> ParameterError {
+        ParameterError::at(self.file, line, said)
+    }
+
+    /// A key or table that no rig has, `key` in the file and `path` in full.
+    pub(super) fn unknown<T>(
+        &self,
+        key: &Spanned<T>,
+        path: &str,
+        value: &Spanned<DeValue<'_>>,
+        known: &str,
+    ) -> ParameterError {
+        let said = format!("unknown key {path} = {}; known here: {known}", self.written(value));
+        self.refused(self.line(key.span().start), &said)
+    }
+
+    /// A key that is not there, in a table that starts in this line.
+    pub(super) fn missing(&self, line: usize, path: &str, range: &str) -> ParameterError {
+        let said = format!("key {path} is missing from the table that starts here; allowed: {range}");
+        self.refused(line, &said)
+    }
+
+    /// A value of the wrong type.
+    pub(super) fn wrong(&self, path: &str, value: &Spanned<DeValue<'_>>, range: &str) -> ParameterError {
+        self.of_value(path, value, &format!("is of the wrong type; allowed: {range}"))
+    }
+
+    pub(super) fn out_of_range(
+        &self,
+        path: &str,
+        value: &Spanned<DeValue<'_>>,
+        range: &str,
+    ) -> ParameterError {
+        self.of_value(path, value, &format!("is out of range; allowed: {range}"))
+    }
+
+    /// What is said of a value, behind it.
+    pub(super) fn of_value(&self, path: &str, value: &Spanned<DeValue<'_>>, said: &str) -> ParameterError {
+        self.refused(self.line(value.span().start), &format!("{path} = {} {said}", self.written(value)))
+    }
+
     fn refuse_unknown(&self, root: &DeTable<'_>) -> Result<(), ParameterError> {
-        let unknown = |key: &Spanned<_>, path: String, value: &Spanned<DeValue<'_>>, known: Vec<&str>| {
-            ParameterError::UnknownKey {
-                file: self.file.to_owned(),
-                line: self.line(key.span().start),
-                key: path,
-                value: self.written(value),
-                known: known.join(", "),
-            }
-        };
         let is_key = |name: &str| !["effects", "tabulated"].contains(&name);
         for (name, value) in root.iter().filter(|(name, _)| is_key(name.get_ref())) {
             let known: Vec<&str> =
@@ -265,16 +214,12 @@ impl Place<'_> {
             if known.is_empty() {
                 let mut tables: Vec<&str> = KEYS.iter().map(|key| key.table).collect();
                 tables.dedup();
-                return Err(unknown(name, name.get_ref().to_string(), value, tables));
+                return Err(self.unknown(name, name.get_ref(), value, &tables.join(", ")));
             }
             for (inner, value) in value.get_ref().as_table().into_iter().flatten() {
                 if !known.iter().any(|known| known == inner.get_ref()) {
-                    return Err(unknown(
-                        inner,
-                        format!("{}.{}", name.get_ref(), inner.get_ref()),
-                        value,
-                        known,
-                    ));
+                    let path = format!("{}.{}", name.get_ref(), inner.get_ref());
+                    return Err(self.unknown(inner, &path, value, &known.join(", ")));
                 }
             }
         }
@@ -286,15 +231,9 @@ impl Place<'_> {
         let value =
             table.and_then(|(_, table)| table.get_ref().as_table()).and_then(|table| table.get(key.name));
         let Some(value) = value else {
-            return Err(ParameterError::MissingKey {
-                file: self.file.to_owned(),
-                line: table.map_or(1, |(name, _)| self.line(name.span().start)),
-                key: key.path(),
-                range: key.range(),
-            });
+            let line = table.map_or(1, |(name, _)| self.line(name.span().start));
+            return Err(self.missing(line, &key.path(), &key.range()));
         };
-        let text = self.written(value);
-        let line = self.line(value.span().start);
         let numbers = match value.get_ref() {
             DeValue::Array(items) => items.iter().map(|item| settings::number(item.get_ref())).collect(),
             single => settings::number(single).map(|number| vec![number]),
@@ -302,17 +241,12 @@ impl Place<'_> {
         let is_array = matches!(value.get_ref(), DeValue::Array(_));
         match numbers {
             Some(numbers) if numbers.len() == key.count && is_array == (key.count > 1) => {
+                let (text, line) = (self.written(value), self.line(value.span().start));
                 let entry = Entry { numbers, text, line };
                 check_range(key, &entry, self.file)?;
                 Ok(entry)
             }
-            _ => Err(ParameterError::WrongType {
-                file: self.file.to_owned(),
-                line,
-                key: key.path(),
-                value: text,
-                range: key.range(),
-            }),
+            _ => Err(self.wrong(&key.path(), value, &key.range())),
         }
     }
 }
@@ -324,11 +258,6 @@ fn check_range(key: &Key, entry: &Entry, file: &str) -> Result<(), ParameterErro
     if entry.numbers.len() == key.count && entry.numbers.iter().all(good) {
         return Ok(());
     }
-    Err(ParameterError::OutOfRange {
-        file: file.to_owned(),
-        line: entry.line,
-        key: key.path(),
-        value: entry.text.clone(),
-        range: key.range(),
-    })
+    let said = format!("{key} = {} is out of range; allowed: {}", entry.text, key.range());
+    Err(ParameterError::at(file, entry.line, &said))
 }

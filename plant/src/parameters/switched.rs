@@ -9,8 +9,7 @@
 //!
 //! A place of two words is a table in a table; what stands under an effect's name is walked down to its keys.
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
 use super::reader::{ParameterError, Place as Text};
 use crate::effects::sheet::{EffectKey, Sheet, Switched};
@@ -23,19 +22,18 @@ pub(super) fn read(root: &DeTable<'_>, text: &Text<'_>) -> Result<Vec<Switched>,
     };
     let mut effects = Vec::new();
     let names = SHEETS.iter().map(|sheet| sheet.name).collect::<Vec<_>>().join(", ");
-    let table = table.get_ref().as_table().ok_or_else(|| wrong(text, "effects", table, "tables"))?;
+    let table = table.get_ref().as_table().ok_or_else(|| text.wrong("effects", table, "tables"))?;
     for (name, value) in table {
         let path = format!("effects.{}", name.get_ref());
-        let sheet = sheet(name.get_ref())
-            .ok_or_else(|| unknown(text, name.span().start, &path, value, names.clone()))?;
-        let places = value.get_ref().as_table().ok_or_else(|| wrong(text, &path, value, &at(sheet)))?;
+        let sheet = sheet(name.get_ref()).ok_or_else(|| text.unknown(name, &path, value, &names))?;
+        let places = value.get_ref().as_table().ok_or_else(|| text.wrong(&path, value, &at(sheet)))?;
         // A table without a place would switch on nothing, and the file would not say so.
         if places.is_empty() {
-            return Err(wrong(text, &path, value, &at(sheet)));
+            return Err(text.wrong(&path, value, &at(sheet)));
         }
         for (first, value) in places {
             let path = format!("{path}.{}", first.get_ref());
-            let bad = |path: &str, value| unknown(text, first.span().start, path, value, at(sheet));
+            let bad = |path: &str, value| text.unknown(first, path, value, &at(sheet));
             let inner = value.get_ref().as_table().ok_or_else(|| bad(&path, value))?;
             if let Some(place) = sheet.place_named(first.get_ref()) {
                 let line = text.line(first.span().start);
@@ -75,32 +73,21 @@ fn read_numbers(
     for (name, value) in table {
         if !sheet.keys.iter().any(|key| key.name == name.get_ref()) {
             let path = format!("{path}.{}", name.get_ref());
-            return Err(unknown(text, name.span().start, &path, value, known()));
+            return Err(text.unknown(name, &path, value, &known()));
         }
     }
     let number = |key: &EffectKey| {
         let path = format!("{path}.{}", key.name);
         let Some(value) = table.get(key.name) else {
-            return key.default.ok_or_else(|| ParameterError::MissingKey {
-                file: text.file.to_owned(),
-                line,
-                key: path,
-                range: key.range(),
-            });
+            return key.default.ok_or_else(|| text.missing(line, &path, &key.range()));
         };
         let number =
-            settings::number(value.get_ref()).ok_or_else(|| wrong(text, &path, value, &key.range()))?;
+            settings::number(value.get_ref()).ok_or_else(|| text.wrong(&path, value, &key.range()))?;
         // Written so that a NaN, which TOML admits, fails.
         if number >= key.min && number <= key.max {
             return Ok(number);
         }
-        Err(ParameterError::OutOfRange {
-            file: text.file.to_owned(),
-            line: text.line(value.span().start),
-            key: path,
-            value: text.written(value),
-            range: key.range(),
-        })
+        Err(text.out_of_range(&path, value, &key.range()))
     };
     sheet.keys.iter().map(number).collect()
 }
@@ -112,35 +99,4 @@ pub(super) fn sort(effects: &mut [Switched]) {
 
 fn at(sheet: &Sheet) -> String {
     sheet.place.names().join(", ")
-}
-
-pub(super) fn unknown(
-    text: &Text<'_>,
-    offset: usize,
-    path: &str,
-    value: &Spanned<DeValue<'_>>,
-    known: String,
-) -> ParameterError {
-    ParameterError::UnknownKey {
-        file: text.file.to_owned(),
-        line: text.line(offset),
-        key: path.to_owned(),
-        value: text.written(value),
-        known,
-    }
-}
-
-pub(super) fn wrong(
-    text: &Text<'_>,
-    path: &str,
-    value: &Spanned<DeValue<'_>>,
-    range: &str,
-) -> ParameterError {
-    ParameterError::WrongType {
-        file: text.file.to_owned(),
-        line: text.line(value.span().start),
-        key: path.to_owned(),
-        value: text.written(value),
-        range: range.to_owned(),
-    }
 }

@@ -12,7 +12,6 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::reader::{ParameterError, Place as Text};
-use super::switched::{unknown, wrong};
 use crate::effects::tabulated::{Balance, POINTS, Tabulated, Variable};
 use crate::state::Axis;
 
@@ -24,7 +23,7 @@ pub(super) fn read(root: &DeTable<'_>, text: &Text<'_>) -> Result<Vec<Tabulated>
     let Some((_, value)) = root.iter().find(|(name, _)| name.get_ref() == "tabulated") else {
         return Ok(Vec::new());
     };
-    let tables = || wrong(text, "tabulated", value, "tables, each under [[tabulated]]");
+    let tables = || text.wrong("tabulated", value, "tables, each under [[tabulated]]");
     let DeValue::Array(items) = value.get_ref() else { return Err(tables()) };
     items.iter().map(|item| read_one(item.get_ref().as_table().ok_or_else(tables)?, item, text)).collect()
 }
@@ -45,36 +44,30 @@ fn read_one(
     let (_, axis, balance) = places()
         .into_iter()
         .find(|(name, ..)| *name == balance.0)
-        .ok_or_else(|| wrong(text, "tabulated.balance", balance.1, &known))?;
+        .ok_or_else(|| text.wrong("tabulated.balance", balance.1, &known))?;
     let known = Variable::ALL.map(Variable::name).join(", ");
     let variable = word(table, "variable", line, text, &known)?;
     let variable = Variable::ALL
         .into_iter()
         .find(|own| own.name() == variable.0)
-        .ok_or_else(|| wrong(text, "tabulated.variable", variable.1, &known))?;
+        .ok_or_else(|| text.wrong("tabulated.variable", variable.1, &known))?;
     let keys = ["balance", "variable", "at", balance.key()];
     if let Some((name, value)) = table.iter().find(|(name, _)| !keys.contains(&name.get_ref().as_ref())) {
         let path = format!("tabulated.{}", name.get_ref());
-        return Err(unknown(text, name.span().start, &path, value, keys.join(", ")));
+        return Err(text.unknown(name, &path, value, &keys.join(", ")));
     }
     let at = numbers(table, "at", MOST_AT, line, text)?;
     let value = numbers(table, balance.key(), balance.most(), line, text)?;
-    let broken = |key: &str, rule: String| {
+    let broken = |key: &str, rule: &str| {
         let value = table.get(key).expect("it was read");
-        ParameterError::Inconsistent {
-            file: text.file.to_owned(),
-            line: text.line(value.span().start),
-            key: format!("tabulated.{key}"),
-            value: text.written(value),
-            rule,
-        }
+        text.of_value(&format!("tabulated.{key}"), value, &format!("contradicts another key: {rule}"))
     };
     if at.windows(2).any(|pair| pair[0] >= pair[1]) {
-        return Err(broken("at", "each number must be above the one before".to_owned()));
+        return Err(broken("at", "each number must be above the one before"));
     }
     if at.len() != value.len() {
         let rule = format!("it must hold as many numbers as tabulated.at, {}, not {}", at.len(), value.len());
-        return Err(broken(balance.key(), rule));
+        return Err(broken(balance.key(), &rule));
     }
     Ok(Tabulated { axis, balance, variable, at, value })
 }
@@ -87,9 +80,10 @@ fn word<'v>(
     text: &Text<'_>,
     known: &str,
 ) -> Result<(&'v str, &'v Spanned<DeValue<'v>>), ParameterError> {
-    let value = table.get(key).ok_or_else(|| missing(key, line, text, known))?;
+    let path = format!("tabulated.{key}");
+    let value = table.get(key).ok_or_else(|| text.missing(line, &path, known))?;
     let word = value.get_ref().as_str();
-    Ok((word.ok_or_else(|| wrong(text, &format!("tabulated.{key}"), value, known))?, value))
+    Ok((word.ok_or_else(|| text.wrong(&path, value, known))?, value))
 }
 
 /// The numbers of a key, each within `most` of 0.
@@ -103,30 +97,15 @@ fn numbers(
     let [fewest, many] = POINTS;
     let range = format!("{fewest} to {many} numbers, each -{most} to {most}");
     let path = format!("tabulated.{key}");
-    let value = table.get(key).ok_or_else(|| missing(key, line, text, &range))?;
+    let value = table.get(key).ok_or_else(|| text.missing(line, &path, &range))?;
     let numbers: Option<Vec<f64>> = match value.get_ref() {
         DeValue::Array(items) => items.iter().map(|item| settings::number(item.get_ref())).collect(),
         _ => None,
     };
-    let numbers = numbers.ok_or_else(|| wrong(text, &path, value, &range))?;
+    let numbers = numbers.ok_or_else(|| text.wrong(&path, value, &range))?;
     // Written so that a NaN, which TOML admits, fails.
     if (fewest..=many).contains(&numbers.len()) && numbers.iter().all(|own| own.abs() <= most) {
         return Ok(numbers);
     }
-    Err(ParameterError::OutOfRange {
-        file: text.file.to_owned(),
-        line: text.line(value.span().start),
-        key: path,
-        value: text.written(value),
-        range,
-    })
-}
-
-fn missing(key: &str, line: usize, text: &Text<'_>, range: &str) -> ParameterError {
-    ParameterError::MissingKey {
-        file: text.file.to_owned(),
-        line,
-        key: format!("tabulated.{key}"),
-        range: range.to_owned(),
-    }
+    Err(text.out_of_range(&path, value, &range))
 }

@@ -12,48 +12,11 @@ use super::hand::{
 use super::{Action, Arm, Event, Hand, Part, Scene, cycle_of};
 use crate::parameters::RigParameters;
 
-/// Why the `[rig]` of an experiment is refused.
+/// Why the `[rig]` of an experiment is refused: file, line, key, value and what is allowed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SceneError {
-    /// The file is not TOML, or holds keys, words or types that it must not.
-    #[error("{file}:{line}: {message}")]
-    Form {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// What the TOML reader says, with what it expected and a caret.
-        message: String,
-    },
-    /// The value lies outside its range, or is not finite.
-    #[error("{file}:{line}: {key} = {value}: allowed are {range}")]
-    OutOfRange {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// `rig.hand.most_n` and the like.
-        key: &'static str,
-        /// Value in SI.
-        value: f64,
-        /// Allowed values with their unit.
-        range: String,
-    },
-    /// Each value may stand alone, but not beside another, or another is missing.
-    #[error("{file}:{line}: {key}: {rule}")]
-    Inconsistent {
-        /// File as given by the caller.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// The key at fault, with its value where it has a number.
-        key: String,
-        /// The rule that is broken.
-        rule: String,
-    },
-}
+#[error("{0}")]
+pub struct SceneError(String);
 
-/// What is read of an experiment file.
 #[derive(Deserialize)]
 struct ExperimentFile {
     #[serde(default)]
@@ -140,10 +103,8 @@ const UNTIL_S: Key = key("rig.event.until_s", "s", 0.0, LONGEST_S);
 /// The `[rig]` of an experiment, checked.
 pub(super) fn read(text: &str, file: &str, rig: &RigParameters) -> Result<Scene, SceneError> {
     let check = Check { text, file, rig };
-    let table = toml::from_str::<ExperimentFile>(text).map_err(|error| SceneError::Form {
-        file: file.to_owned(),
-        line: check.line(error.span().map_or(0, |span| span.start)),
-        message: error.to_string().trim_end().to_owned(),
+    let table = toml::from_str::<ExperimentFile>(text).map_err(|error| {
+        check.refused(error.span().map_or(0, |span| span.start), error.to_string().trim_end())
     })?;
     let RigTable { carriage_position_m, linked, added_mass_kg, sealed, hand, event } = table.rig;
     let default = Scene::default();
@@ -166,8 +127,8 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn line(&self, offset: usize) -> usize {
-        settings::line_of(self.text, offset)
+    fn refused(&self, offset: usize, said: &str) -> SceneError {
+        SceneError(format!("{}:{}: {said}", self.file, settings::line_of(self.text, offset)))
     }
 
     /// A place on the stroke.
@@ -187,29 +148,24 @@ impl Check<'_> {
         if (least..=most).contains(&number) {
             return Ok(number);
         }
-        Err(SceneError::OutOfRange {
-            file: self.file.to_owned(),
-            line: self.line(value.span().start),
-            key: path,
-            value: number,
-            range: format!("{least} to {most} {unit}"),
-        })
+        let said = format!("{path} = {number}: allowed are {least} to {most} {unit}");
+        Err(self.refused(value.span().start, &said))
     }
 
     fn or(&self, key: Key, value: Option<&Spanned<f64>>, default: f64) -> Result<f64, SceneError> {
         value.map_or(Ok(default), |value| self.number(key, value))
     }
 
-    fn refuse<T>(&self, at: &Spanned<T>, key: String, rule: &str) -> SceneError {
-        let line = self.line(at.span().start);
-        SceneError::Inconsistent { file: self.file.to_owned(), line, key, rule: rule.to_owned() }
+    /// A value that may stand alone, but not beside another, or lacks another; `key` with its value where it has a number.
+    fn refuse<T>(&self, at: &Spanned<T>, key: &str, rule: &str) -> SceneError {
+        self.refused(at.span().start, &format!("{key}: {rule}"))
     }
 
     /// Refuses the first of `keys` that is there.
     fn none_of(&self, keys: &[(&str, &Option<Spanned<f64>>)], rule: &str) -> Result<(), SceneError> {
         let there = keys.iter().find_map(|(key, value)| Some((key, value.as_ref()?)));
         there.map_or(Ok(()), |(key, value)| {
-            Err(self.refuse(value, format!("{key} = {}", value.get_ref()), rule))
+            Err(self.refuse(value, &format!("{key} = {}", value.get_ref()), rule))
         })
     }
 
@@ -220,7 +176,7 @@ impl Check<'_> {
             return Ok(end_s);
         }
         let rule = format!("it must be at least 0.001 s after {} = {}", begin.0.path, begin.1);
-        Err(self.refuse(end.1, format!("{} = {end_s}", end.0.path), &rule))
+        Err(self.refuse(end.1, &format!("{} = {end_s}", end.0.path), &rule))
     }
 
     fn hand(&self, table: &HandTable) -> Result<Hand, SceneError> {
@@ -253,7 +209,7 @@ impl Check<'_> {
             }
             _ => {
                 let rule = "a hand has one of force_n, guide_to_m: it pushes or it guides";
-                return Err(self.refuse(&table.on, "rig.hand".to_owned(), rule));
+                return Err(self.refuse(&table.on, "rig.hand", rule));
             }
         };
         Ok(Hand { on: *table.on.get_ref(), from_s, to_s, arm })
@@ -286,7 +242,7 @@ impl Check<'_> {
                 let mass = self.weights("rig.event.added_mass_kg");
                 let Some(added) = &table.added_mass_kg else {
                     let rule = format!("it needs added_mass_kg, {} to {} kg", mass.least, mass.most);
-                    return Err(self.refuse(&table.kind, "rig.event.do = \"weights\"".to_owned(), &rule));
+                    return Err(self.refuse(&table.kind, "rig.event.do = \"weights\"", &rule));
                 };
                 Action::Weights { added_mass_kg: self.number(mass, added)? }
             }

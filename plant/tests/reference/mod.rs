@@ -36,7 +36,6 @@ const KV_EXHAUST: [f64; 6] = [0.0, 0.0, 0.095, 0.30, 0.52, 0.58];
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Method {
-    /// Explicit Euler.
     Euler,
     /// The classical Runge-Kutta rule of order four.
     RungeKutta4,
@@ -63,7 +62,6 @@ pub(crate) struct Seen {
     pub(crate) p_b: [f64; 2],
 }
 
-/// The reference rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Reference {
     pub(crate) axes: [ReferenceAxis; 2],
