@@ -141,7 +141,7 @@ fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
 }
 
 fn name_cause(arguments: &CauseArguments) -> Result<Exit, ReportError> {
-    let (name, sentence) = latency::cause::name(&latency::cause::read(&arguments.file)?);
+    let (name, sentence) = latency::report_cause::name(&latency::report_cause::read(&arguments.file)?);
     eprintln!("{sentence}");
     print(&name);
     Ok(Exit::Good)
