@@ -1,8 +1,8 @@
 //! `emulator seal`: draws effects and writes them into a file that nobody but a rig should read.
 //!
 //! The file appears at once and for its owner alone, and never in place of another: a sealed rig that runs were made with
-//! cannot be
-//! drawn again by accident. What was drawn is reported nowhere else, and neither is the seed, which is as good as the file.
+//! cannot be drawn again by accident. What was drawn is reported nowhere else, and neither is the seed, which is as good as
+//! the file.
 
 use crate::cli::{SealArguments, SealedAxis};
 use crate::run::RunError;

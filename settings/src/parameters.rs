@@ -1,11 +1,9 @@
 //! Parameters of a controller: each a variable with name, unit, range, default and meaning, in tables.
 //!
 //! A part of the axis program declares its parameters once, by [`crate::parameters!`]: that makes the table, which files,
-//! listings,
-//! checks and XCP read, and a struct with a field for each. Values stand in a slice in the table's order, which may change
-//! between
-//! two cycles, so no part keeps a copy; the struct is read from it in each step. What enters a slice was checked against its
-//! table before.
+//! listings, checks and XCP read, and a struct with a field for each. Values stand in a slice in the table's order, which may
+//! change between two cycles, so no part keeps a copy; the struct is read from it in each step. What enters a slice was checked
+//! against its table before.
 
 use std::borrow::Cow;
 
