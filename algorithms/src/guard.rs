@@ -56,7 +56,7 @@ impl Stuck {
     }
 }
 
-/// What a person is informed of an algorithm that never returns.
+/// Message about an algorithm that does not return.
 pub const STUCK: &str = "an algorithm has not returned for 2 s; its valve is shut by the rig for want of commands. What was \
 recorded so far is saved; look for an endless loop or a wait in the step of the library";
 

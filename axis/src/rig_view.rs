@@ -134,7 +134,7 @@ impl RigView {
         };
         self.settle_account(tick, cycle);
         if let (None, Some((came, _))) = (self.cycle, &mut self.status) {
-            // It came before anything reported the time.
+            // It came before the first frame with the time.
             *came = cycle;
         }
         self.cycle = Some(cycle);

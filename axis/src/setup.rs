@@ -49,13 +49,13 @@ pub struct FileArguments {
     /// Program file of the load axis, in place of the experiment's.
     #[arg(long)]
     pub load_program: Option<PathBuf>,
-    /// Parameter set in place of the programs' numbers, as 'controller parameters' or XCP writes it; --set goes before it.
+    /// Parameter set that overrides the programs' parameters, as written by 'controller parameters' or XCP; --set overrides it.
     #[arg(long, value_name = "FILE")]
     pub parameters: Option<PathBuf>,
     /// A variable in place of the program's, such as drive.algorithm.gain_per_s=30; may be repeated.
     #[arg(long, value_name = "AXIS.TASK.NAME=VALUE")]
     pub set: Vec<String>,
-    /// Repeat the experiment until the rig ends, instead of saying Done.
+    /// Repeat the experiment until the rig ends; never report Done.
     #[arg(long)]
     pub repeat: bool,
     /// What follows an emergency stop that was released, in place of the experiment's.

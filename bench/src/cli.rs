@@ -14,7 +14,7 @@ use live::cli::WatchArguments;
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
 
-/// Works on what runs leave behind.
+/// Tools around emulator and controller: evaluate runs, measure latency, serve and check the bus.
 #[derive(Debug, Parser)]
 #[command(name = "bench", version, about, after_help = EXIT_CODE_HELP)]
 pub struct Cli {
@@ -55,11 +55,11 @@ pub enum Command {
     /// Become a program that ends with the one that starts it; `soak` starts this.
     #[command(hide = true)]
     SoakChild(ChildArguments),
-    /// Watch the machine: a thread on each CPU that reads the clock over and over notes when it could not.
+    /// Detect scheduling gaps: a spinning thread on each CPU records every interval in which it did not run.
     Probe(ProbeArguments),
     /// Measure round trips of 16 bytes between two processes, as a reference for those of rig and controller.
     PingPong(PingPongArguments),
-    /// Open a bus to programs that know no SocketCAN: the socketcand protocol, which python-can, cantools and SavvyCAN speak.
+    /// Serve a bus over TCP by the socketcand protocol, for python-can, cantools and SavvyCAN.
     Gateway(GatewayArguments),
     /// Show a run while it goes on, as a page for browsers, as JSON and for Prometheus; and act on it, if it is allowed.
     Watch(WatchArguments),
@@ -84,13 +84,13 @@ pub struct CompareArguments {
     /// The runs' folders; changes are against the first.
     #[arg(required = true, num_args = 2.., value_name = "RUN")]
     pub folders: Vec<PathBuf>,
-    /// Write a page that stands by itself, and its table in Markdown: a file that ends with .html, or a folder.
+    /// Write a self-contained page, and its table in Markdown: a file that ends with .html, or a folder.
     #[arg(long, value_name = "FILE.html|DIR")]
     pub out: Option<PathBuf>,
     /// Compare runs of different experiments too.
     #[arg(long)]
     pub anyway: bool,
-    /// Tell and draw how far each signal lies from the first run, instead of figures and curves.
+    /// Show each signal's difference from the first run, instead of figures and curves.
     #[arg(long)]
     pub differences: bool,
 }
@@ -122,8 +122,8 @@ pub struct ReportArguments {
     /// Heading of the report.
     #[arg(long)]
     pub title: Option<String>,
-    /// Set the runs side by side by the groups that their conditions.json name, the first run's group first; runs of one group
-    /// alone stand each for itself.
+    /// Compare runs by the group named in their conditions.json; the first run's group is the reference. If there is only one
+    /// group, each run is its own group.
     #[arg(long)]
     pub compare: bool,
     /// Put a run, or the runs in a folder, into a group to be set beside others; may be repeated.

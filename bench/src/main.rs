@@ -139,7 +139,7 @@ fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
 }
 
 fn name_cause(file: &Path) -> Result<Exit, ReportError> {
-    let (name, sentence) = latency::cause::name(&latency::cause::read(file)?);
+    let (name, sentence) = latency::report_cause::name(&latency::report_cause::read(file)?);
     eprintln!("{sentence}");
     print(&name);
     Ok(Exit::Good)

@@ -19,7 +19,7 @@ pub struct Cli {
 pub enum Command {
     /// Tell how many runs there are, and what the first ones are made with; runs nothing.
     Plan(PlanArguments),
-    /// Do what is missing of a campaign or of one shard; the whole is merged at the end.
+    /// Make the missing runs of a campaign or of one shard; a complete campaign is merged at the end.
     Run(RunArguments),
     /// Merge parts, of one folder or of several, into runs.csv and report.html.
     Merge(MergeArguments),
@@ -45,7 +45,7 @@ pub struct CommonArguments {
 pub struct PlanArguments {
     #[command(flatten)]
     pub common: CommonArguments,
-    /// How many runs are reported.
+    /// How many of the first runs to print.
     #[arg(long, default_value_t = 5)]
     pub first: u64,
     /// As JSON, for programs, on standard output.
@@ -61,7 +61,7 @@ pub struct RunArguments {
     /// Folder of its parts and results; default: runs/campaigns/NAME.
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// One of several starts that share the campaign: INDEX/COUNT from 0, or COUNT alone in a Slurm array or an indexed job.
+    /// Shard to run: INDEX/COUNT, INDEX from 0; COUNT alone takes the index from Slurm or Kubernetes.
     #[arg(long, value_name = "INDEX/COUNT")]
     pub shard: Option<Asked>,
     /// Runs at once; default: as many as there are cores.

@@ -63,7 +63,7 @@ pub(crate) struct Library {
     pub(crate) file: PathBuf,
 }
 
-/// How the controllers are outcome.
+/// How the controllers are paced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Pace {
     /// Answer the rig's frames as they arrive.
@@ -106,7 +106,7 @@ pub(crate) struct RunArguments {
     /// Which axes this process controls.
     #[arg(long, value_enum, default_value_t = Axes::Both)]
     pub(crate) axis: Axes,
-    /// Do not wait for the other axis's controller, nor mind its absence; with --axis drive or load.
+    /// Run without the other axis's controller; needs --axis drive or load.
     #[arg(long)]
     pub(crate) alone: bool,
     /// real: answer frames as they arrive; lockstep: join the barrier.
@@ -119,14 +119,13 @@ pub(crate) struct RunArguments {
     /// key of FILE; without FILE nothing can be changed. See controller/docs/xcp.md.
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
     pub(crate) xcp: Option<Option<PathBuf>>,
-    /// Write the timing of every cycle, not of the worst ones alone: controller-timing.csv, some 200 bytes a cycle; with --pace
-    /// real.
+    /// Write the time stamps of every cycle to controller-timing.csv, about 200 bytes a cycle; only with --pace real.
     #[arg(long)]
     pub(crate) full_timing: bool,
     /// Freeze the flight recorder when waking or executing takes longer than this, in us; with --pace real.
     #[arg(long, default_value_t = 500, value_name = "US", value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
     pub(crate) flight_late_us: u64,
-    /// Keep no ring of the last seconds, and write none.
+    /// Turn off the flight recorder.
     #[arg(long)]
     pub(crate) no_flight: bool,
     /// How long bus and sensors may be gone before giving up, in s.

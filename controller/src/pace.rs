@@ -14,7 +14,7 @@ use std::time::{Duration, Instant as WallInstant};
 
 /// Longest wait for a frame before looking at the world again.
 const PATIENCE: Duration = Duration::from_millis(20);
-/// Silence of the rig after which a person is informed; the rig shuts its valve by itself.
+/// Silence of the rig after which a message is printed; the rig shuts its valve by itself.
 const SILENCE: Duration = Duration::from_millis(200);
 /// Silence after Done that counts as the rig's end.
 const DONE_SILENCE: Duration = Duration::from_secs(1);

@@ -17,21 +17,22 @@ pub struct Cli {
 /// The workflow and its steps.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The whole workflow: report.json, report.html, the extended rig.toml, and next-NAME.toml where an experiment is proposed.
+    /// Run the whole workflow: report.json, report.html, the extended rig.toml, and next-NAME.toml where an experiment is
+    /// proposed.
     Close(CloseArguments),
-    /// Whether records can be used, and their noise.
+    /// Check whether records can be used, and estimate their noise.
     Check(RecordArguments),
-    /// The baseline's own parameters from records, with errors, and what the records cannot tell.
+    /// Estimate the baseline's parameters from records, with standard errors, and list those that cannot be identified.
     Calibrate(RecordArguments),
-    /// Which balance disagrees, in which regime, over which variables.
+    /// Locate which balance disagrees, in which regime, over which variables.
     Locate(RecordArguments),
-    /// Names what is missing: a close without a held-out record.
+    /// Name the missing effects: like 'close', without a held-out record.
     Name(NameArguments),
-    /// Writes the rig file with what a report names.
+    /// Write the rig file extended by the effects that a report names.
     Extend(ExtendArguments),
-    /// Judges an extended rig file on a record that it was not fitted on.
+    /// Judge an extended rig file on a record that it was not fitted on.
     Verify(VerifyArguments),
-    /// Proposes the experiment that tells apart what a report could not.
+    /// Propose the experiment that distinguishes the effects that a report could not.
     Next(NextArguments),
 }
 
@@ -91,7 +92,7 @@ pub struct CloseArguments {
     /// What naming is given.
     #[command(flatten)]
     pub name: NameArguments,
-    /// The record that the model never sees before it is judged on it; a model of one balance takes several.
+    /// Held-out record, used only to judge the model; a model of one balance accepts several.
     #[arg(long, num_args = 1..)]
     pub test: Vec<PathBuf>,
 }

@@ -8,13 +8,14 @@
 //! | `sensor_inverse` | from readings to states, by the sensor models of a rig |
 //! | [`windows`] | multiple shooting: whitened residuals of windows |
 //! | [`engine`] | training records with their simulations and sensitivities |
-//! | `fit` | robust least squares over windows, standard errors |
+//! | `fit` | linear robust least squares over windows: the step of a fit, standard errors |
+//! | `descent` | the loop of nonlinear fits: steps while the loss falls |
 //! | `stats` | order statistics and means |
 //! | [`candidates`] | effects at places, and the scaling of their numbers |
 //! | [`parameters`] | baseline parameters as nuisance parameters |
 //! | [`calibrate`] | calibration of these parameters |
 //! | [`screen`] | linear screening of candidates |
-//! | [`refit`] | Gauss-Newton fit of effects in the simulator |
+//! | [`refit`] | nonlinear fit of effects in the simulator, by Gauss-Newton |
 //! | [`name`](mod@name) | forward selection and backward elimination of effects |
 //! | [`extend`] | the extended rig file |
 //! | [`locate`] | unknown inputs of each balance |

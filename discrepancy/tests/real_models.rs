@@ -1,6 +1,5 @@
 //! The real records beside the project closed by the models that ship: figures of effects.md, names, held-out ratios;
-//! skipped aloud
-//! where the records are not there.
+//! skipped aloud where the records are not there.
 
 use crate::real::{crate_folder, data};
 use discrepancy::report::{Report, Verdict};

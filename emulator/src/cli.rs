@@ -31,7 +31,7 @@ pub enum Command {
     Run(Box<RunArguments>),
     /// Host an embedded bus alone, without a rig.
     Bus(BusArguments),
-    /// Draw effects that nobody knows, and write them into a file for 'emulator run --sealed'.
+    /// Draw hidden effects at random and write them to a file for 'emulator run --sealed'.
     Seal(SealArguments),
     /// List the effects that a rig file or a sealed file can switch on: names, places, numbers with unit and range, laws,
     /// sources.
@@ -45,8 +45,8 @@ pub enum Command {
 /// What to print of the bus's load.
 #[derive(Args, Debug)]
 pub struct BusLoadArguments {
-    /// Print a table in Markdown instead: each frame's bound, what the modelled wire shows at its critical instant, and what the
-    /// run of this summary.json, over a bus with a bit rate, showed.
+    /// Print a Markdown table instead: each frame's worst-case bound, the modelled response at its critical instant, and the
+    /// response measured in the run of SUMMARY (a bus with a bit rate).
     #[arg(long, value_name = "SUMMARY")]
     pub markdown: Option<PathBuf>,
 }
@@ -64,8 +64,8 @@ pub struct RunArguments {
     /// Experiment file, of which `[rig]` is read: initial state, hands, and what people do when.
     #[arg(long)]
     pub experiment: Option<PathBuf>,
-    /// File with effects that nobody but the rig knows, as 'emulator seal' draws it: what it switches on stands in truth.csv
-    /// alone. In place of the one that the experiment names.
+    /// Sealed file with hidden effects, from 'emulator seal'. Only the plant reads it; the effects appear in truth.csv alone.
+    /// Overrides the experiment's sealed file.
     #[arg(long, value_name = "FILE")]
     pub sealed: Option<PathBuf>,
     /// Script of faults: what breaks when; 'emulator faults' lists what can, emulator/docs/faults.md tells how.
@@ -107,24 +107,24 @@ pub struct RunArguments {
     /// Ask the system for no priority, no locked memory and no latency request.
     #[arg(long)]
     pub no_realtime: bool,
-    /// Write when everything of every cycle happened: emulator-timing.csv.
+    /// Write the time stamps of every cycle to emulator-timing.csv.
     #[arg(long)]
     pub full_timing: bool,
     /// Freeze the flight recorder at a wake-up later than this, an execution longer than this, or a missed cycle, in us.
     #[arg(long, default_value_t = DEFAULT_FLIGHT_LATE_US, value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
     pub flight_late_us: u64,
-    /// Keep no flight recorder.
+    /// Turn off the flight recorder.
     #[arg(long)]
     pub no_flight: bool,
-    /// Ignore frames of the bench: hand force, link, weights; and send no marks of faults, which are the bench's.
+    /// Ignore bench frames (hand force, link, weights) and send no FaultMark frames.
     #[arg(long)]
     pub no_bench_frames: bool,
     /// Take commands from standard input, one a line: emergency stop, linkage, weights, hands, faults; 'help' lists them.
-    /// What is typed is not reproducible, in lockstep neither.
+    /// Typed commands are not reproducible, not even in lockstep.
     #[arg(long)]
     pub console: bool,
-    /// Let viewers look on at a Unix socket of this path: cycles, events, histograms, and with --console its commands;
-    /// 'bench watch' shows them.
+    /// Publish telemetry on a Unix socket at PATH: cycles, events, histograms; with --console, accept commands too.
+    /// 'bench watch' displays it.
     #[arg(long, value_name = "PATH")]
     pub telemetry: Option<PathBuf>,
     /// How long the bus may be gone before the run ends, in s.
@@ -141,10 +141,10 @@ pub struct SealArguments {
     /// How many different effects.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     pub effects: u8,
-    /// Axis that they are on; effects of the linkage are drawn for both alone.
+    /// Axis of the effects; linkage effects are drawn only with 'both'.
     #[arg(long, value_enum, default_value_t = SealedAxis::Both)]
     pub axis: SealedAxis,
-    /// File to write; one that is there is left as it is.
+    /// File to write; an existing file is refused.
     #[arg(long, default_value = "sealed.toml")]
     pub out: PathBuf,
 }

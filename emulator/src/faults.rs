@@ -9,7 +9,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`table`] | every fault: name, places, numbers with unit and range, description; nothing about them stands elsewhere |
+//! | [`table`] | every fault: name, places, numbers with unit and range, description |
 //! | [`script`] | a file of faults with their times and conditions, checked |
 //! | [`schedule`] | what begins and ends when in a run |
 //! | [`overlay`] | what those that are active do to plant, sensors and hands |

@@ -6,8 +6,8 @@
 //!        sent              send frames           (in lockstep: before Go)   step the plant
 //! ```
 //!
-//! The cycle itself is that of [`rig_node`]. Missed cycles are computed with the command latched before, so a stall changes which
-//! inputs there are and never the physics. Nothing here allocates, locks, prints or blocks.
+//! The cycle itself is that of [`rig_node`]. Missed cycles are computed with the command that acted before, so a stall changes
+//! which inputs there are and never the physics. Nothing here allocates, locks, prints or blocks.
 
 use crate::console::Command;
 use crate::event::{Event, EventKind};
@@ -96,7 +96,7 @@ impl EmulatorNode {
         }
     }
 
-    /// Computes `count` cycles from `first` on that the loop missed, with the commands latched before.
+    /// Computes `count` cycles from `first` on that the loop missed, with the commands that acted before.
     pub fn miss(&mut self, first: u64, count: u64) {
         if count == 0 {
             return;
@@ -209,7 +209,7 @@ impl EmulatorNode {
         }
     }
 
-    /// Latches the commands for `cycle`, records it, and steps the plant to the start of the next.
+    /// Withdraws stale or disputed commands in `cycle`, records it, and steps the plant to the start of the next.
     pub fn act(&mut self, cycle: u64) {
         for axis in Axis::ALL {
             let Latched { change, age_cycles } = self.node.latch(axis);

@@ -1,8 +1,8 @@
 //! `emulator seal`: draws effects and writes them into a file that nobody but a rig should read.
 //!
 //! The file appears at once and for its owner alone, and never in place of another: a sealed rig that runs were made with
-//! cannot be
-//! drawn again by accident. What was drawn is reported nowhere else, and neither is the seed, which is as good as the file.
+//! cannot be drawn again by accident. What was drawn is reported nowhere else, and neither is the seed, which is as good as
+//! the file.
 
 use crate::cli::{SealArguments, SealedAxis};
 use crate::run::RunError;
@@ -84,6 +84,7 @@ fn temporary(path: &Path) -> PathBuf {
 mod tests {
     use super::*;
     use plant::RigParameters;
+    use plant::effects::SHEETS;
     use std::os::unix::fs::PermissionsExt;
 
     fn arguments(out: PathBuf, seed: u64) -> SealArguments {
@@ -119,9 +120,16 @@ mod tests {
     #[test]
     fn what_cannot_be_had_is_refused_with_what_can() {
         let folder = tempfile::tempdir().unwrap();
-        let too_many = SealArguments { effects: 40, ..arguments(folder.path().join("a.toml"), 7) };
+        let asked = u8::try_from(SHEETS.len() + 1).unwrap();
+        let too_many = SealArguments { effects: asked, ..arguments(folder.path().join("a.toml"), 7) };
         let error = seal(&too_many).unwrap_err().to_string();
-        assert_eq!(error, "--effects 40: 40 different effects were asked for; allowed are 0 to 38 here");
+        let most = SHEETS.len();
+        assert_eq!(
+            error,
+            format!(
+                "--effects {asked}: {asked} different effects were asked for; allowed are 0 to {most} here"
+            )
+        );
         let nowhere = seal(&arguments(folder.path().join("no/folder/a.toml"), 7)).unwrap_err();
         assert!(matches!(nowhere, RunError::Output { .. }), "{nowhere}");
     }

@@ -1,10 +1,9 @@
 //! Joins what emulator and controllers left in a run's folder: `summary.json` and `run.json` become whole.
 //!
 //! The emulator writes both with what the rig knows. `controller.json` (one process for both axes), or
-//! `controller-drive.json` and
-//! `controller-load.json` (a process each), hold what only the controllers know; the tables give the figures. Joining twice gives
-//! the same as joining once. A key that is missing, since another version or a foreign controller wrote the file, counts as not
-//! known: null.
+//! `controller-drive.json` and `controller-load.json` (a process each), hold what only the controllers know; the tables give the
+//! figures. Joining twice gives the same as joining once. A key that is missing, since another version or a foreign controller
+//! wrote the file, counts as not known: null.
 //!
 //! A run has passed when emulator and controllers ended well, the bounds of its experiment were kept, no record was dropped,
 //! and no second rig spoke: what stands against it is listed in `not_passed_because`.

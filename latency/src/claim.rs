@@ -79,7 +79,7 @@ fn not_granted(runs: &[RunFiles]) -> Vec<String> {
     reasons
 }
 
-/// What is not reported, or too little.
+/// Evidence that the runs lack.
 fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
     let mut reasons = Vec::new();
     let unknown = runs.iter().filter(|run| run.run.is_null() || run.controllers.is_empty()).count();

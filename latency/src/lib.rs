@@ -15,7 +15,7 @@
 //! | [`parts`] | the runs one by one |
 //! | [`explain`] | late cycles with their causes |
 //! | [`findings`] | what disturbed the runs as a whole |
-//! | [`cause`] | the one cause that a report names |
+//! | [`report_cause`] | the one cause of a whole report; that of an event is in `explain/rules.rs` |
 //! | [`ratios`] | ours against the reference, pair by pair |
 //! | [`tallies`] | counts that a reader looks for first |
 //! | [`conditions`] | where and how it was measured |
@@ -31,7 +31,6 @@
 //! | [`table`] | the table of ratios that `scripts/latency` ends with |
 
 pub mod bounds;
-pub mod cause;
 pub mod choice;
 pub mod claim;
 pub mod comparison;
@@ -53,6 +52,7 @@ pub mod parts;
 pub mod probe;
 pub mod ratios;
 pub mod reference;
+pub mod report_cause;
 pub mod resolution;
 pub mod samples;
 pub mod table;

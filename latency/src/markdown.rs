@@ -1,8 +1,8 @@
 //! A report in words and tables: `report.md`, which a merge request takes as it stands, and the short table of a terminal.
 
-use super::cause::in_kebab;
 use super::explain::rules::in_words;
 use super::model::{BoundResult, Comparison, Distribution, Event, PercentilesNs, Ratio, Report, Source};
+use super::report_cause::in_kebab;
 use super::resolution::{self, Verdict};
 use super::tallies;
 use pagekit::grid::Grid;

@@ -30,7 +30,7 @@ pub enum Watched {
     Yes,
     No,
     /// Its table does not say.
-    NotTold,
+    NotReported,
 }
 
 /// Whether a CPU was watched at a time, by the rows of a table.
@@ -40,7 +40,7 @@ pub fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
         return Watched::Yes;
     }
     // A table that names the CPUs names them all.
-    if gaps.iter().any(|gap| gap.from_ns == gap.to_ns) { Watched::No } else { Watched::NotTold }
+    if gaps.iter().any(|gap| gap.from_ns == gap.to_ns) { Watched::No } else { Watched::NotReported }
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -86,7 +86,7 @@ mod tests {
         assert_eq!(watched(Some(&table), 1, 500), Watched::Yes);
         assert_eq!(watched(Some(&table), 2, 500), Watched::No);
         assert_eq!(watched(Some(&table), 1, 50), Watched::No, "it began later");
-        assert_eq!(watched(Some(&table[2..]), 1, 500), Watched::NotTold);
+        assert_eq!(watched(Some(&table[2..]), 1, 500), Watched::NotReported);
         assert_eq!(watched(None, 1, 500), Watched::No);
     }
 

@@ -158,7 +158,7 @@ mod tests {
         minute
     }
 
-    /// Saves so many seconds: what is reported after the folder, and the lines of `measurement.csv` and `bus.log`.
+    /// Saves so many seconds: the message after the folder's name, and the lines of `measurement.csv` and `bus.log`.
     fn saved(minute: &Minute, seconds: f64) -> (String, Vec<String>, usize) {
         let folder = tempfile::tempdir().unwrap();
         let reported = minute.last(seconds, folder.path(), "bus0", SET_UP).write().unwrap();

@@ -1,7 +1,8 @@
 //! The catalogue: what the baseline leaves out and a real servo-pneumatic axis has; one file for each effect.
 //!
-//! All are off unless a rig file switches them on by name and place, as `[effects.piston-leakage.drive]`. A new effect is one
-//! file and one line in the list below; `example.rs`, which only tests see, is added that way.
+//! All are off unless a rig file switches them on by name and place, as `[effects.piston-leakage.drive]`. In
+//! `plant/src`, a new effect is one file and one line in the list below; `example.rs`, which only tests see, is added that way.
+//! What else it needs is in CONTRIBUTING.md.
 //!
 //! Source: effects.md, the catalogue of physical effects; each file names its own.
 

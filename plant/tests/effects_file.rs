@@ -41,8 +41,7 @@ fn the_shipped_rig_has_no_effect() {
 }
 
 #[test]
-fn each_of_the_38_effects_is_switched_on_at_each_place_of_its_kind() {
-    assert_eq!(SHEETS.len(), 38);
+fn each_effect_is_switched_on_at_each_place_of_its_kind() {
     for sheet in SHEETS {
         for place in sheet.place.places() {
             let numbers: Vec<f64> = sheet.keys.iter().map(inside).collect();

@@ -4,7 +4,7 @@ use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Sheet};
 use plant::parameters::table::Unit;
 
-/// The names of effects.md, in the order of its tables; they are binding.
+/// The names of effects.md, in the order of its tables; they are binding. The one place that counts the effects.
 const NAMES: [&str; 38] = [
     "critical-pressure-ratio",
     "valve-characteristic",

@@ -1,9 +1,9 @@
 //! Takes the valve commands of one axis from the bus and tells which opening acts.
 //!
-//! A command is latched at the start of the cycle after it arrived and held for the cycle (bus.md, Time). What
-//! must not act is counted and ignored: a frame whose echo is older than 20 cycles or answers no cycle that was
-//! sent; a command that two senders dispute; a command grown older than 20 cycles, for which the valve shuts until a
-//! fresh one comes.
+//! [`CommandIntake::take`] stores a command when it arrives; it acts from the start of the next cycle (bus.md, Time), unless
+//! [`CommandIntake::latch`] withdraws it there. Commands that must not act are counted and ignored: a frame whose echo is older
+//! than 20 cycles or answers no cycle that was sent; a command that two senders dispute; a command grown older than 20 cycles,
+//! for which the valve shuts until a fresh one comes.
 
 use crate::frames::ValveCommand;
 use crate::live_cycles::LiveCycles;
@@ -35,7 +35,7 @@ pub struct CommandCounters {
     pub two_sources: u64,
 }
 
-/// What changed with a latch, for messages.
+/// A change that `latch` found, for messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// The command grew stale: valve shut.

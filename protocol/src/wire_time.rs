@@ -15,7 +15,7 @@
 //!
 //! Modelled: bits with real stuffing, arbitration by identifier, queues, errors and their cost, error counters, error-passive and
 //! bus-off nodes with their recovery. Not modelled: propagation delay and clock tolerance, missing acknowledgement (a node
-//! alone on the bus is heard by nobody and informed of nothing), overload frames, two nodes that send one identifier at once (the
+//! alone on the bus is heard by nobody and gets no error frame), overload frames, two nodes that send one identifier at once (the
 //! one that was queued first goes first), and controllers that hold fewer mailboxes than frames.
 //!
 //! Source: ISO 11898-1; Davis, Burns, Bril, Lukkien, "Controller Area Network (CAN) schedulability analysis: Refuted,

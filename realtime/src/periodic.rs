@@ -251,8 +251,8 @@ impl<C: Clock> PeriodicLoop<C> {
         Ok(cycle)
     }
 
-    /// Records the execution time of the cycle since its wake-up, and tells when that was. Without a cycle, or reported twice, it
-    /// does nothing.
+    /// Records the execution time of the cycle since its wake-up, and returns when that was. Without a cycle, or
+    /// called twice, it does nothing.
     pub fn end_of_work(&mut self) -> Option<Instant> {
         let cycle = self.working.take()?;
         let now = self.clock.now();

@@ -7,10 +7,8 @@
 //! ```
 //!
 //! A command that arrived before t_k acts over [t_k, t_k+1) (bus.md, Time). What is simulated is a [`SimulatedRig`]: the plant
-//! with
-//! people around it ([`PeopledPlant`]), the emulator's with faults, the record maker's own. Nothing here allocates after the
-//! start,
-//! locks, prints or blocks.
+//! with people around it ([`PeopledPlant`]), the emulator's with faults, the record maker's own. Nothing here allocates after the
+//! start, locks, prints or blocks.
 
 #![warn(missing_docs)] // an interface of other crates
 
@@ -149,21 +147,21 @@ impl<R: SimulatedRig> RigNode<R> {
         Taken::Done
     }
 
-    /// Latches the command of an axis for the cycle that was sent last.
+    /// Withdraws the command of an axis if it is stale or disputed in the cycle that was sent last, and reports what acts.
     pub fn latch(&mut self, axis: Axis) -> Latched {
         let intake = &mut self.commands[axis.index()];
         let change = intake.latch(&self.live);
         Latched { change, age_cycles: intake.obeyed_age_cycles(&self.live) }
     }
 
-    /// Ends `cycle`, sent or missed: the rig moves by one period under the commands latched last.
+    /// Ends `cycle`, sent or missed: the rig moves by one period under the commands that `latch` left.
     pub fn step(&mut self, cycle: u64) -> R::Cycle {
         let valve = self.openings([None, None]);
         self.rig.step(cycle, valve)
     }
 
-    /// Valve openings as they act: of these commands, and where there is none, of the latched one. Commands count as 0 while the
-    /// emergency stop is tripped.
+    /// Valve openings as they act: of these commands, and where there is none, of the one that acts. Commands count as 0 while
+    /// the emergency stop is tripped.
     #[must_use]
     pub fn openings(&self, coming: [Option<ValveCommand>; 2]) -> [f64; 2] {
         let stopped = self.rig.standing().emergency_stop;

@@ -140,7 +140,7 @@ impl Counted {
         }
     }
 
-    /// What it reported of the cycle that it answers.
+    /// Processes a report on the cycle that it answers.
     fn take_told(&mut self, reported: &Frame) {
         match reported {
             Frame::DriveChainStatus(status) if status.main_chain == MainChainState::Experiment => {

@@ -77,8 +77,7 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
         }
     }
     // The run ends when all of it was done, however long this process was kept from it: with an end by the rig's time, a
-    // machine that
-    // was busy sent the last bad frames to a rig that had gone.
+    // machine that was busy sent the last bad frames to a rig that had gone.
     scene.wait_for_rows("emulator", 11_000);
     scene.wait_for_more_rows("emulator", 100);
     emulator.signal(Signal::TERM);

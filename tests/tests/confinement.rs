@@ -1,6 +1,6 @@
 //! What the programs touch that is not theirs: no file outside the folders they are given, no socket beyond this machine.
 //!
-//! Files are reported by strace, system call by system call, so that one that is written and removed again counts, too.
+//! strace lists the files, system call by system call, so that one that is written and removed again counts, too.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -215,7 +215,7 @@ fn the_steps_before_a_report_run_alone() {
     assert_eq!(json(&folder.path().join("checks.json"))[0]["usable"], true);
 
     let calibrate = on("calibrate", train, folder.path(), &[]).expect_code(GOOD);
-    // What is missing here is no number of the file: points of a table that it hides are said not to be reported.
+    // The missing effect is no number of the file. It hides points of a table, which are printed as not determined.
     for reported in [
         "parameter:mass = ",
         "cylinder.dead_volume_cm3 = ",

@@ -4,6 +4,7 @@
 //! Nothing is judged of the control: a controller that knows nothing of an extreme effect may well miss its target. That the
 //! sum of a balance changes by exactly an effect's term is held in `plant`.
 
+use plant::effects::SHEETS;
 use plant::effects::sheet::Switched;
 use std::sync::Mutex;
 use std::thread;
@@ -40,7 +41,7 @@ fn lockstep(effects: &[Switched]) {
 #[test]
 fn each_effect_alone_leaves_the_rig_finite_in_lockstep() {
     let waiting = Mutex::new(each_alone());
-    assert_eq!(waiting.lock().map(|effects| effects.len()).ok(), Some(38));
+    assert_eq!(waiting.lock().map(|effects| effects.len()).ok(), Some(SHEETS.len()));
     let next = || waiting.lock().expect("a worker that fails ends the test").pop();
     thread::scope(|scope| {
         for _ in 0..2 {

@@ -201,7 +201,7 @@ fn sensors_are_noisy_spiky_and_coarse() {
     );
 }
 
-/// The drive's valve is reported 0.5, and -0.4 in answer to cycle 249: from cycle 250 on.
+/// The drive's valve is commanded to 0.5, and to -0.4 in answer to cycle 249: from cycle 250 on.
 fn reported(cycle: u32) -> Option<[f64; 2]> {
     Some([if cycle < 249 { 0.5 } else { -0.4 }, 0.0])
 }

@@ -1,4 +1,4 @@
-//! The telemetry: what viewers are reported is what stands in the run's files, and nothing that they do reaches the run.
+//! The telemetry: viewers receive what stands in the run's files, and nothing that they do reaches the run.
 
 use runlog::telemetry::Packet;
 use serde_json::{Value, json as value};
@@ -18,7 +18,7 @@ fn viewer(scene: &Scene) -> Viewer {
     Viewer::connect(&scene.path("telemetry"))
 }
 
-/// Holds what a viewer was reported against the tables, cell by cell and to the bit.
+/// Compares what a viewer received with the tables, cell by cell and to the bit.
 fn expect_rows_of_the_files(scene: &Scene, reported: &Told) {
     let tables =
         ["measurement", "truth"].map(|name| Table::read(&scene.path(&format!("emulator/{name}.csv"))));
@@ -168,7 +168,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
         "{refused}"
     );
     let is_weights = |event: &Value| event["kind"]["weights"]["added_mass_kg"] == 3.0;
-    // Who comes later is informed of it too.
+    // A viewer that connects later receives it too.
     let mut later = viewer(&scene);
     let heard = std::iter::from_fn(|| later.packet()).find_map(|packet| match packet {
         Packet::Event(text) => serde_json::from_str::<Value>(&text).ok().filter(is_weights),

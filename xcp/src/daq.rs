@@ -31,7 +31,7 @@ const ROOM: usize = 2 * ODTS;
 
 /// Bit of a list's mode: with time stamps. The only one that can be asked for.
 const MODE_STAMP: u8 = 0x10;
-/// Bits of a list's mode as it is reported: selected, running.
+/// Bits of a list's mode in the response to the master: selected, running.
 const SELECTED: u8 = 0x01;
 const RUNNING: u8 = 0x40;
 
@@ -92,7 +92,7 @@ pub struct Daq {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ListMode {
-    /// Bits as they are reported.
+    /// Bits as they stand in the response.
     pub mode: u8,
     /// A packet each so many cycles.
     pub prescaler: u8,

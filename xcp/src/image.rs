@@ -180,7 +180,7 @@ impl Image {
         }
     }
 
-    /// Writes the bytes from `address` on; `desk` is informed of every value that became another's.
+    /// Writes the bytes from `address` on; `desk` gets every value that changed.
     ///
     /// # Errors
     /// [`Refusal::AccessDenied`] where nothing is; [`Refusal::WriteProtected`] for what is only read, or read at the start only;
@@ -267,7 +267,7 @@ impl Image {
     ) -> Result<(), Refusal> {
         if region == Region::Parameters {
             let value = Format::Double.decode(bytes);
-            // What is the same already is no change, and nobody is informed of it.
+            // An equal value is no change, and is not passed on.
             if value.to_bits() != self.parameters[place].to_bits() {
                 self.parameters[place] = value;
                 desk.set(place, value);
@@ -308,7 +308,7 @@ pub(super) mod tests {
     use super::*;
     use settings::parameters::{Parameter, declare};
 
-    /// Whoever is reported, and remembers.
+    /// A desk that records what it gets.
     #[derive(Default)]
     pub(crate) struct Notes {
         pub(crate) set: Vec<(usize, f64)>,

@@ -5,7 +5,7 @@
 //!       ◄ 0x1E1 ──┘          ├── lock: seed and key                      0x1E2 and 0x1E3: the load's
 //!                            ├── daq: lists
 //!                            └── trace: trigger buffer
-//!                 port ─► queue ─► clerk, in the recorder's thread: files, what a person is reported
+//!                 port ─► queue ─► clerk, in the recorder's thread: files, messages
 //! ```
 //!
 //! Off unless `--xcp` asks for it. [`slave`] is a function over bytes; [`port`] puts it on the bus, after the commands to the

@@ -1,4 +1,4 @@
-//! Whether sensors of an axis are new, late or a duplicate, reported by the low 4 bits of their cycle and their content.
+//! Whether sensors of an axis are new, late or a duplicate, by the low 4 bits of their cycle and their content.
 
 use protocol::frames::{ALIVE_RANGE, Sensors};
 

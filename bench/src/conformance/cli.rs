@@ -55,7 +55,7 @@ pub struct ConformanceArguments {
     /// The axis whose controller is checked.
     #[arg(long, value_enum, default_value_t = CheckedAxis::Drive)]
     pub axis: CheckedAxis,
-    /// The controller serves both axes: it may send the frames of the other one's too.
+    /// The controller serves both axes and may send the other axis's frames.
     #[arg(long)]
     pub both_axes: bool,
     /// How time passes.
@@ -70,7 +70,7 @@ pub struct ConformanceArguments {
     /// How long to wait for the first command, and for an open valve before each fault, s.
     #[arg(long, default_value = "20", value_parser = seconds)]
     pub patience: f64,
-    /// Real time: 99 % of the commands come at most so long after the sensors that they answer, us.
+    /// Real time: largest 99th percentile of the response time from sensors to command, us.
     #[arg(long, default_value_t = 500)]
     pub response_us: u64,
     /// Real time: 99 % of the times between two commands differ from 1 ms by at most this, us.

@@ -8,17 +8,17 @@ use std::path::PathBuf;
 /// Which bus for whom.
 #[derive(Args, Debug)]
 pub struct GatewayArguments {
-    /// Bus to open the door to: can://IFACE or unix:///PATH.
+    /// Bus to serve: can://IFACE or unix:///PATH.
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
-    /// Address and port to listen at; port 0 takes a free one and tells it. Whoever reaches an address beyond loopback can move
+    /// Address and port to listen at; port 0 takes a free one and prints it. Whoever reaches an address beyond loopback can move
     /// the rig: the protocol knows no password.
     #[arg(long, default_value = "127.0.0.1:29536", value_name = "ADDRESS:PORT")]
     pub listen: SocketAddr,
     /// Name by which clients open the bus [default: the interface, or the file name of the embedded bus].
     #[arg(long, value_parser = bus_name)]
     pub name: Option<String>,
-    /// Clients at a time; who comes beside them is informed and parted with.
+    /// Maximum number of clients; a further one gets an error and is disconnected.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub clients: u16,
     /// Frames that wait for a client that reads slowly; what does not fit is lost to it, and counted.

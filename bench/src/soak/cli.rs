@@ -38,14 +38,14 @@ pub struct SoakArguments {
     /// Load generator that runs beside every other segment, as one command line; 'none' for none.
     #[arg(long, default_value = "stress-ng --cpu 2 --vm 1 --vm-bytes 128M --switch 1")]
     pub load: String,
-    /// Segments that lose frames on purpose, every fourth one: not on can://, whose wire is not ours.
+    /// Inject frame loss into every fourth segment; embedded bus only.
     #[arg(long, value_enum, default_value_t = YesNo::Yes)]
     pub loss_segments: YesNo,
     /// Probability that a frame is lost in these segments.
     #[arg(long, default_value_t = 0.01, value_parser = probability)]
     pub loss: f64,
-    /// Whether a broken bound on a position error breaks the segment. The bounds are those of an experiment driven once; driven
-    /// again and again some are broken in lockstep too, where no machine disturbs.
+    /// Whether a broken bound on a position error fails the segment. The bounds are those of an experiment run once; repeated,
+    /// it breaks some of them in lockstep too, where no machine disturbs.
     #[arg(long, value_enum, default_value_t = YesNo::No)]
     pub judge_positions: YesNo,
     /// Newest segments that keep their big files (logs and tables).

@@ -7,7 +7,7 @@ use crate::merge::{Results, Unfinished};
 use pagekit::grid::Grid;
 use pagekit::page::escaped;
 
-/// Runs that are informed of each figure.
+/// Number of runs shown for each figure.
 const TOLD: usize = 8;
 
 /// The worst of each figure that is shown.

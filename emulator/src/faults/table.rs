@@ -1,7 +1,8 @@
 //! The table: every fault that can be put into a run, and everything that is known of one before it happens.
 //!
-//! The reader of scripts, the console, the listing, the page and the tests all read it; a new fault is a row, and an arm in
-//! [`super::overlay`] that says what it does. This file says what a row is, `rows.rs` has them.
+//! The reader of scripts, the console, the listing, the page and the tests all read it; a new fault is a row. What it does is
+//! an arm in [`super::overlay`], for a sensor in [`put_sensor`], for frames and nodes in the wire; [`super::schedule`] has the
+//! faults that act once or end by an event. This file says what a row is, `rows.rs` has them.
 
 mod rows;
 

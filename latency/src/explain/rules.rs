@@ -68,15 +68,15 @@ pub struct Seen {
 }
 
 #[derive(Clone, Debug)]
-pub struct Told {
+pub struct Explanation {
     pub cause: Cause,
     pub sentence: String,
     pub evidence: Vec<String>,
 }
 
-pub fn cause(seen: &Seen) -> Told {
+pub fn cause(seen: &Seen) -> Explanation {
     let cause = first_that_holds(seen);
-    Told { cause, sentence: sentence(cause, seen), evidence: evidence(seen) }
+    Explanation { cause, sentence: sentence(cause, seen), evidence: evidence(seen) }
 }
 
 fn first_that_holds(seen: &Seen) -> Cause {
@@ -261,7 +261,7 @@ fn probe_evidence(seen: &Seen) -> String {
     let cpu = seen.vitals.cpu;
     let mut text = if seen.probe_watched == Watched::No {
         format!("No probe watched CPU {cpu}: whether it stood still was not seen directly.")
-    } else if seen.probe_watched == Watched::NotTold {
+    } else if seen.probe_watched == Watched::NotReported {
         format!("The probe's table has no gap of CPU {cpu}, and does not tell whether that CPU was watched.")
     } else if seen.still_ns > 0 {
         format!(

@@ -1,6 +1,6 @@
 //! Which distributions stand in one chart and under one heading, and which reference beside them.
 //!
-//! Ours are reported by the end of their tag (`emulator-wakeup`, `drive-round-trip`), a reference by the program that measured
+//! Ours are recognised by the end of their tag (`emulator-wakeup`, `drive-round-trip`), a reference by the program that measured
 //! it: cyclictest waits for a time as our loops do, a ping-pong sends there and back as a round trip does.
 
 use crate::model::{Distribution, Source};

@@ -28,7 +28,8 @@ const HEAD: &str = "\
 # Effects
 
 This page compares each effect of the catalogue, alone on the drive at the geometric middle of the range that sealed rigs
-and studies draw from, with the baseline. Laws, keys and ranges are those of `src/effects/`; the page and its pictures are made by
+and studies draw from, with the baseline. Laws, keys and ranges are those of `plant/src/effects/`; the page and its
+pictures are made by
 
     cargo run --release -p plant --example effects_page
 

@@ -169,6 +169,7 @@ pub fn as_toml(effects: &[Switched]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sheet::PlaceKind;
     use super::*;
     use crate::parameters::RigParameters;
     use std::collections::BTreeSet;
@@ -205,7 +206,10 @@ mod tests {
 
     #[test]
     fn no_effect_comes_twice_and_more_than_there_are_is_refused() {
-        for (among, most) in [(Among::Both, 38), (Among::Drive, 36), (Among::Load, 36)] {
+        let of_linkage = SHEETS.iter().filter(|sheet| sheet.place == PlaceKind::Linkage).count();
+        let (all, of_one_axis) = (SHEETS.len(), SHEETS.len() - of_linkage);
+        assert!(of_one_axis < all);
+        for (among, most) in [(Among::Both, all), (Among::Drive, of_one_axis), (Among::Load, of_one_axis)] {
             let names: BTreeSet<_> = draw(3, most, among).unwrap().iter().map(|effect| effect.name).collect();
             assert_eq!(names.len(), most);
             assert_eq!(draw(3, most + 1, among), Err(TooMany { asked: most + 1, most }));

@@ -147,7 +147,7 @@ mod tests {
         assert!((position(Some(0.0)) - baseline).abs() < 1e-9, "the order of additions alone");
     }
 
-    /// Adding an effect takes one file and one line: the name of this one stands nowhere else in the crate's sources.
+    /// In `plant/src`, adding an effect takes one file and one line: the name of this one stands nowhere else there.
     #[test]
     fn it_stands_in_one_file_and_one_line() {
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

@@ -72,7 +72,7 @@ impl Term {
 /// Chambers by name, as they are counted.
 const CHAMBERS: [(&str, Element); 2] = [("a", Element::A), ("b", Element::B)];
 
-/// A list that is being reported.
+/// The walk over all terms, which calls a function for each.
 struct Teller<'t> {
     effects: &'t Effects,
     part: Part,

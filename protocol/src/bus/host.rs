@@ -170,7 +170,7 @@ impl Host {
         }
         let wire_to_ns = self.wire_in_real_time().map(|timed| timed.time_ns(0));
         if wire_to_ns.is_some() {
-            // Who comes is reported once; all else again.
+            // A new connection is reported once (edge-triggered); everything else again.
             if events.iter().any(|event| event.data.u64() == LISTENER) {
                 self.let_in();
             }

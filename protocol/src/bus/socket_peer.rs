@@ -331,7 +331,7 @@ impl<L: Link> Bus for SocketPeer<L> {
     }
 
     fn leave(&mut self) {
-        // The kernel decides on each packet under one lock: it is in our queue, or its sender is informed that we have gone.
+        // The kernel decides on each packet under one lock: it is in our queue, or its sender gets the error that we have gone.
         // SocketCAN refuses; its peers go on as before.
         if let Some(socket) = &self.socket {
             self.left = rustix::net::shutdown(socket, rustix::net::Shutdown::Read).is_ok();

@@ -30,6 +30,7 @@ const NS_PER_S: u64 = 1_000_000_000;
 /// Nanoseconds of simulated time in a cycle of the barrier.
 pub(super) const CYCLE_NS: u64 = 1_000_000;
 
+/// Receiver of the wire's reports on a node.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Reported {
     /// The rig that lives in the host's process.
@@ -44,7 +45,7 @@ pub(super) enum Reported {
 pub(super) struct TimedWire {
     model: WireModel,
     nodes: BTreeMap<PeerId, NodeId>,
-    /// Each node as it is reported.
+    /// For each node, the receiver of its reports.
     reported: Vec<Reported>,
     timer: OwnedFd,
     /// What the timer was set to, ns of the model's time.

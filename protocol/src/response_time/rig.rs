@@ -88,7 +88,7 @@ impl RigFrame {
         Self { message, bits: worst_case_bits(message.length), arrivals, reason }
     }
 
-    /// Allows for frames that came closer than they may: a late machine makes them. What was seen is reported by the model's
+    /// Allows for frames that came closer than they may: a late machine makes them. The arguments are those of the wire model's
     /// report.
     pub fn allow_for(&mut self, least_distance_ns: Option<u64>, release_jitter_ns: Option<u64>) {
         let Arrivals { jitter_ns, distance_ns, .. } = &mut self.arrivals;
@@ -101,7 +101,7 @@ impl RigFrame {
         }
     }
 
-    /// Whether frames that came so kept to what is declared here; what was seen is reported by the model's report. Its jitter
+    /// Whether frames that came so kept to what is declared here; the arguments are those of the wire model's report. Its jitter
     /// counts against the period of `rig.dbc`, and says nothing of frames that come on a change too.
     #[must_use]
     pub fn kept_to(&self, least_distance_ns: Option<u64>, release_jitter_ns: Option<u64>) -> bool {

@@ -30,7 +30,7 @@ pub enum WireEvent {
         /// Nodes that were off the bus.
         deaf: Vec<NodeId>,
     },
-    /// A node has to be informed of its own state, by an error frame.
+    /// A node gets an error frame with its own state.
     Told {
         /// The node.
         node: NodeId,

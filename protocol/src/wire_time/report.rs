@@ -117,7 +117,7 @@ pub struct WireTimeReport {
     pub errors: u64,
     /// Bus-offs of all nodes.
     pub bus_offs: u64,
-    /// Frames that the model was informed of after it had gone beyond their time: entered late by so much.
+    /// Frames that reached the model after it had passed their time, and by how much.
     pub entered_late: Lateness,
     /// Frames handed to their receivers, and how much later than the model says. 0 in lockstep, which has no other clock.
     pub delivered_late: Lateness,

@@ -11,7 +11,7 @@ use std::io::Read;
 pub struct Preemption {
     /// `PREEMPT_RT`, `full`, `lazy`, `voluntary`, `none`, or `unknown`.
     pub model: String,
-    /// What reported it, or why nobody does.
+    /// Source of the value, or why there is none.
     pub told_by: String,
 }
 

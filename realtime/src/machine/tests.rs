@@ -26,7 +26,7 @@ const VERSION: &str = "proc/version";
 const DYNAMIC: &str = "Linux version 6.1.0 (gcc 12) #1 SMP PREEMPT_DYNAMIC Debian\n";
 const CPU: &str = "sys/devices/system/cpu";
 
-/// Files, the model, and a part of what reported it.
+/// Files, the model, and a part of the name of its source.
 type Case<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
 
 fn preemption(files: &[(&str, &str)]) -> (String, String) {

@@ -8,8 +8,8 @@ use std::io;
 const LAST_FRAMES_NS: u64 = 50_000_000;
 
 impl Host {
-    /// What peers have sent is still carried on, to whoever is there; what they send from now on they are informed is refused,
-    /// which they count. So every frame that a peer sent was either taken and carried, or is none.
+    /// Frames that peers have sent are still carried to the peers that are there. Frames that they send from now on are refused,
+    /// and the sender counts the refusal. So every frame of a peer was either accepted and carried, or refused.
     pub(super) fn close(&mut self) -> io::Result<()> {
         self.closing = true;
         for peer in self.peers.values() {

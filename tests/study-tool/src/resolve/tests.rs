@@ -120,7 +120,7 @@ start_m = 0.2
 set-point = [{ law = "rest", duration_s = 0.3 }]
 "#;
 
-/// A study whose program leaves `inclination` and its twin ambiguous, and is reported by the second record.
+/// A study whose program leaves `inclination` and its twin ambiguous, until the second record names the effect.
 struct Bench {
     folder: TempDir,
     study: Study,
