@@ -51,10 +51,7 @@ pub fn run(
     folder: &Path,
     limit: Limit<'_>,
 ) -> Result<Outcome, ProcessesError> {
-    let system = |what: &str| {
-        let what = what.to_owned();
-        move |error| ProcessesError::System { run, what, error }
-    };
+    let system = |what: &str| system(run, what);
     let files = Files::write(condition, shelf, run, folder)?;
     // The socket's path may not be long, and a folder's may.
     let private =
@@ -136,6 +133,11 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
     Ok(Outcome { ended, because, simulated_s: number("cycles").unwrap_or(0.0) * 1e-3, passed, figures })
 }
 
+fn system(run: u64, what: &str) -> impl FnOnce(io::Error) -> ProcessesError + use<> {
+    let what = what.to_owned();
+    move |error| ProcessesError::System { run, what, error }
+}
+
 /// The files that both programs read.
 struct Files {
     rig: PathBuf,
@@ -154,11 +156,7 @@ impl Files {
     ) -> Result<Self, ProcessesError> {
         let put = |name: &str, text: &str| {
             let path = folder.join(name);
-            fs::write(&path, text).map_err(|error| ProcessesError::System {
-                run,
-                what: path.display().to_string(),
-                error,
-            })?;
+            fs::write(&path, text).map_err(system(run, &path.display().to_string()))?;
             Ok::<_, ProcessesError>(path)
         };
         let experiment = condition.experiment;

@@ -305,9 +305,7 @@ extern "C" fn fmi2GetReal(
     count: usize,
     values: *mut c_double,
 ) -> Status {
-    get(component, (references, values, count), |instance, references, values| {
-        instance.reals(references, values)
-    })
+    get(component, (references, values, count), Simulation::reals)
 }
 
 #[unsafe(no_mangle)]
@@ -354,9 +352,7 @@ extern "C" fn fmi2SetReal(
     count: usize,
     values: *const c_double,
 ) -> Status {
-    set(component, (references, values, count), |instance, references, values| {
-        instance.set_reals(references, values)
-    })
+    set(component, (references, values, count), Simulation::set_reals)
 }
 
 #[unsafe(no_mangle)]
@@ -366,9 +362,7 @@ extern "C" fn fmi2SetInteger(
     count: usize,
     values: *const c_int,
 ) -> Status {
-    set(component, (references, values, count), |instance, references, values| {
-        instance.set_integers(references, values)
-    })
+    set(component, (references, values, count), Simulation::set_integers)
 }
 
 #[unsafe(no_mangle)]

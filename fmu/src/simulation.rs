@@ -57,7 +57,7 @@ struct Running {
 }
 
 /// What an importer may set, save the numbers of the rig.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Asked {
     valve: [f64; 2],
     hand_n: [f64; 2],
@@ -88,14 +88,7 @@ impl Simulation {
     /// [`SetupError`]: the rig does not take the default set-up.
     pub fn new(rig: RigParameters) -> Result<Self, SetupError> {
         let variables = Arc::new(variables::of(&rig)?);
-        let asked = Asked {
-            valve: [0.0; 2],
-            hand_n: [0.0; 2],
-            emergency_stop: false,
-            link: false,
-            setup: variables::start_setup(&rig),
-            seed: 1,
-        };
+        let asked = Asked { setup: variables::start_setup(&rig), seed: 1, ..Asked::default() };
         let (rig, numbers) = (Arc::new(rig), BTreeMap::new());
         let (mode, running) = (Mode::Instantiated, None);
         Ok(Self { variables, rig, numbers, asked, start_s: 0.0, mode, running })
@@ -335,12 +328,10 @@ impl Simulation {
 
     fn settable(&self, instance: &Variable) -> Result<(), Refusal> {
         let before = matches!(self.mode, Mode::Instantiated | Mode::Initialising);
+        let refused = |when| Err(Refusal::NotSettable(instance.name.clone(), when));
         match instance.causality {
-            Causality::Output => Err(Refusal::NotSettable(instance.name.clone(), "at all: it is an output")),
-            Causality::Parameter if !before => Err(Refusal::NotSettable(
-                instance.name.clone(),
-                "after the initialisation: it is a fixed parameter",
-            )),
+            Causality::Output => refused("at all: it is an output"),
+            Causality::Parameter if !before => refused("after the initialisation: it is a fixed parameter"),
             _ => Ok(()),
         }
     }

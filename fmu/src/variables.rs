@@ -48,11 +48,8 @@ pub enum Role {
 /// The type of a variable, with its start value where it has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// A 64-bit number.
     Real(Option<f64>),
-    /// A 32-bit number.
     Integer(Option<i32>),
-    /// A flag.
     Boolean(Option<bool>),
 }
 
@@ -67,16 +64,12 @@ pub enum Causality {
     Output,
 }
 
-/// One variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
     /// Name, unique.
     pub name: String,
-    /// What it stands for.
     pub role: Role,
-    /// Type and start value.
     pub kind: Kind,
-    /// What the importer does with it.
     pub causality: Causality,
     /// Whether it changes at instants only.
     pub discrete: bool,
@@ -84,7 +77,6 @@ pub struct Variable {
     pub unit: &'static str,
     /// Allowed values, in the variable's unit.
     pub range: Option<(f64, f64)>,
-    /// What it is.
     pub about: String,
 }
 
@@ -136,30 +128,20 @@ fn inputs() -> Vec<Variable> {
 }
 
 fn setup(rig: &RigParameters) -> Vec<Variable> {
-    let start = start_setup(rig);
-    let position = "Carriage position at the start";
-    let mass = "Weights on the carriage";
+    let parameter = |name: &str, role, kind, most, about: &str| {
+        let range = Some((0.0, most));
+        Variable { causality: Causality::Parameter, range, ..variable(name, role, kind, about) }
+    };
+    let Setup { carriage_position_m, added_mass_kg, .. } = start_setup(rig);
+    let (position, mass) = (Kind::Real(Some(carriage_position_m)), Kind::Real(Some(added_mass_kg)));
+    let (stroke_m, limit_kg) = (rig.cylinder().stroke_m, rig.mass().added_limit_kg);
+    let at_the_start = "Carriage position at the start";
     let seed = "Seed of the sensors' noise; the same seed gives the same noise as in a run";
-    let list = [
-        Variable {
-            range: Some((0.0, rig.cylinder().stroke_m)),
-            ..variable(
-                "carriage_position_m",
-                Role::CarriagePosition,
-                Kind::Real(Some(start.carriage_position_m)),
-                position,
-            )
-        },
-        Variable {
-            range: Some((0.0, rig.mass().added_limit_kg)),
-            ..variable("added_mass_kg", Role::AddedMass, Kind::Real(Some(start.added_mass_kg)), mass)
-        },
-        Variable {
-            range: Some((0.0, f64::from(i32::MAX))),
-            ..variable("sensor_seed", Role::Seed, Kind::Integer(Some(1)), seed)
-        },
-    ];
-    list.map(|instance| Variable { causality: Causality::Parameter, ..instance }).to_vec()
+    vec![
+        parameter("carriage_position_m", Role::CarriagePosition, position, stroke_m, at_the_start),
+        parameter("added_mass_kg", Role::AddedMass, mass, limit_kg, "Weights on the carriage"),
+        parameter("sensor_seed", Role::Seed, Kind::Integer(Some(1)), f64::from(i32::MAX), seed),
+    ]
 }
 
 fn numbers(rig: &RigParameters) -> Vec<Variable> {

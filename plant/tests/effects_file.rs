@@ -132,8 +132,8 @@ fn a_key_with_a_default_may_be_left_out_and_any_other_is_asked_for() {
     }
 }
 
-/// Keys that are unknown in a table of an effect: the lines after `[effects.`, on which of them the key is, the key with its value,
-/// and what is known there.
+/// Keys that are unknown in a table of an effect: the lines after `[effects.`, on which of them the key is, the key with its
+/// value, and what is known there.
 const UNKNOWN: &[(&str, usize, &str, &str)] = &[
     ("piston-leak.drive]\nleakage_nl_per_min = 2.5", 0, "piston-leak = piston-leak", FIRST),
     ("Piston-Leakage.drive]\nleakage_nl_per_min = 2.5", 0, "Piston-Leakage = ", ""),

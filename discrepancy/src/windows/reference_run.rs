@@ -14,7 +14,7 @@ use plant::effects::tabulated::Variable;
 use plant::{Axis, Plant, RigParameters, State};
 
 /// Readings of a rig in the windows of a record, with start states and ranges of the variables.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ReferenceRun {
     simulated: Vec<f64>,
     /// Start state of each judged window; empty for rigs with effects, whose memories are no part of it.
@@ -61,11 +61,8 @@ impl Windows<'_> {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
         let inverse = SensorInverse::of(rig);
         let remembers = !rig.effects().is_empty();
-        let mut reference_run = ReferenceRun {
-            simulated: Vec::with_capacity(self.readings.len()),
-            states: Vec::new(),
-            reaches: Vec::new(),
-        };
+        let mut reference_run =
+            ReferenceRun { simulated: Vec::with_capacity(self.readings.len()), ..ReferenceRun::default() };
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
             super::set_state(&mut plant, self.record, &points);

@@ -22,7 +22,7 @@ pub(crate) struct Moving {
 }
 
 /// The copyable half of the memory of one axis; chambers as a, b.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct AxisMoving {
     /// Spool at the end of the step.
     pub(crate) spool: f64,
@@ -139,16 +139,11 @@ impl Memory {
             AxisMoving {
                 spool: lane(lanes.spool),
                 play: lane(lanes.spool),
-                spool_rate_per_s: 0.0,
-                silencer_pa: 0.0,
-                silencer_pa_per_s: 0.0,
                 normal_volume_m3: stored_j.map(|stored| lane(stored) / of.chambers.normal_pa()),
-                air_rate_w: [0.0; 2],
                 port_flow_m3_per_s: lanes.air().map(|air| lane(air.flow)),
-                deflection_m: 0.0,
-                rest_s: 0.0,
                 shown: truths,
                 seen: truths,
+                ..AxisMoving::default()
             }
         };
         let axes = [axis(0), axis(1)];
