@@ -8,14 +8,14 @@ use std::path::PathBuf;
 /// What to show to whom.
 #[derive(Args, Debug)]
 pub struct WatchArguments {
-    /// Bus to look on at: can://IFACE or unix:///PATH.
+    /// Bus to watch: can://IFACE or unix:///PATH.
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
     /// Socket that the emulator was given with --telemetry; without it the page shows what is on the bus.
     #[arg(long, value_name = "PATH")]
     pub telemetry: Option<PathBuf>,
-    /// Address and port of the page; port 0 takes a free one and tells it. Whoever reaches an address beyond loopback sees the
-    /// run.
+    /// Address and port of the page; port 0 takes a free one and prints it. Whoever reaches an address beyond loopback sees
+    /// the run.
     #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS:PORT")]
     pub http: SocketAddr,
     /// Let the page act: emergency stop, start, faults. It needs the token that is printed with the address; what acts on the rig
@@ -28,7 +28,7 @@ pub struct WatchArguments {
     /// Folder in which records are saved [default: the run's].
     #[arg(long, value_name = "DIR")]
     pub save: Option<PathBuf>,
-    /// Browsers and other clients at a time; who comes beside them is refused.
+    /// Maximum number of browsers and other clients; a further one is refused.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub clients: u16,
 }

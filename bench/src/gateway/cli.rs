@@ -11,7 +11,7 @@ pub struct GatewayArguments {
     /// Bus to serve: can://IFACE or unix:///PATH.
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
-    /// Address and port to listen at; port 0 takes a free one and tells it. Whoever reaches an address beyond loopback can move
+    /// Address and port to listen at; port 0 takes a free one and prints it. Whoever reaches an address beyond loopback can move
     /// the rig: the protocol knows no password.
     #[arg(long, default_value = "127.0.0.1:29536", value_name = "ADDRESS:PORT")]
     pub listen: SocketAddr,
