@@ -230,8 +230,8 @@ pub(super) fn emergency_stop(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
     vec![valve_shut("emergency-stop", heard, window, STOP_WITHIN_CYCLES)]
 }
 
-/// Without sensors the controller shuts the valve and may trip the emergency stop. It sends no command with an invented echo, then
-/// or when the sensors are `back`.
+/// Without sensors the controller shuts the valve and may trip the emergency stop. It sends no command with an invented echo,
+/// then or when the sensors are `back`.
 pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
     let class = "sensor-loss";
     let [without, again] = [&window, &back].map(|window| {

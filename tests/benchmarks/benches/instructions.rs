@@ -1,7 +1,7 @@
 //! Instructions of one period of 1 ms, counted by valgrind: a figure that no other process on the machine moves.
 //!
-//! `cargo bench -p benchmarks --bench instructions [-- CASE]` starts itself under `valgrind --tool=callgrind` for each case, and callgrind
-//! counts inside one function.
+//! `cargo bench -p benchmarks --bench instructions [-- CASE]` starts itself under `valgrind --tool=callgrind` for each case, and
+//! callgrind counts inside one function.
 //!
 //! Both motions start in the middle of the recorded one; a thousand periods are counted together, so one period is the
 //! figure over a thousand. With effects: all of them, every fourth, and a few alone; `plant/docs/effects-cost.md` has each.
