@@ -216,8 +216,9 @@ impl<'a> Engine<'a> {
     }
 }
 
-/// Noise level: the lowest decile of chi2 per degree of freedom over its expectation. The estimated noise is right to some per
-/// cent only, which over 200 windows would look like a large excess.
+/// Common variance factor: the lowest decile of chi2 per degree of freedom over its expectation, within [`LEVELS`]. An error of a
+/// few per cent in the estimated noise would look like a large excess over 200 windows. The factor multiplies the degrees of
+/// freedom instead of dividing chi2, so that fixed thresholds on the loss change their level with it.
 fn level(squares: &[f64], scaled_dof: &[f64]) -> f64 {
     let mut quiet: Vec<f64> =
         squares.iter().zip(scaled_dof).map(|(square, scaled_dof)| square / scaled_dof).collect();

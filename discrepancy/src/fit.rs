@@ -4,7 +4,8 @@
 //!   minimise  sum_k f_k ln(|e_k - C_k a|^2 / f_k) + sum_j (a_j / tolerance_j)^2         window k, f_k degrees of freedom
 //! ```
 //!
-//! It is minus twice the profile log-likelihood of Gaussian windows of unknown variance. The contribution of a window grows only
+//! The first sum is, up to a constant, minus twice the profile log-likelihood of Gaussian windows of unknown variance; its null
+//! expectation is about -1 for each window. The contribution of a window grows only
 //! logarithmically, so that a few windows around a break-away do not dominate; within the noise it is least squares. It is
 //! minimised by iterative reweighting: the weight of a window is f_k / |e_k - C_k a|^2.
 //!
@@ -309,9 +310,11 @@ impl Products {
         Some(&inverse * middle * &inverse)
     }
 
-    /// Delete-one-window jackknife standard errors. Where few windows determine a number, residuals understate its error. Errors
-    /// are scaled so that two of them cover as two of a normal distribution do. Source: Bell, McCaffrey 2002, Survey Methodology
-    /// 28(2): jackknife variance with Student's distribution and Satterthwaite degrees of freedom.
+    /// One-step delete-one-window jackknife errors with frozen window weights. Where few windows determine a coefficient,
+    /// residuals understate its error. A Student t factor widens each error to half of the half-width of a calibrated 95.4 %
+    /// interval: two of them cover as two of a normal distribution do, and one is no plain standard error. Source: Bell,
+    /// McCaffrey 2002, Survey Methodology 28(2): jackknife variance with Student's distribution and Satterthwaite degrees of
+    /// freedom.
     pub(crate) fn jackknife(&self, chosen: &[usize], fit: &Fit, precisions: &[f64]) -> Option<Vec<f64>> {
         let each: Vec<[usize; 1]> = (0..chosen.len()).map(|at| [at]).collect();
         self.jackknife_of_sums(chosen, fit, precisions, &each)

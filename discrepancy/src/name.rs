@@ -45,7 +45,8 @@ const RELINEARISATIONS: usize = 4;
 const EXCESS: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
 const EXCESS_LINKED: f64 = 0.3;
-/// Screened gain below which no candidate is fitted: the best of some forty candidates gains half of it by chance.
+/// Screened gain below which no candidate is fitted. Of forty independent null gains (chi2 of one degree of freedom) the largest
+/// has the median 5.7 and the 99th percentile 13.4.
 pub(crate) const WORTH_A_FIT: f64 = 25.0;
 /// Penalty for each fitted number of an effect.
 pub(crate) const NUMBER_COSTS: f64 = 8.0;
@@ -228,7 +229,9 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     }
 }
 
-/// Detection limits: the amplitude whose expected gain reaches the null threshold and the gain worth a fit, at least the floor.
+/// Detection limits: the amplitude whose expected linear gain reaches [`SAFETY`] null thresholds and the gain worth a fit, at
+/// least the floor. The linear gain exceeds that in half of the records; the procedure finds fewer, since the objective charges
+/// [`NUMBER_COSTS`] for each parameter of the effect. The smallest limit of several probes is optimistic for nonlinear effects.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
     let limits = null.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {

@@ -6,7 +6,9 @@
 //! ```
 //!
 //! T is the expected gain in chi2 of the true explanation over its rival with refitted amplitude, with noise and model error
-//! (`next/divergence.rs`); the target is 25, five standard deviations. Repetitions average noise: an experiment that reaches 25
+//! (`next/divergence.rs`). The target is 25, a distance d' = 5 between the two mean records: the difference of chi2 has mean 25
+//! and standard deviation 10, so that noise alone prefers the rival in 0.6 % of records. The criterion is T-optimality [Atkinson,
+//! Fedorov 1975]. Repetitions average noise: an experiment that reaches 25
 //! within [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`remedies`] names a manual measurement: tilting,
 //! uncoupling, locking the piston.
 //!
@@ -19,7 +21,7 @@
 //! | [`remedies`] | what would separate effects where no experiment does |
 //!
 //! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner
-//! 1965.
+//! 1965; Atkinson and Fedorov 1975, Biometrika 62(1): T-optimality.
 
 pub mod closed_loop;
 pub(crate) mod divergence;
@@ -34,7 +36,7 @@ use menu::{Entry, MENU};
 use plant::RigParameters;
 use rayon::prelude::*;
 
-/// Target divergence: five standard deviations.
+/// Target divergence, a squared distance: d' = 5.
 pub(crate) const WANTED: f64 = 25.0;
 /// Maximum number of repetitions.
 pub(crate) const MOST_REPETITIONS: u32 = 6;

@@ -30,10 +30,10 @@ const HALF: f64 = -0.1;
 const STRONG: f64 = 0.5;
 /// over_noise that is significant by itself.
 const LIFTED: f64 = 1.15;
-/// Significance of R2 against shifted series where over_noise is not significant: one in a billion for one test, for some hundred
-/// tests with non-Gaussian tails.
+/// Significance of R2 against shifted series where over_noise is not significant, in standard deviations. One-sided, a normal
+/// variable exceeds it with probability 1.3e-12; the margin is for some hundred tests and for tails that are not normal.
 const STANDS_OUT: f64 = 7.0;
-/// Significance of a mean, in standard errors.
+/// Significance of a mean, in standard errors from the propagated noise (z test).
 const MEAN: f64 = 6.0;
 /// Fewest windows of a balance.
 const LEAST: usize = 100;
@@ -80,6 +80,8 @@ impl Found<'_> {
             .collect();
         let mean = self.sample.mean_over_error().abs();
         if mean > MEAN && constant > explained * (1.0 - constant) {
+            // No permutation p value: a circular shift leaves the mean unchanged. The z test above decides, and the smallest p
+            // value of the other variables stands for it.
             let p_value = 1.0 / (SHIFTS as f64 + 1.0);
             let place = usize::from(explained > STRONG);
             variables.insert(place, Dependence { variable: "constant".to_owned(), r2: constant, p_value });

@@ -13,7 +13,8 @@ pub const SCHEMA_VERSION: u32 = 1;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// No effect is missing above the detection limits.
+    /// No effect was found. An effect at its detection limit would be found in about half of the records or fewer, so that one
+    /// just above it may be missed.
     #[default]
     NothingMissing,
     /// Only baseline parameters are off.
@@ -52,7 +53,8 @@ pub struct Report {
     pub candidates: Vec<Candidate>,
     /// Effects that the training records do not excite.
     pub(crate) not_excited: Vec<EffectPlace>,
-    /// Smallest amplitude of each other effect whose expected gain reaches the threshold.
+    /// Amplitude of each other effect at which the expected linear gain reaches the threshold: found in about half of the records
+    /// or fewer, since the penalties of the objective are ignored.
     pub(crate) detection_limits: Vec<DetectionLimit>,
     /// Where model and records disagree.
     pub location: Option<Location>,
@@ -112,7 +114,8 @@ pub struct Quantity {
     pub value: f64,
     /// Unit of the rig file; empty for a plain number.
     pub unit: String,
-    /// One standard error; null when the records do not bound the number.
+    /// One standard error; null when the records do not bound the number. Of the final model it is half of the half-width of a
+    /// calibrated 95.4 % interval: one-step jackknife with frozen window weights, widened by a Student t factor.
     pub standard_error: Option<f64>,
     /// Value in the rig file; null where it has none.
     pub before: Option<f64>,
@@ -214,7 +217,8 @@ pub struct Dependence {
     pub variable: String,
     /// Share of the variance explained on folds it was not fitted on.
     pub(crate) r2: f64,
-    /// Permutation p value over 200 circular shifts: (1 + shifts that reach R2) / 201.
+    /// Permutation p value over 200 circular shifts: (1 + shifts that reach R2) / 201. The entry `constant` is no permutation p
+    /// value, since a shift leaves the mean unchanged: a z test of the mean decides on it, and it always has 1/201 here.
     pub(crate) p_value: f64,
 }
 

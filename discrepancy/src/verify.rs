@@ -13,13 +13,15 @@
 //! - *Level*: the noise of a channel is known to some per cent only. The lowest decile of the windows, by the better of both
 //!   models, corrects it within [`LEVELS`].
 //!
-//! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors, clustered
-//! by windows, as in the loss of [`crate::fit`]. An effect in fewer than ten windows cannot pass, whatever its size.
+//! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors: a paired
+//! t test of log-variance differences (Diebold-Mariano type) with windows taken as independent. Equal gains in m of n windows
+//! give t = sqrt(m (n - 1) / (n - m)), so that an effect in fewer than about nine windows (seven to eight in a short record)
+//! cannot pass, whatever its size.
 //!
 //! Expected power comes from drawn noise with the autocorrelation and jitter of the record. The null range of chi2 comes from
 //! synthetic records of the extended model, whose start states are estimated as those of the record are. Source:
-//! discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s). Cameron, Gelbach, Miller 2008, Rev.
-//! Econ. Stat. 90(3): clusters.
+//! discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s). Diebold, Mariano 1995, J. Bus. Econ.
+//! Stat. 13(3): paired differences.
 
 mod free_run;
 mod null_power;
@@ -151,7 +153,7 @@ fn signal_gap(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Ga
     }
 }
 
-/// Whether the mean log improvement exceeds [`BETTER_ERRORS`], clustered by windows.
+/// Whether the mean log improvement exceeds [`BETTER_ERRORS`] over independent windows.
 fn is_better(before: &Power, after: &Power) -> bool {
     let gains: Vec<f64> = before
         .joint()

@@ -1,4 +1,4 @@
-//! Multiple shooting: a record in windows of 400 ms, each simulated from a start state estimated from the record.
+//! Truncated simulation error: a record in windows of 400 ms, each simulated from a start state estimated from the record.
 //!
 //! ```text
 //!   e_k = M_k (y_k - f_k(start_k; rig)) / sigma          window k: readings y, simulation f, noise sigma
@@ -13,7 +13,8 @@
 //! reading that differs from its neighbours by more than noise is replaced by their median, in residuals and sensitivities alike
 //! [rig-model.md, Accuracy].
 //!
-//! Source: discrepancy-notes.md, 1 (naming over the length of windows: as good from 100 ms to 2 s), 6.
+//! Source: discrepancy-notes.md, 1 (the share of right names is the same from 100 ms to 2 s; longer windows show smaller slow
+//! effects, such as leaks), 6.
 
 mod reference_run;
 mod starts;

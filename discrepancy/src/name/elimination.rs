@@ -10,8 +10,9 @@ use rayon::prelude::*;
 
 /// Runners-up of an earlier round that are tried again after another effect joined.
 const SWAPPED: usize = 3;
-/// Fits are indistinguishable when their losses differ by less than this times the design effect. Noise alone makes the wrong
-/// one of two better by more in one record of 700 at most.
+/// Fits are indistinguishable when their objectives differ by less than this times the design effect. Noise alone makes the wrong
+/// one of two better by more in one record of 700 at most, if both have the same number of effect parameters; each further
+/// parameter shifts the difference by [`NUMBER_COSTS`].
 const ALIKE: f64 = 9.0;
 /// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
 const ALIKE_SHARE: f64 = 0.02;

@@ -8,7 +8,8 @@
 //! For the same reason a count of rows is replaced by n / (1 + 2 sum rho_k), the sum ending where the autocorrelation first is
 //! not positive.
 //!
-//! Source: Liang, Zeger 1986, Biometrika 73(1) (clusters); Geyer 1992, Statistical Science 7(4) (the sum's end).
+//! Source: Liang, Zeger 1986, Biometrika 73(1) (clusters). The sum ends on a single lag; Geyer 1992, Statistical Science 7(4),
+//! ends it on sums of adjacent pairs of lags.
 
 use crate::stats::mean;
 use nalgebra::{DMatrix, DVector};
@@ -194,7 +195,7 @@ pub(super) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Mean over its standard error, of differences that are one for each fold.
+/// Mean over its standard error, of differences that are one for each fold and taken as independent.
 pub(super) fn clustered_t(differences: &[f64]) -> f64 {
     let count = differences.len() as f64;
     let mean = mean(differences);

@@ -14,19 +14,21 @@
 //! what passes is taken; another effect that passes and leaves no more on the same folds (3 clustered standard errors) explains
 //! the records as well.
 //!
-//! Source: Schwarz 1978 (penalty); discrepancy-notes.md, 3, 5 and Pipeline 5; Roberts et al. 2017, Ecography 40(8) (blocked
-//! folds).
+//! Source: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); discrepancy-notes.md, 3, 5 and Pipeline 5; Roberts et al.
+//! 2017, Ecography 40(8) (blocked folds).
 
 use super::fit::{Columns, Cut, Rows, clustered_t};
 use super::model::{Selection, TermEntry};
 use super::terms::{Family, amplitude};
 
-/// Clustered standard errors that folds in time ask, and those in bands.
+/// Clustered standard errors that folds in time ask, and those in bands. Folds are taken as independent, although their training
+/// rows overlap [Bengio, Grandvalet 2004, JMLR 5]; for ten folds 2 is about 4 % one-sided.
 const T_TIME: f64 = 3.0;
 const T_BANDS: f64 = 2.0;
 /// Significance of a difference between two effects, in clustered standard errors.
 const T_APART: f64 = 3.0;
-/// Twice the difference of log likelihoods that does the same: "very strong" is 10 [Kass, Raftery 1995, JASA 90(430)].
+/// Twice the difference of log likelihoods that does the same. "Very strong" is 10 for twice the log Bayes factor [Kass, Raftery
+/// 1995, JASA 90(430)], which this difference approximates for equal numbers of parameters only.
 const GAIN_APART: f64 = 10.0;
 
 /// A family with its columns over the training rows.
