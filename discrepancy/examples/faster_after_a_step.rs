@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let mut at = candidate.origin();
                 at[0] = *size;
                 let key = &candidate.sheet.keys[0];
-                let amplitude = short(candidate.numbers(&at)[0], key.unit.name());
+                let amplitude = short(candidate.effect_parameters(&at)[0], key.unit.name());
                 let head = format!("| {} | {} | {amplitude} |", candidate.sheet.name, candidate.place);
                 candidate.rig(quiet, &at).map(|rig| (head, rig))
             })

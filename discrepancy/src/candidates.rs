@@ -185,8 +185,8 @@ impl Candidate {
         least < -1e-6 && most > 1e-6
     }
 
-    /// The numbers at some coordinates, in the file's units, held in their ranges.
-    pub fn numbers(&self, coordinates: &[f64]) -> Vec<f64> {
+    /// The effect parameters at some coordinates, in the file's units, clamped to their ranges.
+    pub fn effect_parameters(&self, coordinates: &[f64]) -> Vec<f64> {
         self.sheet
             .keys
             .iter()
@@ -210,7 +210,7 @@ impl Candidate {
     /// # Errors
     /// [`ParameterError`] when the numbers do not fit together.
     pub fn rig(&self, rig: &RigParameters, coordinates: &[f64]) -> Result<RigParameters, ParameterError> {
-        let numbers = self.numbers(coordinates);
+        let numbers = self.effect_parameters(coordinates);
         let named: Vec<(&str, f64)> =
             self.sheet.keys.iter().map(|key| key.name).zip(numbers.iter().copied()).collect();
         rig.with_effect(self.sheet.name, &self.place.to_string(), &named)
@@ -262,7 +262,7 @@ mod tests {
         for candidate in all {
             for probe in candidate.probes() {
                 candidate.rig(&rig, &probe).unwrap_or_else(|error| panic!("{}: {error}", candidate.name()));
-                let numbers = candidate.numbers(&probe);
+                let numbers = candidate.effect_parameters(&probe);
                 // A stiffness without end is held at what a file may say.
                 let moved = numbers.iter().zip(&probe).enumerate().filter(|(_, (_, z))| **z != 0.0);
                 for (key, (number, z)) in moved {
@@ -286,7 +286,7 @@ mod tests {
             let Ok(rig) = candidate.rig(&RigParameters::baseline(), &strong) else { continue };
             let here = Candidate::beside(&rig, candidate.sheet, candidate.place);
             assert_eq!(here.rig(&rig, &here.origin()).unwrap(), rig, "{}", here.name());
-            assert_eq!(here.baseline(0), Some(candidate.numbers(&strong)[0]), "{}", here.name());
+            assert_eq!(here.baseline(0), Some(candidate.effect_parameters(&strong)[0]), "{}", here.name());
             for probe in here.probes() {
                 assert_ne!(here.rig(&rig, &probe).unwrap(), rig, "{}: {probe:?}", here.name());
             }

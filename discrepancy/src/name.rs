@@ -48,8 +48,8 @@ const EXCESS_LINKED: f64 = 0.3;
 /// Screened gain below which no candidate is fitted. Of forty independent null gains (chi2 of one degree of freedom) the largest
 /// has the median 5.7 and the 99th percentile 13.4.
 pub(crate) const WORTH_A_FIT: f64 = 25.0;
-/// Penalty for each fitted number of an effect.
-pub(crate) const NUMBER_COSTS: f64 = 8.0;
+/// Penalty for each fitted parameter of an effect.
+pub(crate) const EFFECT_PARAMETER_PENALTY: f64 = 8.0;
 /// Multiple of the null threshold required of a single effect.
 const SAFETY: f64 = 2.0;
 /// Share of the loss after calibration that the first effect must remove.
@@ -199,7 +199,7 @@ pub(crate) fn on_all(engine: &Engine<'_>, found: &mut Found) {
 
 /// Refits a model with sensitivities relinearised at itself.
 fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
-    crate::refit::relinearise(engine, model, NUMBER_COSTS, RELINEARISATIONS)
+    crate::refit::relinearise(engine, model, EFFECT_PARAMETER_PENALTY, RELINEARISATIONS)
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.
@@ -231,7 +231,8 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
 
 /// Detection limits: the amplitude whose expected linear gain reaches [`SAFETY`] null thresholds and the gain worth a fit, at
 /// least the floor. The linear gain exceeds that in half of the records; the procedure finds fewer, since the objective charges
-/// [`NUMBER_COSTS`] for each parameter of the effect. The smallest limit of several probes is optimistic for nonlinear effects.
+/// [`EFFECT_PARAMETER_PENALTY`] for each parameter of the effect. The smallest limit of several probes is optimistic for
+/// nonlinear effects.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
     let limits = null.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {

@@ -17,7 +17,7 @@
 //! | [`menu`] | the experiments |
 //! | [`closed_loop`] | one of them in closed loop with an explanation's rig |
 //! | [`divergence`] | how far explanations lie apart in it |
-//! | [`nuisance`] | numbers of the baseline that are refitted beside |
+//! | [`nuisance`] | baseline parameters that are refitted jointly |
 //! | [`remedies`] | what would separate effects where no experiment does |
 //!
 //! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner
@@ -124,8 +124,9 @@ pub fn judge(
     axes_measured: [bool; 2],
 ) -> Option<Judged> {
     let named = |name: &str| explanations.iter().any(|one| one.names.iter().any(|known| known == name));
-    let numbers = nuisance::numbers().filter(|number| !named(number.name));
-    let numbers: Vec<_> = numbers.filter_map(|number| nuisance::off(baseline, number).ok()).collect();
+    let parameters = nuisance::nuisance_parameters().filter(|parameter| !named(parameter.name));
+    let perturbed: Vec<_> =
+        parameters.filter_map(|parameter| nuisance::perturbed(baseline, parameter).ok()).collect();
     let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
         .into_par_iter()
         .map(|truth| {
@@ -133,7 +134,7 @@ pub fn judge(
             let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
             let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != truth).collect();
             let rigs: Vec<_> = [truth].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
-            let values = divergences(&run, baseline, &rigs, &numbers, axes_measured);
+            let values = divergences(&run, baseline, &rigs, &perturbed, axes_measured);
             Some(rivals.into_iter().zip(values).map(|(rival, value)| (truth, rival, value)).collect())
         })
         .collect();

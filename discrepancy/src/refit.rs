@@ -12,7 +12,7 @@ use crate::candidates::Candidate;
 use crate::descent::descend;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products};
-use crate::name::NUMBER_COSTS;
+use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use plant::RigParameters;
 use std::iter::successors;
@@ -35,7 +35,7 @@ const SHAPE_PRIOR_STD: f64 = 0.7;
 pub(crate) const MOST_OFF: f64 = 0.3;
 /// Penalty for each parameter off its file value. A sensor that reads four per cent low is a better explanation than all masses,
 /// frictions and areas off by as much.
-const PARAMETER_COSTS: f64 = NUMBER_COSTS;
+const PARAMETER_COSTS: f64 = EFFECT_PARAMETER_PENALTY;
 /// Relative deviation at which half of the penalty is due.
 const COUNTS_AS_OFF: f64 = 0.005;
 
@@ -107,8 +107,8 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
         .sum()
 }
 
-pub(crate) fn model_penalty(numbers: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
-    penalty * numbers as f64 + PARAMETER_COSTS * parameters_off(factors)
+pub(crate) fn model_penalty(effect_parameters: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
+    penalty * effect_parameters as f64 + PARAMETER_COSTS * parameters_off(factors)
 }
 
 /// Prior precision of a coordinate.

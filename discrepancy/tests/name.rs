@@ -76,7 +76,7 @@ fn limit(found: &Found, name: &str) -> f64 {
     let candidate = &found.columns.candidates[at];
     let mut coordinates = candidate.origin();
     coordinates[0] = found.limits[at].expect("it is excited");
-    candidate.numbers(&coordinates)[0]
+    candidate.effect_parameters(&coordinates)[0]
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     let found = found(&hiding(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 4.0)])]), &[]);
     assert_eq!(names(&found), ["rod-leakage drive.b"]);
     let placed = &found.model.placed[0];
-    let leakage = placed.candidate.numbers(&placed.coordinates)[0];
+    let leakage = placed.candidate.effect_parameters(&placed.coordinates)[0];
     let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
     assert!((leakage - 4.0).abs() < 4.0 * error + 0.05, "{leakage} +- {error}");
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
@@ -111,7 +111,7 @@ fn an_effect_that_the_rig_file_has_is_named_where_it_is_off_and_only_there() {
         let found = found_beside(&rig, &leaking(truth), &[]);
         assert_eq!(names(&found), ["piston-leakage drive"], "{truth}");
         let placed = &found.reported.placed[0];
-        let reported = placed.candidate.numbers(&placed.coordinates)[0];
+        let reported = placed.candidate.effect_parameters(&placed.coordinates)[0];
         assert!((reported - truth).abs() < 0.3, "{reported}, in truth {truth}");
         assert_eq!(placed.candidate.baseline(0), Some(3.0));
     }

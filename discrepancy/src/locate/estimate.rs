@@ -27,9 +27,9 @@ use crate::gridded_record::{CHANNELS, GriddedRecord};
 use nalgebra::{SMatrix, SVector};
 use plant::{Axis, PERIOD_S, RigParameters};
 
-/// Numbers of a window and axis.
-const NUMBERS: usize = 9;
-/// Places among them.
+/// Parameters of a window and axis: start state and unknown inputs.
+const THETA_LEN: usize = 9;
+/// Indices among them.
 const FORCE: usize = 4;
 const FLOW_A: usize = 6;
 const FLOW_B: usize = 7;
@@ -40,7 +40,7 @@ const OPPOSITE: usize = OFFSET + 1;
 const NUDGES: [f64; OFFSET] = [1e-5, 5e-4, 200.0, 200.0, 1.0, 1.0, 3e-5, 3e-5];
 /// Standard deviations of the weak priors, in the same units. A guess: some ten times the errors of points and the size of
 /// effects.
-const PRIORS: [f64; NUMBERS] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 100.0];
+const PRIORS: [f64; THETA_LEN] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 100.0];
 /// Prior of the force sensor's offset in the solution without one, N.
 const NO_OFFSET_N: f64 = 1e-3;
 /// Ratio of posterior to prior above which an input is not observable.
@@ -52,8 +52,8 @@ const FILLING: usize = 5;
 /// Threshold of significant offsets of the force sensor.
 const OFFSET_OVER_NOISE: f64 = 1.15;
 
-type Normal = SMatrix<f64, NUMBERS, NUMBERS>;
-type Theta = SVector<f64, NUMBERS>;
+type Normal = SMatrix<f64, THETA_LEN, THETA_LEN>;
+type Theta = SVector<f64, THETA_LEN>;
 
 /// Collected unknown inputs of all balances.
 #[derive(Debug, Default)]
@@ -195,7 +195,7 @@ impl Seen<'_> {
             return None;
         }
         normal.fill_upper_triangle_with_lower_triangle();
-        let equations = Equations { normal, right, squares, dof: (used - NUMBERS) as f64, pressure };
+        let equations = Equations { normal, right, squares, dof: (used - THETA_LEN) as f64, pressure };
         let bound = equations.solve(NO_OFFSET_N)?;
         let forces_n = self.looks[0][self.axis].iter().map(|reading| reading[1]);
         let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
@@ -271,9 +271,9 @@ impl Equations {
         let left = self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
         let birge = (left / self.dof).max(1.0).sqrt();
         let mut deviation = Theta::zeros();
-        for number in 0..NUMBERS {
+        for number in 0..THETA_LEN {
             // Under the null, unknown inputs are 0 and start values vary within their priors.
-            let unknown: f64 = (FORCE..NUMBERS).map(|at| (p[(number, at)] / prior(at)).powi(2)).sum();
+            let unknown: f64 = (FORCE..THETA_LEN).map(|at| (p[(number, at)] / prior(at)).powi(2)).sum();
             deviation[number] = (p[(number, number)] - unknown).max(0.0).sqrt() * birge;
         }
         Some(Solution {

@@ -1,7 +1,7 @@
 //! Backward elimination of effects, swaps between rounds, and alternatives.
 
 use super::null_distribution::NullDistribution;
-use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, relinearise};
+use super::{Alternative, EFFECT_PARAMETER_PENALTY, SAFETY, STEPS, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{Placed, Refit, linearise, refit_steps};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 const SWAPPED: usize = 3;
 /// Fits are indistinguishable when their objectives differ by less than this times the design effect. Noise alone makes the wrong
 /// one of two better by more in one record of 700 at most, if both have the same number of effect parameters; each further
-/// parameter shifts the difference by [`NUMBER_COSTS`].
+/// parameter shifts the difference by [`EFFECT_PARAMETER_PENALTY`].
 const ALIKE: f64 = 9.0;
 /// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
 const ALIKE_SHARE: f64 = 0.02;
@@ -42,7 +42,7 @@ pub(super) fn swap(
     let best = tried
         .par_iter()
         .filter_map(|(at, rank, placed)| {
-            Some((*at, *rank, refit_steps(engine, &point, placed, NUMBER_COSTS, STEPS)?))
+            Some((*at, *rank, refit_steps(engine, &point, placed, EFFECT_PARAMETER_PENALTY, STEPS)?))
         })
         .collect::<Vec<_>>()
         .into_iter()
@@ -83,7 +83,7 @@ pub(super) fn drop_unneeded<'a>(
                 if placed.is_empty() {
                     return Some(calibrated.fit.clone());
                 }
-                refit_steps(engine, &linearisation, &placed, NUMBER_COSTS, 4)
+                refit_steps(engine, &linearisation, &placed, EFFECT_PARAMETER_PENALTY, 4)
             })
             .collect();
         let least = without

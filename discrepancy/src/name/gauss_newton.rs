@@ -7,7 +7,7 @@
 //! Forward selection moves the parameters on the linearised model, which suffices to compare models. The final numbers come from
 //! the simulator.
 
-use super::NUMBER_COSTS;
+use super::EFFECT_PARAMETER_PENALTY;
 use super::null_distribution::above_far_off;
 use crate::descent::descend;
 use crate::engine::Engine;
@@ -49,7 +49,7 @@ pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
 /// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
-    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors, NUMBER_COSTS);
+    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors, EFFECT_PARAMETER_PENALTY);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 

@@ -9,7 +9,7 @@ use super::elimination::same;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
 use super::start_states::{Restarted, gap_start, refit_with_starts};
-use super::{EXCESS, NUMBER_COSTS, STEPS, WORTH_A_FIT, is_large, relinearise};
+use super::{EFFECT_PARAMETER_PENALTY, EXCESS, STEPS, WORTH_A_FIT, is_large, relinearise};
 use crate::engine::Engine;
 use crate::refit::{Linearisation, Placed, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
@@ -91,7 +91,7 @@ impl<'a> Round<'a> {
             .par_iter()
             .filter_map(|screened| {
                 let start = best_start(engine, point, &model.placed, screened, *null_loss);
-                refit_steps(engine, point, &start, NUMBER_COSTS, STEPS)
+                refit_steps(engine, point, &start, EFFECT_PARAMETER_PENALTY, STEPS)
             })
             .collect();
         sort(&mut fits);
@@ -103,7 +103,11 @@ impl<'a> Round<'a> {
         let restarted = fits[..near]
             .par_iter()
             .map(|fit| {
-                refit_with_starts(engine, &relinearise(engine, at_best_pitch(engine, fit)), NUMBER_COSTS)
+                refit_with_starts(
+                    engine,
+                    &relinearise(engine, at_best_pitch(engine, fit)),
+                    EFFECT_PARAMETER_PENALTY,
+                )
             })
             .collect();
         let mut round = Self { fits, restarted };
@@ -137,8 +141,8 @@ impl<'a> Round<'a> {
     /// Fits the backlash from other starting widths than the screened one.
     fn with_gap(&mut self, engine: &Engine<'a>, point: &Linearisation, model: &Refit, gap: &Screened) {
         let start = gap_start(engine, point, &model.placed, &gap.start);
-        let Some(fit) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
-        let restarted = refit_with_starts(engine, &relinearise(engine, fit), NUMBER_COSTS);
+        let Some(fit) = refit_steps(engine, point, &start, EFFECT_PARAMETER_PENALTY, STEPS) else { return };
+        let restarted = refit_with_starts(engine, &relinearise(engine, fit), EFFECT_PARAMETER_PENALTY);
         // The fit from the screened width is the same effect, not an alternative.
         let is_gap = |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &gap.start));
         if self.fits.iter().filter(|other| is_gap(other)).all(|other| restarted.fit.loss < other.loss) {

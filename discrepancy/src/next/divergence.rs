@@ -65,19 +65,19 @@ impl Divergence {
     }
 }
 
-/// Divergence of the first of `rigs`, which made the run, from each of the others. `numbers` are baselines with one parameter off
-/// by a prior standard deviation each.
+/// Divergence of the first of `rigs`, which made the run, from each of the others. `perturbed` are baselines with one parameter
+/// off by a prior standard deviation each.
 pub(crate) fn divergences(
     driven: &ClosedLoopRun,
     baseline: &RigParameters,
     rigs: &[&RigParameters],
-    numbers: &[RigParameters],
+    perturbed: &[RigParameters],
     measured: [bool; 2],
 ) -> Vec<Divergence> {
-    let all: Vec<&RigParameters> = rigs.iter().copied().chain(numbers).collect();
+    let all: Vec<&RigParameters> = rigs.iter().copied().chain(perturbed).collect();
     let signatures = signatures(driven, baseline, &all, measured);
-    let (signatures, numbers) = signatures.split_at(rigs.len());
-    let product = Product::new(numbers);
+    let (signatures, sensitivities) = signatures.split_at(rigs.len());
+    let product = Product::new(sensitivities);
     let Some((truth, rivals)) = signatures.split_first() else { return Vec::new() };
     let square = product.of(truth, truth).max(0.0);
     let from = |rival: &Vec<f64>| {

@@ -12,7 +12,7 @@ use super::with_tables;
 use crate::descent::descend;
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Products, loss};
-use crate::name::NUMBER_COSTS;
+use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
 use crate::windows::{Reach, ReferenceRun};
@@ -168,7 +168,7 @@ impl Model {
             .iter()
             .filter(|coordinate| matches!(coordinate, Coordinate::Value(..)))
             .count();
-        factors + NUMBER_COSTS * points as f64
+        factors + EFFECT_PARAMETER_PENALTY * points as f64
     }
 }
 

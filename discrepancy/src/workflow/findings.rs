@@ -65,7 +65,7 @@ fn named(found: &Found) -> Vec<NamedEffect> {
 
 fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<NamedEffect>) -> NamedEffect {
     let candidate = &placed.candidate;
-    let numbers = candidate.numbers(&placed.coordinates);
+    let numbers = candidate.effect_parameters(&placed.coordinates);
     let parameters = candidate
         .sheet
         .keys
@@ -135,7 +135,7 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
                 place: Where::from(candidate.place),
                 score: (null_loss - screened.loss) / found.threshold.max(1e-9),
                 share_explained: share,
-                amplitude: candidate.numbers(&shown.coordinates)[0],
+                amplitude: candidate.effect_parameters(&shown.coordinates)[0],
                 unit: candidate.sheet.keys[0].unit.name().to_owned(),
                 fate: fate.to_owned(),
             }
@@ -153,7 +153,7 @@ fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
         match limit {
             Some(z) if *z <= 1.0 => {
                 let key = &candidate.sheet.keys[0];
-                let at = candidate.numbers(&{
+                let at = candidate.effect_parameters(&{
                     let mut coordinates = candidate.origin();
                     coordinates[0] = *z;
                     coordinates
