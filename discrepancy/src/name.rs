@@ -126,8 +126,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
             if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, &model) };
         let Some(contenders) = Contenders::of(screening, here, &columns, &model, threshold) else { break };
         progress(&format!("fitting {} candidates, round {}", contenders.count(), number + 1));
-        let point = if number == 0 { linearisation.clone() } else { linearise(here, &model) };
-        let Some(mut round) = Round::fitted(here, &point, &model, &contenders, progress) else { break };
+        let at_model = if number == 0 { linearisation.clone() } else { linearise(here, &model) };
+        let Some(mut round) = Round::fitted(here, &at_model, &model, &contenders, progress) else { break };
         fitted.extend(round.fits.iter().cloned());
         round.keep_large();
         let best_restarted = round.take_engine();

@@ -151,7 +151,7 @@ pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed
         .loss
 }
 
-struct Point {
+struct Iterate {
     placed: Vec<Placed>,
     simulated: Vec<f64>,
     residual: Vec<f64>,
@@ -184,7 +184,7 @@ pub(crate) fn refit_steps(
     let chosen: Vec<usize> = (0..all_precisions.len()).collect();
     let coordinates = coordinates(start);
     let mut parameter_products: Option<Products> = None;
-    let mut evaluate = |placed: Vec<Placed>| -> Option<Point> {
+    let mut evaluate = |placed: Vec<Placed>| -> Option<Iterate> {
         let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
@@ -195,7 +195,7 @@ pub(crate) fn refit_steps(
             none => none.insert(engine.products(&residual, &linearisation.columns)),
         };
         let fit = products.fit_from(&parameters, &precisions, &off);
-        Some(Point { placed, simulated, residual, fit })
+        Some(Iterate { placed, simulated, residual, fit })
     };
     let prior = |placed: &[Placed]| -> f64 {
         coordinates
@@ -205,32 +205,33 @@ pub(crate) fn refit_steps(
             })
             .sum()
     };
-    let total = |point: &Point| point.fit.loss + prior(&point.placed);
+    let total = |iterate: &Iterate| iterate.fit.loss + prior(&iterate.placed);
     let first = evaluate(start.to_vec())?;
     // The last linearisation; one more than steps are taken, for the errors.
     let (mut last, mut left) = (None, steps);
-    let point = descend(first, steps + 1, CONVERGED, total, |point| {
+    let iterate = descend(first, steps + 1, CONVERGED, total, |iterate| {
         last = None;
-        let columns = coordinate_columns(engine, &linearisation.factors, &point.placed, &point.simulated)?;
+        let columns =
+            coordinate_columns(engine, &linearisation.factors, &iterate.placed, &iterate.simulated)?;
         let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&columns).collect();
-        let products = last.insert(engine.products(&point.residual, &all));
+        let products = last.insert(engine.products(&iterate.residual, &all));
         left = left.checked_sub(1)?;
-        let from = prior_deviations(&linearisation.factors, &point.placed);
+        let from = prior_deviations(&linearisation.factors, &iterate.placed);
         let joint = products.fit_from(&chosen, &all_precisions, &from);
         let shares = successors(Some(1.0), |share| Some(share * SHORTER));
         shares.take(SHORTENINGS + 1).find_map(|share| {
-            let mut placed = point.placed.clone();
+            let mut placed = iterate.placed.clone();
             for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
                 let [least, most] = placed[*at].candidate.reach(*key);
                 let coordinate = &mut placed[*at].coordinates[*key];
                 *coordinate = (*coordinate + share * change).clamp(least, most);
             }
-            evaluate(placed).filter(|tried| total(tried) < total(point))
+            evaluate(placed).filter(|tried| total(tried) < total(iterate))
         })
     });
     let products = last?;
     // At the final iterate: parameters as fitted, coordinates unchanged.
-    let mut at_point = point.fit.clone();
+    let mut at_point = iterate.fit.clone();
     at_point.coefficients.extend(std::iter::repeat_n(0.0, coordinates.len()));
     let covariance = products.covariance(&chosen, &at_point, &all_precisions);
     let (plain, _) = products.normal(&chosen, &at_point.weights, &all_precisions);
@@ -245,11 +246,12 @@ pub(crate) fn refit_steps(
     };
     let errors = (COUNT..chosen.len()).chain(0..COUNT).map(error).collect();
     let mut factors = linearisation.factors;
-    for (factor, change) in factors.iter_mut().zip(&point.fit.coefficients) {
+    for (factor, change) in factors.iter_mut().zip(&iterate.fit.coefficients) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
-    let loss = point.fit.loss + prior(&point.placed) + model_penalty(coordinates.len(), &factors, penalty);
-    Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, design_effect })
+    let loss =
+        iterate.fit.loss + prior(&iterate.placed) + model_penalty(coordinates.len(), &factors, penalty);
+    Some(Refit { placed: iterate.placed, factors, loss, squares: iterate.fit.squares, errors, design_effect })
 }
 
 /// Parameter sensitivities linearised at a model.

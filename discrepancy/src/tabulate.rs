@@ -25,19 +25,19 @@ use crate::name::WORTH_A_FIT;
 use crate::parameters::COUNT;
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
-use fit::{FittedTable, LinearisedTable, Model, Point, TableLinearisation};
+use fit::{FittedTable, Iterate, LinearisedTable, Model, TableLinearisation};
 use plant::effects::tabulated::{self, Balance, Tabulated, Variable, interpolated};
 use plant::{Axis, RigParameters};
 
 /// Number of screened tables that are fitted.
 const TRIED: usize = 3;
 /// Points of a first table; a law over position and direction has two branches.
-const POINTS: usize = 8;
-const DIRECTED_POINTS: usize = 32;
+const KNOTS: usize = 8;
+const DIRECTED_KNOTS: usize = 32;
 /// Refinement factors.
 const FINER: [usize; 2] = [2, 4];
 /// Maximum number of points of a table.
-const MOST_POINTS: usize = tabulated::POINTS[1];
+const MAX_KNOTS: usize = tabulated::POINTS[1];
 /// Steps of a first fit, and of a final one.
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
@@ -69,7 +69,7 @@ pub(crate) fn tabulate(
     let engine = restarted.as_ref().unwrap_or(engine);
     let free = reported.factors.map(|factor| factor != 1.0);
     let alone = Model::alone(reported.factors, free);
-    let parameters_alone = Point::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
+    let parameters_alone = Iterate::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
     let parameters_alone = fit::fit(engine, parameters_alone, FIRST_STEPS);
     let seek = Seek { engine, axis, balance, unknowns };
 
@@ -104,16 +104,16 @@ pub(crate) fn tabulate(
 }
 
 /// The model with the needed parameters, and which; the others are at the rig file's values.
-fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
+fn with_needed(engine: &Engine<'_>, best: Iterate) -> (Iterate, [bool; COUNT]) {
     let all = Model { free: [true; COUNT], ..best.model.clone() };
-    let held = Point::of(engine, best.model.clone().held([false; COUNT]));
+    let held = Iterate::of(engine, best.model.clone().held([false; COUNT]));
     let Some((linearisation, held)) = TableLinearisation::of(engine, all).zip(held) else {
         return (best, [true; COUNT]);
     };
     let linearisation = linearisation.with(&[]);
     let bare = fit::steps(engine, held, &linearisation[COUNT..]);
     let needed = fit::needed(engine, &bare, &linearisation, WORTH_A_FIT);
-    let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
+    let Some(start) = Iterate::of(engine, bare.model.clone().held(needed)) else {
         return (bare, [false; COUNT]);
     };
     // The known linearisation serves for the first steps.
@@ -147,7 +147,7 @@ struct Seek<'a> {
 impl Seek<'_> {
     /// The best model with one more variable other than `used`; `None` where no rig can have any. All are screened linearly and
     /// the best are fitted.
-    fn best(&self, from: &Point, used: Option<Over>) -> Option<(Point, Over)> {
+    fn best(&self, from: &Iterate, used: Option<Over>) -> Option<(Iterate, Over)> {
         let sets: &[&[Balance]] = match self.balance {
             Balance::Force => &[&[Balance::Force]],
             Balance::FlowA => &[&[Balance::FlowA], &[Balance::FlowA, Balance::FlowB]],
@@ -206,9 +206,9 @@ impl Seek<'_> {
     }
 
     /// A model with tables of some balances, started at their curves or at 0, whichever has the smaller loss.
-    fn start(&self, model: &Model, over: Over, balances: &[Balance]) -> Option<Point> {
+    fn start(&self, model: &Model, over: Over, balances: &[Balance]) -> Option<Iterate> {
         let from = [false, true].map(|is_flat| self.with(model, over, balances, is_flat));
-        let [curved, flat] = from.map(|model| Point::of(self.engine, model?));
+        let [curved, flat] = from.map(|model| Iterate::of(self.engine, model?));
         match (curved, flat) {
             (Some(curved), Some(flat)) => Some(if curved.loss < flat.loss { curved } else { flat }),
             (one, other) => one.or(other),
@@ -247,8 +247,8 @@ impl Seek<'_> {
         let at = match (over, variable) {
             (Over::Constant, _) => vec![0.0, self.engine.rig().cylinder().stroke_m],
             (_, Variable::Direction) => vec![-1.0, 1.0],
-            (_, Variable::DirectedExtension) => knots(&seen, DIRECTED_POINTS),
-            _ => knots(&seen, POINTS),
+            (_, Variable::DirectedExtension) => knots(&seen, DIRECTED_KNOTS),
+            _ => knots(&seen, KNOTS),
         };
         if at.len() < 2 || curve.as_ref().is_some_and(|curve| curve.at.is_empty()) {
             return None;
@@ -269,20 +269,20 @@ impl Seek<'_> {
     }
 
     /// Refines the table while the loss, penalty included, falls.
-    fn finer(&self, start: Point) -> Point {
+    fn finer(&self, start: Iterate) -> Iterate {
         let mut best = fit::fit(self.engine, start, STEPS);
         for times in FINER {
             let mut model = best.model.clone();
             for fitted in model.tables.iter_mut().filter(|fitted| fitted.table.at.len() > 2) {
                 let is_directed = fitted.table.variable == Variable::DirectedExtension;
-                let points = if is_directed { DIRECTED_POINTS } else { POINTS };
+                let points = if is_directed { DIRECTED_KNOTS } else { KNOTS };
                 // One more may come at the end.
-                let at = knots(&fitted.seen, (times * points).min(MOST_POINTS - 1));
+                let at = knots(&fitted.seen, (times * points).min(MAX_KNOTS - 1));
                 fitted.table.value =
                     at.iter().map(|x| interpolated(&fitted.table.at, &fitted.table.value, *x)).collect();
                 fitted.table.at = at;
             }
-            let Some(point) = Point::of(self.engine, model) else { break };
+            let Some(point) = Iterate::of(self.engine, model) else { break };
             let tried = fit::fit(self.engine, point, FIRST_STEPS);
             if tried.loss >= best.loss {
                 break;

@@ -20,7 +20,7 @@ mod reference_run;
 mod starts;
 mod whiten;
 
-use crate::gridded_record::{CHANNELS, GriddedRecord, Point};
+use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::sensor_inverse::SensorInverse;
 use plant::{Batch, Inputs, Plant, RigParameters};
 pub use reference_run::{Reach, ReferenceRun};
@@ -43,7 +43,7 @@ pub struct Windows<'a> {
     /// First period of each window.
     starts: Vec<usize>,
     /// Start state of each window, unjudged ones included.
-    points: Vec<[Point; 2]>,
+    points: Vec<[AxisState; 2]>,
     /// Axis and channel of each output.
     outputs: Vec<(usize, usize)>,
     /// Readings over their noise by window, period and output; 0 where there is none.
@@ -75,7 +75,7 @@ impl<'a> Windows<'a> {
         // The first window fills lags and memories and is not judged [rig-model.md: a record is judged after 0.1 s].
         let starts: Vec<usize> = (1..record.len() / WINDOW)
             .map(|window| window * WINDOW)
-            .filter(|start| !record.gaps[*start..start + WINDOW].contains(&true))
+            .filter(|start| !record.excluded_periods[*start..start + WINDOW].contains(&true))
             .collect();
         let mut readings = Vec::with_capacity(starts.len() * WINDOW * outputs.len());
         let mut valid = Vec::with_capacity(readings.capacity());

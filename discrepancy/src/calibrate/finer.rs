@@ -9,7 +9,7 @@
 //!
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
-use super::{Calibrated, POINTS, UNRESOLVED};
+use super::{Calibrated, MAX_ITERATIONS, UNRESOLVED};
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
@@ -58,7 +58,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let mut factors: Vec<f64> = calibrated.fit.factors.to_vec();
     factors.resize(precisions.len(), 1.0);
     let mut best: Option<(Vec<f64>, Products, Fit)> = None;
-    for _ in 0..POINTS {
+    for _ in 0..MAX_ITERATIONS {
         // At the end of a range the last iterate stands.
         let Some((tried, columns)) = with(rig, &entries, &factors).zip(columns(engine, &entries, &factors))
         else {

@@ -116,7 +116,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     // The last window needs one more period.
     for window in 0..(gridded.len() - 1) / WINDOW {
         let from = window * WINDOW;
-        let whole = !gridded.gaps[from..=from + WINDOW].iter().any(|gap| *gap);
+        let whole = !gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap);
         filled = if whole { filled + 1 } else { 0 };
         if filled > FILLING
             && let Some(looks) = pass.look(from, &nudges)

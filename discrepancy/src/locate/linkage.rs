@@ -37,7 +37,7 @@ pub(super) fn gather(
         let forces = &contact_n[from..from + WINDOW];
         let side = forces[0].signum();
         let touching = forces.iter().all(|force| force * side > least_n);
-        if !touching || gridded.gaps[from..=from + WINDOW].iter().any(|gap| *gap) {
+        if !touching || gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap) {
             continue;
         }
         let mut sum_n = 0.0;

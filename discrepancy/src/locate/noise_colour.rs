@@ -29,7 +29,7 @@ pub(super) fn colours(record: &GriddedRecord, axis: usize) -> [f64; CHANNELS] {
     for from in (0..record.len().saturating_sub(WINDOW)).step_by(WINDOW) {
         let command = |at: usize| record.inputs[at].valve[axis];
         let since = from.saturating_sub(2 * WINDOW);
-        if !(since..from + WINDOW).all(|at| !record.gaps[at] && command(at) == command(since)) {
+        if !(since..from + WINDOW).all(|at| !record.excluded_periods[at] && command(at) == command(since)) {
             continue;
         }
         for (channel, windows) in windows.iter_mut().enumerate() {

@@ -102,7 +102,7 @@ impl<'a> Pass<'a> {
 
     /// Advances to the next window from the state of the record.
     pub(super) fn go_on(&mut self, from: usize, periods: usize) {
-        if !self.record.gaps[from] {
+        if !self.record.excluded_periods[from] {
             let start = state_at(&self.plant, &self.record.points[from], self.record.measured);
             // Impossible points come from a broken record; the plant then continues from its state.
             let _ = self.plant.go_on_in(&start);

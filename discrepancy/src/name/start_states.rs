@@ -39,9 +39,9 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty:
 
 /// Start of the fit of a backlash: the amplitude with the smallest loss, each under its own start states. Under the start states
 /// of another backlash even the true one fits badly.
-pub(super) fn gap_start(
+pub(super) fn backlash_start(
     engine: &Engine<'_>,
-    point: &Linearisation,
+    linearisation: &Linearisation,
     model: &[Placed],
     start: &Placed,
 ) -> Vec<Placed> {
@@ -61,8 +61,8 @@ pub(super) fn gap_start(
     let losses: Vec<f64> = tried
         .par_iter()
         .map(|placed| {
-            rig_of(engine.rig(), placed, &point.factors)
-                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), point, placed))
+            rig_of(engine.rig(), placed, &linearisation.factors)
+                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), linearisation, placed))
         })
         .collect();
     let best = (0..tried.len()).min_by(|left, right| losses[*left].total_cmp(&losses[*right]));

@@ -21,7 +21,7 @@
 
 use super::closed_loop::ClosedLoopRun;
 use super::nuisance::Product;
-use crate::gridded_record::{CHANNELS, Point};
+use crate::gridded_record::{AxisState, CHANNELS};
 use crate::windows::{FORCE, dot, project, state_at};
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
@@ -149,10 +149,10 @@ impl<'a> Observer<'a> {
 
     /// Start states of a window, with creep set to rest, as in the workflow: friction then holds the piston in both directions. A
     /// piston still sliding would respond to one sign of a nudge only.
-    fn points(&self, window: usize) -> [Point; 2] {
+    fn points(&self, window: usize) -> [AxisState; 2] {
         self.driven.points[window * WINDOW].map(|point| {
             let creeps = point.rod_velocity_m_per_s.abs() < REST_M_PER_S;
-            if creeps { Point { rod_velocity_m_per_s: 0.0, ..point } } else { point }
+            if creeps { AxisState { rod_velocity_m_per_s: 0.0, ..point } } else { point }
         })
     }
 
@@ -220,7 +220,7 @@ impl<'a> Observer<'a> {
         };
         let mut columns = Vec::new();
         for axes in together {
-            for number in 0..Point::NUDGES.len() {
+            for number in 0..AxisState::NUDGES.len() {
                 let mut points = self.points(window);
                 for axis in &axes {
                     points[*axis] = points[*axis].nudged(number);

@@ -174,19 +174,19 @@ impl Model {
 
 /// A simulated model.
 #[derive(Clone, Debug)]
-pub(super) struct Point {
+pub(super) struct Iterate {
     pub(super) model: Model,
     residual: Vec<f64>,
     /// Loss of the windows plus penalties.
     pub(super) loss: f64,
 }
 
-impl Point {
+impl Iterate {
     /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
         let loss = loss(&engine.squares(&residual), engine.scaled_dof()) + model.penalty();
-        loss.is_finite().then_some(Point { model, residual, loss })
+        loss.is_finite().then_some(Iterate { model, residual, loss })
     }
 
     /// The parameters with standard errors, as a fit without effects; `linearisation` is the linearisation at the model.
@@ -286,7 +286,7 @@ impl TableLinearisation {
     }
 
     /// Cross-validated loss of the linearised model, without penalties.
-    pub(super) fn cross_validated_loss(&self, engine: &Engine<'_>, point: &Point) -> f64 {
+    pub(super) fn cross_validated_loss(&self, engine: &Engine<'_>, point: &Iterate) -> f64 {
         let products = engine.products(&point.residual, &self.columns);
         let coordinates = self.model.coordinates();
         let precisions = self.model.precisions();
@@ -298,7 +298,7 @@ impl TableLinearisation {
     pub(super) fn predicted_loss(
         &self,
         engine: &Engine<'_>,
-        point: &Point,
+        point: &Iterate,
         tables: &[&LinearisedTable],
     ) -> f64 {
         let mut model = self.model.clone();
@@ -312,7 +312,7 @@ impl TableLinearisation {
 /// Forward selection of parameters beside the tables on the linearised model, while the loss falls by `gain`.
 pub(super) fn needed(
     engine: &Engine<'_>,
-    point: &Point,
+    point: &Iterate,
     linearisation: &[&[f64]],
     gain: f64,
 ) -> [bool; COUNT] {
@@ -345,8 +345,8 @@ pub(super) fn needed(
 }
 
 /// Gauss-Newton until convergence.
-pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
-    let loss = |point: &Point| point.loss;
+pub(super) fn fit(engine: &Engine<'_>, start: Iterate, steps: usize) -> Iterate {
+    let loss = |point: &Iterate| point.loss;
     descend(start, steps, CONVERGED, loss, |point| {
         let linearisation = TableLinearisation::of(engine, point.model.clone())?;
         Some(self::steps(engine, point.clone(), &linearisation.with(&[])))
@@ -354,10 +354,10 @@ pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
 }
 
 /// Steps with the same sensitivities, one column for each free coordinate.
-pub(super) fn steps(engine: &Engine<'_>, start: Point, linearisation: &[&[f64]]) -> Point {
+pub(super) fn steps(engine: &Engine<'_>, start: Iterate, linearisation: &[&[f64]]) -> Iterate {
     let (coordinates, precisions) = (start.model.coordinates(), start.model.precisions());
     let mut products = engine.products(&start.residual, linearisation);
-    let loss = |point: &Point| point.loss;
+    let loss = |point: &Iterate| point.loss;
     descend(start, STEPS_PER_LINEARISATION, CONVERGED, loss, |point| {
         products.set_residual(&point.residual, linearisation, engine.rows());
         line_search(engine, point, &coordinates, &products, &precisions)
@@ -367,17 +367,17 @@ pub(super) fn steps(engine: &Engine<'_>, start: Point, linearisation: &[&[f64]])
 /// Backtracking line search: the longest step that lowers the loss.
 fn line_search(
     engine: &Engine<'_>,
-    point: &Point,
+    point: &Iterate,
     coordinates: &[Coordinate],
     products: &Products,
     precisions: &[f64],
-) -> Option<Point> {
+) -> Option<Iterate> {
     let joint = products.fit(&(0..coordinates.len()).collect::<Vec<_>>(), precisions);
     SHARES.iter().find_map(|share| {
         let changes = coordinates.iter().zip(&joint.coefficients);
         let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {
             model.perturbed(*coordinate, share * change)
         });
-        Point::of(engine, model).filter(|tried| tried.loss < point.loss)
+        Iterate::of(engine, model).filter(|tried| tried.loss < point.loss)
     })
 }

@@ -1,7 +1,7 @@
 //! Held-out figures of models that are known to be right, wrong or unchanged.
 
 use super::*;
-use crate::gridded_record::Point;
+use crate::gridded_record::AxisState;
 use crate::next::divergence::noise_with_rounding;
 use crate::windows::first_state;
 use plant::{Inputs, Plant, Sensors};
@@ -13,9 +13,9 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
         name: "made".to_owned(),
         measured: [true, false],
         inputs: vec![Inputs::default(); PERIODS],
-        points: vec![[Point { extension_m: 0.1, ..Point::default() }; 2]],
+        points: vec![[AxisState { extension_m: 0.1, ..AxisState::default() }; 2]],
         noise: [noise_with_rounding(baseline), [0.0; CHANNELS]],
-        gaps: vec![false; PERIODS],
+        excluded_periods: vec![false; PERIODS],
         ..GriddedRecord::default()
     };
     for (period, inputs) in record.inputs.iter_mut().enumerate() {
@@ -31,13 +31,13 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
         let samples = [reading.position, reading.force, reading.pressure_a, reading.pressure_b]
             .map(|reading| Some(reading.value));
         record.samples.push([samples, [None; CHANNELS]]);
-        let point = Point {
+        let point = AxisState {
             extension_m: axis.position_m,
             rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
             or_else_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         };
-        record.points.push([point, Point::default()]);
+        record.points.push([point, AxisState::default()]);
         plant.step(inputs);
     }
     record
@@ -109,7 +109,7 @@ fn traces_hold_the_whole_record_and_nothing_where_it_is_not_judged() {
     let rig = RigParameters::baseline();
     let mut record = record(&rig, &rig, 4);
     record.samples[555][0][2] = None;
-    record.gaps[1010] = true;
+    record.excluded_periods[1010] = true;
     let traces = judged(&rig, &rig, &record).traces;
     assert_eq!(traces.len(), CHANNELS);
     let pressure = traces.iter().find(|trace| trace.signal == "drive_pressure_a_Pa").unwrap();
