@@ -58,7 +58,7 @@ pub struct GriddedRecord {
     /// Standard deviation of each reading, its rounding included.
     pub noise: [[f64; CHANNELS]; 2],
     /// Lag-1 autocorrelation of the noise, 0 to 1.
-    pub memory: [[f64; CHANNELS]; 2],
+    pub lag1_autocorrelation: [[f64; CHANNELS]; 2],
     pub(crate) jitter_s: f64,
     /// Periods without a known command or without a smoothed state.
     pub(crate) excluded_periods: Vec<bool>,
@@ -233,7 +233,7 @@ impl GriddedRecord {
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
         let mut still = Still::new(&position, &positions, self.noise[i][0]);
         // Autocorrelation widens the error of a mean.
-        let share = memory(&positions, &still.resting(), self.noise[i][0]);
+        let share = lag1_autocorrelation(&positions, &still.resting(), self.noise[i][0]);
         if share > 0.0 {
             let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
             still = Still::new(&position, &positions, lasting_m);
@@ -256,7 +256,7 @@ impl GriddedRecord {
         }
         let resting = still.resting();
         for at in 0..CHANNELS {
-            self.memory[i][at] = memory(&column(at), &resting, self.noise[i][at]);
+            self.lag1_autocorrelation[i][at] = lag1_autocorrelation(&column(at), &resting, self.noise[i][at]);
         }
         self.jitter_s = self.jitter_s.max(jitter_s(&position, &positions, &resting));
     }
@@ -264,7 +264,7 @@ impl GriddedRecord {
 
 /// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1
 /// - share).
-fn memory(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
+fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
     let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / MEMORY_BLOCK)
         .filter_map(|block| {
             let places = block * MEMORY_BLOCK..(block + 1) * MEMORY_BLOCK;

@@ -36,28 +36,28 @@ use round::{Contenders, Round};
 use start_states::{Restarted, refit_with_starts};
 
 /// Maximum number of effects.
-const MOST: usize = 3;
+const MAX_EFFECTS: usize = 3;
 /// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
 /// Maximum number of relinearisations of the parameter sensitivities.
 const RELINEARISATIONS: usize = 4;
 /// Mean log ratio of a window's chi2 to its degrees of freedom above which a model shows lack of fit (is inadequate).
-const EXCESS: f64 = 0.08;
+const LACK_OF_FIT_PER_DOF: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
-const EXCESS_LINKED: f64 = 0.3;
+const LACK_OF_FIT_PER_DOF_LINKED: f64 = 0.3;
 /// Screened gain below which no candidate is fitted. Of forty independent null gains (chi2 of one degree of freedom) the largest
 /// has the median 5.7 and the 99th percentile 13.4.
-pub(crate) const WORTH_A_FIT: f64 = 25.0;
+pub(crate) const MIN_LOSS_REDUCTION: f64 = 25.0;
 /// Penalty for each fitted parameter of an effect.
 pub(crate) const EFFECT_PARAMETER_PENALTY: f64 = 8.0;
 /// Multiple of the null threshold required of a single effect.
-const SAFETY: f64 = 2.0;
+const THRESHOLD_FACTOR_SINGLE: f64 = 2.0;
 /// Share of the loss after calibration that the first effect must remove.
-const LEAST_SHARE_OF_FIRST: f64 = 0.1;
+const MIN_LOSS_SHARE_FIRST: f64 = 0.1;
 /// Share of the remaining loss that each further effect must remove.
-const LEAST_SHARE: f64 = 0.3;
+const MIN_LOSS_SHARE_FURTHER: f64 = 0.3;
 /// Smallest amplitude, as a share of the smallest change that occurs.
-const FLOOR: f64 = 0.6;
+const MIN_AMPLITUDE_RATIO: f64 = 0.6;
 /// Share of the loss after calibration that an explanation may leave.
 const MOST_LOSS_LEFT: f64 = 0.3;
 /// Fall of the loss per degree of freedom that makes a model adequate whatever it leaves (1.8: chi2 to a sixth). A law of a
@@ -120,7 +120,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let mut fitted = Vec::new();
     // For each accepted effect the fits of its round, best first.
     let mut rounds: Vec<Vec<Refit>> = Vec::new();
-    for number in 0..MOST {
+    for number in 0..MAX_EFFECTS {
         let here = restarted.as_ref().unwrap_or(engine);
         let screening =
             if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, &model) };
@@ -155,7 +155,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
     let dof = here.scaled_dof().iter().sum::<f64>();
     let loss_per_dof = model.loss / dof;
-    let most_loss_per_dof = if engine.is_linked() { EXCESS_LINKED } else { EXCESS };
+    let most_loss_per_dof = if engine.is_linked() { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF };
     let fall_per_dof = (calibrated.fit.loss - model.loss) / dof;
     let inadequate = loss_per_dof > most_loss_per_dof
         && model.loss > MOST_LOSS_LEFT * calibrated.fit.loss
@@ -205,8 +205,8 @@ fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
 /// Whether a model's last effect removes the required share of the loss before it.
 fn gains_enough(before: &Refit, after: &Refit) -> bool {
     let gain = before.loss - after.loss;
-    let share = if before.placed.is_empty() { LEAST_SHARE_OF_FIRST } else { LEAST_SHARE };
-    gain > (share * before.loss).max(WORTH_A_FIT)
+    let share = if before.placed.is_empty() { MIN_LOSS_SHARE_FIRST } else { MIN_LOSS_SHARE_FURTHER };
+    gain > (share * before.loss).max(MIN_LOSS_REDUCTION)
 }
 
 /// Whether one of an effect's amplitudes is above the floor.
@@ -225,16 +225,17 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     if candidate.is_present() || ends[0] * ends[1] < 0.0 {
         0.05
     } else {
-        FLOOR * ends[0].abs().min(ends[1].abs())
+        MIN_AMPLITUDE_RATIO * ends[0].abs().min(ends[1].abs())
     }
 }
 
-/// Detection limits: the amplitude whose expected linear gain reaches [`SAFETY`] null thresholds and the gain worth a fit, at
-/// least the floor. The linear gain exceeds that in half of the records; the procedure finds fewer, since the objective charges
-/// [`EFFECT_PARAMETER_PENALTY`] for each parameter of the effect. The smallest limit of several probes is optimistic for
-/// nonlinear effects.
+/// Detection limits: the amplitude whose expected linear gain reaches [`THRESHOLD_FACTOR_SINGLE`] null thresholds and the gain
+/// worth a fit, at least the floor. The linear gain exceeds that in half of the records; the procedure finds fewer, since the
+/// objective charges [`EFFECT_PARAMETER_PENALTY`] for each parameter of the effect. The smallest limit of several probes is
+/// optimistic for nonlinear effects.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
-    let limits = null.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
+    let limits =
+        null.limits(columns.candidates.len(), (THRESHOLD_FACTOR_SINGLE * threshold).max(MIN_LOSS_REDUCTION));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {
         limit.map(|limit: f64| limit.max(least_coordinate(candidate, 0)))
     };

@@ -1,8 +1,8 @@
 //! Linear screening: gain and starting point of each candidate, from one simulation at each of its probes.
 //!
 //! Each probe is one column. Fitted jointly with the parameters' columns, its coefficient is the amplitude of an effect whose
-//! responses were proportional to it. Screening ranks, and ends the search where no gain exceeds [`crate::name::WORTH_A_FIT`]
-//! and a share of the last threshold; the refit decides.
+//! responses were proportional to it. Screening ranks, and ends the search where no gain exceeds
+//! [`crate::name::MIN_LOSS_REDUCTION`] and a share of the last threshold; the refit decides.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
@@ -10,6 +10,9 @@ use crate::fit::Products;
 use crate::parameters::COUNT;
 use crate::refit::{Linearisation, Placed, parameter_precisions};
 use rayon::prelude::*;
+
+/// Penalty for each column of a candidate.
+const COLUMN_PENALTY: f64 = 6.0;
 
 #[derive(Debug)]
 pub struct Columns {
@@ -126,7 +129,7 @@ impl Columns {
                         coordinates[key] = (coefficient * z).clamp(least.max(-1.3), most.min(1.3));
                     }
                 }
-                let loss = fit.loss + 6.0 * (1 + with.len()) as f64;
+                let loss = fit.loss + COLUMN_PENALTY * (1 + with.len()) as f64;
                 if best.as_ref().is_none_or(|(best, _)| loss < *best) {
                     best = Some((loss, coordinates));
                 }

@@ -21,7 +21,7 @@ use crate::calibrate::{Calibrated, quantity};
 use crate::engine::Engine;
 use crate::locate::maps::map;
 use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
-use crate::name::WORTH_A_FIT;
+use crate::name::MIN_LOSS_REDUCTION;
 use crate::parameters::COUNT;
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
@@ -112,7 +112,7 @@ fn with_needed(engine: &Engine<'_>, best: Iterate) -> (Iterate, [bool; COUNT]) {
     };
     let linearisation = linearisation.with(&[]);
     let bare = fit::steps(engine, held, &linearisation[COUNT..]);
-    let needed = fit::needed(engine, &bare, &linearisation, WORTH_A_FIT);
+    let needed = fit::needed(engine, &bare, &linearisation, MIN_LOSS_REDUCTION);
     let Some(start) = Iterate::of(engine, bare.model.clone().held(needed)) else {
         return (bare, [false; COUNT]);
     };

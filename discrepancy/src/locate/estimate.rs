@@ -19,7 +19,7 @@
 //!
 //! Source: discrepancy-notes.md, 2; Kay 1993, Fundamentals of Statistical Signal Processing I, 4.5 and 11.5.
 
-use super::noise_colour::colours;
+use super::noise_colour::ar1_coefficients;
 use super::regime::Regimes;
 use super::simulated::{Nudge, Pass, Readings};
 use super::{NORMAL_LITRES_PER_MINUTE, UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
@@ -108,8 +108,8 @@ struct Solution {
 pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &mut Unknowns) {
     let Some(mut pass) = Pass::new(rig, gridded) else { return };
     let axes: Vec<usize> = (0..2).filter(|axis| gridded.measured[*axis]).collect();
-    let colours =
-        [0, 1].map(|axis| if gridded.measured[axis] { colours(gridded, axis) } else { [0.0; CHANNELS] });
+    let ar1_coefficients = [0, 1]
+        .map(|axis| if gridded.measured[axis] { ar1_coefficients(gridded, axis) } else { [0.0; CHANNELS] });
     let nudges = nudges();
     let mut solved: [Vec<Solved>; 2] = [Vec::new(), Vec::new()];
     let mut filled = 0;
@@ -122,7 +122,13 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
             && let Some(looks) = pass.look(from, &nudges)
         {
             for axis in &axes {
-                let seen = Seen { gridded, axis: *axis, from, colours: &colours[*axis], looks: &looks };
+                let seen = Seen {
+                    gridded,
+                    axis: *axis,
+                    from,
+                    ar1_coefficients: &ar1_coefficients[*axis],
+                    looks: &looks,
+                };
                 solved[*axis].extend(seen.solve());
             }
         }
@@ -131,7 +137,13 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     for axis in axes {
         gather(rig, gridded, axis, &solved[axis], &mut unknowns.axes[axis]);
     }
-    linkage::gather(rig, gridded, pass.contact_n(), [colours[0][0], colours[1][0]], &mut unknowns.linkage);
+    linkage::gather(
+        rig,
+        gridded,
+        pass.contact_n(),
+        [ar1_coefficients[0][0], ar1_coefficients[1][0]],
+        &mut unknowns.linkage,
+    );
 }
 
 /// The baseline, a nudge of each number but the last, and the force's nudge the other way.
@@ -155,7 +167,7 @@ struct Seen<'a> {
     gridded: &'a GriddedRecord,
     axis: usize,
     from: usize,
-    colours: &'a [f64; CHANNELS],
+    ar1_coefficients: &'a [f64; CHANNELS],
     looks: &'a [Readings],
 }
 
@@ -167,7 +179,7 @@ impl Seen<'_> {
         let mut pressure = [Theta::zeros(), Theta::zeros()];
         let (mut squares, mut used) = (0.0, 0);
         for channel in (0..CHANNELS).filter(|channel| *channel != 1 || !self.force_is_input()) {
-            let phi = self.colours[channel];
+            let phi = self.ar1_coefficients[channel];
             let white = (1.0 - phi * phi).sqrt();
             let mut before: Option<(Theta, f64)> = None;
             for at in 0..WINDOW {

@@ -8,7 +8,7 @@
 //! the simulator.
 
 use super::EFFECT_PARAMETER_PENALTY;
-use super::null_distribution::above_far_off;
+use super::null_distribution::above_outlier_limit;
 use crate::descent::descend;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
@@ -142,7 +142,7 @@ fn stepped(
     linearisation: &JointLinearisation,
     chosen: &[usize],
 ) -> Option<Iterate> {
-    let far: Vec<usize> = above_far_off(&iterate.squares, engine.scaled_dof()).collect();
+    let far: Vec<usize> = above_outlier_limit(&iterate.squares, engine.scaled_dof()).collect();
     let with_all = line_search(engine, iterate, linearisation, chosen, &[]);
     let without =
         if far.is_empty() { None } else { line_search(engine, iterate, linearisation, chosen, &far) };

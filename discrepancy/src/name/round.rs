@@ -9,7 +9,9 @@ use super::elimination::same;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
 use super::start_states::{Restarted, backlash_start, refit_with_starts};
-use super::{EFFECT_PARAMETER_PENALTY, EXCESS, STEPS, WORTH_A_FIT, is_large, relinearise};
+use super::{
+    EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, is_large, relinearise,
+};
 use crate::engine::Engine;
 use crate::refit::{Linearisation, Placed, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
@@ -55,7 +57,7 @@ impl Contenders {
         let mut best: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
         best.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let most = null_loss - best.first()?.loss;
-        if most < WORTH_A_FIT.max(SEARCHED_SHARE * threshold) {
+        if most < MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold) {
             return None;
         }
         let is_backlash = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
@@ -114,7 +116,7 @@ impl<'a> Round<'a> {
         round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
         let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
         if let Some(backlash) = backlash
-            && least > EXCESS * engine.scaled_dof().iter().sum::<f64>()
+            && least > LACK_OF_FIT_PER_DOF * engine.scaled_dof().iter().sum::<f64>()
         {
             progress("trying other gaps");
             round.with_backlash(engine, linearisation, model, backlash);
