@@ -77,7 +77,7 @@ pub struct Alternative {
 }
 
 #[derive(Debug)]
-pub struct Found {
+pub struct SelectionResult {
     /// Calibration: parameters without effects.
     pub(crate) calibrated: Calibrated,
     pub model: Refit,
@@ -103,7 +103,11 @@ pub struct Found {
 }
 
 /// Selects the effects that are missing from the baseline.
-pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn FnMut(&str)) -> Found {
+pub fn name(
+    engine: &Engine<'_>,
+    candidates: Vec<Candidate>,
+    progress: &mut dyn FnMut(&str),
+) -> SelectionResult {
     let linearisation = Linearisation::at_baseline(engine);
     progress("parameters alone");
     let calibrated = calibrate(engine, &linearisation);
@@ -171,7 +175,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let alternatives = with_shares
         .map(|(placed, share)| alternatives(placed, *share, &model, &calibrated, &rounds))
         .collect();
-    Found {
+    SelectionResult {
         calibrated,
         model,
         reported,
@@ -188,7 +192,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
 }
 
 /// Refits the reported model on all of the records, where the search used a part of them.
-pub(crate) fn on_all(engine: &Engine<'_>, found: &mut Found) {
+pub(crate) fn on_all(engine: &Engine<'_>, found: &mut SelectionResult) {
     let Some(rig) = rig_of(engine.rig(), &found.reported.placed, &found.reported.factors) else { return };
     let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
     let needed = found.reported.factors.map(|factor| factor != 1.0);

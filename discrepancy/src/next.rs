@@ -58,7 +58,7 @@ impl Explanation {
 
 /// Divergences of an entry of the menu.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Judged {
+pub struct ExperimentDivergences {
     pub name: &'static str,
     /// For each ordered pair: the true explanation, its rival, their divergence.
     pub pairs: Vec<(usize, usize, Divergence)>,
@@ -72,10 +72,10 @@ pub struct Proposal {
     /// Text of the experiment file, if one is proposed.
     pub(crate) experiment_toml: Option<String>,
     /// All entries of the menu that can be rehearsed, in its order.
-    pub table: Vec<Judged>,
+    pub table: Vec<ExperimentDivergences>,
 }
 
-impl Judged {
+impl ExperimentDivergences {
     /// The smallest T of its pairs, in one repetition.
     pub fn least(&self) -> f64 {
         self.pairs.iter().map(|pair| pair.2.in_repetitions(1)).fold(f64::INFINITY, f64::min)
@@ -122,7 +122,7 @@ pub fn judge(
     baseline: &RigParameters,
     explanations: &[Explanation],
     axes_measured: [bool; 2],
-) -> Option<Judged> {
+) -> Option<ExperimentDivergences> {
     let named = |name: &str| explanations.iter().any(|one| one.names.iter().any(|known| known == name));
     let parameters = nuisance::nuisance_parameters().filter(|parameter| !named(parameter.name));
     let perturbed: Vec<_> =
@@ -138,18 +138,18 @@ pub fn judge(
             Some(rivals.into_iter().zip(values).map(|(rival, value)| (truth, rival, value)).collect())
         })
         .collect();
-    Some(Judged { name: entry.name, pairs: pairs?.concat() })
+    Some(ExperimentDivergences { name: entry.name, pairs: pairs?.concat() })
 }
 
-fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<String>) {
+fn choose(explanations: &[Explanation], table: &[ExperimentDivergences]) -> (Next, Option<String>) {
     let titles: Vec<String> = explanations.iter().map(Explanation::title).collect();
     let alike = format!("{} explain the records alike", listed(&titles));
     // Ties go to the first of the menu.
-    let better = |one: &Judged, other: &Judged| {
-        let key = |judged: &Judged| (judged.apart(1).count(), judged.least_apart(1));
+    let better = |one: &ExperimentDivergences, other: &ExperimentDivergences| {
+        let key = |judged: &ExperimentDivergences| (judged.apart(1).count(), judged.least_apart(1));
         key(one) > key(other)
     };
-    let best = table.iter().fold(None, |best: Option<&Judged>, one| match best {
+    let best = table.iter().fold(None, |best: Option<&ExperimentDivergences>, one| match best {
         Some(best) if !better(one, best) => Some(best),
         _ => Some(one),
     });

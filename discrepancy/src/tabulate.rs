@@ -241,14 +241,15 @@ impl Seek<'_> {
         if variable == Variable::DirectedExtension && balance != Balance::Force {
             return None;
         }
-        let mut seen: Vec<f64> = series.points.iter().map(|point| Self::value(variable, point)).collect();
-        seen.sort_unstable_by(f64::total_cmp);
+        let mut sorted_samples: Vec<f64> =
+            series.points.iter().map(|point| Self::value(variable, point)).collect();
+        sorted_samples.sort_unstable_by(f64::total_cmp);
         let curve = Self::place(variable).map(|place| map(series, place));
         let at = match (over, variable) {
             (Over::Constant, _) => vec![0.0, self.engine.rig().cylinder().stroke_m],
             (_, Variable::Direction) => vec![-1.0, 1.0],
-            (_, Variable::DirectedExtension) => knots(&seen, DIRECTED_KNOTS),
-            _ => knots(&seen, KNOTS),
+            (_, Variable::DirectedExtension) => knots(&sorted_samples, DIRECTED_KNOTS),
+            _ => knots(&sorted_samples, KNOTS),
         };
         if at.len() < 2 || curve.as_ref().is_some_and(|curve| curve.at.is_empty()) {
             return None;
@@ -265,7 +266,7 @@ impl Seek<'_> {
             }
         };
         let table = Tabulated { axis: self.axis, balance, variable, at, value };
-        Some(FittedTable { table, is_constant: over == Over::Constant, seen })
+        Some(FittedTable { table, is_constant: over == Over::Constant, sorted_samples })
     }
 
     /// Refines the table while the loss, penalty included, falls.
@@ -277,7 +278,7 @@ impl Seek<'_> {
                 let is_directed = fitted.table.variable == Variable::DirectedExtension;
                 let points = if is_directed { DIRECTED_KNOTS } else { KNOTS };
                 // One more may come at the end.
-                let at = knots(&fitted.seen, (times * points).min(MAX_KNOTS - 1));
+                let at = knots(&fitted.sorted_samples, (times * points).min(MAX_KNOTS - 1));
                 fitted.table.value =
                     at.iter().map(|x| interpolated(&fitted.table.at, &fitted.table.value, *x)).collect();
                 fitted.table.at = at;
@@ -295,12 +296,14 @@ impl Seek<'_> {
 
 /// Knots over sorted values: placed half by rank, half by distance, so that neither a cluster at rest nor a single fast stroke
 /// dominates.
-fn knots(seen: &[f64], count: usize) -> Vec<f64> {
-    let (Some(least), Some(most)) = (seen.first(), seen.last()) else { return Vec::new() };
+fn knots(sorted_samples: &[f64], count: usize) -> Vec<f64> {
+    let (Some(least), Some(most)) = (sorted_samples.first(), sorted_samples.last()) else {
+        return Vec::new();
+    };
     let width = most - least;
     let mut at = vec![*least];
-    for (rank, value) in seen.iter().enumerate() {
-        let line_search = 0.5 * rank as f64 / seen.len() as f64 + 0.5 * (value - least) / width;
+    for (rank, value) in sorted_samples.iter().enumerate() {
+        let line_search = 0.5 * rank as f64 / sorted_samples.len() as f64 + 0.5 * (value - least) / width;
         let apart = value - at[at.len() - 1] > 0.2 * width / count as f64;
         if line_search >= at.len() as f64 / (count - 1) as f64 && apart {
             at.push(*value);
@@ -349,11 +352,11 @@ mod tests {
 
     #[test]
     fn points_are_where_values_are_and_reach_from_the_least_to_the_most() {
-        let mut seen: Vec<f64> =
+        let mut sorted_samples: Vec<f64> =
             (0..1000).map(|at| if at < 700 { 0.0 } else { f64::from(at) * 1e-3 }).collect();
-        seen.sort_unstable_by(f64::total_cmp);
+        sorted_samples.sort_unstable_by(f64::total_cmp);
         for count in [2, 8, 16, 32] {
-            let at = knots(&seen, count);
+            let at = knots(&sorted_samples, count);
             assert!((2..=count + 1).contains(&at.len()), "{at:?}");
             assert_eq!((at[0], at[at.len() - 1]), (0.0, 0.999));
             assert!(at.windows(2).all(|pair| pair[0] < pair[1]), "{at:?}");

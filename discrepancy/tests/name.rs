@@ -3,27 +3,27 @@
 use crate::record::{gridded, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
-use discrepancy::name::{Found, name};
+use discrepancy::name::{SelectionResult, name};
 use discrepancy::parameters::{COUNT, with_factors};
 use plant::RigParameters;
 
-fn found(hidden: &RigParameters, without: &[&str]) -> Found {
+fn found(hidden: &RigParameters, without: &[&str]) -> SelectionResult {
     found_beside(&RigParameters::baseline(), hidden, without)
 }
 
-fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> Found {
+fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> SelectionResult {
     let records = [gridded(hidden, &RigParameters::baseline())];
     let engine = Engine::new(&records, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
     name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())
 }
 
-fn names(found: &Found) -> Vec<String> {
+fn names(found: &SelectionResult) -> Vec<String> {
     found.model.placed.iter().map(|placed| placed.candidate.name()).collect()
 }
 
 /// Factors of the parameters with their errors.
-fn factors(found: &Found) -> Vec<(f64, f64)> {
+fn factors(found: &SelectionResult) -> Vec<(f64, f64)> {
     let errors = &found.model.errors[found.model.errors.len() - COUNT..];
     found.model.factors.iter().copied().zip(errors.iter().copied()).collect()
 }
@@ -71,7 +71,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
 }
 
 /// Amplitude from which on a candidate would have been named.
-fn limit(found: &Found, name: &str) -> f64 {
+fn limit(found: &SelectionResult, name: &str) -> f64 {
     let at = found.columns.candidates.iter().position(|known| known.name() == name).expect("a candidate");
     let candidate = &found.columns.candidates[at];
     let mut coordinates = candidate.origin();

@@ -119,20 +119,20 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
         let whole = !gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap);
         filled = if whole { filled + 1 } else { 0 };
         if filled > FILLING
-            && let Some(looks) = pass.look(from, &nudges)
+            && let Some(perturbed_outputs) = pass.simulate_window(from, &nudges)
         {
             for axis in &axes {
-                let seen = Seen {
+                let window = LinearisedWindow {
                     gridded,
                     axis: *axis,
                     from,
                     ar1_coefficients: &ar1_coefficients[*axis],
-                    looks: &looks,
+                    perturbed_outputs: &perturbed_outputs,
                 };
-                solved[*axis].extend(seen.solve());
+                solved[*axis].extend(window.solve());
             }
         }
-        pass.go_on(from, WINDOW);
+        pass.advance(from, WINDOW);
     }
     for axis in axes {
         gather(rig, gridded, axis, &solved[axis], &mut unknowns.axes[axis]);
@@ -163,15 +163,15 @@ fn nudges() -> Vec<Nudge> {
 }
 
 /// A window of an axis with its nudged simulations.
-struct Seen<'a> {
+struct LinearisedWindow<'a> {
     gridded: &'a GriddedRecord,
     axis: usize,
     from: usize,
     ar1_coefficients: &'a [f64; CHANNELS],
-    looks: &'a [Readings],
+    perturbed_outputs: &'a [Readings],
 }
 
-impl Seen<'_> {
+impl LinearisedWindow<'_> {
     /// Solves the window; `None` when it has too few samples.
     fn solve(&self) -> Option<Solved> {
         let mut normal = Normal::zeros();
@@ -209,7 +209,7 @@ impl Seen<'_> {
         normal.fill_upper_triangle_with_lower_triangle();
         let equations = Equations { normal, right, squares, dof: (used - THETA_LEN) as f64, pressure };
         let bound = equations.solve(NO_OFFSET_N)?;
-        let forces_n = self.looks[0][self.axis].iter().map(|reading| reading[1]);
+        let forces_n = self.perturbed_outputs[0][self.axis].iter().map(|reading| reading[1]);
         let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
         Some(Solved {
             from: self.from,
@@ -225,13 +225,14 @@ impl Seen<'_> {
         let sample = self.gridded.samples[self.from + at][self.axis][channel]?;
         let rests = self.gridded.points[self.from][self.axis].rod_velocity_m_per_s == 0.0;
         let weight = 1.0 / self.noise(channel);
-        let baseline = self.looks[0][self.axis][at][channel];
+        let baseline = self.perturbed_outputs[0][self.axis][at][channel];
         let mut row = Theta::zeros();
         for number in 0..OFFSET {
             // A speed known to be 0 is not estimated.
             if number != 1 || !rests {
-                row[number] =
-                    (self.looks[number + 1][self.axis][at][channel] - baseline) / NUDGES[number] * weight;
+                row[number] = (self.perturbed_outputs[number + 1][self.axis][at][channel] - baseline)
+                    / NUDGES[number]
+                    * weight;
             }
         }
         if channel == 1 {
@@ -245,7 +246,8 @@ impl Seen<'_> {
         let (mut sum, mut difference) = (0.0, 0.0);
         for at in 0..WINDOW {
             for channel in 0..CHANNELS {
-                let of = |look: usize| self.looks[look][self.axis][at][channel] / self.noise(channel);
+                let of =
+                    |run: usize| self.perturbed_outputs[run][self.axis][at][channel] / self.noise(channel);
                 let (plus, minus) = (of(1 + FORCE) - of(0), of(OPPOSITE) - of(0));
                 sum += (plus + minus).powi(2);
                 difference += (plus - minus).powi(2);

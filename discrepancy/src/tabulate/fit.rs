@@ -42,7 +42,7 @@ pub(super) struct FittedTable {
     /// Whether all values are equal.
     pub(super) is_constant: bool,
     /// Sorted values of its variable in the windows.
-    pub(super) seen: Vec<f64>,
+    pub(super) sorted_samples: Vec<f64>,
 }
 
 impl FittedTable {

@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{Found, same};
+use crate::name::{SelectionResult, same};
 use crate::parameters::COUNT;
 use crate::refit::{Placed, Refit};
 use crate::report::{
@@ -14,7 +14,7 @@ const OFF_ERRORS: f64 = 4.0;
 /// Smallest relative deviation of a reported parameter.
 const OFF_LEAST: f64 = 0.01;
 
-pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
+pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report {
     let named = named(found);
     let (parameters, carried) = parameters(engine, &found.reported);
     let verdict = if found.inadequate {
@@ -41,7 +41,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     }
 }
 
-fn named(found: &Found) -> Vec<NamedEffect> {
+fn named(found: &SelectionResult) -> Vec<NamedEffect> {
     let mut at = 0;
     let mut all = Vec::new();
     for ((placed, share), alternatives) in
@@ -100,7 +100,7 @@ fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantit
     (quantities(off), quantities(carried))
 }
 
-fn candidates(found: &Found) -> Vec<report::Candidate> {
+fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
     let null_loss = found.null_loss;
     found
         .screened
@@ -144,7 +144,7 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
 }
 
 /// Candidates that the records do not excite, and the detection limits of the others.
-fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
+fn limits(found: &SelectionResult) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
     let mut not_excited = Vec::new();
     let mut limits = Vec::new();
     for (candidate, limit) in found.columns.candidates.iter().zip(&found.limits) {
