@@ -173,7 +173,7 @@ impl Candidate {
     }
 
     /// Bounds of a key's coordinate in a fit.
-    pub fn reach(&self, key: usize) -> [f64; 2] {
+    pub fn fit_bounds(&self, key: usize) -> [f64; 2] {
         let [least, most] = self.range(key);
         let most = most.min(FARTHEST);
         [least.max(-FARTHEST).min(most), most]

@@ -159,21 +159,21 @@ impl Products {
         (matrix, vector)
     }
 
-    /// The solution of the weighted normal equations; `from` is what earlier steps added to each coefficient. `None` where they
-    /// are singular.
+    /// The solution of the weighted normal equations; `prior_offset` is what earlier steps added to each coefficient. `None`
+    /// where they are singular.
     fn weighted_solution(
         &self,
         chosen: &[usize],
         weights: &[f64],
         precisions: &[f64],
-        from: &[f64],
+        prior_offset: &[f64],
     ) -> Option<Vec<f64>> {
         let (matrix, mut vector) = self.normal(chosen, weights, precisions);
         vector
             .iter_mut()
             .zip(precisions)
-            .zip(from)
-            .for_each(|((score, precision), from)| *score -= precision * from);
+            .zip(prior_offset)
+            .for_each(|((score, precision), prior_offset)| *score -= precision * prior_offset);
         solve(matrix, &vector).map(|solution| solution.iter().copied().collect())
     }
 
@@ -182,22 +182,24 @@ impl Products {
         self.fit_from(chosen, precisions, &vec![0.0; chosen.len()])
     }
 
-    /// The same with prior means at `-from`: ridges act on the sums of `from` and the coefficients.
-    pub(crate) fn fit_from(&self, chosen: &[usize], precisions: &[f64], from: &[f64]) -> Fit {
+    /// The same with prior means at `-prior_offset`: ridges act on the sums of `prior_offset` and the coefficients.
+    pub(crate) fn fit_from(&self, chosen: &[usize], precisions: &[f64], prior_offset: &[f64]) -> Fit {
         let mut weights = self.weights(&self.squares);
         let mut coefficients = vec![0.0; chosen.len()];
         let mut squares = self.squares.clone();
         let prior_loss = |coefficients: &[f64]| -> f64 {
             coefficients
                 .iter()
-                .zip(from)
+                .zip(prior_offset)
                 .zip(precisions)
-                .map(|((value, from), precision)| precision * (value + from).powi(2))
+                .map(|((value, prior_offset), precision)| precision * (value + prior_offset).powi(2))
                 .sum()
         };
         let mut loss = self.loss(&squares) + prior_loss(&coefficients);
         for _ in 0..PASSES {
-            let Some(tried) = self.weighted_solution(chosen, &weights, precisions, from) else { break };
+            let Some(tried) = self.weighted_solution(chosen, &weights, precisions, prior_offset) else {
+                break;
+            };
             let tried_squares = self.squares(chosen, &tried);
             let tried_loss = self.loss(&tried_squares) + prior_loss(&tried);
             if tried_loss > loss - CONVERGED && tried_loss >= loss {
@@ -219,7 +221,7 @@ impl Products {
         &self,
         chosen: &[usize],
         precisions: &[f64],
-        from: &[f64],
+        prior_offset: &[f64],
         folds: usize,
     ) -> f64 {
         let all = self.weights(&self.squares);
@@ -228,7 +230,7 @@ impl Products {
         let judged = (0..folds).flat_map(|fold| {
             let mut weights = all.clone();
             weights[of(fold)].fill(0.0);
-            let solution = self.weighted_solution(chosen, &weights, precisions, from);
+            let solution = self.weighted_solution(chosen, &weights, precisions, prior_offset);
             let solution = solution.unwrap_or_else(|| vec![0.0; chosen.len()]);
             self.squares(chosen, &solution)[of(fold)].to_vec()
         });

@@ -27,7 +27,7 @@ pub(crate) const CHANNELS: usize = 4;
 pub(crate) const SIGNALS: [Signal; CHANNELS] =
     [Signal::Position, Signal::Force, Signal::PressureA, Signal::PressureB];
 /// Samples to each side of a local parabola of the position.
-const POSITION_REACH: usize = 10;
+const POSITION_HALF_WIDTH: usize = 10;
 /// The same of a pressure.
 const PRESSURE_REACH: usize = 5;
 /// Differences in a block of the autocorrelation estimate, and the fewest blocks at rest.
@@ -229,7 +229,7 @@ impl GriddedRecord {
         let column =
             |at: usize| -> Vec<Option<f64>> { self.samples.iter().map(|sample| sample[i][at]).collect() };
         let positions = column(0);
-        let position = parabolas(&positions, POSITION_REACH);
+        let position = parabolas(&positions, POSITION_HALF_WIDTH);
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
         let mut still = Still::new(&position, &positions, self.noise[i][0]);
         // Autocorrelation widens the error of a mean.
@@ -303,7 +303,7 @@ fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: 
     });
     let Some(variance) = moving else { return 0.0 };
     // A parabola absorbs part of the scatter.
-    let m = POSITION_REACH as f64;
+    let m = POSITION_HALF_WIDTH as f64;
     let kept =
         1.0 - 3.0 * (3.0 * m * m + 3.0 * m - 1.0) / ((2.0 * m - 1.0) * (2.0 * m + 1.0) * (2.0 * m + 3.0));
     let jitter_s = (variance / kept).max(0.0).sqrt();

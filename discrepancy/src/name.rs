@@ -24,7 +24,7 @@ mod start_states;
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::refit::{Linearisation, Placed, Refit, derivative, linearise, rig_of};
+use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 pub(crate) use elimination::same;
 use elimination::{alternatives, drop_unneeded, shares, swap};
@@ -214,7 +214,7 @@ fn gains_enough(before: &Refit, after: &Refit) -> bool {
 }
 
 /// Whether one of an effect's amplitudes is above the floor.
-pub(crate) fn is_large(placed: &Placed) -> bool {
+pub(crate) fn is_large(placed: &EffectEstimate) -> bool {
     let candidate = &placed.candidate;
     let keys = if DEFINED_BY_FIRST.contains(&candidate.sheet.name) { 1 } else { placed.coordinates.len() };
     (0..keys)
@@ -252,9 +252,9 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
     let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);
     let residual = engine.residual(&simulated);
-    let beside: Vec<Vec<f64>> = (0..model.placed.len())
+    let model_sensitivities: Vec<Vec<f64>> = (0..model.placed.len())
         .into_par_iter()
         .filter_map(|at| derivative(engine, &model.factors, &model.placed, &simulated, at, 0))
         .collect();
-    columns.screen(engine, &linearisation, &residual, &beside)
+    columns.screen(engine, &linearisation, &residual, &model_sensitivities)
 }

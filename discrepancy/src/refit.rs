@@ -40,7 +40,7 @@ const PARAMETER_COSTS: f64 = EFFECT_PARAMETER_PENALTY;
 const COUNTS_AS_OFF: f64 = 0.005;
 
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub struct EffectEstimate {
     pub candidate: Candidate,
     /// One for each key of its sheet.
     pub coordinates: Vec<f64>,
@@ -49,7 +49,7 @@ pub struct Placed {
 /// A fitted model: effects and parameters.
 #[derive(Clone, Debug)]
 pub struct Refit {
-    pub placed: Vec<Placed>,
+    pub placed: Vec<EffectEstimate>,
     pub factors: [f64; COUNT],
     /// The loss, priors and a penalty for each number of an effect and each parameter that is off included.
     pub loss: f64,
@@ -85,7 +85,7 @@ impl Linearisation {
 /// The rig with effects and factors; `None` where the numbers are inconsistent.
 pub(crate) fn rig_of(
     rig: &RigParameters,
-    placed: &[Placed],
+    placed: &[EffectEstimate],
     factors: &[f64; COUNT],
 ) -> Option<RigParameters> {
     placed.iter().try_fold(with_factors(rig, factors), |rig, placed| {
@@ -118,8 +118,8 @@ pub(crate) fn coordinate_precision(candidate: &Candidate, key: usize) -> f64 {
 }
 
 /// Prior precisions of the parameters, then of all coordinates of the effects.
-pub(crate) fn prior_precisions(placed: &[Placed]) -> Vec<f64> {
-    let of_effect = |effect: &Placed| {
+pub(crate) fn prior_precisions(placed: &[EffectEstimate]) -> Vec<f64> {
+    let of_effect = |effect: &EffectEstimate| {
         (0..effect.coordinates.len())
             .map(|key| coordinate_precision(&effect.candidate, key))
             .collect::<Vec<_>>()
@@ -128,13 +128,13 @@ pub(crate) fn prior_precisions(placed: &[Placed]) -> Vec<f64> {
 }
 
 /// Deviations from the prior means in the same order.
-pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[Placed]) -> Vec<f64> {
+pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[EffectEstimate]) -> Vec<f64> {
     let coordinates = placed.iter().flat_map(|effect| effect.coordinates.iter().copied());
     factors.iter().map(|factor| factor - 1.0).chain(coordinates).collect()
 }
 
 /// All coordinates of the effects: place in `placed`, and key.
-fn coordinates(placed: &[Placed]) -> Vec<(usize, usize)> {
+fn coordinates(placed: &[EffectEstimate]) -> Vec<(usize, usize)> {
     placed
         .iter()
         .enumerate()
@@ -143,7 +143,7 @@ fn coordinates(placed: &[Placed]) -> Vec<(usize, usize)> {
 }
 
 /// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
-pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed: &[Placed]) -> f64 {
+pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed: &[EffectEstimate]) -> f64 {
     let Some(rig) = rig_of(engine.rig(), placed, &linearisation.factors) else { return f64::INFINITY };
     let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &linearisation.columns);
     products
@@ -152,7 +152,7 @@ pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed
 }
 
 struct Iterate {
-    placed: Vec<Placed>,
+    placed: Vec<EffectEstimate>,
     simulated: Vec<f64>,
     residual: Vec<f64>,
     fit: Fit,
@@ -164,7 +164,7 @@ struct Iterate {
 pub fn refit(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    start: &[Placed],
+    start: &[EffectEstimate],
     penalty: f64,
 ) -> Option<Refit> {
     refit_steps(engine, linearisation, start, penalty, STEPS)
@@ -174,7 +174,7 @@ pub fn refit(
 pub(crate) fn refit_steps(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    start: &[Placed],
+    start: &[EffectEstimate],
     penalty: f64,
     steps: usize,
 ) -> Option<Refit> {
@@ -184,7 +184,7 @@ pub(crate) fn refit_steps(
     let chosen: Vec<usize> = (0..all_precisions.len()).collect();
     let coordinates = coordinates(start);
     let mut parameter_products: Option<Products> = None;
-    let mut evaluate = |placed: Vec<Placed>| -> Option<Iterate> {
+    let mut evaluate = |placed: Vec<EffectEstimate>| -> Option<Iterate> {
         let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
@@ -197,7 +197,7 @@ pub(crate) fn refit_steps(
         let fit = products.fit_from(&parameters, &precisions, &off);
         Some(Iterate { placed, simulated, residual, fit })
     };
-    let prior = |placed: &[Placed]| -> f64 {
+    let prior = |placed: &[EffectEstimate]| -> f64 {
         coordinates
             .iter()
             .map(|(at, key)| {
@@ -222,7 +222,7 @@ pub(crate) fn refit_steps(
         shares.take(SHORTENINGS + 1).find_map(|share| {
             let mut placed = iterate.placed.clone();
             for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
-                let [least, most] = placed[*at].candidate.reach(*key);
+                let [least, most] = placed[*at].candidate.fit_bounds(*key);
                 let coordinate = &mut placed[*at].coordinates[*key];
                 *coordinate = (*coordinate + share * change).clamp(least, most);
             }
@@ -281,7 +281,7 @@ pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, penalty: f64, times
 pub(crate) fn coordinate_columns(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
-    placed: &[Placed],
+    placed: &[EffectEstimate],
     simulated: &[f64],
 ) -> Option<Vec<Vec<f64>>> {
     coordinates(placed)
@@ -294,7 +294,7 @@ pub(crate) fn coordinate_columns(
 pub(crate) fn derivative(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
-    placed: &[Placed],
+    placed: &[EffectEstimate],
     simulated: &[f64],
     at: usize,
     key: usize,
@@ -302,7 +302,7 @@ pub(crate) fn derivative(
     let candidate = placed[at].candidate;
     let coordinate = placed[at].coordinates[key];
     let size = CHANGE.max(CHANGE_SHARE * coordinate.abs());
-    let [_, most] = candidate.reach(key);
+    let [_, most] = candidate.fit_bounds(key);
     let change = if coordinate + size > most { -size } else { size };
     let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;

@@ -11,7 +11,7 @@
 //!   a break-away would outweigh all others. Both models leave out the same windows: those of the signal for a gap, those of all
 //!   signals together for chi2 and whiteness. The test of improvement uses all windows.
 //! - *Level*: the noise of a channel is known to some per cent only. The lowest decile of the windows, by the better of both
-//!   models, corrects it within [`LEVELS`].
+//!   models, corrects it within [`VARIANCE_FACTOR_BOUNDS`].
 //!
 //! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors: a paired
 //! t test of log-variance differences (Diebold-Mariano type) with windows taken as independent. Equal gains in m of n windows
@@ -41,7 +41,7 @@ use records::Channel;
 use std::collections::BTreeMap;
 
 /// Bounds of the noise level correction, as a factor on the power.
-pub(crate) const LEVELS: [f64; 2] = [0.75, 1.15];
+pub(crate) const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.75, 1.15];
 /// Significance of an improvement, in standard errors.
 const BETTER_ERRORS: f64 = 3.0;
 /// Largest ratio of a signal's rms after to before.
@@ -84,7 +84,7 @@ pub(crate) fn verify(
         .map(|model| Power::new(&power::sums(&model.residual, outputs), &null.expected, outputs));
     let [power_before, power_after] = &models;
     let levels = levels(&power_before.smaller(power_after), &null);
-    let models = [power_before, power_after].map(|power| power.over(&levels));
+    let models = [power_before, power_after].map(|power| power.divided_by_levels(&levels));
     let [power_before, power_after] = &models;
 
     let names: Vec<String> = after.windows.outputs().iter().map(|(axis, at)| column(*axis, *at)).collect();
@@ -160,7 +160,7 @@ fn is_better(before: &Power, after: &Power) -> bool {
         .iter()
         .zip(after.joint())
         .filter(|(before, _)| before.expected > 0.0)
-        .map(|(before, after)| after.expected * (before.over().max(LEAST) / after.over().max(LEAST)).ln())
+        .map(|(before, after)| after.expected * (before.ratio().max(LEAST) / after.ratio().max(LEAST)).ln())
         .collect();
     let count = gains.len() as f64;
     if count < 2.0 {

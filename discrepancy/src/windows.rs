@@ -23,7 +23,7 @@ mod whiten;
 use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::sensor_inverse::SensorInverse;
 use plant::{Batch, Inputs, Plant, RigParameters};
-pub use reference_run::{Reach, ReferenceRun};
+pub use reference_run::{ReferenceRun, VariableRanges};
 use starts::START_PASSES;
 pub(crate) use starts::{first_state, set_state, state_at};
 use whiten::{SPIKE, jitter_sensitivity_of};

@@ -4,7 +4,7 @@
 //! Rest is slow for a while; creep is slow and steady in one direction for longer. Where neither is certain, the alternative rate
 //! is kept, and the simulation decides by the residual.
 
-use super::{POSITION_REACH, Parabola};
+use super::{POSITION_HALF_WIDTH, Parabola};
 use crate::stats::mean;
 use plant::PERIOD_S;
 
@@ -41,7 +41,7 @@ impl<'a> Still<'a> {
     /// `noise_m` is the effective noise of means, larger than that of readings where noise is autocorrelated.
     pub(super) fn new(parabolas: &'a [Option<Parabola>], positions: &'a [Option<f64>], noise_m: f64) -> Self {
         // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
-        let n = POSITION_REACH as f64;
+        let n = POSITION_HALF_WIDTH as f64;
         let slope_error = noise_m * (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt();
         let slow = |parabola: &Parabola| parabola.slope.abs() < SLOW_ERRORS * slope_error;
         let slow: Vec<bool> = parabolas.iter().map(|parabola| parabola.as_ref().is_some_and(slow)).collect();
@@ -129,7 +129,7 @@ mod tests {
         let scatter = |at: f64| 28e-6 * (0.9 * at).sin();
         let positions: Vec<_> =
             (0..600).map(f64::from).map(|at| Some(way(at - 300.0) + scatter(at))).collect();
-        let parabolas = parabolas(&positions, POSITION_REACH);
+        let parabolas = parabolas(&positions, POSITION_HALF_WIDTH);
         Still::new(&parabolas, &positions, 20e-6).rate(300).unwrap()
     }
 

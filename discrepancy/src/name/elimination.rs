@@ -4,7 +4,7 @@ use super::null_distribution::NullDistribution;
 use super::{Alternative, EFFECT_PARAMETER_PENALTY, STEPS, THRESHOLD_FACTOR_SINGLE, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
-use crate::refit::{Placed, Refit, linearise, refit_steps};
+use crate::refit::{EffectEstimate, Refit, linearise, refit_steps};
 use crate::screen::Columns;
 use rayon::prelude::*;
 
@@ -107,13 +107,13 @@ pub(super) fn drop_unneeded<'a>(
 }
 
 /// Whether two are the same effect at the same place.
-pub(crate) fn same(left: &Placed, right: &Placed) -> bool {
+pub(crate) fn same(left: &EffectEstimate, right: &EffectEstimate) -> bool {
     left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
 }
 
 /// Alternatives to an effect of the model; `share` is the share of the excess that the effect removes.
 pub(super) fn alternatives(
-    placed: &Placed,
+    placed: &EffectEstimate,
     share: f64,
     model: &Refit,
     calibrated: &Calibrated,

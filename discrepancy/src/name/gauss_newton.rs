@@ -14,7 +14,8 @@ use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
-    MOST_OFF, Placed, Refit, coordinate_columns, model_penalty, prior_deviations, prior_precisions, rig_of,
+    EffectEstimate, MOST_OFF, Refit, coordinate_columns, model_penalty, prior_deviations, prior_precisions,
+    rig_of,
 };
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -55,7 +56,7 @@ pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
 
 /// A simulated model.
 struct Iterate {
-    placed: Vec<Placed>,
+    placed: Vec<EffectEstimate>,
     factors: [f64; COUNT],
     simulated: Vec<f64>,
     residual: Vec<f64>,
@@ -87,7 +88,7 @@ pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; C
     Some(Refit { placed, factors, loss, squares, errors, design_effect: model.design_effect })
 }
 
-fn iterate(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Option<Iterate> {
+fn iterate(engine: &Engine<'_>, placed: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Iterate> {
     let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
     let residual = engine.residual(&simulated);
     let squares = engine.squares(&residual);
@@ -100,7 +101,7 @@ fn iterate(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> O
 }
 
 /// Number of coordinates of the effects.
-fn coordinates(placed: &[Placed]) -> usize {
+fn coordinates(placed: &[EffectEstimate]) -> usize {
     placed.iter().map(|effect| effect.coordinates.len()).sum()
 }
 
@@ -196,7 +197,7 @@ fn step_by(engine: &Engine<'_>, from: &Iterate, chosen: &[usize], step: &Fit, sh
     let mut changes = changes[COUNT..].iter();
     for effect in &mut placed {
         for key in 0..effect.coordinates.len() {
-            let [least, most] = effect.candidate.reach(key);
+            let [least, most] = effect.candidate.fit_bounds(key);
             effect.coordinates[key] =
                 (effect.coordinates[key] + changes.next().expect("one each")).clamp(least, most);
         }

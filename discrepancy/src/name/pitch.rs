@@ -64,7 +64,7 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
         (at, products.fit_from(&chosen, &precisions, &from))
     });
     let (at, fit) = fits.min_by(|left, right| left.1.loss.total_cmp(&right.1.loss))?;
-    let [smallest, largest] = candidate.reach(ripple);
+    let [smallest, largest] = candidate.fit_bounds(ripple);
     let amplitude = (PROBE * fit.coefficients[always]).clamp(smallest, largest);
     refit_steps(engine, &linearisation, &with(amplitude, pitches[at]), EFFECT_PARAMETER_PENALTY, STEPS)
 }

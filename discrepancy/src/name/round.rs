@@ -13,7 +13,7 @@ use super::{
     EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, is_large, relinearise,
 };
 use crate::engine::Engine;
-use crate::refit::{Linearisation, Placed, Refit, loss_at, refit_steps};
+use crate::refit::{EffectEstimate, Linearisation, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
 use rayon::prelude::*;
 
@@ -187,10 +187,10 @@ fn sort(fits: &mut [Refit]) {
 fn best_start(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    model: &[Placed],
+    model: &[EffectEstimate],
     screened: &Screened,
     null_loss: f64,
-) -> Vec<Placed> {
+) -> Vec<EffectEstimate> {
     let with = |amplitude: f64| {
         let mut placed = model.to_vec();
         let mut effect = screened.start.clone();

@@ -1,7 +1,7 @@
 //! Refits of models of linked rods with the window start states re-estimated under the model itself.
 
 use crate::engine::Engine;
-use crate::refit::{Linearisation, Placed, Refit, linearise, loss_at, refit, rig_of};
+use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, loss_at, refit, rig_of};
 use rayon::prelude::*;
 
 /// Starting amplitudes of the backlash.
@@ -42,12 +42,12 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty:
 pub(super) fn backlash_start(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    model: &[Placed],
-    start: &Placed,
-) -> Vec<Placed> {
+    model: &[EffectEstimate],
+    start: &EffectEstimate,
+) -> Vec<EffectEstimate> {
     let [least, most] = start.candidate.range(0);
     let screened_z = start.coordinates[0];
-    let tried: Vec<Vec<Placed>> = AMPLITUDES
+    let tried: Vec<Vec<EffectEstimate>> = AMPLITUDES
         .iter()
         .map(|size| size * screened_z.signum())
         .filter(|size| *size >= least && *size <= most)

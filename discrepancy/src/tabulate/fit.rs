@@ -15,7 +15,7 @@ use crate::fit::{Products, loss};
 use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
-use crate::windows::{Reach, ReferenceRun};
+use crate::windows::{ReferenceRun, VariableRanges};
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
@@ -47,11 +47,11 @@ pub(super) struct FittedTable {
 
 impl FittedTable {
     /// Whether a point acts in a window.
-    fn acts(&self, point: usize, reach: &Reach) -> bool {
+    fn acts(&self, point: usize, ranges: &VariableRanges) -> bool {
         let Tabulated { axis, variable, at, .. } = &self.table;
         let before = point.checked_sub(1).map_or(f64::NEG_INFINITY, |before| at[before]);
         let after = at.get(point + 1).copied().unwrap_or(f64::INFINITY);
-        self.is_constant || reach.meets(*axis, *variable, [before, after])
+        self.is_constant || ranges.overlaps(*axis, *variable, [before, after])
     }
 }
 
@@ -74,12 +74,12 @@ enum Coordinate {
 
 impl Model {
     /// Parameters without tables; those not free are at the rig file's values.
-    pub(super) fn alone(factors: [f64; COUNT], free: [bool; COUNT]) -> Self {
-        Model { factors, free: [true; COUNT], tables: Vec::new() }.held(free)
+    pub(super) fn without_tables(factors: [f64; COUNT], free: [bool; COUNT]) -> Self {
+        Model { factors, free: [true; COUNT], tables: Vec::new() }.with_fixed(free)
     }
 
     /// The same with only some parameters free, the others at the rig file's values.
-    pub(super) fn held(mut self, free: [bool; COUNT]) -> Self {
+    pub(super) fn with_fixed(mut self, free: [bool; COUNT]) -> Self {
         self.free = free;
         for (factor, _) in self.factors.iter_mut().zip(free).filter(|(_, free)| !free) {
             *factor = 1.0;
@@ -152,7 +152,7 @@ impl Model {
     }
 
     /// Deviation of a coordinate from its neutral value.
-    fn off(&self, coordinate: Coordinate) -> f64 {
+    fn deviation(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
             Coordinate::Factor(at) => self.factors[at] - 1.0,
             Coordinate::Value(at, point) => self.tables[at].table.value[point],
@@ -161,8 +161,9 @@ impl Model {
 
     /// Prior penalty of the factors and penalty for the points.
     fn penalty(&self) -> f64 {
-        let factors: f64 =
-            (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].prior_std).powi(2)).sum();
+        let factors: f64 = (0..COUNT)
+            .map(|at| (self.deviation(Coordinate::Factor(at)) / PARAMETERS[at].prior_std).powi(2))
+            .sum();
         let points = self
             .coordinates()
             .iter()
@@ -232,7 +233,7 @@ fn columns(
                 Coordinate::Factor(_) => engine.simulate_coarsely(&rig),
                 Coordinate::Value(at, point) => {
                     let fitted = &model.tables[*at];
-                    engine.simulate_where(&rig, reference_runs, |reach| fitted.acts(*point, reach))
+                    engine.simulate_where(&rig, reference_runs, |ranges| fitted.acts(*point, ranges))
                 }
             };
             let mut column = engine.difference(&simulated, &from);
@@ -290,7 +291,7 @@ impl TableLinearisation {
         let products = engine.products(&point.residual, &self.columns);
         let coordinates = self.model.coordinates();
         let precisions = self.model.precisions();
-        let from: Vec<f64> = coordinates.iter().map(|coordinate| self.model.off(*coordinate)).collect();
+        let from: Vec<f64> = coordinates.iter().map(|coordinate| self.model.deviation(*coordinate)).collect();
         products.cross_validated_loss(&(0..coordinates.len()).collect::<Vec<_>>(), &precisions, &from, FOLDS)
     }
 

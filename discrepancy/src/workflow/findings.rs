@@ -4,7 +4,7 @@ use crate::calibrate::quantity;
 use crate::engine::Engine;
 use crate::name::{SelectionResult, same};
 use crate::parameters::COUNT;
-use crate::refit::{Placed, Refit};
+use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
     self, DetectionLimit, EffectPlace, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, Where,
 };
@@ -63,7 +63,12 @@ fn named(found: &SelectionResult) -> Vec<NamedEffect> {
     all
 }
 
-fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<NamedEffect>) -> NamedEffect {
+fn named_effect(
+    placed: &EffectEstimate,
+    errors: &[f64],
+    share: f64,
+    alternatives: Vec<NamedEffect>,
+) -> NamedEffect {
     let candidate = &placed.candidate;
     let numbers = candidate.effect_parameters(&placed.coordinates);
     let parameters = candidate
@@ -108,7 +113,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
         .map(|screened| {
             let placed = &screened.start;
             let candidate = &placed.candidate;
-            let is_it = |other: &Placed| same(other, placed);
+            let is_it = |other: &EffectEstimate| same(other, placed);
             let is_last = |fit: &&Refit| fit.placed.last().is_some_and(is_it);
             let alone = found.fitted.iter().filter(|fit| fit.placed.len() == 1).find(is_last);
             let is_named = found.model.placed.iter().any(is_it);
