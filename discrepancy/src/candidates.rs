@@ -25,7 +25,7 @@ const FAR: f64 = 10.0;
 const FARTHEST: f64 = 1.5;
 
 /// Effects whose traces are nonlinear in the amplitude.
-const BENT: [&str; 6] = [
+const NONLINEAR_IN_AMPLITUDE: [&str; 6] = [
     "valve-dead-zone",
     "valve-hysteresis",
     "spool-rate-limit",
@@ -160,7 +160,7 @@ impl Candidate {
     }
 
     /// Whether the effect vanishes continuously with its amplitude.
-    pub fn is_anchored(&self) -> bool {
+    pub fn vanishes_at_zero_amplitude(&self) -> bool {
         self.is_present() || self.sheet.keys[0].neutral.is_some()
     }
 
@@ -228,9 +228,9 @@ impl Candidate {
             vec![at(0, 0.3)]
         } else if self.is_two_sided() {
             vec![at(0, 0.2), at(0, -0.2)]
-        } else if self.is_anchored() && BENT.contains(&self.sheet.name) {
+        } else if self.vanishes_at_zero_amplitude() && NONLINEAR_IN_AMPLITUDE.contains(&self.sheet.name) {
             vec![at(0, 0.1), at(0, 0.5)]
-        } else if self.is_anchored() {
+        } else if self.vanishes_at_zero_amplitude() {
             vec![at(0, 0.25)]
         } else {
             vec![at(0, 0.6), at(0, 0.85)]

@@ -248,9 +248,9 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     if let Some(out) = out {
         out.write_json("parameters.json", &quantities)?;
         let records: Vec<String> = arguments.train.iter().map(|path| path.display().to_string()).collect();
-        let weighed = workflow::weighed(gridded[0].measured);
+        let mass_axis = workflow::mass_axis(gridded[0].measured);
         let text =
-            crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, weighed, &records)
+            crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, mass_axis, &records)
                 .map_err(WorkflowError::from)?;
         out.write("rig.toml", &text)?;
     }

@@ -71,7 +71,7 @@ pub struct AxisState {
     /// Its rate, m/s; exactly 0 at rest.
     pub(crate) rod_velocity_m_per_s: f64,
     /// An indistinguishable rate: that of creep where the piston seems at rest, 0 where it is slow.
-    pub(crate) or_else_m_per_s: Option<f64>,
+    pub(crate) alternative_velocity_m_per_s: Option<f64>,
     /// Absolute pressures of the chambers a and b, Pa.
     pub(crate) pressures_pa: [f64; 2],
 }
@@ -244,13 +244,13 @@ impl GriddedRecord {
                 self.excluded_periods[place] = true;
                 continue;
             };
-            let Rate { position_m, rate_m_per_s, or_else_m_per_s } = rate;
+            let Rate { position_m, rate_m_per_s, alternative_velocity_m_per_s } = rate;
             let (out_m, out) =
                 if axis == Axis::Load { (stroke_m - position_m, -1.0) } else { (position_m, 1.0) };
             self.points[place][i] = AxisState {
                 extension_m: out_m.clamp(0.0, stroke_m),
                 rod_velocity_m_per_s: out * rate_m_per_s,
-                or_else_m_per_s: or_else_m_per_s.map(|rate| out * rate),
+                alternative_velocity_m_per_s: alternative_velocity_m_per_s.map(|rate| out * rate),
                 pressures_pa: [a, b],
             };
         }

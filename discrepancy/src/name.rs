@@ -27,13 +27,13 @@ use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 pub(crate) use elimination::same;
-use elimination::{alternatives, drop_unneeded, shares, swap};
+use elimination::{alternatives, eliminate_backward, shares, swap};
 use gauss_newton::{backtrack, fit_selected};
 use needed_parameters::with_needed;
 use null_distribution::NullDistribution;
 use rayon::prelude::*;
 use round::{Contenders, Round};
-use start_states::{Restarted, refit_with_starts};
+use start_states::{RefitWithInitialStates, refit_with_starts};
 
 /// Maximum number of effects.
 const MAX_EFFECTS: usize = 3;
@@ -117,7 +117,8 @@ pub fn name(
     let (null_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
-    let Restarted { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated.fit, 0.0);
+    let RefitWithInitialStates { engine: mut restarted, fit } =
+        refit_with_starts(engine, &calibrated.fit, 0.0);
     let calibrated = Calibrated { fit };
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
@@ -152,7 +153,7 @@ pub fn name(
         restarted = best_restarted.or(restarted);
     }
     let here = restarted.as_ref().unwrap_or(engine);
-    drop_unneeded(here, &calibrated, &columns, &mut model, &mut rounds);
+    eliminate_backward(here, &calibrated, &columns, &mut model, &mut rounds);
     let null = NullDistribution::new(here, &columns, &linearise(here, &model), &model);
     threshold = null.threshold();
     let limits = limits_of(&null, &columns, threshold);

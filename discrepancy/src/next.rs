@@ -37,7 +37,7 @@ use plant::RigParameters;
 use rayon::prelude::*;
 
 /// Target divergence, a squared distance: d' = 5.
-pub(crate) const WANTED: f64 = 25.0;
+pub(crate) const TARGET_DIVERGENCE: f64 = 25.0;
 /// Maximum number of repetitions.
 pub(crate) const MOST_REPETITIONS: u32 = 6;
 
@@ -83,7 +83,8 @@ impl ExperimentDivergences {
 
     /// T in `times` repetitions of the pairs that reach the target within [`MOST_REPETITIONS`].
     fn apart(&self, times: u32) -> impl Iterator<Item = f64> {
-        let enough = self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= WANTED);
+        let enough =
+            self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= TARGET_DIVERGENCE);
         enough.map(move |pair| pair.2.in_repetitions(times))
     }
 
@@ -165,28 +166,28 @@ fn choose(explanations: &[Explanation], table: &[ExperimentDivergences]) -> (Nex
     let left: Vec<(usize, usize)> = best
         .pairs
         .iter()
-        .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < WANTED)
+        .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < TARGET_DIVERGENCE)
         .map(|(one, other, _)| (*one.min(other), *one.max(other)))
         .collect();
     let otherwise = remedies::of_pairs(explanations, &left);
     if left.len() == best.pairs.len() {
         let reason = format!(
             "{alike}, and no experiment of this rig separates them: \
-             the best, {}, is expected to by {:.1}, and {WANTED} are wanted",
+             the best, {}, is expected to by {:.1}, and {TARGET_DIVERGENCE} are wanted",
             best.name,
             best.least()
         );
         return (Next { reason, experiment: None, divergence: Some(best.least()), otherwise }, None);
     }
-    let times = (1..MOST_REPETITIONS).find(|times| best.least_apart(*times) >= WANTED);
+    let times = (1..MOST_REPETITIONS).find(|times| best.least_apart(*times) >= TARGET_DIVERGENCE);
     let times = times.unwrap_or(MOST_REPETITIONS);
     let how_often = if times > 1 { format!(" in {times} repetitions") } else { String::new() };
     let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
     let total = best.least_apart(times);
     let reason = format!(
         "{alike}; {}, which serves to tell apart {}, is expected to separate them by {total:.0}{how_often} \
-         ({WANTED} are wanted){rest}",
-        entry.name, entry.serves
+         ({TARGET_DIVERGENCE} are wanted){rest}",
+        entry.name, entry.purpose
     );
     let experiment = Some(entry.file());
     (Next { reason, experiment, divergence: Some(total), otherwise }, Some(text(entry, times)))

@@ -105,7 +105,7 @@ impl BalanceTests<'_> {
         order.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
         let Some(most) = order.first().map(r2) else { return (order, None) };
         let near = order.iter().take_while(|variable| r2(variable) >= TIE_R2_RATIO * most).count();
-        order[..near].sort_by_key(|variable| VARIABLES[*variable].costs);
+        order[..near].sort_by_key(|variable| VARIABLES[*variable].complexity);
         let Some((mut pair, _)) = self.pair().filter(|(_, together)| *together > most + MIN_PAIR_R2_GAIN)
         else {
             return (order, None);

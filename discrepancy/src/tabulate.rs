@@ -72,13 +72,13 @@ pub(crate) fn tabulate(
     let parameters_alone =
         Iterate::of(engine, without_tables).ok_or("no rig can have the parameters that are off")?;
     let parameters_alone = fit::fit(engine, parameters_alone, FIRST_STEPS);
-    let seek = Seek { engine, axis, balance, unknowns };
+    let search = TableSearch { engine, axis, balance, unknowns };
 
     progress("a table for what is missing");
-    let (first, used) = seek.best(&parameters_alone, None).ok_or("no rig can have its curve")?;
-    let mut best = seek.finer(first);
+    let (first, used) = search.best(&parameters_alone, None).ok_or("no rig can have its curve")?;
+    let mut best = search.finer(first);
     progress("a table over a second variable");
-    if let Some((second, _)) = seek.best(&best, Some(used))
+    if let Some((second, _)) = search.best(&best, Some(used))
         && best.loss - second.loss > LEAST_SHARE_OF_SECOND * best.loss.abs()
     {
         best = fit::fit(engine, second, STEPS);
@@ -138,14 +138,14 @@ fn parse_balance(balance: &str) -> Option<(Axis, Balance)> {
 }
 
 /// The search for tables of a balance.
-struct Seek<'a> {
+struct TableSearch<'a> {
     engine: &'a Engine<'a>,
     axis: Axis,
     balance: Balance,
     unknowns: &'a [UnknownSeries],
 }
 
-impl Seek<'_> {
+impl TableSearch<'_> {
     /// The best model with one more variable other than `used`; `None` where no rig can have any. All are screened linearly and
     /// the best are fitted.
     fn best(&self, from: &Iterate, used: Option<Argument>) -> Option<(Iterate, Argument)> {

@@ -276,8 +276,9 @@ fn is_copy(one: &Path, other: &Path) -> bool {
 pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, ExtendError> {
     let additions: Vec<Addition> = reported.named.iter().map(addition).collect();
     let changed = [&reported.parameters[..], &reported.carried].concat();
-    let weighed = weighed(reported.measured());
-    let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, weighed, &reported.inputs.train)?;
+    let mass_axis = mass_axis(reported.measured());
+    let text =
+        extend(&rig_file.text, &rig_file.file, &additions, &changed, mass_axis, &reported.inputs.train)?;
     let terms = reported.outside.as_ref().map_or(&[][..], |outside| &outside.tables);
     add_tables(&text, &rig_file.file, &tables(terms), &reported.inputs.train)
 }
@@ -347,7 +348,7 @@ pub(crate) fn on_shared_axes(records: &mut [GriddedRecord]) -> Result<(), Workfl
 }
 
 /// The axis of a mass in kg; for both axes the mass is a common factor.
-pub(crate) fn weighed(measured: [bool; 2]) -> Axis {
+pub(crate) fn mass_axis(measured: [bool; 2]) -> Axis {
     if measured == [false, true] { Axis::Load } else { Axis::Drive }
 }
 

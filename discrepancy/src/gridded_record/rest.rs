@@ -34,7 +34,7 @@ pub(super) struct Rate {
     pub(super) position_m: f64,
     pub(super) rate_m_per_s: f64,
     /// An indistinguishable rate.
-    pub(super) or_else_m_per_s: Option<f64>,
+    pub(super) alternative_velocity_m_per_s: Option<f64>,
 }
 
 impl<'a> Still<'a> {
@@ -58,8 +58,8 @@ impl<'a> Still<'a> {
     /// Position and rate; `None` without a parabola.
     pub(super) fn rate(&self, place: usize) -> Option<Rate> {
         let Parabola { value, slope } = self.parabolas[place]?;
-        let rate_of = |position_m: f64, rate_m_per_s: f64, or_else_m_per_s: Option<f64>| {
-            Some(Rate { position_m, rate_m_per_s, or_else_m_per_s })
+        let rate_of = |position_m: f64, rate_m_per_s: f64, alternative_velocity_m_per_s: Option<f64>| {
+            Some(Rate { position_m, rate_m_per_s, alternative_velocity_m_per_s })
         };
         let Some(rest_m) = self.rests[place] else {
             return rate_of(value, slope / PERIOD_S, self.slow[place].then_some(0.0));
@@ -136,27 +136,30 @@ mod tests {
     #[test]
     fn what_goes_evenly_one_way_creeps_and_may_yet_rest() {
         let rate = rate_of(&|t| 1e-6 * t);
-        assert!((rate.rate_m_per_s - 1e-3).abs() < 1e-4 && rate.or_else_m_per_s == Some(0.0), "{rate:?}");
+        assert!(
+            (rate.rate_m_per_s - 1e-3).abs() < 1e-4 && rate.alternative_velocity_m_per_s == Some(0.0),
+            "{rate:?}"
+        );
     }
 
     #[test]
     fn what_stands_rests_for_sure() {
         let rate = rate_of(&|_| 0.2);
-        assert_eq!((rate.rate_m_per_s, rate.or_else_m_per_s), (0.0, None));
+        assert_eq!((rate.rate_m_per_s, rate.alternative_velocity_m_per_s), (0.0, None));
         let moves = rate_of(&|t| 1e-4 * ((t - 60.0).max(0.0) + (t + 60.0).min(0.0)));
-        assert_eq!((moves.rate_m_per_s, moves.or_else_m_per_s), (0.0, None));
+        assert_eq!((moves.rate_m_per_s, moves.alternative_velocity_m_per_s), (0.0, None));
     }
 
     #[test]
     fn what_seems_at_rest_but_is_soon_under_way_may_creep() {
         let rate = rate_of(&|t| 1e-7 * (t - 15.0).max(0.0).powi(2));
         assert_eq!(rate.rate_m_per_s, 0.0);
-        assert!(rate.or_else_m_per_s.unwrap() > 2e-4, "{rate:?}");
+        assert!(rate.alternative_velocity_m_per_s.unwrap() > 2e-4, "{rate:?}");
     }
 
     #[test]
     fn what_is_slow_beside_a_motion_may_rest() {
         let rate = rate_of(&|t| 3e-5 * (t - 8.0).max(0.0));
-        assert!(rate.rate_m_per_s.abs() < 5e-3 && rate.or_else_m_per_s == Some(0.0), "{rate:?}");
+        assert!(rate.rate_m_per_s.abs() < 5e-3 && rate.alternative_velocity_m_per_s == Some(0.0), "{rate:?}");
     }
 }

@@ -67,7 +67,7 @@ fn alike(best: &Refit, calibrated: &Calibrated) -> f64 {
 }
 
 /// Eliminates effects whose removal raises the loss by less than a multiple of the null threshold.
-pub(super) fn drop_unneeded<'a>(
+pub(super) fn eliminate_backward<'a>(
     engine: &Engine<'a>,
     calibrated: &Calibrated,
     columns: &Columns,

@@ -8,7 +8,7 @@
 use super::elimination::same;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
-use super::start_states::{Restarted, backlash_start, refit_with_starts};
+use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_starts};
 use super::{
     EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, is_large, relinearise,
 };
@@ -76,7 +76,7 @@ impl Contenders {
 pub(super) struct Round<'a> {
     pub(super) fits: Vec<Refit>,
     /// Their relinearised refits, each with its start states.
-    restarted: Vec<Restarted<'a>>,
+    restarted: Vec<RefitWithInitialStates<'a>>,
 }
 
 impl<'a> Round<'a> {
@@ -122,13 +122,13 @@ impl<'a> Round<'a> {
             round.with_backlash(engine, linearisation, model, backlash);
         }
         sort(&mut round.fits);
-        round.run_off(engine, model);
+        round.refit_close_jointly(engine, model);
         Some(round)
     }
 
     /// Where several fits are close, fits all numbers of each in the simulator: with linearised parameters, a wrong effect that
     /// moves all parameters may beat the right one.
-    fn run_off(&mut self, engine: &Engine<'a>, model: &Refit) {
+    fn refit_close_jointly(&mut self, engine: &Engine<'a>, model: &Refit) {
         let Some(best) = self.fits.first().map(|fit| fit.loss) else { return };
         let is_close = |fit: &&Refit| fit.loss - best < CLOSE * (model.loss - best);
         let close = self.fits.iter().take(RELINEARISED).filter(is_close).count();

@@ -7,28 +7,33 @@ use rayon::prelude::*;
 /// Starting amplitudes of the backlash.
 const AMPLITUDES: [f64; 5] = [0.12, 0.25, 0.45, 0.7, 1.0];
 /// Maximum number of alternations between start states and model, and the relative fall of the loss that ends them.
-const MOVES: usize = 3;
-const MOVED: f64 = 0.05;
+const MAX_ALTERNATIONS: usize = 3;
+const RELATIVE_TOLERANCE: f64 = 0.05;
 
 /// A fitted model, and the engine whose start states were estimated under it; `None` where the rods are not linked.
-pub(super) struct Restarted<'a> {
+pub(super) struct RefitWithInitialStates<'a> {
     pub(super) engine: Option<Engine<'a>>,
     pub(super) fit: Refit,
 }
 
 /// Refits a model of linked rods, alternating with estimates of the window start states under it.
-pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty: f64) -> Restarted<'a> {
-    let mut best = Restarted { engine: None, fit: model.clone() };
-    for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
+pub(super) fn refit_with_starts<'a>(
+    engine: &Engine<'a>,
+    model: &Refit,
+    penalty: f64,
+) -> RefitWithInitialStates<'a> {
+    let mut best = RefitWithInitialStates { engine: None, fit: model.clone() };
+    for _ in 0..if engine.is_linked() { MAX_ALTERNATIONS } else { 0 } {
         let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
         let restarted = engine.with_starts_under(&rig);
         let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.placed, penalty)
         else {
             break;
         };
-        let converged = best.engine.is_some() && fit.loss > best.fit.loss - MOVED * best.fit.loss.abs();
+        let converged =
+            best.engine.is_some() && fit.loss > best.fit.loss - RELATIVE_TOLERANCE * best.fit.loss.abs();
         if best.engine.is_none() || fit.loss < best.fit.loss {
-            best = Restarted { engine: Some(restarted), fit };
+            best = RefitWithInitialStates { engine: Some(restarted), fit };
         }
         if converged {
             break;

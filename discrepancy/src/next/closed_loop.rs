@@ -110,7 +110,7 @@ fn points_of(truth: &Truth, stroke_m: f64) -> [AxisState; 2] {
         AxisState {
             extension_m: extension_m.clamp(0.0, stroke_m),
             rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
-            or_else_m_per_s: None,
+            alternative_velocity_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         }
     })

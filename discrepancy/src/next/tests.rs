@@ -108,7 +108,7 @@ fn an_explanation_does_not_differ_from_itself_and_differs_from_another() {
     };
     // Another amplitude of the same effect is refitted; what is left comes from stick and slip.
     assert!(of(0, 1) < 0.2 * of(0, 2), "{} and {}", of(0, 1), of(0, 2));
-    assert!(of(2, 0) > WANTED, "{}", of(2, 0));
+    assert!(of(2, 0) > TARGET_DIVERGENCE, "{}", of(2, 0));
 }
 
 #[test]
@@ -119,7 +119,11 @@ fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
         explained(&[("valve-offset", "drive", &[("offset_percent", 0.5)])]),
     ];
     let proposal = propose(&rig, &explanations, [true, false], &mut |_| {});
-    assert!(proposal.next.divergence.is_some_and(|divergence| divergence >= WANTED), "{:?}", proposal.next);
+    assert!(
+        proposal.next.divergence.is_some_and(|divergence| divergence >= TARGET_DIVERGENCE),
+        "{:?}",
+        proposal.next
+    );
     let file = proposal.next.experiment.clone().expect("an experiment");
     assert!(file.starts_with("next-") && file.ends_with(".toml"), "{file}");
     let toml = proposal.experiment_toml.clone().expect("its file");
@@ -184,5 +188,5 @@ fn a_piston_at_rest_does_not_tell_the_gains_of_its_chambers_apart() {
     ];
     let judged =
         judge(entry, &RigParameters::baseline(), &gains, [true, false]).expect("it can be rehearsed");
-    assert!(judged.least() < WANTED, "{:?}", judged.pairs);
+    assert!(judged.least() < TARGET_DIVERGENCE, "{:?}", judged.pairs);
 }

@@ -34,7 +34,7 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
         let point = AxisState {
             extension_m: axis.position_m,
             rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
-            or_else_m_per_s: None,
+            alternative_velocity_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         };
         record.points.push([point, AxisState::default()]);

@@ -14,7 +14,7 @@ const SHORTER: f64 = 0.3;
 /// Speeds of a piston that seems at rest, m/s: too slow to measure, but sliding pistons need no break-away force.
 const SLIDES_M_PER_S: [f64; 2] = [1e-4, -1e-4];
 /// Fall of a window's squares at which another speed is taken.
-const MET_BETTER: f64 = 10.0;
+const MIN_CHI2_DROP: f64 = 10.0;
 /// Gauss-Newton passes after each search on linked records.
 const LINKED_PASSES: usize = 3;
 /// Grids of relative shifts of the two pistons: first over the noise of two sensors, then finer.
@@ -55,7 +55,7 @@ impl Windows<'_> {
             for start in &self.starts {
                 for point in &mut self.points[start / WINDOW] {
                     let rests = point.rod_velocity_m_per_s == 0.0;
-                    let other = point.or_else_m_per_s.or(rests.then_some(slide_m_per_s));
+                    let other = point.alternative_velocity_m_per_s.or(rests.then_some(slide_m_per_s));
                     point.rod_velocity_m_per_s = other.unwrap_or(point.rod_velocity_m_per_s);
                 }
             }
@@ -67,7 +67,7 @@ impl Windows<'_> {
             let points = std::mem::replace(&mut self.points, tried);
             let all_new = self.squares_of(&self.simulate_coarsely(&self.rig));
             for ((start, old), new) in self.starts.iter().zip(squares).zip(all_new) {
-                if new < *old - MET_BETTER {
+                if new < *old - MIN_CHI2_DROP {
                     *old = new;
                 } else {
                     self.points[start / WINDOW] = points[start / WINDOW];
