@@ -42,11 +42,13 @@ pub struct Report {
     /// Baseline parameters that were significantly off.
     pub parameters: Vec<Quantity>,
     /// Parameters that the model moved by an insignificant amount; the extended rig file has them.
-    pub(crate) carried: Vec<Quantity>,
+    #[serde(rename = "carried")]
+    pub(crate) insignificant: Vec<Quantity>,
     /// The missing term outside the catalogue.
     pub outside: Option<Outside>,
     /// Per signal of the held-out record, as `drive_position_m`; empty without `--test`.
-    pub gap: BTreeMap<String, Gap>,
+    #[serde(rename = "gap")]
+    pub misfit: BTreeMap<String, Misfit>,
     /// Further figures of the held-out record; null without `--test`.
     pub verification: Option<Verification>,
     /// All candidates, the best first.
@@ -157,7 +159,8 @@ pub struct Candidate {
     /// Unit of the amplitude.
     pub unit: String,
     /// Outcome, in words.
-    pub fate: String,
+    #[serde(rename = "fate")]
+    pub decision: String,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -251,9 +254,9 @@ pub(crate) struct Surface {
     pub band: Vec<Vec<Option<f64>>>,
 }
 
-/// The gap of a signal of the held-out record, rms over windows, in the signal's unit.
+/// The misfit of a signal of the held-out record, rms over windows, in the signal's unit.
 #[derive(Clone, Debug, Serialize)]
-pub struct Gap {
+pub struct Misfit {
     /// Baseline against measurement.
     pub before: f64,
     /// Extended model against measurement.

@@ -31,7 +31,7 @@ mod traces;
 use crate::fit::LEAST;
 use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::page::Trace;
-use crate::report::{BeforeAfter, Gap, Verification};
+use crate::report::{BeforeAfter, Misfit, Verification};
 use crate::stats::mean_and_variance;
 use crate::windows::Windows;
 use null_power::NullPower;
@@ -52,8 +52,8 @@ const EXCESS_SPREADS: f64 = 10.0;
 /// Result of a held-out record.
 #[derive(Clone, Debug)]
 pub(crate) struct Verified {
-    /// The gap of each signal, by its column.
-    pub(crate) gap: BTreeMap<String, Gap>,
+    /// The misfit of each signal, by its column.
+    pub(crate) misfit: BTreeMap<String, Misfit>,
     /// Everything else.
     pub(crate) verification: Verification,
     /// Series for the page.
@@ -88,17 +88,17 @@ pub(crate) fn verify(
     let [power_before, power_after] = &models;
 
     let names: Vec<String> = after.windows.outputs().iter().map(|(axis, at)| column(*axis, *at)).collect();
-    let mut gap = BTreeMap::new();
+    let mut misfit = BTreeMap::new();
     let mut whiteness = BTreeMap::new();
     let all_kept = kept(&power_after.joint());
     for (output, name) in names.iter().enumerate() {
         let (axis, at) = after.windows.outputs()[output];
         let noise = record.noise[axis][at] * levels[output].sqrt();
-        gap.insert(name.clone(), signal_gap(&models, output, noise, null.spreads[output]));
+        misfit.insert(name.clone(), signal_misfit(&models, output, noise, null.spreads[output]));
         let of = |model: &Model<'_>| power::neighbours(&model.residual, output, outputs, &all_kept);
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
-    let worse = gap.values().any(|gap| gap.after > WORSE * gap.before);
+    let worse = misfit.values().any(|misfit| misfit.after > WORSE * misfit.before);
     let verification = Verification {
         record: record.name.clone(),
         chi2_before: pooled(&power_before.joint(), &all_kept),
@@ -110,7 +110,7 @@ pub(crate) fn verify(
         confirmed: !worse && is_better(power_before, power_after),
     };
     let traces = traces::traces(&before, &after);
-    Verified { gap, verification, traces }
+    Verified { misfit, verification, traces }
 }
 
 /// A model in the windows of the record.
@@ -138,14 +138,14 @@ fn column(axis: usize, at: usize) -> String {
     Channel::Of(Axis::ALL[axis], SIGNALS[at]).column()
 }
 
-/// Gap of a output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
-fn signal_gap(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Gap {
+/// Misfit of an output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
+fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Misfit {
     let [before, after] = models.each_ref().map(|power| power.output(output));
     let kept = kept(&after);
     let [before_power, after_power] = [&before, &after].map(|squares| pooled(squares, &kept));
     let excess = before_power - 1.0;
     let is_resolved = excess > EXCESS_SPREADS * spread;
-    Gap {
+    Misfit {
         before: noise * before_power.sqrt(),
         after: noise * after_power.sqrt(),
         floor: noise,

@@ -34,7 +34,7 @@ pub(super) fn candidates(report: &Report) -> String {
             number(words::short(one.score)),
             number(one.share_explained.map_or_else(|| words::NOTHING.to_owned(), words::percent)),
             number(words::with_unit(&words::short(one.amplitude), &one.unit)),
-            Cell::Sentence(one.fate.clone()),
+            Cell::Sentence(one.decision.clone()),
         ]
     };
     let heads = ["effect", "where", "score", "explains alone", "amplitude", "what became of it"];

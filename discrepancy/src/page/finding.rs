@@ -41,11 +41,11 @@ pub(super) fn finding(report: &Report) -> String {
         }
         text += &quantities("Parameters", "parameter", &report.parameters, |_| String::new());
     }
-    if !report.carried.is_empty() {
+    if !report.insignificant.is_empty() {
         text += &paragraph(
             "Moved along with the fit, by too little to call them off; the extended rig file has them as well:",
         );
-        text += &quantities("Moved along", "parameter", &report.carried, |_| String::new());
+        text += &quantities("Moved along", "parameter", &report.insignificant, |_| String::new());
     }
     if let Some(outside) = &report.outside {
         text += &unknown(outside);

@@ -2,21 +2,27 @@
 
 use super::markup::{Cell, number, paragraph, table, words as text_cell};
 use super::words;
-use crate::report::{BeforeAfter, Gap, Report};
+use crate::report::{BeforeAfter, Misfit, Report};
 use std::collections::BTreeMap;
 
-pub(super) fn gap(report: &Report) -> String {
-    let row = |(signal, gap): (&String, &Gap)| {
+pub(super) fn misfit(report: &Report) -> String {
+    let row = |(signal, misfit): (&String, &Misfit)| {
         let (unit, factor) = words::shown_small(words::unit_of(signal));
         let size = |value: f64| number(words::with_unit(&words::short(value * factor), &unit));
-        let closed = match gap.closed {
+        let closed = match misfit.closed {
             Some(closed) => Cell::Judged(closed >= 0.95, words::percent(closed)),
             None => text_cell("not significant"),
         };
-        vec![text_cell(words::signal(signal)), size(gap.before), size(gap.after), size(gap.floor), closed]
+        vec![
+            text_cell(words::signal(signal)),
+            size(misfit.before),
+            size(misfit.after),
+            size(misfit.floor),
+            closed,
+        ]
     };
     let heads = ["signal", "before", "after", "noise alone", "closed"];
-    let table = table("Gap of each signal", &heads, report.gap.iter().map(row));
+    let table = table("Gap of each signal", &heads, report.misfit.iter().map(row));
     if table.is_empty() {
         return table;
     }

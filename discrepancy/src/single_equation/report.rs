@@ -1,7 +1,7 @@
 //! The report of a balance: selected and rejected terms, and the held-out record.
 //!
-//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the same
-//! reason `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their
+//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the
+//! same reason `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their
 //! folds.
 
 use super::fit::{clustered_t, rms};
@@ -11,8 +11,8 @@ use super::select::{CandidateEvaluation, Taken, describe};
 use super::terms::{self, shape_unit, shown};
 use super::{Fitted, Study};
 use crate::report::{
-    BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, Gap, InputFiles, Location, NamedEffect, Next,
-    Outside, Quantity, Report, Verdict, Verification, Where,
+    BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, InputFiles, Location, Misfit, NamedEffect,
+    Next, Outside, Quantity, Report, Verdict, Verification, Where,
 };
 use crate::workflow::empty;
 use std::collections::BTreeMap;
@@ -220,7 +220,7 @@ impl Study {
                 let entry = &self.families[evaluation.place].family.variants[evaluation.variant];
                 let (_, unit, factor) = shown(entry);
                 let last = self.found.last.iter().find(|last| last.place == evaluation.place);
-                let fate = match (taken(evaluation), last) {
+                let decision = match (taken(evaluation), last) {
                     (Some(round), _) => {
                         let ordinal = ["first", "second", "third"]
                             .get(round)
@@ -243,7 +243,7 @@ impl Study {
                     share_explained: Some(evaluation.share),
                     amplitude: evaluation.number * factor,
                     unit: unit.into(),
-                    fate,
+                    decision,
                 }
             })
             .collect();
@@ -352,7 +352,9 @@ impl Study {
         };
         let [before_rms, after_rms] = [before, after].map(|values| rms(values));
         let closed = (before_rms > 0.0).then(|| 1.0 - (after_rms / before_rms).powi(2));
-        report.gap.insert(signal.clone(), Gap { before: before_rms, after: after_rms, floor: 0.0, closed });
+        report
+            .misfit
+            .insert(signal.clone(), Misfit { before: before_rms, after: after_rms, floor: 0.0, closed });
         let cut = rows.in_time(self.model.selection.blocks);
         let squares = |residual: &[f64]| -> Vec<f64> {
             cut.folds.iter().map(|fold| fold.iter().map(|row| residual[*row].powi(2)).sum()).collect()

@@ -62,11 +62,11 @@ fn where_nothing_is_missing_nothing_changes() {
     // Four sevenths of a per cent of spread on each side of the range: 30 windows hold 1 % of it.
     assert!((seen.chi2_after - 1.0).abs() < 0.06, "{}", seen.chi2_after);
     assert_eq!(seen.physical, Vec::<String>::new());
-    for (signal, gap) in &verified.gap {
-        assert_eq!(gap.closed, None, "{signal}: {gap:?}");
-        assert_eq!(gap.before.to_bits(), gap.after.to_bits(), "{signal}");
+    for (signal, misfit) in &verified.misfit {
+        assert_eq!(misfit.closed, None, "{signal}: {misfit:?}");
+        assert_eq!(misfit.before.to_bits(), misfit.after.to_bits(), "{signal}");
     }
-    assert_eq!(verified.gap.len(), CHANNELS);
+    assert_eq!(verified.misfit.len(), CHANNELS);
     assert_eq!(seen.free_run_nrmse_percent.len(), CHANNELS);
 }
 
@@ -78,11 +78,11 @@ fn the_true_model_closes_the_gap_and_a_wrong_sign_does_not() {
     let verified = judged(&rig, &truth, &record);
     let seen = &verified.verification;
     assert!(seen.confirmed, "{seen:?}");
-    let closed_shares: Vec<f64> = verified.gap.values().filter_map(|gap| gap.closed).collect();
+    let closed_shares: Vec<f64> = verified.misfit.values().filter_map(|misfit| misfit.closed).collect();
     assert!(
         !closed_shares.is_empty() && closed_shares.iter().all(|closed| *closed > 0.95),
         "{:?}",
-        verified.gap
+        verified.misfit
     );
     let run = seen.free_run_nrmse_percent["drive_position_m"];
     assert!(run.after < 0.2 * run.before, "{run:?}");
@@ -100,8 +100,8 @@ fn a_hidden_leak_is_closed_by_itself() {
     let truth = rig.with_effect("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)]).unwrap();
     let verified = judged(&rig, &truth, &record(&truth, &rig, 3));
     assert!(verified.verification.confirmed, "{:?}", verified.verification);
-    let closed: Vec<f64> = verified.gap.values().filter_map(|gap| gap.closed).collect();
-    assert!(!closed.is_empty() && closed.iter().all(|closed| *closed > 0.95), "{:?}", verified.gap);
+    let closed: Vec<f64> = verified.misfit.values().filter_map(|misfit| misfit.closed).collect();
+    assert!(!closed.is_empty() && closed.iter().all(|closed| *closed > 0.95), "{:?}", verified.misfit);
 }
 
 #[test]

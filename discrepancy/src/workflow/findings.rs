@@ -16,7 +16,7 @@ const OFF_LEAST: f64 = 0.01;
 
 pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report {
     let named = named(found);
-    let (parameters, carried) = parameters(engine, &found.reported);
+    let (parameters, insignificant) = parameters(engine, &found.reported);
     let verdict = if found.inadequate {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
@@ -33,7 +33,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     Report {
         named,
         parameters,
-        carried,
+        insignificant,
         candidates: candidates(found),
         not_excited,
         detection_limits,
@@ -98,11 +98,11 @@ fn named_effect(
 fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantity>) {
     let errors = &model.errors[model.errors.len() - COUNT..];
     let by = |at: usize| (model.factors[at] - 1.0).abs();
-    let (off, carried): (Vec<usize>, Vec<usize>) = (0..COUNT)
+    let (off, insignificant): (Vec<usize>, Vec<usize>) = (0..COUNT)
         .filter(|at| by(*at) > 0.0)
         .partition(|at| by(*at) > OFF_LEAST && by(*at) > OFF_ERRORS * errors[*at]);
     let quantities = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, model)).collect();
-    (quantities(off), quantities(carried))
+    (quantities(off), quantities(insignificant))
 }
 
 fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
@@ -122,7 +122,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let share = alone.map(|fit| {
                 ((found.calibrated.fit.loss - fit.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
             });
-            let fate = if is_named && !found.inadequate {
+            let decision = if is_named && !found.inadequate {
                 "named"
             } else if is_named {
                 "explains too little"
@@ -142,7 +142,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
                 share_explained: share,
                 amplitude: candidate.effect_parameters(&shown.coordinates)[0],
                 unit: candidate.sheet.keys[0].unit.name().to_owned(),
-                fate: fate.to_owned(),
+                decision: decision.to_owned(),
             }
         })
         .collect()
