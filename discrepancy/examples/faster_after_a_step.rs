@@ -18,7 +18,7 @@ use plant::{Plant, RigParameters};
 use rayon::prelude::*;
 
 const STEP: Entry =
-    Entry { name: "step", serves: "", toml: include_str!("../../controller/experiments/step.toml") };
+    Entry { name: "step", purpose: "", toml: include_str!("../../controller/experiments/step.toml") };
 /// Periods that are compared.
 const COMPARED: usize = 50;
 /// Jump of the valve's command that is an edge.
@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let effects = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]).into_iter().flat_map(
         |candidate| {
-            let sizes: &[f64] = match (candidate.is_anchored(), candidate.is_two_sided()) {
+            let sizes: &[f64] = match (candidate.vanishes_at_zero_amplitude(), candidate.is_two_sided()) {
                 (false, _) => &[0.7],
                 (true, false) => &[0.5],
                 (true, true) => &[0.5, -0.5],
@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let mut at = candidate.origin();
                 at[0] = *size;
                 let key = &candidate.sheet.keys[0];
-                let amplitude = short(candidate.numbers(&at)[0], key.unit.name());
+                let amplitude = short(candidate.effect_parameters(&at)[0], key.unit.name());
                 let head = format!("| {} | {} | {amplitude} |", candidate.sheet.name, candidate.place);
                 candidate.rig(quiet, &at).map(|rig| (head, rig))
             })

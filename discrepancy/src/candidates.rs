@@ -25,7 +25,7 @@ const FAR: f64 = 10.0;
 const FARTHEST: f64 = 1.5;
 
 /// Effects whose traces are nonlinear in the amplitude.
-const BENT: [&str; 6] = [
+const NONLINEAR_IN_AMPLITUDE: [&str; 6] = [
     "valve-dead-zone",
     "valve-hysteresis",
     "spool-rate-limit",
@@ -160,7 +160,7 @@ impl Candidate {
     }
 
     /// Whether the effect vanishes continuously with its amplitude.
-    pub fn is_anchored(&self) -> bool {
+    pub fn vanishes_at_zero_amplitude(&self) -> bool {
         self.is_present() || self.sheet.keys[0].neutral.is_some()
     }
 
@@ -173,7 +173,7 @@ impl Candidate {
     }
 
     /// Bounds of a key's coordinate in a fit.
-    pub fn reach(&self, key: usize) -> [f64; 2] {
+    pub fn fit_bounds(&self, key: usize) -> [f64; 2] {
         let [least, most] = self.range(key);
         let most = most.min(FARTHEST);
         [least.max(-FARTHEST).min(most), most]
@@ -185,8 +185,8 @@ impl Candidate {
         least < -1e-6 && most > 1e-6
     }
 
-    /// The numbers at some coordinates, in the file's units, held in their ranges.
-    pub fn numbers(&self, coordinates: &[f64]) -> Vec<f64> {
+    /// The effect parameters at some coordinates, in the file's units, clamped to their ranges.
+    pub fn effect_parameters(&self, coordinates: &[f64]) -> Vec<f64> {
         self.sheet
             .keys
             .iter()
@@ -210,7 +210,7 @@ impl Candidate {
     /// # Errors
     /// [`ParameterError`] when the numbers do not fit together.
     pub fn rig(&self, rig: &RigParameters, coordinates: &[f64]) -> Result<RigParameters, ParameterError> {
-        let numbers = self.numbers(coordinates);
+        let numbers = self.effect_parameters(coordinates);
         let named: Vec<(&str, f64)> =
             self.sheet.keys.iter().map(|key| key.name).zip(numbers.iter().copied()).collect();
         rig.with_effect(self.sheet.name, &self.place.to_string(), &named)
@@ -228,9 +228,9 @@ impl Candidate {
             vec![at(0, 0.3)]
         } else if self.is_two_sided() {
             vec![at(0, 0.2), at(0, -0.2)]
-        } else if self.is_anchored() && BENT.contains(&self.sheet.name) {
+        } else if self.vanishes_at_zero_amplitude() && NONLINEAR_IN_AMPLITUDE.contains(&self.sheet.name) {
             vec![at(0, 0.1), at(0, 0.5)]
-        } else if self.is_anchored() {
+        } else if self.vanishes_at_zero_amplitude() {
             vec![at(0, 0.25)]
         } else {
             vec![at(0, 0.6), at(0, 0.85)]
@@ -262,7 +262,7 @@ mod tests {
         for candidate in all {
             for probe in candidate.probes() {
                 candidate.rig(&rig, &probe).unwrap_or_else(|error| panic!("{}: {error}", candidate.name()));
-                let numbers = candidate.numbers(&probe);
+                let numbers = candidate.effect_parameters(&probe);
                 // A stiffness without end is held at what a file may say.
                 let moved = numbers.iter().zip(&probe).enumerate().filter(|(_, (_, z))| **z != 0.0);
                 for (key, (number, z)) in moved {
@@ -286,7 +286,7 @@ mod tests {
             let Ok(rig) = candidate.rig(&RigParameters::baseline(), &strong) else { continue };
             let here = Candidate::beside(&rig, candidate.sheet, candidate.place);
             assert_eq!(here.rig(&rig, &here.origin()).unwrap(), rig, "{}", here.name());
-            assert_eq!(here.baseline(0), Some(candidate.numbers(&strong)[0]), "{}", here.name());
+            assert_eq!(here.baseline(0), Some(candidate.effect_parameters(&strong)[0]), "{}", here.name());
             for probe in here.probes() {
                 assert_ne!(here.rig(&rig, &probe).unwrap(), rig, "{}: {probe:?}", here.name());
             }

@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
-use records::{ReadOptions, Unknown};
+use records::{ReadOptions, UnlistedColumns};
 use std::path::PathBuf;
 
 /// Finds where model and records disagree, names the missing effect, adds it to the model and shows the gap shrink.
@@ -70,7 +70,7 @@ pub struct ReadArguments {
 impl ReadArguments {
     /// The same for the reader.
     pub(crate) fn options(&self) -> ReadOptions {
-        let unknown = if self.strict { Unknown::Refused } else { Unknown::Ignored };
+        let unknown = if self.strict { UnlistedColumns::Refused } else { UnlistedColumns::Ignored };
         ReadOptions { unknown, mapping: self.mapping.clone(), ..ReadOptions::default() }
     }
 }

@@ -13,7 +13,7 @@ use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
 use crate::refit::Linearisation;
-use crate::report::{Gap, NamedEffect, Quantity, Report, Verdict, Verification, decimals};
+use crate::report::{Misfit, NamedEffect, Quantity, Report, Verdict, Verification, decimals};
 use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
 use crate::{locate, page, single_equation, verify};
 use plant::effects::{SHEETS, sheet};
@@ -248,9 +248,9 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     if let Some(out) = out {
         out.write_json("parameters.json", &quantities)?;
         let records: Vec<String> = arguments.train.iter().map(|path| path.display().to_string()).collect();
-        let weighed = workflow::weighed(gridded[0].measured);
+        let mass_axis = workflow::mass_axis(gridded[0].measured);
         let text =
-            crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, weighed, &records)
+            crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, mass_axis, &records)
                 .map_err(WorkflowError::from)?;
         out.write("rig.toml", &text)?;
     }
@@ -298,12 +298,13 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     let Some(gridded) = opened.gridded else { return Err(CommandError::BadData(opened.checked.why_not())) };
     let verified = verify::verify(&before, &after, &gridded, &mut progress());
     let mut text = String::new();
-    for (signal, gap) in &verified.gap {
-        let closed = gap.closed.map_or("no gap".into(), |closed| format!("{:.1} % closed", closed * 100.0));
+    for (signal, misfit) in &verified.misfit {
+        let closed =
+            misfit.closed.map_or("no gap".into(), |closed| format!("{:.1} % closed", closed * 100.0));
         let _ = writeln!(
             text,
             "{signal}: before {:.4e}, after {:.4e}, noise {:.4e}: {closed}",
-            gap.before, gap.after, gap.floor
+            misfit.before, misfit.after, misfit.floor
         );
     }
     let Verification { chi2_before, chi2_after, chi2_null, confirmed, .. } = &verified.verification;
@@ -320,7 +321,7 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     verified.verification.physical.iter().for_each(|unphysical| text.push_str(&format!("{unphysical}\n")));
     print(&text)?;
     if let Some(out) = out {
-        let shown = VerifiedFile { gap: &verified.gap, verification: &verified.verification };
+        let shown = VerifiedFile { misfit: &verified.misfit, verification: &verified.verification };
         out.write_json("verification.json", &shown)?;
     }
     Ok(if *confirmed { Exit::Good } else { Exit::BoundBroken })
@@ -329,7 +330,8 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
 /// `verification.json`: these fields of a report.
 #[derive(serde::Serialize)]
 struct VerifiedFile<'a> {
-    gap: &'a BTreeMap<String, Gap>,
+    #[serde(rename = "gap")]
+    misfit: &'a BTreeMap<String, Misfit>,
     verification: &'a Verification,
 }
 
@@ -422,8 +424,8 @@ fn in_words(report: &Report) -> String {
     for quantity in &report.parameters {
         let _ = writeln!(text, "  {}", quantity_in_words(quantity));
     }
-    for (signal, gap) in &report.gap {
-        if let Some(closed) = gap.closed {
+    for (signal, misfit) in &report.misfit {
+        if let Some(closed) = misfit.closed {
             let _ = writeln!(text, "  {signal}: {:.1} % of the gap to the noise closed", closed * 100.0);
         }
     }

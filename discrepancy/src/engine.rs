@@ -13,7 +13,7 @@ use crate::fit::Products;
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
 use crate::stats::order_statistic;
-use crate::windows::{Reach, ReferenceRun, Windows, dot};
+use crate::windows::{ReferenceRun, VariableRanges, Windows, dot};
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -22,7 +22,7 @@ use std::sync::Mutex;
 pub(crate) const FACTOR_CHANGE: f64 = 0.01;
 
 /// Bounds of the noise level correction: an effect in every window must not pass for noise.
-const LEVELS: [f64; 2] = [0.6, 1.05];
+const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.6, 1.05];
 
 /// Size of the cache of sensitivities, which saves a fifth of the time of naming.
 const KEPT: usize = 4;
@@ -38,7 +38,7 @@ pub struct Engine<'a> {
     rows: usize,
     scaled_dof: Vec<f64>,
     /// Common variance factor of the noise, by the quietest windows.
-    level: f64,
+    variance_factor: f64,
     /// Cache of sensitivities, latest last.
     kept: Mutex<Vec<Sensitivities>>,
 }
@@ -49,11 +49,17 @@ impl<'a> Engine<'a> {
         let windows: Vec<Windows<'a>> = records.par_iter().map(|record| Windows::new(record, rig)).collect();
         let rows = windows.first().map_or(0, Windows::rows);
         let scaled_dof = windows.iter().flat_map(Windows::dof).collect();
-        let mut engine =
-            Engine { windows, rig: rig.clone(), rows, scaled_dof, level: 1.0, kept: Mutex::default() };
+        let mut engine = Engine {
+            windows,
+            rig: rig.clone(),
+            rows,
+            scaled_dof,
+            variance_factor: 1.0,
+            kept: Mutex::default(),
+        };
         let residual = engine.residual(&engine.simulate(rig));
-        engine.level = level(&engine.squares(&residual), &engine.scaled_dof);
-        engine.scaled_dof.iter_mut().for_each(|scaled_dof| *scaled_dof *= engine.level);
+        engine.variance_factor = variance_factor(&engine.squares(&residual), &engine.scaled_dof);
+        engine.scaled_dof.iter_mut().for_each(|scaled_dof| *scaled_dof *= engine.variance_factor);
         engine
     }
 
@@ -62,14 +68,17 @@ impl<'a> Engine<'a> {
     pub(crate) fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
         let windows: Vec<Windows<'a>> =
             self.windows.par_iter().map(|windows| Windows::new(windows.record(), rig)).collect();
-        let scaled_dof =
-            windows.iter().flat_map(Windows::dof).map(|scaled_dof| scaled_dof * self.level).collect();
+        let scaled_dof = windows
+            .iter()
+            .flat_map(Windows::dof)
+            .map(|scaled_dof| scaled_dof * self.variance_factor)
+            .collect();
         Engine {
             windows,
             rig: self.rig.clone(),
             rows: self.rows,
             scaled_dof,
-            level: self.level,
+            variance_factor: self.variance_factor,
             kept: Mutex::default(),
         }
     }
@@ -117,7 +126,7 @@ impl<'a> Engine<'a> {
         &self,
         rig: &RigParameters,
         passed: &[ReferenceRun],
-        differs: impl Fn(&Reach) -> bool,
+        differs: impl Fn(&VariableRanges) -> bool,
     ) -> Vec<f64> {
         let windows = self.windows.iter().zip(passed);
         windows.flat_map(|(windows, passed)| windows.simulate_where(rig, passed, &differs)).collect()
@@ -216,14 +225,17 @@ impl<'a> Engine<'a> {
     }
 }
 
-/// Noise level: the lowest decile of chi2 per degree of freedom over its expectation. The estimated noise is right to some per
-/// cent only, which over 200 windows would look like a large excess.
-fn level(squares: &[f64], scaled_dof: &[f64]) -> f64 {
+/// Common variance factor: the lowest decile of chi2 per degree of freedom over its expectation, within
+/// [`VARIANCE_FACTOR_BOUNDS`]. An error of a few per cent in the estimated noise would look like a large excess over 200 windows.
+/// The factor multiplies the degrees of freedom instead of dividing chi2, so that fixed thresholds on the loss change their level
+/// with it.
+fn variance_factor(squares: &[f64], scaled_dof: &[f64]) -> f64 {
     let mut quiet: Vec<f64> =
         squares.iter().zip(scaled_dof).map(|(square, scaled_dof)| square / scaled_dof).collect();
     let decile = quiet.len() / 10;
     let Some(quantile) = order_statistic(&mut quiet, decile) else { return 1.0 };
     let mean = scaled_dof.iter().sum::<f64>() / scaled_dof.len() as f64;
     // The lowest tenth of chi2 / f ends 1.28 standard deviations below 1.
-    (quantile / (1.0 - 1.28 * (2.0 / mean).sqrt())).clamp(LEVELS[0], LEVELS[1])
+    (quantile / (1.0 - 1.28 * (2.0 / mean).sqrt()))
+        .clamp(VARIANCE_FACTOR_BOUNDS[0], VARIANCE_FACTOR_BOUNDS[1])
 }

@@ -64,7 +64,7 @@ pub enum ExtendError {
 
 /// The rig file with these effects and parameters, `records` named as where they come from; `file` is only its name for messages.
 ///
-/// `weighed` is the axis that a mass with a unit is the mass of; a mass without one is a factor on all masses.
+/// `mass_axis` is the axis that a mass with a unit is the mass of; a mass without one is a factor on all masses.
 ///
 /// # Errors
 /// [`ExtendError`] with what is known or allowed, for a file that is no rig, for effects, places, keys and parameters that do not
@@ -74,7 +74,7 @@ pub fn extend(
     file: &str,
     additions: &[Addition],
     changed: &[Quantity],
-    weighed: Axis,
+    mass_axis: Axis,
     records: &[String],
 ) -> Result<String, ExtendError> {
     RigParameters::from_toml(rig_text, file).map_err(ExtendError::Rig)?;
@@ -84,7 +84,7 @@ pub fn extend(
         what: what.to_owned(),
         reason: reason.lines().last().unwrap_or_default().to_owned(),
     };
-    let mut text = parameters::change(rig_text, changed, weighed, &from, &layout)?;
+    let mut text = parameters::change(rig_text, changed, mass_axis, &from, &layout)?;
     let mut done: Vec<(&str, &str)> = Vec::new();
     for addition in additions {
         let effect = format!("{} at {}", addition.effect, addition.place);

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Rows go to their nearest millisecond. A period without a row has no samples and keeps the command before. A window with a
-//! longer run of missing commands is not simulated ([`GriddedRecord::gaps`]).
+//! longer run of missing commands is not simulated ([`GriddedRecord::excluded_periods`]).
 //!
 //! Windows start at the points; their remaining errors are estimated with each window. At rest the speed is exactly zero
 //! (`gridded_record/rest.rs`).
@@ -27,7 +27,7 @@ pub(crate) const CHANNELS: usize = 4;
 pub(crate) const SIGNALS: [Signal; CHANNELS] =
     [Signal::Position, Signal::Force, Signal::PressureA, Signal::PressureB];
 /// Samples to each side of a local parabola of the position.
-const POSITION_REACH: usize = 10;
+const POSITION_HALF_WIDTH: usize = 10;
 /// The same of a pressure.
 const PRESSURE_REACH: usize = 5;
 /// Differences in a block of the autocorrelation estimate, and the fewest blocks at rest.
@@ -54,40 +54,40 @@ pub struct GriddedRecord {
     /// Readings at the start of each period, in the order of [`SIGNALS`], rig coordinates, the load's offset taken off.
     pub samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
     /// Smoothed state of each axis at the start of each period.
-    pub points: Vec<[Point; 2]>,
+    pub points: Vec<[AxisState; 2]>,
     /// Standard deviation of each reading, its rounding included.
     pub noise: [[f64; CHANNELS]; 2],
     /// Lag-1 autocorrelation of the noise, 0 to 1.
-    pub memory: [[f64; CHANNELS]; 2],
+    pub lag1_autocorrelation: [[f64; CHANNELS]; 2],
     pub(crate) jitter_s: f64,
     /// Periods without a known command or without a smoothed state.
-    pub(crate) gaps: Vec<bool>,
+    pub(crate) excluded_periods: Vec<bool>,
 }
 
 /// Mechanical state and pressures of an axis, along its extension.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Point {
+pub struct AxisState {
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 at rest.
     pub(crate) rod_velocity_m_per_s: f64,
     /// An indistinguishable rate: that of creep where the piston seems at rest, 0 where it is slow.
-    pub(crate) or_else_m_per_s: Option<f64>,
+    pub(crate) alternative_velocity_m_per_s: Option<f64>,
     /// Absolute pressures of the chambers a and b, Pa.
     pub(crate) pressures_pa: [f64; 2],
 }
 
-impl Point {
+impl AxisState {
     /// Steps of finite differences in x, v, p_a, p_b: m, m/s, Pa, Pa. Small, so that no stick-slip event moves.
     pub(crate) const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
 
-    /// The point with one of its numbers nudged, in the order of [`Point::NUDGES`].
+    /// The state with one of its values nudged, in the order of [`AxisState::NUDGES`].
     pub(crate) fn nudged(mut self, number: usize) -> Self {
         let value = match number {
             0 => &mut self.extension_m,
             1 => &mut self.rod_velocity_m_per_s,
             _ => &mut self.pressures_pa[number - 2],
         };
-        *value += Point::NUDGES[number];
+        *value += AxisState::NUDGES[number];
         self
     }
 }
@@ -157,8 +157,8 @@ impl GriddedRecord {
             measured,
             inputs: vec![Inputs::default(); length],
             samples: vec![[[None; CHANNELS]; 2]; length],
-            points: vec![[Point::default(); 2]; length],
-            gaps: vec![false; length],
+            points: vec![[AxisState::default(); 2]; length],
+            excluded_periods: vec![false; length],
             ..GriddedRecord::default()
         };
         for axis in Axis::ALL {
@@ -222,18 +222,18 @@ impl GriddedRecord {
             // Rounding is a lower bound of the noise.
             self.noise[i][at] = noise.max(steps[at] / 12.0_f64.sqrt());
         }
-        hold(&mut commands, &mut self.gaps);
+        hold(&mut commands, &mut self.excluded_periods);
         for (inputs, command) in self.inputs.iter_mut().zip(&commands) {
             inputs.valve[i] = quantise_valve(command.unwrap_or(0.0).clamp(-1.0, 1.0));
         }
         let column =
             |at: usize| -> Vec<Option<f64>> { self.samples.iter().map(|sample| sample[i][at]).collect() };
         let positions = column(0);
-        let position = parabolas(&positions, POSITION_REACH);
+        let position = parabolas(&positions, POSITION_HALF_WIDTH);
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
         let mut still = Still::new(&position, &positions, self.noise[i][0]);
         // Autocorrelation widens the error of a mean.
-        let share = memory(&positions, &still.resting(), self.noise[i][0]);
+        let share = lag1_autocorrelation(&positions, &still.resting(), self.noise[i][0]);
         if share > 0.0 {
             let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
             still = Still::new(&position, &positions, lasting_m);
@@ -241,22 +241,22 @@ impl GriddedRecord {
         for place in 0..self.len() {
             let pressures = pressures.each_ref().map(|column| column[place].map(|parabola| parabola.value));
             let (Some(rate), [Some(a), Some(b)]) = (still.rate(place), pressures) else {
-                self.gaps[place] = true;
+                self.excluded_periods[place] = true;
                 continue;
             };
-            let Rate { position_m, rate_m_per_s, or_else_m_per_s } = rate;
+            let Rate { position_m, rate_m_per_s, alternative_velocity_m_per_s } = rate;
             let (out_m, out) =
                 if axis == Axis::Load { (stroke_m - position_m, -1.0) } else { (position_m, 1.0) };
-            self.points[place][i] = Point {
+            self.points[place][i] = AxisState {
                 extension_m: out_m.clamp(0.0, stroke_m),
                 rod_velocity_m_per_s: out * rate_m_per_s,
-                or_else_m_per_s: or_else_m_per_s.map(|rate| out * rate),
+                alternative_velocity_m_per_s: alternative_velocity_m_per_s.map(|rate| out * rate),
                 pressures_pa: [a, b],
             };
         }
         let resting = still.resting();
         for at in 0..CHANNELS {
-            self.memory[i][at] = memory(&column(at), &resting, self.noise[i][at]);
+            self.lag1_autocorrelation[i][at] = lag1_autocorrelation(&column(at), &resting, self.noise[i][at]);
         }
         self.jitter_s = self.jitter_s.max(jitter_s(&position, &positions, &resting));
     }
@@ -264,7 +264,7 @@ impl GriddedRecord {
 
 /// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1
 /// - share).
-fn memory(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
+fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
     let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / MEMORY_BLOCK)
         .filter_map(|block| {
             let places = block * MEMORY_BLOCK..(block + 1) * MEMORY_BLOCK;
@@ -303,7 +303,7 @@ fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: 
     });
     let Some(variance) = moving else { return 0.0 };
     // A parabola absorbs part of the scatter.
-    let m = POSITION_REACH as f64;
+    let m = POSITION_HALF_WIDTH as f64;
     let kept =
         1.0 - 3.0 * (3.0 * m * m + 3.0 * m - 1.0) / ((2.0 * m - 1.0) * (2.0 * m + 1.0) * (2.0 * m + 3.0));
     let jitter_s = (variance / kept).max(0.0).sqrt();
@@ -332,7 +332,7 @@ fn places(record: &Record, checked: &Checked) -> Vec<usize> {
 }
 
 /// Holds commands over short gaps and marks long ones.
-fn hold(commands: &mut [Option<f64>], gaps: &mut [bool]) {
+fn hold(commands: &mut [Option<f64>], excluded_periods: &mut [bool]) {
     let mut since = 0;
     for place in 0..commands.len() {
         if commands[place].is_some() {
@@ -342,7 +342,7 @@ fn hold(commands: &mut [Option<f64>], gaps: &mut [bool]) {
         since += 1;
         commands[place] = place.checked_sub(1).and_then(|before| commands[before]);
         if since > HELD_LONGEST || commands[place].is_none() {
-            gaps[place + 1 - since..=place].fill(true);
+            excluded_periods[place + 1 - since..=place].fill(true);
         }
     }
 }
@@ -418,9 +418,9 @@ mod tests {
     #[test]
     fn commands_are_held_over_a_short_gap_and_a_long_one_is_marked() {
         let mut commands = vec![Some(0.5), None, None, Some(0.1), None, None, None, None, Some(0.2)];
-        let mut gaps = vec![false; 9];
-        hold(&mut commands, &mut gaps);
+        let mut excluded_periods = vec![false; 9];
+        hold(&mut commands, &mut excluded_periods);
         assert_eq!(commands[2], Some(0.5));
-        assert_eq!(gaps, [false, false, false, false, true, true, true, true, false]);
+        assert_eq!(excluded_periods, [false, false, false, false, true, true, true, true, false]);
     }
 }

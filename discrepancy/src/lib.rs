@@ -6,7 +6,7 @@
 //! | [`check`] | fitness of a record, and its noise |
 //! | [`gridded_record`] | a record on the grid of the simulation, with smoothed states |
 //! | `sensor_inverse` | from readings to states, by the sensor models of a rig |
-//! | [`windows`] | multiple shooting: whitened residuals of windows |
+//! | [`windows`] | truncated simulation error: whitened residuals of windows |
 //! | [`engine`] | training records with their simulations and sensitivities |
 //! | `fit` | linear robust least squares over windows: the step of a fit, standard errors |
 //! | `descent` | the loop of nonlinear fits: steps while the loss falls |

@@ -61,13 +61,13 @@ pub struct WindowVariable {
     /// Its unit; empty for a number.
     pub unit: &'static str,
     /// Complexity: of variables that explain nearly as much the simplest comes first.
-    pub(crate) costs: usize,
+    pub(crate) complexity: usize,
     /// Nodes in a formula.
     pub(crate) nodes: usize,
 }
 
-const fn variable(name: &'static str, unit: &'static str, costs: usize, nodes: usize) -> WindowVariable {
-    WindowVariable { name, unit, costs, nodes }
+const fn variable(name: &'static str, unit: &'static str, complexity: usize, nodes: usize) -> WindowVariable {
+    WindowVariable { name, unit, complexity, nodes }
 }
 
 /// Where baseline and records disagree.

@@ -6,7 +6,9 @@
 //! ```
 //!
 //! T is the expected gain in chi2 of the true explanation over its rival with refitted amplitude, with noise and model error
-//! (`next/divergence.rs`); the target is 25, five standard deviations. Repetitions average noise: an experiment that reaches 25
+//! (`next/divergence.rs`). The target is 25, a distance d' = 5 between the two mean records: the difference of chi2 has mean 25
+//! and standard deviation 10, so that noise alone prefers the rival in 0.6 % of records. The criterion is T-optimality [Atkinson,
+//! Fedorov 1975]. Repetitions average noise: an experiment that reaches 25
 //! within [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`remedies`] names a manual measurement: tilting,
 //! uncoupling, locking the piston.
 //!
@@ -15,11 +17,11 @@
 //! | [`menu`] | the experiments |
 //! | [`closed_loop`] | one of them in closed loop with an explanation's rig |
 //! | [`divergence`] | how far explanations lie apart in it |
-//! | [`nuisance`] | numbers of the baseline that are refitted beside |
+//! | [`nuisance`] | baseline parameters that are refitted jointly |
 //! | [`remedies`] | what would separate effects where no experiment does |
 //!
 //! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner
-//! 1965.
+//! 1965; Atkinson and Fedorov 1975, Biometrika 62(1): T-optimality.
 
 pub mod closed_loop;
 pub(crate) mod divergence;
@@ -34,8 +36,8 @@ use menu::{Entry, MENU};
 use plant::RigParameters;
 use rayon::prelude::*;
 
-/// Target divergence: five standard deviations.
-pub(crate) const WANTED: f64 = 25.0;
+/// Target divergence, a squared distance: d' = 5.
+pub(crate) const TARGET_DIVERGENCE: f64 = 25.0;
 /// Maximum number of repetitions.
 pub(crate) const MOST_REPETITIONS: u32 = 6;
 
@@ -56,7 +58,7 @@ impl Explanation {
 
 /// Divergences of an entry of the menu.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Judged {
+pub struct ExperimentDivergences {
     pub name: &'static str,
     /// For each ordered pair: the true explanation, its rival, their divergence.
     pub pairs: Vec<(usize, usize, Divergence)>,
@@ -70,10 +72,10 @@ pub struct Proposal {
     /// Text of the experiment file, if one is proposed.
     pub(crate) experiment_toml: Option<String>,
     /// All entries of the menu that can be rehearsed, in its order.
-    pub table: Vec<Judged>,
+    pub table: Vec<ExperimentDivergences>,
 }
 
-impl Judged {
+impl ExperimentDivergences {
     /// The smallest T of its pairs, in one repetition.
     pub fn least(&self) -> f64 {
         self.pairs.iter().map(|pair| pair.2.in_repetitions(1)).fold(f64::INFINITY, f64::min)
@@ -81,7 +83,8 @@ impl Judged {
 
     /// T in `times` repetitions of the pairs that reach the target within [`MOST_REPETITIONS`].
     fn apart(&self, times: u32) -> impl Iterator<Item = f64> {
-        let enough = self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= WANTED);
+        let enough =
+            self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= TARGET_DIVERGENCE);
         enough.map(move |pair| pair.2.in_repetitions(times))
     }
 
@@ -120,10 +123,11 @@ pub fn judge(
     baseline: &RigParameters,
     explanations: &[Explanation],
     axes_measured: [bool; 2],
-) -> Option<Judged> {
+) -> Option<ExperimentDivergences> {
     let named = |name: &str| explanations.iter().any(|one| one.names.iter().any(|known| known == name));
-    let numbers = nuisance::numbers().filter(|number| !named(number.name));
-    let numbers: Vec<_> = numbers.filter_map(|number| nuisance::off(baseline, number).ok()).collect();
+    let parameters = nuisance::nuisance_parameters().filter(|parameter| !named(parameter.name));
+    let perturbed: Vec<_> =
+        parameters.filter_map(|parameter| nuisance::perturbed(baseline, parameter).ok()).collect();
     let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
         .into_par_iter()
         .map(|truth| {
@@ -131,22 +135,22 @@ pub fn judge(
             let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
             let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != truth).collect();
             let rigs: Vec<_> = [truth].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
-            let values = divergences(&run, baseline, &rigs, &numbers, axes_measured);
+            let values = divergences(&run, baseline, &rigs, &perturbed, axes_measured);
             Some(rivals.into_iter().zip(values).map(|(rival, value)| (truth, rival, value)).collect())
         })
         .collect();
-    Some(Judged { name: entry.name, pairs: pairs?.concat() })
+    Some(ExperimentDivergences { name: entry.name, pairs: pairs?.concat() })
 }
 
-fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<String>) {
+fn choose(explanations: &[Explanation], table: &[ExperimentDivergences]) -> (Next, Option<String>) {
     let titles: Vec<String> = explanations.iter().map(Explanation::title).collect();
     let alike = format!("{} explain the records alike", listed(&titles));
     // Ties go to the first of the menu.
-    let better = |one: &Judged, other: &Judged| {
-        let key = |judged: &Judged| (judged.apart(1).count(), judged.least_apart(1));
+    let better = |one: &ExperimentDivergences, other: &ExperimentDivergences| {
+        let key = |judged: &ExperimentDivergences| (judged.apart(1).count(), judged.least_apart(1));
         key(one) > key(other)
     };
-    let best = table.iter().fold(None, |best: Option<&Judged>, one| match best {
+    let best = table.iter().fold(None, |best: Option<&ExperimentDivergences>, one| match best {
         Some(best) if !better(one, best) => Some(best),
         _ => Some(one),
     });
@@ -162,28 +166,28 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
     let left: Vec<(usize, usize)> = best
         .pairs
         .iter()
-        .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < WANTED)
+        .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < TARGET_DIVERGENCE)
         .map(|(one, other, _)| (*one.min(other), *one.max(other)))
         .collect();
     let otherwise = remedies::of_pairs(explanations, &left);
     if left.len() == best.pairs.len() {
         let reason = format!(
             "{alike}, and no experiment of this rig separates them: \
-             the best, {}, is expected to by {:.1}, and {WANTED} are wanted",
+             the best, {}, is expected to by {:.1}, and {TARGET_DIVERGENCE} are wanted",
             best.name,
             best.least()
         );
         return (Next { reason, experiment: None, divergence: Some(best.least()), otherwise }, None);
     }
-    let times = (1..MOST_REPETITIONS).find(|times| best.least_apart(*times) >= WANTED);
+    let times = (1..MOST_REPETITIONS).find(|times| best.least_apart(*times) >= TARGET_DIVERGENCE);
     let times = times.unwrap_or(MOST_REPETITIONS);
     let how_often = if times > 1 { format!(" in {times} repetitions") } else { String::new() };
     let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
     let total = best.least_apart(times);
     let reason = format!(
         "{alike}; {}, which serves to tell apart {}, is expected to separate them by {total:.0}{how_often} \
-         ({WANTED} are wanted){rest}",
-        entry.name, entry.serves
+         ({TARGET_DIVERGENCE} are wanted){rest}",
+        entry.name, entry.purpose
     );
     let experiment = Some(entry.file());
     (Next { reason, experiment, divergence: Some(total), otherwise }, Some(text(entry, times)))

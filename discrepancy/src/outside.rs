@@ -21,25 +21,25 @@ pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
 
 /// Share of the best R2 that is nearly as good.
-const NEARLY: f64 = 0.9;
+const TIE_R2_RATIO: f64 = 0.9;
 /// Least gain in R2 of a pair.
-const PAIR: f64 = 0.15;
+const MIN_PAIR_R2_GAIN: f64 = 0.15;
 /// Least R2 of a variable of a pair; below, its bins overfit.
-const HALF: f64 = -0.1;
+const MIN_MARGINAL_R2: f64 = -0.1;
 /// R2 above which a variable precedes the constant: a law through 0 has a mean too.
-const STRONG: f64 = 0.5;
+const R2_BEFORE_CONSTANT: f64 = 0.5;
 /// over_noise that is significant by itself.
-const LIFTED: f64 = 1.15;
-/// Significance of R2 against shifted series where over_noise is not significant: one in a billion for one test, for some hundred
-/// tests with non-Gaussian tails.
-const STANDS_OUT: f64 = 7.0;
-/// Significance of a mean, in standard errors.
-const MEAN: f64 = 6.0;
+const MIN_BIRGE_RATIO: f64 = 1.15;
+/// Significance of R2 against shifted series where over_noise is not significant, in standard deviations. One-sided, a normal
+/// variable exceeds it with probability 1.3e-12; the margin is for some hundred tests and for tails that are not normal.
+const MIN_SHIFT_Z: f64 = 7.0;
+/// Significance of a mean, in standard errors from the propagated noise (z test).
+const MIN_MEAN_Z: f64 = 6.0;
 /// Fewest windows of a balance.
-const LEAST: usize = 100;
+const MIN_WINDOWS: usize = 100;
 
 /// A balance with its tests.
-struct Found<'a> {
+struct BalanceTests<'a> {
     series: &'a UnknownSeries,
     sample: Sample,
     /// For each variable R2, p value, and the significance of R2 against shifted series.
@@ -48,25 +48,25 @@ struct Found<'a> {
 
 /// Describes the term outside the catalogue; `None` where no balance is significant.
 pub fn outside(unknowns: &[UnknownSeries], progress: &mut dyn FnMut(&str)) -> Option<Outside> {
-    let mut best: Option<(f64, Found<'_>)> = None;
-    for series in unknowns.iter().filter(|series| series.points.len() >= LEAST) {
+    let mut best: Option<(f64, BalanceTests<'_>)> = None;
+    for series in unknowns.iter().filter(|series| series.points.len() >= MIN_WINDOWS) {
         progress(&format!("outside: {}", series.balance));
         let sample = Sample::of(series);
         let tests: Vec<_> = (0..VARIABLES.len()).map(|variable| sample.test(variable)).collect();
         let stands_out = tests.iter().map(|test| test.2).fold(0.0, f64::max);
-        let lifted = series.over_noise().is_some_and(|over| over > LIFTED);
-        if !lifted && stands_out < STANDS_OUT && sample.mean_over_error().abs() < MEAN {
+        let lifted = series.over_noise().is_some_and(|over| over > MIN_BIRGE_RATIO);
+        if !lifted && stands_out < MIN_SHIFT_Z && sample.mean_over_error().abs() < MIN_MEAN_Z {
             continue;
         }
         let excess = sample.excess();
         if best.as_ref().is_none_or(|(most, _)| excess > *most) {
-            best = Some((excess, Found { series, sample, tests }));
+            best = Some((excess, BalanceTests { series, sample, tests }));
         }
     }
-    best.map(|(_, found)| found.report())
+    best.map(|(_, tests)| tests.report())
 }
 
-impl Found<'_> {
+impl BalanceTests<'_> {
     fn report(&self) -> Outside {
         let (order, pair) = self.order();
         let constant = self.sample.constant_share();
@@ -79,9 +79,11 @@ impl Found<'_> {
             })
             .collect();
         let mean = self.sample.mean_over_error().abs();
-        if mean > MEAN && constant > explained * (1.0 - constant) {
+        if mean > MIN_MEAN_Z && constant > explained * (1.0 - constant) {
+            // No permutation p value: a circular shift leaves the mean unchanged. The z test above decides, and the smallest p
+            // value of the other variables stands for it.
             let p_value = 1.0 / (SHIFTS as f64 + 1.0);
-            let place = usize::from(explained > STRONG);
+            let place = usize::from(explained > R2_BEFORE_CONSTANT);
             variables.insert(place, Dependence { variable: "constant".to_owned(), r2: constant, p_value });
         }
         let formula =
@@ -102,9 +104,10 @@ impl Found<'_> {
         let mut order: Vec<usize> = (0..VARIABLES.len()).filter(|variable| r2(variable) > 0.0).collect();
         order.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
         let Some(most) = order.first().map(r2) else { return (order, None) };
-        let near = order.iter().take_while(|variable| r2(variable) >= NEARLY * most).count();
-        order[..near].sort_by_key(|variable| VARIABLES[*variable].costs);
-        let Some((mut pair, _)) = self.pair().filter(|(_, together)| *together > most + PAIR) else {
+        let near = order.iter().take_while(|variable| r2(variable) >= TIE_R2_RATIO * most).count();
+        order[..near].sort_by_key(|variable| VARIABLES[*variable].complexity);
+        let Some((mut pair, _)) = self.pair().filter(|(_, together)| *together > most + MIN_PAIR_R2_GAIN)
+        else {
             return (order, None);
         };
         pair.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
@@ -118,7 +121,7 @@ impl Found<'_> {
         let mut best: Option<([usize; 2], f64)> = None;
         for left in 0..VARIABLES.len() {
             for right in left + 1..VARIABLES.len() {
-                let is_half = |at: usize| at != TIME && self.tests[at].0 > HALF;
+                let is_half = |at: usize| at != TIME && self.tests[at].0 > MIN_MARGINAL_R2;
                 if !is_half(left) || !is_half(right) {
                     continue;
                 }

@@ -69,7 +69,7 @@ pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
         ("finding", finding::title(report), finding::finding(report)),
         ("next", "What to measure next", finding::next(report)),
         ("after", "After: with what was found", pictures::after(report, pictures)),
-        ("gap", "The gap, before and after", held_out::gap(report)),
+        ("gap", "The gap, before and after", held_out::misfit(report)),
         ("verification", "On a held-out record", held_out::verification(report)),
         ("location", "Where they disagree", location::location(report)),
         ("candidates", "Candidates, the best first", candidates::candidates(report)),

@@ -12,7 +12,7 @@ use crate::candidates::Candidate;
 use crate::descent::descend;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products};
-use crate::name::NUMBER_COSTS;
+use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use plant::RigParameters;
 use std::iter::successors;
@@ -35,12 +35,12 @@ const SHAPE_PRIOR_STD: f64 = 0.7;
 pub(crate) const MOST_OFF: f64 = 0.3;
 /// Penalty for each parameter off its file value. A sensor that reads four per cent low is a better explanation than all masses,
 /// frictions and areas off by as much.
-const PARAMETER_COSTS: f64 = NUMBER_COSTS;
+const PARAMETER_COSTS: f64 = EFFECT_PARAMETER_PENALTY;
 /// Relative deviation at which half of the penalty is due.
 const COUNTS_AS_OFF: f64 = 0.005;
 
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub struct EffectEstimate {
     pub candidate: Candidate,
     /// One for each key of its sheet.
     pub coordinates: Vec<f64>,
@@ -49,7 +49,7 @@ pub struct Placed {
 /// A fitted model: effects and parameters.
 #[derive(Clone, Debug)]
 pub struct Refit {
-    pub placed: Vec<Placed>,
+    pub placed: Vec<EffectEstimate>,
     pub factors: [f64; COUNT],
     /// The loss, priors and a penalty for each number of an effect and each parameter that is off included.
     pub loss: f64,
@@ -85,7 +85,7 @@ impl Linearisation {
 /// The rig with effects and factors; `None` where the numbers are inconsistent.
 pub(crate) fn rig_of(
     rig: &RigParameters,
-    placed: &[Placed],
+    placed: &[EffectEstimate],
     factors: &[f64; COUNT],
 ) -> Option<RigParameters> {
     placed.iter().try_fold(with_factors(rig, factors), |rig, placed| {
@@ -107,8 +107,8 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
         .sum()
 }
 
-pub(crate) fn model_penalty(numbers: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
-    penalty * numbers as f64 + PARAMETER_COSTS * parameters_off(factors)
+pub(crate) fn model_penalty(effect_parameters: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
+    penalty * effect_parameters as f64 + PARAMETER_COSTS * parameters_off(factors)
 }
 
 /// Prior precision of a coordinate.
@@ -118,8 +118,8 @@ pub(crate) fn coordinate_precision(candidate: &Candidate, key: usize) -> f64 {
 }
 
 /// Prior precisions of the parameters, then of all coordinates of the effects.
-pub(crate) fn prior_precisions(placed: &[Placed]) -> Vec<f64> {
-    let of_effect = |effect: &Placed| {
+pub(crate) fn prior_precisions(placed: &[EffectEstimate]) -> Vec<f64> {
+    let of_effect = |effect: &EffectEstimate| {
         (0..effect.coordinates.len())
             .map(|key| coordinate_precision(&effect.candidate, key))
             .collect::<Vec<_>>()
@@ -128,13 +128,13 @@ pub(crate) fn prior_precisions(placed: &[Placed]) -> Vec<f64> {
 }
 
 /// Deviations from the prior means in the same order.
-pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[Placed]) -> Vec<f64> {
+pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[EffectEstimate]) -> Vec<f64> {
     let coordinates = placed.iter().flat_map(|effect| effect.coordinates.iter().copied());
     factors.iter().map(|factor| factor - 1.0).chain(coordinates).collect()
 }
 
 /// All coordinates of the effects: place in `placed`, and key.
-fn coordinates(placed: &[Placed]) -> Vec<(usize, usize)> {
+fn coordinates(placed: &[EffectEstimate]) -> Vec<(usize, usize)> {
     placed
         .iter()
         .enumerate()
@@ -143,7 +143,7 @@ fn coordinates(placed: &[Placed]) -> Vec<(usize, usize)> {
 }
 
 /// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
-pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed: &[Placed]) -> f64 {
+pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed: &[EffectEstimate]) -> f64 {
     let Some(rig) = rig_of(engine.rig(), placed, &linearisation.factors) else { return f64::INFINITY };
     let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &linearisation.columns);
     products
@@ -151,8 +151,8 @@ pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed
         .loss
 }
 
-struct Point {
-    placed: Vec<Placed>,
+struct Iterate {
+    placed: Vec<EffectEstimate>,
     simulated: Vec<f64>,
     residual: Vec<f64>,
     fit: Fit,
@@ -164,7 +164,7 @@ struct Point {
 pub fn refit(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    start: &[Placed],
+    start: &[EffectEstimate],
     penalty: f64,
 ) -> Option<Refit> {
     refit_steps(engine, linearisation, start, penalty, STEPS)
@@ -174,7 +174,7 @@ pub fn refit(
 pub(crate) fn refit_steps(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    start: &[Placed],
+    start: &[EffectEstimate],
     penalty: f64,
     steps: usize,
 ) -> Option<Refit> {
@@ -184,7 +184,7 @@ pub(crate) fn refit_steps(
     let chosen: Vec<usize> = (0..all_precisions.len()).collect();
     let coordinates = coordinates(start);
     let mut parameter_products: Option<Products> = None;
-    let mut evaluate = |placed: Vec<Placed>| -> Option<Point> {
+    let mut evaluate = |placed: Vec<EffectEstimate>| -> Option<Iterate> {
         let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
@@ -195,9 +195,9 @@ pub(crate) fn refit_steps(
             none => none.insert(engine.products(&residual, &linearisation.columns)),
         };
         let fit = products.fit_from(&parameters, &precisions, &off);
-        Some(Point { placed, simulated, residual, fit })
+        Some(Iterate { placed, simulated, residual, fit })
     };
-    let prior = |placed: &[Placed]| -> f64 {
+    let prior = |placed: &[EffectEstimate]| -> f64 {
         coordinates
             .iter()
             .map(|(at, key)| {
@@ -205,32 +205,33 @@ pub(crate) fn refit_steps(
             })
             .sum()
     };
-    let total = |point: &Point| point.fit.loss + prior(&point.placed);
+    let total = |iterate: &Iterate| iterate.fit.loss + prior(&iterate.placed);
     let first = evaluate(start.to_vec())?;
     // The last linearisation; one more than steps are taken, for the errors.
     let (mut last, mut left) = (None, steps);
-    let point = descend(first, steps + 1, CONVERGED, total, |point| {
+    let iterate = descend(first, steps + 1, CONVERGED, total, |iterate| {
         last = None;
-        let columns = coordinate_columns(engine, &linearisation.factors, &point.placed, &point.simulated)?;
+        let columns =
+            coordinate_columns(engine, &linearisation.factors, &iterate.placed, &iterate.simulated)?;
         let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&columns).collect();
-        let products = last.insert(engine.products(&point.residual, &all));
+        let products = last.insert(engine.products(&iterate.residual, &all));
         left = left.checked_sub(1)?;
-        let from = prior_deviations(&linearisation.factors, &point.placed);
+        let from = prior_deviations(&linearisation.factors, &iterate.placed);
         let joint = products.fit_from(&chosen, &all_precisions, &from);
         let shares = successors(Some(1.0), |share| Some(share * SHORTER));
         shares.take(SHORTENINGS + 1).find_map(|share| {
-            let mut placed = point.placed.clone();
+            let mut placed = iterate.placed.clone();
             for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
-                let [least, most] = placed[*at].candidate.reach(*key);
+                let [least, most] = placed[*at].candidate.fit_bounds(*key);
                 let coordinate = &mut placed[*at].coordinates[*key];
                 *coordinate = (*coordinate + share * change).clamp(least, most);
             }
-            evaluate(placed).filter(|tried| total(tried) < total(point))
+            evaluate(placed).filter(|tried| total(tried) < total(iterate))
         })
     });
     let products = last?;
     // At the final iterate: parameters as fitted, coordinates unchanged.
-    let mut at_point = point.fit.clone();
+    let mut at_point = iterate.fit.clone();
     at_point.coefficients.extend(std::iter::repeat_n(0.0, coordinates.len()));
     let covariance = products.covariance(&chosen, &at_point, &all_precisions);
     let (plain, _) = products.normal(&chosen, &at_point.weights, &all_precisions);
@@ -245,11 +246,12 @@ pub(crate) fn refit_steps(
     };
     let errors = (COUNT..chosen.len()).chain(0..COUNT).map(error).collect();
     let mut factors = linearisation.factors;
-    for (factor, change) in factors.iter_mut().zip(&point.fit.coefficients) {
+    for (factor, change) in factors.iter_mut().zip(&iterate.fit.coefficients) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
-    let loss = point.fit.loss + prior(&point.placed) + model_penalty(coordinates.len(), &factors, penalty);
-    Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, design_effect })
+    let loss =
+        iterate.fit.loss + prior(&iterate.placed) + model_penalty(coordinates.len(), &factors, penalty);
+    Some(Refit { placed: iterate.placed, factors, loss, squares: iterate.fit.squares, errors, design_effect })
 }
 
 /// Parameter sensitivities linearised at a model.
@@ -279,7 +281,7 @@ pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, penalty: f64, times
 pub(crate) fn coordinate_columns(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
-    placed: &[Placed],
+    placed: &[EffectEstimate],
     simulated: &[f64],
 ) -> Option<Vec<Vec<f64>>> {
     coordinates(placed)
@@ -292,7 +294,7 @@ pub(crate) fn coordinate_columns(
 pub(crate) fn derivative(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
-    placed: &[Placed],
+    placed: &[EffectEstimate],
     simulated: &[f64],
     at: usize,
     key: usize,
@@ -300,7 +302,7 @@ pub(crate) fn derivative(
     let candidate = placed[at].candidate;
     let coordinate = placed[at].coordinates[key];
     let size = CHANGE.max(CHANGE_SHARE * coordinate.abs());
-    let [_, most] = candidate.reach(key);
+    let [_, most] = candidate.fit_bounds(key);
     let change = if coordinate + size > most { -size } else { size };
     let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;

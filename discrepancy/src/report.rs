@@ -13,7 +13,8 @@ pub const SCHEMA_VERSION: u32 = 1;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// No effect is missing above the detection limits.
+    /// No effect was found. An effect at its detection limit would be found in about half of the records or fewer, so that one
+    /// just above it may be missed.
     #[default]
     NothingMissing,
     /// Only baseline parameters are off.
@@ -41,18 +42,21 @@ pub struct Report {
     /// Baseline parameters that were significantly off.
     pub parameters: Vec<Quantity>,
     /// Parameters that the model moved by an insignificant amount; the extended rig file has them.
-    pub(crate) carried: Vec<Quantity>,
+    #[serde(rename = "carried")]
+    pub(crate) insignificant: Vec<Quantity>,
     /// The missing term outside the catalogue.
     pub outside: Option<Outside>,
     /// Per signal of the held-out record, as `drive_position_m`; empty without `--test`.
-    pub gap: BTreeMap<String, Gap>,
+    #[serde(rename = "gap")]
+    pub misfit: BTreeMap<String, Misfit>,
     /// Further figures of the held-out record; null without `--test`.
     pub verification: Option<Verification>,
     /// All candidates, the best first.
     pub candidates: Vec<Candidate>,
     /// Effects that the training records do not excite.
     pub(crate) not_excited: Vec<EffectPlace>,
-    /// Smallest amplitude of each other effect whose expected gain reaches the threshold.
+    /// Amplitude of each other effect at which the expected linear gain reaches the threshold: found in about half of the records
+    /// or fewer, since the penalties of the objective are ignored.
     pub(crate) detection_limits: Vec<DetectionLimit>,
     /// Where model and records disagree.
     pub location: Option<Location>,
@@ -112,7 +116,8 @@ pub struct Quantity {
     pub value: f64,
     /// Unit of the rig file; empty for a plain number.
     pub unit: String,
-    /// One standard error; null when the records do not bound the number.
+    /// One standard error; null when the records do not bound the number. Of the final model it is half of the half-width of a
+    /// calibrated 95.4 % interval: one-step jackknife with frozen window weights, widened by a Student t factor.
     pub standard_error: Option<f64>,
     /// Value in the rig file; null where it has none.
     pub before: Option<f64>,
@@ -154,7 +159,8 @@ pub struct Candidate {
     /// Unit of the amplitude.
     pub unit: String,
     /// Outcome, in words.
-    pub fate: String,
+    #[serde(rename = "fate")]
+    pub decision: String,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -214,7 +220,8 @@ pub struct Dependence {
     pub variable: String,
     /// Share of the variance explained on folds it was not fitted on.
     pub(crate) r2: f64,
-    /// Permutation p value over 200 circular shifts: (1 + shifts that reach R2) / 201.
+    /// Permutation p value over 200 circular shifts: (1 + shifts that reach R2) / 201. The entry `constant` is no permutation p
+    /// value, since a shift leaves the mean unchanged: a z test of the mean decides on it, and it always has 1/201 here.
     pub(crate) p_value: f64,
 }
 
@@ -247,9 +254,9 @@ pub(crate) struct Surface {
     pub band: Vec<Vec<Option<f64>>>,
 }
 
-/// The gap of a signal of the held-out record, rms over windows, in the signal's unit.
+/// The misfit of a signal of the held-out record, rms over windows, in the signal's unit.
 #[derive(Clone, Debug, Serialize)]
-pub struct Gap {
+pub struct Misfit {
     /// Baseline against measurement.
     pub before: f64,
     /// Extended model against measurement.

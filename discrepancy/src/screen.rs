@@ -1,15 +1,18 @@
 //! Linear screening: gain and starting point of each candidate, from one simulation at each of its probes.
 //!
 //! Each probe is one column. Fitted jointly with the parameters' columns, its coefficient is the amplitude of an effect whose
-//! responses were proportional to it. Screening ranks, and ends the search where no gain exceeds [`crate::name::WORTH_A_FIT`]
-//! and a share of the last threshold; the refit decides.
+//! responses were proportional to it. Screening ranks, and ends the search where no gain exceeds
+//! [`crate::name::MIN_LOSS_REDUCTION`] and a share of the last threshold; the refit decides.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::COUNT;
-use crate::refit::{Linearisation, Placed, parameter_precisions};
+use crate::refit::{EffectEstimate, Linearisation, parameter_precisions};
 use rayon::prelude::*;
+
+/// Penalty for each column of a candidate.
+const COLUMN_PENALTY: f64 = 6.0;
 
 #[derive(Debug)]
 pub struct Columns {
@@ -21,12 +24,12 @@ pub struct Columns {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Screened {
-    /// Place in [`Columns::candidates`].
+    /// Index in [`Columns::candidates`].
     pub at: usize,
     /// Loss with it.
     pub loss: f64,
     /// Where its fit starts.
-    pub start: Placed,
+    pub start: EffectEstimate,
 }
 
 impl Columns {
@@ -57,30 +60,31 @@ impl Columns {
     }
 
     /// Column of a probe.
-    pub fn column(&self, place: usize) -> &[f64] {
-        &self.columns[place]
+    pub fn column(&self, index: usize) -> &[f64] {
+        &self.columns[index]
     }
 
-    /// Null loss, and the screening of all candidates against a residual; `beside` are columns fitted with each (effects already
-    /// in the model).
+    /// Null loss, and the screening of all candidates against a residual; `model_sensitivities` are columns fitted with each
+    /// (effects already in the model).
     pub(crate) fn screen(
         &self,
         engine: &Engine<'_>,
         linearisation: &Linearisation,
         residual: &[f64],
-        beside: &[Vec<f64>],
+        model_sensitivities: &[Vec<f64>],
     ) -> (f64, Vec<Screened>) {
-        let always = COUNT + beside.len();
-        let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(beside).chain(&self.columns).collect();
+        let always = COUNT + model_sensitivities.len();
+        let all: Vec<&Vec<f64>> =
+            linearisation.columns.iter().chain(model_sensitivities).chain(&self.columns).collect();
         let products = engine.products(residual, &all);
-        let (mut precisions, mut from) = (parameter_precisions(), linearisation.deviations());
+        let (mut precisions, mut prior_offset) = (parameter_precisions(), linearisation.deviations());
         precisions.resize(always, 1e-2);
-        from.resize(always, 0.0);
+        prior_offset.resize(always, 0.0);
         let basic: Vec<usize> = (0..always).collect();
-        let null_loss = products.fit_from(&basic, &precisions, &from).loss;
+        let null_loss = products.fit_from(&basic, &precisions, &prior_offset).loss;
         let screened = (0..self.candidates.len())
             .into_par_iter()
-            .filter_map(|at| self.screen_one(&products, at, &basic, &precisions, &from))
+            .filter_map(|at| self.screen_one(&products, at, &basic, &precisions, &prior_offset))
             .collect();
         (null_loss, screened)
     }
@@ -91,7 +95,7 @@ impl Columns {
         at: usize,
         basic: &[usize],
         precisions: &[f64],
-        from: &[f64],
+        prior_offset: &[f64],
     ) -> Option<Screened> {
         let always = basic.len();
         let candidate = self.candidates[at];
@@ -100,14 +104,14 @@ impl Columns {
             self.probes[at].iter().partition(|(probe, _)| probe[0] != 0.0);
         let mut best: Option<(f64, Vec<f64>)> = None;
         let alone = Vec::new();
-        for (probe, place) in &leading {
+        for (probe, index) in &leading {
             for with in if joining.is_empty() { vec![&alone] } else { vec![&alone, &joining] } {
                 let mut chosen = basic.to_vec();
                 let mut chosen_precisions = precisions.to_vec();
-                chosen.push(always + place);
-                chosen.extend(with.iter().map(|(_, place)| always + place));
+                chosen.push(always + index);
+                chosen.extend(with.iter().map(|(_, index)| always + index));
                 chosen_precisions.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
-                let mut chosen_from = from.to_vec();
+                let mut chosen_from = prior_offset.to_vec();
                 chosen_from.resize(chosen.len(), 0.0);
                 let fit = products.fit_from(&chosen, &chosen_precisions, &chosen_from);
                 let mut coordinates = probe.clone();
@@ -126,12 +130,16 @@ impl Columns {
                         coordinates[key] = (coefficient * z).clamp(least.max(-1.3), most.min(1.3));
                     }
                 }
-                let loss = fit.loss + 6.0 * (1 + with.len()) as f64;
+                let loss = fit.loss + COLUMN_PENALTY * (1 + with.len()) as f64;
                 if best.as_ref().is_none_or(|(best, _)| loss < *best) {
                     best = Some((loss, coordinates));
                 }
             }
         }
-        best.map(|(loss, coordinates)| Screened { at, loss, start: Placed { candidate, coordinates } })
+        best.map(|(loss, coordinates)| Screened {
+            at,
+            loss,
+            start: EffectEstimate { candidate, coordinates },
+        })
     }
 }

@@ -7,7 +7,7 @@
 //! Windows start from recorded readings. If the simulated rig has a sensor with delay, gain or offset, the true state differs
 //! from the reading; the start state is corrected by the inverse of the sensor. Source: effects.md, Sensors.
 
-use crate::gridded_record::{GriddedRecord, Point};
+use crate::gridded_record::{AxisState, GriddedRecord};
 use plant::effects::sheet::{Element, Part};
 use plant::{Axis, PERIOD_S, RigParameters};
 
@@ -69,7 +69,12 @@ impl SensorInverse {
     }
 
     /// True states whose readings are those of the record at a period; `starts` are its estimated points there.
-    pub(crate) fn points(&self, record: &GriddedRecord, period: usize, starts: &[Point; 2]) -> [Point; 2] {
+    pub(crate) fn points(
+        &self,
+        record: &GriddedRecord,
+        period: usize,
+        starts: &[AxisState; 2],
+    ) -> [AxisState; 2] {
         let mut points = *starts;
         if self.is_true {
             return points;
@@ -77,7 +82,7 @@ impl SensorInverse {
         for axis in Axis::ALL {
             let i = axis.index();
             let [position, a, b] = self.axes[i];
-            let later = |reading: Reading, of: &dyn Fn(&Point) -> f64| {
+            let later = |reading: Reading, of: &dyn Fn(&AxisState) -> f64| {
                 let (then, now) = (at(record, i, period, reading.delay_s, of), of(&record.points[period][i]));
                 of(&starts[i]) + then - now
             };
@@ -98,7 +103,13 @@ impl SensorInverse {
 }
 
 /// A number of the points at some time after a period, interpolated.
-fn at(record: &GriddedRecord, axis: usize, period: usize, delay_s: f64, of: &dyn Fn(&Point) -> f64) -> f64 {
+fn at(
+    record: &GriddedRecord,
+    axis: usize,
+    period: usize,
+    delay_s: f64,
+    of: &dyn Fn(&AxisState) -> f64,
+) -> f64 {
     let place = (period as f64 + delay_s / PERIOD_S).min((record.len() - 1) as f64);
     let (before, share) = (place.floor() as usize, place.fract());
     let after = (before + 1).min(record.len() - 1);

@@ -45,7 +45,7 @@ use plant::RigParameters;
 use records::description_error::DescriptionError;
 use records::{ReadError, ReadOptions, Record};
 use runs::Run;
-use select::{Cuts, Found, Prepared};
+use select::{Cuts, Prepared, SearchResult};
 use std::path::{Path, PathBuf};
 
 /// Ratio of the deciles of speed below which folds over speed would ask for another experiment.
@@ -142,7 +142,7 @@ struct Study {
     base_fit: Fit,
     time: Cut,
     families: Vec<Prepared>,
-    found: Found,
+    found: SearchResult,
     /// Columns of the baseline and of the selected terms.
     extended: Columns,
     extended_fit: Fit,
@@ -202,7 +202,8 @@ impl Study {
         let found = select::search(&rows, &cuts, [&plain, &base], &families, &selection, progress);
         let mut extended = base.clone();
         for taken in &found.taken {
-            extended.extend(families[taken.judged.place].columns[taken.judged.variant].iter().cloned());
+            extended
+                .extend(families[taken.evaluation.place].columns[taken.evaluation.variant].iter().cloned());
         }
         let extended_fit = rows.fit(&extended).unwrap_or_else(|| base_fit.clone());
         Ok(Self {
@@ -260,7 +261,7 @@ impl Study {
         let rows = rows_of(runs);
         let before = residual(&rows.target, &columns, &self.base_fit.numbers);
         for taken in &self.found.taken {
-            let entry = &self.families[taken.judged.place].family.variants[taken.judged.variant];
+            let entry = &self.families[taken.evaluation.place].family.variants[taken.evaluation.variant];
             columns.extend(term_columns(&self.model, entry, runs)?);
         }
         let after = residual(&rows.target, &columns, &self.extended_fit.numbers);
@@ -282,7 +283,7 @@ fn rows_of(runs: &[Run]) -> Rows {
     }
     Rows {
         target: runs.iter().flat_map(|run| run.rows(&run.target)).collect(),
-        judged: runs.iter().flat_map(|run| run.judged.iter().copied()).collect(),
+        in_score: runs.iter().flat_map(|run| run.in_score.iter().copied()).collect(),
         records,
     }
 }

@@ -21,23 +21,23 @@ use crate::calibrate::{Calibrated, quantity};
 use crate::engine::Engine;
 use crate::locate::maps::map;
 use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
-use crate::name::WORTH_A_FIT;
+use crate::name::MIN_LOSS_REDUCTION;
 use crate::parameters::COUNT;
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
-use fit::{FittedTable, LinearisedTable, Model, Point, TableLinearisation};
+use fit::{FittedTable, Iterate, LinearisedTable, Model, TableLinearisation};
 use plant::effects::tabulated::{self, Balance, Tabulated, Variable, interpolated};
 use plant::{Axis, RigParameters};
 
 /// Number of screened tables that are fitted.
 const TRIED: usize = 3;
 /// Points of a first table; a law over position and direction has two branches.
-const POINTS: usize = 8;
-const DIRECTED_POINTS: usize = 32;
+const KNOTS: usize = 8;
+const DIRECTED_KNOTS: usize = 32;
 /// Refinement factors.
 const FINER: [usize; 2] = [2, 4];
 /// Maximum number of points of a table.
-const MOST_POINTS: usize = tabulated::POINTS[1];
+const MAX_KNOTS: usize = tabulated::POINTS[1];
 /// Steps of a first fit, and of a final one.
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
@@ -63,21 +63,22 @@ pub(crate) fn tabulate(
     unknowns: &[UnknownSeries],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Tables, String> {
-    let (axis, balance) = place(&outside.balance)
+    let (axis, balance) = parse_balance(&outside.balance)
         .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
     let restarted = engine.is_linked().then(|| engine.with_starts_under(&calibrated.rig(engine.rig())));
     let engine = restarted.as_ref().unwrap_or(engine);
     let free = reported.factors.map(|factor| factor != 1.0);
-    let alone = Model::alone(reported.factors, free);
-    let parameters_alone = Point::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
+    let without_tables = Model::without_tables(reported.factors, free);
+    let parameters_alone =
+        Iterate::of(engine, without_tables).ok_or("no rig can have the parameters that are off")?;
     let parameters_alone = fit::fit(engine, parameters_alone, FIRST_STEPS);
-    let seek = Seek { engine, axis, balance, unknowns };
+    let search = TableSearch { engine, axis, balance, unknowns };
 
     progress("a table for what is missing");
-    let (first, used) = seek.best(&parameters_alone, None).ok_or("no rig can have its curve")?;
-    let mut best = seek.finer(first);
+    let (first, used) = search.best(&parameters_alone, None).ok_or("no rig can have its curve")?;
+    let mut best = search.finer(first);
     progress("a table over a second variable");
-    if let Some((second, _)) = seek.best(&best, Some(used))
+    if let Some((second, _)) = search.best(&best, Some(used))
         && best.loss - second.loss > LEAST_SHARE_OF_SECOND * best.loss.abs()
     {
         best = fit::fit(engine, second, STEPS);
@@ -104,16 +105,16 @@ pub(crate) fn tabulate(
 }
 
 /// The model with the needed parameters, and which; the others are at the rig file's values.
-fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
+fn with_needed(engine: &Engine<'_>, best: Iterate) -> (Iterate, [bool; COUNT]) {
     let all = Model { free: [true; COUNT], ..best.model.clone() };
-    let held = Point::of(engine, best.model.clone().held([false; COUNT]));
-    let Some((linearisation, held)) = TableLinearisation::of(engine, all).zip(held) else {
+    let all_fixed = Iterate::of(engine, best.model.clone().with_fixed([false; COUNT]));
+    let Some((linearisation, all_fixed)) = TableLinearisation::of(engine, all).zip(all_fixed) else {
         return (best, [true; COUNT]);
     };
     let linearisation = linearisation.with(&[]);
-    let bare = fit::steps(engine, held, &linearisation[COUNT..]);
-    let needed = fit::needed(engine, &bare, &linearisation, WORTH_A_FIT);
-    let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
+    let bare = fit::steps(engine, all_fixed, &linearisation[COUNT..]);
+    let needed = fit::needed(engine, &bare, &linearisation, MIN_LOSS_REDUCTION);
+    let Some(start) = Iterate::of(engine, bare.model.clone().with_fixed(needed)) else {
         return (bare, [false; COUNT]);
     };
     // The known linearisation serves for the first steps.
@@ -124,79 +125,86 @@ fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
 
 /// Argument of a table: a variable, or none for a constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Over {
+enum Argument {
     Variable(Variable),
     Constant,
 }
 
 /// `drive.flow-a`; `None` for a balance that a table cannot add to.
-fn place(balance: &str) -> Option<(Axis, Balance)> {
+fn parse_balance(balance: &str) -> Option<(Axis, Balance)> {
     let (axis, name) = balance.split_once('.')?;
     let axis = Axis::ALL.into_iter().find(|known| known.name() == axis)?;
     Some((axis, Balance::ALL.into_iter().find(|known| known.name() == name)?))
 }
 
 /// The search for tables of a balance.
-struct Seek<'a> {
+struct TableSearch<'a> {
     engine: &'a Engine<'a>,
     axis: Axis,
     balance: Balance,
     unknowns: &'a [UnknownSeries],
 }
 
-impl Seek<'_> {
+impl TableSearch<'_> {
     /// The best model with one more variable other than `used`; `None` where no rig can have any. All are screened linearly and
     /// the best are fitted.
-    fn best(&self, from: &Point, used: Option<Over>) -> Option<(Point, Over)> {
+    fn best(&self, from: &Iterate, used: Option<Argument>) -> Option<(Iterate, Argument)> {
         let sets: &[&[Balance]] = match self.balance {
             Balance::Force => &[&[Balance::Force]],
             Balance::FlowA => &[&[Balance::FlowA], &[Balance::FlowA, Balance::FlowB]],
             Balance::FlowB => &[&[Balance::FlowB], &[Balance::FlowA, Balance::FlowB]],
         };
         let linearisation = TableLinearisation::of(self.engine, from.model.clone())?;
-        let all = Variable::ALL.into_iter().map(Over::Variable).chain([Over::Constant]);
+        let all = Variable::ALL.into_iter().map(Argument::Variable).chain([Argument::Constant]);
         // Linearised once for each balance.
-        let flat = |over: Over, balance: Balance| {
-            let mut fitted = self.table(over, balance)?;
+        let flat = |argument: Argument, balance: Balance| {
+            let mut fitted = self.table(argument, balance)?;
             fitted.table.value.fill(0.0);
             linearisation.beside(self.engine, fitted)
         };
-        let flats: Vec<(Over, Vec<LinearisedTable>)> = all
-            .filter(|over| Some(*over) != used)
-            .map(|over| {
-                (over, sets[sets.len() - 1].iter().filter_map(|balance| flat(over, *balance)).collect())
+        let flats: Vec<(Argument, Vec<LinearisedTable>)> = all
+            .filter(|argument| Some(*argument) != used)
+            .map(|argument| {
+                (
+                    argument,
+                    sets[sets.len() - 1].iter().filter_map(|balance| flat(argument, *balance)).collect(),
+                )
             })
             .collect();
-        let mut screened: Vec<(f64, Over, Vec<&LinearisedTable>)> = Vec::new();
-        for (over, tables) in &flats {
+        let mut screened: Vec<(f64, Argument, Vec<&LinearisedTable>)> = Vec::new();
+        for (argument, tables) in &flats {
             for balances in sets {
                 let beside: Vec<&LinearisedTable> =
                     tables.iter().filter(|table| balances.contains(&table.balance())).collect();
                 if beside.len() == balances.len() {
-                    screened.push((linearisation.predicted_loss(self.engine, from, &beside), *over, beside));
+                    screened.push((
+                        linearisation.predicted_loss(self.engine, from, &beside),
+                        *argument,
+                        beside,
+                    ));
                 }
             }
         }
         screened.sort_by(|left, right| left.0.total_cmp(&right.0));
-        let fitted = screened.iter().take(TRIED).filter_map(|(_, over, beside)| {
+        let fitted = screened.iter().take(TRIED).filter_map(|(_, argument, beside)| {
             let balances: Vec<Balance> = beside.iter().map(|table| table.balance()).collect();
-            let start = self.start(&from.model, *over, &balances)?;
+            let start = self.start(&from.model, *argument, &balances)?;
             // Beside a fitted table the linearisation of the screening suffices.
             let point = if from.model.tables.is_empty() {
                 fit::fit(self.engine, start, FIRST_STEPS)
             } else {
                 fit::steps(self.engine, start, &linearisation.with(beside))
             };
-            Some((point, *over))
+            Some((point, *argument))
         });
         fitted.min_by(|left, right| left.0.loss.total_cmp(&right.0.loss))
     }
 
     /// A model with tables of some balances, at their curves or at 0.
-    fn with(&self, model: &Model, over: Over, balances: &[Balance], is_flat: bool) -> Option<Model> {
+    fn with(&self, model: &Model, argument: Argument, balances: &[Balance], is_flat: bool) -> Option<Model> {
         let mut model = model.clone();
         for balance in balances {
-            let mut fitted = self.table(over, *balance)?;
+            let mut fitted = self.table(argument, *balance)?;
             if is_flat {
                 fitted.table.value.fill(0.0);
             }
@@ -206,9 +214,9 @@ impl Seek<'_> {
     }
 
     /// A model with tables of some balances, started at their curves or at 0, whichever has the smaller loss.
-    fn start(&self, model: &Model, over: Over, balances: &[Balance]) -> Option<Point> {
-        let from = [false, true].map(|is_flat| self.with(model, over, balances, is_flat));
-        let [curved, flat] = from.map(|model| Point::of(self.engine, model?));
+    fn start(&self, model: &Model, argument: Argument, balances: &[Balance]) -> Option<Iterate> {
+        let from = [false, true].map(|is_flat| self.with(model, argument, balances, is_flat));
+        let [curved, flat] = from.map(|model| Iterate::of(self.engine, model?));
         match (curved, flat) {
             (Some(curved), Some(flat)) => Some(if curved.loss < flat.loss { curved } else { flat }),
             (one, other) => one.or(other),
@@ -216,13 +224,14 @@ impl Seek<'_> {
     }
 
     /// Index of a table variable among those of unknown inputs.
-    fn place(variable: Variable) -> Option<usize> {
+    fn variable_index(variable: Variable) -> Option<usize> {
         VARIABLES.iter().position(|known| known.name == variable.name())
     }
 
     /// Value of a variable in a window.
     fn value(variable: Variable, point: &UnknownPoint) -> f64 {
-        let of = |variable: Variable| Self::place(variable).map_or(0.0, |place| point.variables[place]);
+        let of =
+            |variable: Variable| Self::variable_index(variable).map_or(0.0, |index| point.variables[index]);
         match variable {
             Variable::DirectedExtension => of(Variable::Extension) * of(Variable::Direction),
             variable => of(variable),
@@ -230,59 +239,60 @@ impl Seek<'_> {
     }
 
     /// The curve of an unknown input as a table.
-    fn table(&self, over: Over, balance: Balance) -> Option<FittedTable> {
+    fn table(&self, argument: Argument, balance: Balance) -> Option<FittedTable> {
         let name = format!("{}.{}", self.axis.name(), balance.name());
         let series = self.unknowns.iter().find(|series| series.balance == name)?;
-        let variable = match over {
-            Over::Constant => Variable::Extension,
-            Over::Variable(variable) => variable,
+        let variable = match argument {
+            Argument::Constant => Variable::Extension,
+            Argument::Variable(variable) => variable,
         };
         // Only friction changes sign with the direction.
         if variable == Variable::DirectedExtension && balance != Balance::Force {
             return None;
         }
-        let mut seen: Vec<f64> = series.points.iter().map(|point| Self::value(variable, point)).collect();
-        seen.sort_unstable_by(f64::total_cmp);
-        let curve = Self::place(variable).map(|place| map(series, place));
-        let at = match (over, variable) {
-            (Over::Constant, _) => vec![0.0, self.engine.rig().cylinder().stroke_m],
+        let mut sorted_samples: Vec<f64> =
+            series.points.iter().map(|point| Self::value(variable, point)).collect();
+        sorted_samples.sort_unstable_by(f64::total_cmp);
+        let curve = Self::variable_index(variable).map(|index| map(series, index));
+        let at = match (argument, variable) {
+            (Argument::Constant, _) => vec![0.0, self.engine.rig().cylinder().stroke_m],
             (_, Variable::Direction) => vec![-1.0, 1.0],
-            (_, Variable::DirectedExtension) => knots(&seen, DIRECTED_POINTS),
-            _ => knots(&seen, POINTS),
+            (_, Variable::DirectedExtension) => knots(&sorted_samples, DIRECTED_KNOTS),
+            _ => knots(&sorted_samples, KNOTS),
         };
         if at.len() < 2 || curve.as_ref().is_some_and(|curve| curve.at.is_empty()) {
             return None;
         }
         let most = balance.most();
-        let value = match (over, curve) {
+        let value = match (argument, curve) {
             (_, None) => vec![0.0; at.len()],
-            (Over::Constant, Some(curve)) => {
+            (Argument::Constant, Some(curve)) => {
                 let mean = curve.value.iter().sum::<f64>() / curve.value.len() as f64;
                 vec![mean.clamp(-most, most); 2]
             }
-            (Over::Variable(_), Some(curve)) => {
+            (Argument::Variable(_), Some(curve)) => {
                 at.iter().map(|x| interpolated(&curve.at, &curve.value, *x).clamp(-most, most)).collect()
             }
         };
         let table = Tabulated { axis: self.axis, balance, variable, at, value };
-        Some(FittedTable { table, is_constant: over == Over::Constant, seen })
+        Some(FittedTable { table, is_constant: argument == Argument::Constant, sorted_samples })
     }
 
     /// Refines the table while the loss, penalty included, falls.
-    fn finer(&self, start: Point) -> Point {
+    fn finer(&self, start: Iterate) -> Iterate {
         let mut best = fit::fit(self.engine, start, STEPS);
         for times in FINER {
             let mut model = best.model.clone();
             for fitted in model.tables.iter_mut().filter(|fitted| fitted.table.at.len() > 2) {
                 let is_directed = fitted.table.variable == Variable::DirectedExtension;
-                let points = if is_directed { DIRECTED_POINTS } else { POINTS };
+                let points = if is_directed { DIRECTED_KNOTS } else { KNOTS };
                 // One more may come at the end.
-                let at = knots(&fitted.seen, (times * points).min(MOST_POINTS - 1));
+                let at = knots(&fitted.sorted_samples, (times * points).min(MAX_KNOTS - 1));
                 fitted.table.value =
                     at.iter().map(|x| interpolated(&fitted.table.at, &fitted.table.value, *x)).collect();
                 fitted.table.at = at;
             }
-            let Some(point) = Point::of(self.engine, model) else { break };
+            let Some(point) = Iterate::of(self.engine, model) else { break };
             let tried = fit::fit(self.engine, point, FIRST_STEPS);
             if tried.loss >= best.loss {
                 break;
@@ -295,12 +305,14 @@ impl Seek<'_> {
 
 /// Knots over sorted values: placed half by rank, half by distance, so that neither a cluster at rest nor a single fast stroke
 /// dominates.
-fn knots(seen: &[f64], count: usize) -> Vec<f64> {
-    let (Some(least), Some(most)) = (seen.first(), seen.last()) else { return Vec::new() };
+fn knots(sorted_samples: &[f64], count: usize) -> Vec<f64> {
+    let (Some(least), Some(most)) = (sorted_samples.first(), sorted_samples.last()) else {
+        return Vec::new();
+    };
     let width = most - least;
     let mut at = vec![*least];
-    for (rank, value) in seen.iter().enumerate() {
-        let line_search = 0.5 * rank as f64 / seen.len() as f64 + 0.5 * (value - least) / width;
+    for (rank, value) in sorted_samples.iter().enumerate() {
+        let line_search = 0.5 * rank as f64 / sorted_samples.len() as f64 + 0.5 * (value - least) / width;
         let apart = value - at[at.len() - 1] > 0.2 * width / count as f64;
         if line_search >= at.len() as f64 / (count - 1) as f64 && apart {
             at.push(*value);
@@ -330,7 +342,7 @@ fn term(table: &Tabulated) -> TableTerm {
 /// Tables of a report as tables of a rig; invalid ones are left out.
 pub(crate) fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
     let table = |term: &TableTerm| {
-        let (axis, balance) = place(&term.balance)?;
+        let (axis, balance) = parse_balance(&term.balance)?;
         let variable = Variable::ALL.into_iter().find(|known| known.name() == term.variable)?;
         Some(Tabulated { axis, balance, variable, at: term.at.clone(), value: term.value.clone() })
     };
@@ -349,11 +361,11 @@ mod tests {
 
     #[test]
     fn points_are_where_values_are_and_reach_from_the_least_to_the_most() {
-        let mut seen: Vec<f64> =
+        let mut sorted_samples: Vec<f64> =
             (0..1000).map(|at| if at < 700 { 0.0 } else { f64::from(at) * 1e-3 }).collect();
-        seen.sort_unstable_by(f64::total_cmp);
+        sorted_samples.sort_unstable_by(f64::total_cmp);
         for count in [2, 8, 16, 32] {
-            let at = knots(&seen, count);
+            let at = knots(&sorted_samples, count);
             assert!((2..=count + 1).contains(&at.len()), "{at:?}");
             assert_eq!((at[0], at[at.len() - 1]), (0.0, 0.999));
             assert!(at.windows(2).all(|pair| pair[0] < pair[1]), "{at:?}");

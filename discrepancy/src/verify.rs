@@ -11,15 +11,17 @@
 //!   a break-away would outweigh all others. Both models leave out the same windows: those of the signal for a gap, those of all
 //!   signals together for chi2 and whiteness. The test of improvement uses all windows.
 //! - *Level*: the noise of a channel is known to some per cent only. The lowest decile of the windows, by the better of both
-//!   models, corrects it within [`LEVELS`].
+//!   models, corrects it within [`VARIANCE_FACTOR_BOUNDS`].
 //!
-//! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors, clustered
-//! by windows, as in the loss of [`crate::fit`]. An effect in fewer than ten windows cannot pass, whatever its size.
+//! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors: a paired
+//! t test of log-variance differences (Diebold-Mariano type) with windows taken as independent. Equal gains in m of n windows
+//! give t = sqrt(m (n - 1) / (n - m)), so that an effect in fewer than about nine windows (seven to eight in a short record)
+//! cannot pass, whatever its size.
 //!
 //! Expected power comes from drawn noise with the autocorrelation and jitter of the record. The null range of chi2 comes from
 //! synthetic records of the extended model, whose start states are estimated as those of the record are. Source:
-//! discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s). Cameron, Gelbach, Miller 2008, Rev.
-//! Econ. Stat. 90(3): clusters.
+//! discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s). Diebold, Mariano 1995, J. Bus. Econ.
+//! Stat. 13(3): paired differences.
 
 mod free_run;
 mod null_power;
@@ -29,7 +31,7 @@ mod traces;
 use crate::fit::LEAST;
 use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::page::Trace;
-use crate::report::{BeforeAfter, Gap, Verification};
+use crate::report::{BeforeAfter, Misfit, Verification};
 use crate::stats::mean_and_variance;
 use crate::windows::Windows;
 use null_power::NullPower;
@@ -39,7 +41,7 @@ use records::Channel;
 use std::collections::BTreeMap;
 
 /// Bounds of the noise level correction, as a factor on the power.
-pub(crate) const LEVELS: [f64; 2] = [0.75, 1.15];
+pub(crate) const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.75, 1.15];
 /// Significance of an improvement, in standard errors.
 const BETTER_ERRORS: f64 = 3.0;
 /// Largest ratio of a signal's rms after to before.
@@ -50,8 +52,8 @@ const EXCESS_SPREADS: f64 = 10.0;
 /// Result of a held-out record.
 #[derive(Clone, Debug)]
 pub(crate) struct Verified {
-    /// The gap of each signal, by its column.
-    pub(crate) gap: BTreeMap<String, Gap>,
+    /// The misfit of each signal, by its column.
+    pub(crate) misfit: BTreeMap<String, Misfit>,
     /// Everything else.
     pub(crate) verification: Verification,
     /// Series for the page.
@@ -82,21 +84,21 @@ pub(crate) fn verify(
         .map(|model| Power::new(&power::sums(&model.residual, outputs), &null.expected, outputs));
     let [power_before, power_after] = &models;
     let levels = levels(&power_before.smaller(power_after), &null);
-    let models = [power_before, power_after].map(|power| power.over(&levels));
+    let models = [power_before, power_after].map(|power| power.divided_by_levels(&levels));
     let [power_before, power_after] = &models;
 
     let names: Vec<String> = after.windows.outputs().iter().map(|(axis, at)| column(*axis, *at)).collect();
-    let mut gap = BTreeMap::new();
+    let mut misfit = BTreeMap::new();
     let mut whiteness = BTreeMap::new();
     let all_kept = kept(&power_after.joint());
     for (output, name) in names.iter().enumerate() {
         let (axis, at) = after.windows.outputs()[output];
         let noise = record.noise[axis][at] * levels[output].sqrt();
-        gap.insert(name.clone(), signal_gap(&models, output, noise, null.spreads[output]));
+        misfit.insert(name.clone(), signal_misfit(&models, output, noise, null.spreads[output]));
         let of = |model: &Model<'_>| power::neighbours(&model.residual, output, outputs, &all_kept);
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
-    let worse = gap.values().any(|gap| gap.after > WORSE * gap.before);
+    let worse = misfit.values().any(|misfit| misfit.after > WORSE * misfit.before);
     let verification = Verification {
         record: record.name.clone(),
         chi2_before: pooled(&power_before.joint(), &all_kept),
@@ -108,7 +110,7 @@ pub(crate) fn verify(
         confirmed: !worse && is_better(power_before, power_after),
     };
     let traces = traces::traces(&before, &after);
-    Verified { gap, verification, traces }
+    Verified { misfit, verification, traces }
 }
 
 /// A model in the windows of the record.
@@ -136,14 +138,14 @@ fn column(axis: usize, at: usize) -> String {
     Channel::Of(Axis::ALL[axis], SIGNALS[at]).column()
 }
 
-/// Gap of a output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
-fn signal_gap(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Gap {
+/// Misfit of an output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
+fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Misfit {
     let [before, after] = models.each_ref().map(|power| power.output(output));
     let kept = kept(&after);
     let [before_power, after_power] = [&before, &after].map(|squares| pooled(squares, &kept));
     let excess = before_power - 1.0;
     let is_resolved = excess > EXCESS_SPREADS * spread;
-    Gap {
+    Misfit {
         before: noise * before_power.sqrt(),
         after: noise * after_power.sqrt(),
         floor: noise,
@@ -151,14 +153,14 @@ fn signal_gap(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Ga
     }
 }
 
-/// Whether the mean log improvement exceeds [`BETTER_ERRORS`], clustered by windows.
+/// Whether the mean log improvement exceeds [`BETTER_ERRORS`] over independent windows.
 fn is_better(before: &Power, after: &Power) -> bool {
     let gains: Vec<f64> = before
         .joint()
         .iter()
         .zip(after.joint())
         .filter(|(before, _)| before.expected > 0.0)
-        .map(|(before, after)| after.expected * (before.over().max(LEAST) / after.over().max(LEAST)).ln())
+        .map(|(before, after)| after.expected * (before.ratio().max(LEAST) / after.ratio().max(LEAST)).ln())
         .collect();
     let count = gains.len() as f64;
     if count < 2.0 {

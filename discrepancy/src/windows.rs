@@ -1,4 +1,4 @@
-//! Multiple shooting: a record in windows of 400 ms, each simulated from a start state estimated from the record.
+//! Truncated simulation error: a record in windows of 400 ms, each simulated from a start state estimated from the record.
 //!
 //! ```text
 //!   e_k = M_k (y_k - f_k(start_k; rig)) / sigma          window k: readings y, simulation f, noise sigma
@@ -13,16 +13,17 @@
 //! reading that differs from its neighbours by more than noise is replaced by their median, in residuals and sensitivities alike
 //! [rig-model.md, Accuracy].
 //!
-//! Source: discrepancy-notes.md, 1 (naming over the length of windows: as good from 100 ms to 2 s), 6.
+//! Source: discrepancy-notes.md, 1 (the share of right names is the same from 100 ms to 2 s; longer windows show smaller slow
+//! effects, such as leaks), 6.
 
 mod reference_run;
 mod starts;
 mod whiten;
 
-use crate::gridded_record::{CHANNELS, GriddedRecord, Point};
+use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::sensor_inverse::SensorInverse;
 use plant::{Batch, Inputs, Plant, RigParameters};
-pub use reference_run::{Reach, ReferenceRun};
+pub use reference_run::{ReferenceRun, VariableRanges};
 use starts::START_PASSES;
 pub(crate) use starts::{first_state, set_state, state_at};
 use whiten::{SPIKE, jitter_sensitivity_of};
@@ -42,7 +43,7 @@ pub struct Windows<'a> {
     /// First period of each window.
     starts: Vec<usize>,
     /// Start state of each window, unjudged ones included.
-    points: Vec<[Point; 2]>,
+    points: Vec<[AxisState; 2]>,
     /// Axis and channel of each output.
     outputs: Vec<(usize, usize)>,
     /// Readings over their noise by window, period and output; 0 where there is none.
@@ -74,7 +75,7 @@ impl<'a> Windows<'a> {
         // The first window fills lags and memories and is not judged [rig-model.md: a record is judged after 0.1 s].
         let starts: Vec<usize> = (1..record.len() / WINDOW)
             .map(|window| window * WINDOW)
-            .filter(|start| !record.gaps[*start..start + WINDOW].contains(&true))
+            .filter(|start| !record.excluded_periods[*start..start + WINDOW].contains(&true))
             .collect();
         let mut readings = Vec::with_capacity(starts.len() * WINDOW * outputs.len());
         let mut valid = Vec::with_capacity(readings.capacity());

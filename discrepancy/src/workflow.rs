@@ -5,7 +5,7 @@
 //!                 └─ cannot be used: bad-data     alike ──► next             └─► verify: opens the held-out record, alone
 //! ```
 //!
-//! All but [`Report::gap`] and [`Report::verification`] is computed before the held-out record is opened.
+//! All but [`Report::misfit`] and [`Report::verification`] is computed before the held-out record is opened.
 
 mod findings;
 mod reported;
@@ -188,7 +188,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
                     reported.tables = found.terms;
                     reported.share_explained = Some(found.share_explained);
                     report.parameters = found.parameters;
-                    report.carried.clear();
+                    report.insignificant.clear();
                 }
                 Err(why_not) => reported.why_not = Some(why_not),
             }
@@ -245,7 +245,7 @@ fn held_out(
     }
     record.measured = judged_axes(&record, records[0].measured).map_err(unusable)?;
     let verified = verify(rig, after, &record, progress);
-    report.gap = verified.gap;
+    report.misfit = verified.misfit;
     report.verification = Some(verified.verification);
     Ok(Pictures { record: record.name.clone(), held_out: true, traces: verified.traces })
 }
@@ -275,9 +275,10 @@ fn is_copy(one: &Path, other: &Path) -> bool {
 /// [`ExtendError`] when it names what a rig cannot have.
 pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, ExtendError> {
     let additions: Vec<Addition> = reported.named.iter().map(addition).collect();
-    let changed = [&reported.parameters[..], &reported.carried].concat();
-    let weighed = weighed(reported.measured());
-    let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, weighed, &reported.inputs.train)?;
+    let changed = [&reported.parameters[..], &reported.insignificant].concat();
+    let mass_axis = mass_axis(reported.measured());
+    let text =
+        extend(&rig_file.text, &rig_file.file, &additions, &changed, mass_axis, &reported.inputs.train)?;
     let terms = reported.outside.as_ref().map_or(&[][..], |outside| &outside.tables);
     add_tables(&text, &rig_file.file, &tables(terms), &reported.inputs.train)
 }
@@ -347,7 +348,7 @@ pub(crate) fn on_shared_axes(records: &mut [GriddedRecord]) -> Result<(), Workfl
 }
 
 /// The axis of a mass in kg; for both axes the mass is a common factor.
-pub(crate) fn weighed(measured: [bool; 2]) -> Axis {
+pub(crate) fn mass_axis(measured: [bool; 2]) -> Axis {
     if measured == [false, true] { Axis::Load } else { Axis::Drive }
 }
 

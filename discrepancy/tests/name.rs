@@ -3,27 +3,27 @@
 use crate::record::{gridded, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
-use discrepancy::name::{Found, name};
+use discrepancy::name::{SelectionResult, name};
 use discrepancy::parameters::{COUNT, with_factors};
 use plant::RigParameters;
 
-fn found(hidden: &RigParameters, without: &[&str]) -> Found {
+fn found(hidden: &RigParameters, without: &[&str]) -> SelectionResult {
     found_beside(&RigParameters::baseline(), hidden, without)
 }
 
-fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> Found {
+fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> SelectionResult {
     let records = [gridded(hidden, &RigParameters::baseline())];
     let engine = Engine::new(&records, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
     name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())
 }
 
-fn names(found: &Found) -> Vec<String> {
+fn names(found: &SelectionResult) -> Vec<String> {
     found.model.placed.iter().map(|placed| placed.candidate.name()).collect()
 }
 
 /// Factors of the parameters with their errors.
-fn factors(found: &Found) -> Vec<(f64, f64)> {
+fn factors(found: &SelectionResult) -> Vec<(f64, f64)> {
     let errors = &found.model.errors[found.model.errors.len() - COUNT..];
     found.model.factors.iter().copied().zip(errors.iter().copied()).collect()
 }
@@ -71,12 +71,12 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
 }
 
 /// Amplitude from which on a candidate would have been named.
-fn limit(found: &Found, name: &str) -> f64 {
+fn limit(found: &SelectionResult, name: &str) -> f64 {
     let at = found.columns.candidates.iter().position(|known| known.name() == name).expect("a candidate");
     let candidate = &found.columns.candidates[at];
     let mut coordinates = candidate.origin();
     coordinates[0] = found.limits[at].expect("it is excited");
-    candidate.numbers(&coordinates)[0]
+    candidate.effect_parameters(&coordinates)[0]
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     let found = found(&hiding(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 4.0)])]), &[]);
     assert_eq!(names(&found), ["rod-leakage drive.b"]);
     let placed = &found.model.placed[0];
-    let leakage = placed.candidate.numbers(&placed.coordinates)[0];
+    let leakage = placed.candidate.effect_parameters(&placed.coordinates)[0];
     let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
     assert!((leakage - 4.0).abs() < 4.0 * error + 0.05, "{leakage} +- {error}");
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
@@ -111,7 +111,7 @@ fn an_effect_that_the_rig_file_has_is_named_where_it_is_off_and_only_there() {
         let found = found_beside(&rig, &leaking(truth), &[]);
         assert_eq!(names(&found), ["piston-leakage drive"], "{truth}");
         let placed = &found.reported.placed[0];
-        let reported = placed.candidate.numbers(&placed.coordinates)[0];
+        let reported = placed.candidate.effect_parameters(&placed.coordinates)[0];
         assert!((reported - truth).abs() < 0.3, "{reported}, in truth {truth}");
         assert_eq!(placed.candidate.baseline(0), Some(3.0));
     }

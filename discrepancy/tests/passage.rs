@@ -36,7 +36,7 @@ fn a_point_of_a_table_changes_nothing_in_windows_that_do_not_reach_it() {
         let after = AT.get(point + 1).copied().unwrap_or(f64::INFINITY);
         let differing = Cell::new(0);
         let sparse = windows.simulate_where(&rig(point, 1.0), &passage, |reach| {
-            let meets = reach.meets(Axis::Drive, Variable::Extension, [before, after]);
+            let meets = reach.overlaps(Axis::Drive, Variable::Extension, [before, after]);
             differing.set(differing.get() + usize::from(meets));
             meets
         });

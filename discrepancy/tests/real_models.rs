@@ -22,9 +22,9 @@ fn closed(model: &Path, train: &[PathBuf], tests: &[PathBuf]) -> Report {
 /// The residuals of a model file as it is, its terms fitted: training and held out.
 fn residuals(model: &Path, train: &[PathBuf], tests: &[PathBuf]) -> [f64; 2] {
     let report = closed(model, train, tests);
-    let gap = report.gap.values().next().expect("a record was held out");
+    let misfit = report.misfit.values().next().expect("a record was held out");
     let trained = report.summary.split("Residual of the training records ").nth(1).unwrap();
-    [trained.split(' ').next().unwrap().parse().unwrap(), gap.before]
+    [trained.split(' ').next().unwrap().parse().unwrap(), misfit.before]
 }
 
 /// A shipped model with a change, that searches for nothing.
@@ -88,17 +88,17 @@ fn emps_has_viscous_friction_that_differs_with_the_direction() {
         (-25.0..-15.0).contains(&asymmetry.value) && asymmetry.name == "asymmetry_percent",
         "{asymmetry:?}"
     );
-    let gap = &report.gap["drive_applied_force_N"];
-    assert!(gap.after <= 0.88 * gap.before, "{gap:?}");
+    let misfit = &report.misfit["drive_applied_force_N"];
+    assert!(misfit.after <= 0.88 * misfit.before, "{misfit:?}");
     assert!(report.verification.as_ref().unwrap().confirmed);
     // By the training record alone: the same list without the held-out one.
     let alone = closed(&model("emps.toml"), &train, &[]);
     for name in ["stribeck-friction", "position-dependent-force", "position-dependent-friction"] {
         let fates = alone.candidates.iter().filter(|candidate| candidate.effect == name);
         assert!(fates.clone().count() > 0);
-        assert!(fates.clone().all(|candidate| candidate.fate.starts_with("rejected: ")), "{name}");
+        assert!(fates.clone().all(|candidate| candidate.decision.starts_with("rejected: ")), "{name}");
     }
-    let ripple = alone.candidates.iter().filter(|candidate| candidate.fate.contains("pitch_mm 2.5000"));
+    let ripple = alone.candidates.iter().filter(|candidate| candidate.decision.contains("pitch_mm 2.5000"));
     assert!(ripple.clone().count() >= 2, "as a force, and as friction");
     let candidates = |report: &Report| serde_json::to_string(&report.candidates).unwrap();
     assert_eq!(candidates(&alone), candidates(&report));
@@ -108,8 +108,8 @@ fn emps_has_viscous_friction_that_differs_with_the_direction() {
     file.write_all(extended.as_bytes()).unwrap();
     let again = closed(file.path(), &train, &test);
     assert_eq!(again.verdict, Verdict::NothingMissing, "{extended}");
-    let before = again.gap["drive_applied_force_N"].before;
-    assert!((before - gap.after).abs() < 1e-6, "the term is in the model: {before}");
+    let before = again.misfit["drive_applied_force_N"].before;
+    assert!((before - misfit.after).abs() < 1e-6, "the term is in the model: {before}");
 }
 
 #[test]
@@ -123,9 +123,9 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
     assert_eq!((report.verdict, report.named.len()), (Verdict::Named, 1), "{:#?}", report.named);
     let friction = &report.named[0];
     assert_eq!(friction.effect, "pressure-dependent-friction");
-    let gap = &report.gap["drive_force_N"];
+    let misfit = &report.misfit["drive_force_N"];
     // 0.524 for the root; the straight line, which two levels of pressure cannot tell from it, has 0.603.
-    assert!(gap.after <= 0.60 * gap.before, "{gap:?}");
+    assert!(misfit.after <= 0.60 * misfit.before, "{misfit:?}");
     let linear = &friction.alternatives[0];
     assert_eq!(
         (linear.effect.as_str(), linear.parameters[0].name.as_str()),
@@ -148,16 +148,16 @@ fn an_x_ring_does_too_but_at_seven_bar_it_rubs_more_than_any_law_of_the_others_s
         return;
     };
     let train = cylinder(&folder, "X-ring257", [1, 5]);
-    let gap = |bar: u32| {
+    let misfit = |bar: u32| {
         let report = closed(
             &model("cylinder-friction.toml"),
             &train,
             &cylinder(&folder, "X-ring257", [bar, bar])[..1],
         );
         assert_eq!(report.named[0].effect, "pressure-dependent-friction");
-        report.gap["drive_force_N"].clone()
+        report.misfit["drive_force_N"].clone()
     };
-    let (three, seven) = (gap(3), gap(7));
+    let (three, seven) = (misfit(3), misfit(7));
     // At 3 bar both models are right to a newton; at 7 bar the term takes a third, and leaves thirteen times what it left in
     // training.
     assert!(three.before < 1.0 && three.after < 1.0, "{three:?}");

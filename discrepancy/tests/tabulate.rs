@@ -36,8 +36,8 @@ fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
         ("drive.force", "x")
     );
 
-    let closed: Vec<f64> = report.gap.values().filter_map(|gap| gap.closed).collect();
-    assert!(closed.len() >= 2 && closed.iter().all(|share| *share > 0.6), "{:?}", report.gap);
+    let closed: Vec<f64> = report.misfit.values().filter_map(|misfit| misfit.closed).collect();
+    assert!(closed.len() >= 2 && closed.iter().all(|share| *share > 0.6), "{:?}", report.misfit);
     assert!(report.verification.as_ref().expect("of a test").confirmed);
 
     // The rig file loads, has the table to the bit and says where it is from; the report alone gives the same file.

@@ -95,9 +95,9 @@ impl Acting {
             // The rig starts with both valves shut; of one that ran before nobody knows, until its commands would be stale.
             let known = self.first == 0 || self.accepted[axis] || cycle - self.first > STALE_AFTER_CYCLES;
             // Where a listener heard no command, the rig may have heard one.
-            let heard = self.fresh[axis] || self.logged_by == LoggedBy::Rig || intake.stale();
+            let command_known = self.fresh[axis] || self.logged_by == LoggedBy::Rig || intake.stale();
             let opening = if stopped { 0.0 } else { intake.opening() };
-            self.opening[axis] = (stopped || known && heard).then(|| plant::quantise_valve(opening));
+            self.opening[axis] = (stopped || known && command_known).then(|| plant::quantise_valve(opening));
         }
         self.opening
     }

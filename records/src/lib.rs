@@ -35,7 +35,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
     /// Treatment of unknown columns.
-    pub unknown: Unknown,
+    pub unknown: UnlistedColumns,
     /// The mapping file of a foreign CSV.
     pub mapping: Option<PathBuf>,
     /// Who wrote the log, if it is one.
@@ -44,7 +44,7 @@ pub struct ReadOptions {
 
 /// Treatment of columns and comments that rig-model.md does not list.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Unknown {
+pub enum UnlistedColumns {
     /// Left out, with a warning.
     #[default]
     Ignored,

@@ -6,11 +6,11 @@
 //! ```
 
 use super::table::{Layout, Table};
-use super::{Channel, Form, ReadError, Record, RigSetup, Signal, Unknown};
+use super::{Channel, Form, ReadError, Record, RigSetup, Signal, UnlistedColumns};
 use plant::{Axis, PERIOD_S};
 use std::path::Path;
 
-pub(super) fn read(file: &Path, unknown: Unknown) -> Result<Record, ReadError> {
+pub(super) fn read(file: &Path, unknown: UnlistedColumns) -> Result<Record, ReadError> {
     let table = Table::read(file, &Layout::default())?;
     let mut record = Record::new(file, Form::Measurement, RigSetup::default());
     record.nominal_period_s = Some(PERIOD_S);
@@ -31,14 +31,14 @@ pub(super) fn read(file: &Path, unknown: Unknown) -> Result<Record, ReadError> {
 }
 
 /// The first comment holds the set-up of the rig; others are ignored, and a blind record has none.
-fn read_comments(table: &Table, unknown: Unknown, record: &mut Record) -> Result<(), ReadError> {
+fn read_comments(table: &Table, unknown: UnlistedColumns, record: &mut Record) -> Result<(), ReadError> {
     for (place, (line, text)) in table.comments.iter().enumerate() {
         let words = text.trim_start_matches('#').split_whitespace();
         if place == 0 && *line == 1 && text.contains('=') {
             for word in words {
                 read_setup(table, *line, word, unknown, record)?;
             }
-        } else if unknown == Unknown::Refused {
+        } else if unknown == UnlistedColumns::Refused {
             let allowed = "one comment in the first line, # linked=true added_mass_kg=0";
             return Err(not_blind(table, *line, text, allowed));
         }
@@ -55,7 +55,7 @@ fn read_setup(
     table: &Table,
     line: u64,
     word: &str,
-    unknown: Unknown,
+    unknown: UnlistedColumns,
     record: &mut Record,
 ) -> Result<(), ReadError> {
     let (key, value) = word.split_once('=').unwrap_or((word, ""));
@@ -66,7 +66,7 @@ fn read_setup(
             let mass_kg = value.parse().ok().filter(|mass_kg: &f64| mass_kg.is_finite() && *mass_kg >= 0.0);
             record.setup.added_mass_kg = mass_kg.ok_or_else(|| refused("a number of kg, not below 0"))?;
         }
-        _ if unknown == Unknown::Refused => {
+        _ if unknown == UnlistedColumns::Refused => {
             return Err(not_blind(table, line, word, "linked, added_mass_kg"));
         }
         _ => record
@@ -78,7 +78,7 @@ fn read_setup(
 /// The channels of the table with their places.
 fn channels(
     table: &Table,
-    unknown: Unknown,
+    unknown: UnlistedColumns,
     record: &mut Record,
 ) -> Result<Vec<(Channel, usize)>, ReadError> {
     let mut places = Vec::new();
@@ -87,7 +87,7 @@ fn channels(
             record.add(channel);
             places.push((channel, place));
         } else if column != "time_s" {
-            if unknown == Unknown::Refused {
+            if unknown == UnlistedColumns::Refused {
                 return Err(not_blind(table, table.head_line, column, &allowed_columns()));
             }
             record.warn(table.head_line, format!("column {column} is ignored: no record has it"));
@@ -132,7 +132,7 @@ mod tests {
         (folder, path)
     }
 
-    fn refused(text: &str, unknown: Unknown) -> String {
+    fn refused(text: &str, unknown: UnlistedColumns) -> String {
         let (_folder, path) = written(text);
         read(&path, unknown).expect_err(text).to_string()
     }
@@ -141,7 +141,7 @@ mod tests {
     fn columns_come_in_any_order_and_the_load_may_be_missing() {
         let (_folder, path) =
             written(&format!("# linked=true added_mass_kg=7.5\n{DRIVE}0.001,1e5,0.5,0.1,-3,2e5\n"));
-        let record = read(&path, Unknown::Refused).unwrap();
+        let record = read(&path, UnlistedColumns::Refused).unwrap();
         assert_eq!(record.setup(), RigSetup { linked: true, added_mass_kg: 7.5 });
         assert_eq!(record.time_s(), [0.001]);
         assert_eq!(record.value(Channel::Of(Axis::Drive, Signal::PressureA), 0), Some(1e5));
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn an_empty_cell_is_no_value_and_a_missing_line_no_row() {
         let (_folder, path) = written(&format!("{DRIVE}0,1e5,0,0.1,,2e5\n0.003,1e5,0,,1,2e5\n"));
-        let record = read(&path, Unknown::Ignored).unwrap();
+        let record = read(&path, UnlistedColumns::Ignored).unwrap();
         assert_eq!((record.setup(), record.len()), (RigSetup::default(), 2));
         let force = record.channel(Channel::Of(Axis::Drive, Signal::Force)).unwrap();
         assert_eq!(force, [None, Some(1.0)]);
@@ -163,14 +163,18 @@ mod tests {
     fn unknown_columns_are_ignored_with_a_warning_and_refused_when_blind() {
         let text = "time_s,drive_position_m,truth\n0,0.1,5\n";
         let (_folder, path) = written(text);
-        let record = read(&path, Unknown::Ignored).unwrap();
+        let record = read(&path, UnlistedColumns::Ignored).unwrap();
         assert!(record.warnings()[0].text.contains("column truth is ignored"), "{:?}", record.warnings());
         assert!(
-            refused(text, Unknown::Refused)
+            refused(text, UnlistedColumns::Refused)
                 .contains("'truth' is refused in a blind record; allowed are time_s, drive_valve")
         );
-        assert!(refused("# seed=7\ntime_s,drive_valve\n0,0\n", Unknown::Refused).contains("'seed=7'"));
-        assert!(refused("time_s,drive_valve\n# hint\n0,0\n", Unknown::Refused).contains(":2: '# hint'"));
+        assert!(
+            refused("# seed=7\ntime_s,drive_valve\n0,0\n", UnlistedColumns::Refused).contains("'seed=7'")
+        );
+        assert!(
+            refused("time_s,drive_valve\n# hint\n0,0\n", UnlistedColumns::Refused).contains(":2: '# hint'")
+        );
     }
 
     #[test]
@@ -184,7 +188,11 @@ mod tests {
             ("# linked=maybe\ntime_s,drive_valve\n0,1\n", "linked = 'maybe'; allowed is true or false"),
             ("# added_mass_kg=-1\ntime_s,drive_valve\n0,1\n", "added_mass_kg = '-1'"),
         ] {
-            assert!(refused(text, Unknown::Ignored).contains(hint), "{}", refused(text, Unknown::Ignored));
+            assert!(
+                refused(text, UnlistedColumns::Ignored).contains(hint),
+                "{}",
+                refused(text, UnlistedColumns::Ignored)
+            );
         }
     }
 }

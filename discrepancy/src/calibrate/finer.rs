@@ -1,7 +1,7 @@
 //! Calibration of single rig file numbers: the dead volume and each point of the valve tables.
 //!
 //! ```text
-//!   number = the file's x factor of the parameter that scales it x its own factor       one Gauss-Newton fit of all factors
+//!   entry = the file's x factor of the parameter that scales it x its own factor       one Gauss-Newton fit of all factors
 //! ```
 //!
 //! A parameter is the common factor of all points of a table, so that points outside the records follow it. Naming does not use
@@ -9,7 +9,7 @@
 //!
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
-use super::{Calibrated, POINTS, UNRESOLVED};
+use super::{Calibrated, MAX_ITERATIONS, UNRESOLVED};
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
@@ -29,38 +29,38 @@ const KV_SCALE: &str = "parameter:kv-scale";
 /// Step fractions until the rig is valid.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 
-/// A number of a key: its place in the list.
+/// An entry of a key of the rig file: its index in the list.
 #[derive(Clone, Copy, Debug)]
-struct Number {
+struct TableEntry {
     key: &'static str,
-    place: usize,
+    index: usize,
     prior_std: f64,
 }
 
-/// Result for every number.
+/// Result for every entry.
 #[derive(Clone, Debug)]
 pub struct Finer {
-    /// Parameters, then numbers, for display.
+    /// Parameters, then entries, for display.
     pub quantities: Vec<Quantity>,
     /// The same for the rig file: points of tables multiplied by their common factor.
     pub changed: Vec<Quantity>,
 }
 
-/// Fits numbers and parameters jointly; `None` where no rig can have the result.
+/// Fits entries and parameters jointly; `None` where no rig can have the result.
 pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let rig = engine.rig();
     let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
-    let numbers = numbers(rig, &calibrated.fit.factors);
+    let entries = entries(rig, &calibrated.fit.factors);
     let mut precisions = parameter_precisions();
-    precisions.extend(numbers.iter().map(|number| number.prior_std.powi(-2)));
+    precisions.extend(entries.iter().map(|entry| entry.prior_std.powi(-2)));
     let all: Vec<usize> = (0..precisions.len()).collect();
 
     let mut factors: Vec<f64> = calibrated.fit.factors.to_vec();
     factors.resize(precisions.len(), 1.0);
     let mut best: Option<(Vec<f64>, Products, Fit)> = None;
-    for _ in 0..POINTS {
+    for _ in 0..MAX_ITERATIONS {
         // At the end of a range the last iterate stands.
-        let Some((tried, columns)) = with(rig, &numbers, &factors).zip(columns(engine, &numbers, &factors))
+        let Some((tried, columns)) = with(rig, &entries, &factors).zip(columns(engine, &entries, &factors))
         else {
             break;
         };
@@ -70,7 +70,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         let fit = products.fit_from(&all, &precisions, &off);
         let before = best.as_ref().map_or(f64::INFINITY, |(.., fit)| fit.loss);
         if fit.loss < before {
-            let next = moved(rig, &numbers, &factors, &fit.coefficients)?;
+            let next = moved(rig, &entries, &factors, &fit.coefficients)?;
             let at = std::mem::replace(&mut factors, next);
             best = Some((at, products, fit.clone()));
         }
@@ -80,14 +80,14 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     }
     let (at, products, fit) = best?;
     // Points of tables times their common factor.
-    let in_file = numbers
+    let in_file = entries
         .iter()
         .zip(COUNT..)
-        .map(|(number, at)| if rig.numbers(number.key).len() > 1 { vec![at, scale] } else { vec![at] });
+        .map(|(entry, at)| if rig.numbers(entry.key).len() > 1 { vec![at, scale] } else { vec![at] });
     let sums: Vec<Vec<usize>> = all.iter().map(|at| vec![*at]).chain(in_file).collect();
     let errors = products.jackknife_of_sums(&all, &fit, &precisions, &sums)?;
     let (factor_errors, file_errors) = errors.split_at(all.len());
-    let factors = moved(rig, &numbers, &at, &fit.coefficients)?;
+    let factors = moved(rig, &entries, &at, &fit.coefficients)?;
 
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
@@ -105,21 +105,21 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         .map(|(_, quantity)| quantity)
         .collect();
     changed.retain(|quantity| quantity.standard_error.is_some());
-    let is_resolved = |at: usize| factor_errors[COUNT + at] < UNRESOLVED * numbers[at].prior_std;
+    let is_resolved = |at: usize| factor_errors[COUNT + at] < UNRESOLVED * entries[at].prior_std;
     // All points of a table change together, so that it stays monotonic.
     let is_changed = |key: &str| {
-        let any = (0..numbers.len()).any(|at| numbers[at].key == key && is_resolved(at));
+        let any = (0..entries.len()).any(|at| entries[at].key == key && is_resolved(at));
         any || (rig.numbers(key).len() > 1 && quantities[scale].standard_error.is_some())
     };
-    let changes: Vec<bool> = numbers.iter().map(|number| is_changed(number.key)).collect();
-    for (at, number) in numbers.iter().enumerate() {
-        let list = rig.numbers(number.key);
-        let before = list[number.place];
-        let key = KEYS.iter().find(|key| key.path() == number.key)?;
+    let changes: Vec<bool> = entries.iter().map(|entry| is_changed(entry.key)).collect();
+    for (at, entry) in entries.iter().enumerate() {
+        let list = rig.numbers(entry.key);
+        let before = list[entry.index];
+        let key = KEYS.iter().find(|key| key.path() == entry.key)?;
         let of_table = list.len() > 1;
         let factor = factors[COUNT + at] * if of_table { factors[scale] } else { 1.0 };
         let quantity = Quantity {
-            name: if of_table { format!("{}[{}]", number.key, number.place) } else { number.key.to_owned() },
+            name: if of_table { format!("{}[{}]", entry.key, entry.index) } else { entry.key.to_owned() },
             value: before * factor,
             unit: key.unit.name().to_owned(),
             standard_error: is_resolved(at).then_some(before * file_errors[at]),
@@ -133,24 +133,28 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     Some(Finer { quantities, changed })
 }
 
-/// Numbers that are not 0 and can change either way. Points without flow belong to the dead zone; equal points of a table cannot
+/// Entries that are not 0 and can change either way. Points without flow belong to the dead zone; equal points of a table cannot
 /// move alone.
-fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
-    let has_neighbours = |number: &Number| {
+fn entries(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<TableEntry> {
+    let has_neighbours = |entry: &TableEntry| {
         [FACTOR_CHANGE, -FACTOR_CHANGE].iter().all(|change| {
             let factors: Vec<f64> = parameters.iter().copied().chain([1.0 + change]).collect();
-            with(rig, std::slice::from_ref(number), &factors).is_some()
+            with(rig, std::slice::from_ref(entry), &factors).is_some()
         })
     };
     let of_key = |(key, prior_std): (&'static str, f64)| {
         let list = rig.numbers(key);
-        (0..list.len()).filter(|place| list[*place] > 0.0).map(move |place| Number { key, place, prior_std })
+        (0..list.len()).filter(|index| list[*index] > 0.0).map(move |index| TableEntry {
+            key,
+            index,
+            prior_std,
+        })
     };
     FINER.into_iter().flat_map(of_key).filter(has_neighbours).collect()
 }
 
 /// The rig with all factors; `None` where one leaves its range or a table is not monotonic.
-fn with(rig: &RigParameters, numbers: &[Number], factors: &[f64]) -> Option<RigParameters> {
+fn with(rig: &RigParameters, entries: &[TableEntry], factors: &[f64]) -> Option<RigParameters> {
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
     let rig = with_factors(rig, &parameter_factors);
@@ -158,10 +162,10 @@ fn with(rig: &RigParameters, numbers: &[Number], factors: &[f64]) -> Option<RigP
         .iter()
         .map(|(key, _)| {
             let mut list = rig.numbers(key).to_vec();
-            for (number, factor) in
-                numbers.iter().zip(&factors[COUNT..]).filter(|(number, _)| number.key == *key)
+            for (entry, factor) in
+                entries.iter().zip(&factors[COUNT..]).filter(|(entry, _)| entry.key == *key)
             {
-                list[number.place] *= factor;
+                list[entry.index] *= factor;
             }
             (*key, list)
         })
@@ -170,23 +174,23 @@ fn with(rig: &RigParameters, numbers: &[Number], factors: &[f64]) -> Option<RigP
 }
 
 /// The factors after the largest valid fraction of a step.
-fn moved(rig: &RigParameters, numbers: &[Number], factors: &[f64], step: &[f64]) -> Option<Vec<f64>> {
+fn moved(rig: &RigParameters, entries: &[TableEntry], factors: &[f64], step: &[f64]) -> Option<Vec<f64>> {
     SHARES.iter().find_map(|share| {
         let moved: Vec<f64> = factors
             .iter()
             .zip(step)
             .map(|(factor, step)| (factor + share * step).clamp(1.0 - 2.0 * MOST_OFF, 1.0 + 2.0 * MOST_OFF))
             .collect();
-        with(rig, numbers, &moved).map(|_| moved)
+        with(rig, entries, &moved).map(|_| moved)
     })
 }
 
-fn columns(engine: &Engine<'_>, numbers: &[Number], factors: &[f64]) -> Option<Vec<Vec<f64>>> {
+fn columns(engine: &Engine<'_>, entries: &[TableEntry], factors: &[f64]) -> Option<Vec<Vec<f64>>> {
     let perturbed = |change: f64| {
         (0..factors.len()).map(move |at| {
             let mut factors = factors.to_vec();
             factors[at] += change;
-            with(engine.rig(), numbers, &factors)
+            with(engine.rig(), entries, &factors)
         })
     };
     let rigs = perturbed(FACTOR_CHANGE).chain(perturbed(-FACTOR_CHANGE)).collect::<Option<Vec<_>>>()?;

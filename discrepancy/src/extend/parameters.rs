@@ -26,10 +26,10 @@ pub(crate) fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static st
 /// The keys of a changed parameter, and the factor on them.
 ///
 /// Without a unit the value is the factor, on both axes; with the file's unit it is the new number of the first key, a mass that
-/// of the axis that was `weighed`.
+/// of the axis that was `mass_axis`.
 fn scaling(
     quantity: &Quantity,
-    weighed: Axis,
+    mass_axis: Axis,
     number_of: impl Fn(&str) -> Option<f64>,
 ) -> Result<(Vec<&'static str>, Option<f64>), ExtendError> {
     let unknown = || ExtendError::UnknownParameter { name: quantity.name.clone(), known: names().join(", ") };
@@ -46,7 +46,7 @@ fn scaling(
         }
         return Ok((keys, Some(quantity.value)));
     }
-    let keys = key_of_parameter(&quantity.name, weighed).ok_or_else(unknown)?;
+    let keys = key_of_parameter(&quantity.name, mass_axis).ok_or_else(unknown)?;
     let key = KEYS.iter().find(|key| key.path() == keys[0]).filter(|key| key.count == 1);
     let wanted = key.map_or("", |key| key.unit.name());
     if quantity.unit != wanted {
@@ -74,7 +74,7 @@ fn number_of_file(name: &str) -> Option<(&str, usize)> {
 pub(super) fn change(
     text: &str,
     changed: &[Quantity],
-    weighed: Axis,
+    mass_axis: Axis,
     from: &str,
     layout: &dyn Fn(&str, String) -> ExtendError,
 ) -> Result<String, ExtendError> {
@@ -111,7 +111,7 @@ pub(super) fn change(
             edits.replace(span.clone(), written(quantity.value));
             continue;
         }
-        let (keys, factor) = scaling(quantity, weighed, number_of)?;
+        let (keys, factor) = scaling(quantity, mass_axis, number_of)?;
         for (at, path) in keys.into_iter().enumerate() {
             if done.iter().any(|key| key.split('[').next() == Some(path)) {
                 return Err(ExtendError::Twice { what: path.to_owned() });

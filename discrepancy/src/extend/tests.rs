@@ -137,8 +137,8 @@ fn a_mass_is_that_of_the_axis_that_was_weighed() {
     // As heavy as the drive: no number says which of them it is.
     let text = RigParameters::BASELINE_TOML.replace("load_kg = 1.5", "load_kg = 5.0");
     let changed = [quantity("parameter:mass", 5.2, "kg", Some(5.0))];
-    for (weighed, masses_kg) in [(Axis::Load, (5.2, 5.0)), (Axis::Drive, (5.0, 5.2))] {
-        let text = extend(&text, "rig.toml", &[], &changed, weighed, &records()).unwrap();
+    for (mass_axis, masses_kg) in [(Axis::Load, (5.2, 5.0)), (Axis::Drive, (5.0, 5.2))] {
+        let text = extend(&text, "rig.toml", &[], &changed, mass_axis, &records()).unwrap();
         let rig = RigParameters::from_toml(&text, "rig.toml").unwrap();
         assert_eq!((rig.mass().load_kg, rig.mass().drive_kg), masses_kg);
     }

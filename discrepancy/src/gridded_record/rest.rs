@@ -4,7 +4,7 @@
 //! Rest is slow for a while; creep is slow and steady in one direction for longer. Where neither is certain, the alternative rate
 //! is kept, and the simulation decides by the residual.
 
-use super::{POSITION_REACH, Parabola};
+use super::{POSITION_HALF_WIDTH, Parabola};
 use crate::stats::mean;
 use plant::PERIOD_S;
 
@@ -34,14 +34,14 @@ pub(super) struct Rate {
     pub(super) position_m: f64,
     pub(super) rate_m_per_s: f64,
     /// An indistinguishable rate.
-    pub(super) or_else_m_per_s: Option<f64>,
+    pub(super) alternative_velocity_m_per_s: Option<f64>,
 }
 
 impl<'a> Still<'a> {
     /// `noise_m` is the effective noise of means, larger than that of readings where noise is autocorrelated.
     pub(super) fn new(parabolas: &'a [Option<Parabola>], positions: &'a [Option<f64>], noise_m: f64) -> Self {
         // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
-        let n = POSITION_REACH as f64;
+        let n = POSITION_HALF_WIDTH as f64;
         let slope_error = noise_m * (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt();
         let slow = |parabola: &Parabola| parabola.slope.abs() < SLOW_ERRORS * slope_error;
         let slow: Vec<bool> = parabolas.iter().map(|parabola| parabola.as_ref().is_some_and(slow)).collect();
@@ -58,8 +58,8 @@ impl<'a> Still<'a> {
     /// Position and rate; `None` without a parabola.
     pub(super) fn rate(&self, place: usize) -> Option<Rate> {
         let Parabola { value, slope } = self.parabolas[place]?;
-        let rate_of = |position_m: f64, rate_m_per_s: f64, or_else_m_per_s: Option<f64>| {
-            Some(Rate { position_m, rate_m_per_s, or_else_m_per_s })
+        let rate_of = |position_m: f64, rate_m_per_s: f64, alternative_velocity_m_per_s: Option<f64>| {
+            Some(Rate { position_m, rate_m_per_s, alternative_velocity_m_per_s })
         };
         let Some(rest_m) = self.rests[place] else {
             return rate_of(value, slope / PERIOD_S, self.slow[place].then_some(0.0));
@@ -129,34 +129,37 @@ mod tests {
         let scatter = |at: f64| 28e-6 * (0.9 * at).sin();
         let positions: Vec<_> =
             (0..600).map(f64::from).map(|at| Some(way(at - 300.0) + scatter(at))).collect();
-        let parabolas = parabolas(&positions, POSITION_REACH);
+        let parabolas = parabolas(&positions, POSITION_HALF_WIDTH);
         Still::new(&parabolas, &positions, 20e-6).rate(300).unwrap()
     }
 
     #[test]
     fn what_goes_evenly_one_way_creeps_and_may_yet_rest() {
         let rate = rate_of(&|t| 1e-6 * t);
-        assert!((rate.rate_m_per_s - 1e-3).abs() < 1e-4 && rate.or_else_m_per_s == Some(0.0), "{rate:?}");
+        assert!(
+            (rate.rate_m_per_s - 1e-3).abs() < 1e-4 && rate.alternative_velocity_m_per_s == Some(0.0),
+            "{rate:?}"
+        );
     }
 
     #[test]
     fn what_stands_rests_for_sure() {
         let rate = rate_of(&|_| 0.2);
-        assert_eq!((rate.rate_m_per_s, rate.or_else_m_per_s), (0.0, None));
+        assert_eq!((rate.rate_m_per_s, rate.alternative_velocity_m_per_s), (0.0, None));
         let moves = rate_of(&|t| 1e-4 * ((t - 60.0).max(0.0) + (t + 60.0).min(0.0)));
-        assert_eq!((moves.rate_m_per_s, moves.or_else_m_per_s), (0.0, None));
+        assert_eq!((moves.rate_m_per_s, moves.alternative_velocity_m_per_s), (0.0, None));
     }
 
     #[test]
     fn what_seems_at_rest_but_is_soon_under_way_may_creep() {
         let rate = rate_of(&|t| 1e-7 * (t - 15.0).max(0.0).powi(2));
         assert_eq!(rate.rate_m_per_s, 0.0);
-        assert!(rate.or_else_m_per_s.unwrap() > 2e-4, "{rate:?}");
+        assert!(rate.alternative_velocity_m_per_s.unwrap() > 2e-4, "{rate:?}");
     }
 
     #[test]
     fn what_is_slow_beside_a_motion_may_rest() {
         let rate = rate_of(&|t| 3e-5 * (t - 8.0).max(0.0));
-        assert!(rate.rate_m_per_s.abs() < 5e-3 && rate.or_else_m_per_s == Some(0.0), "{rate:?}");
+        assert!(rate.rate_m_per_s.abs() < 5e-3 && rate.alternative_velocity_m_per_s == Some(0.0), "{rate:?}");
     }
 }

@@ -4,7 +4,7 @@
 //!   |......|lead|judged judged judged judged judged|............|lead|judged ...
 //! ```
 //!
-//! The first window of a block only fills lags and memories and counts as a gap ([`GriddedRecord::gaps`]).
+//! The first window of a block only fills lags and memories and counts as a gap ([`GriddedRecord::excluded_periods`]).
 
 use super::GriddedRecord;
 use crate::windows::WINDOW;
@@ -34,7 +34,7 @@ impl GriddedRecord {
             inputs: Vec::new(),
             samples: Vec::new(),
             points: Vec::new(),
-            gaps: Vec::new(),
+            excluded_periods: Vec::new(),
             ..self.clone()
         };
         for chosen in 0..wanted {
@@ -44,9 +44,9 @@ impl GriddedRecord {
             part.inputs.extend_from_slice(&self.inputs[places.clone()]);
             part.samples.extend_from_slice(&self.samples[places.clone()]);
             part.points.extend_from_slice(&self.points[places.clone()]);
-            part.gaps.extend_from_slice(&self.gaps[places]);
-            let began = part.gaps.len() - BLOCK * WINDOW;
-            part.gaps[began..began + WINDOW].fill(true);
+            part.excluded_periods.extend_from_slice(&self.excluded_periods[places]);
+            let began = part.excluded_periods.len() - BLOCK * WINDOW;
+            part.excluded_periods[began..began + WINDOW].fill(true);
         }
         Some(part)
     }
@@ -63,8 +63,8 @@ mod tests {
             measured: [true, true],
             inputs: (0..periods).map(inputs).collect(),
             samples: vec![[[None; super::super::CHANNELS]; 2]; periods],
-            points: vec![[super::super::Point::default(); 2]; periods],
-            gaps: vec![false; periods],
+            points: vec![[super::super::AxisState::default(); 2]; periods],
+            excluded_periods: vec![false; periods],
             ..GriddedRecord::default()
         }
     }
@@ -78,9 +78,10 @@ mod tests {
         let began: Vec<f64> =
             part.inputs.iter().step_by(BLOCK * WINDOW).map(|inputs| inputs.valve[0]).collect();
         assert_eq!(began, [4800.0, 16_800.0, 28_800.0, 40_800.0]);
-        let lead_in = part.gaps.iter().filter(|gap| **gap).count();
+        let lead_in = part.excluded_periods.iter().filter(|gap| **gap).count();
         assert_eq!(lead_in, 4 * WINDOW);
-        assert!((0..4).all(|block| part.gaps[block * BLOCK * WINDOW] && !part.gaps[block * BLOCK * WINDOW + WINDOW]));
+        assert!((0..4).all(|block| part.excluded_periods[block * BLOCK * WINDOW]
+            && !part.excluded_periods[block * BLOCK * WINDOW + WINDOW]));
     }
 
     #[test]

@@ -19,7 +19,7 @@
 //!
 //! Source: discrepancy-notes.md, 2; Kay 1993, Fundamentals of Statistical Signal Processing I, 4.5 and 11.5.
 
-use super::noise_colour::colours;
+use super::noise_colour::ar1_coefficients;
 use super::regime::Regimes;
 use super::simulated::{Nudge, Pass, Readings};
 use super::{NORMAL_LITRES_PER_MINUTE, UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
@@ -27,9 +27,9 @@ use crate::gridded_record::{CHANNELS, GriddedRecord};
 use nalgebra::{SMatrix, SVector};
 use plant::{Axis, PERIOD_S, RigParameters};
 
-/// Numbers of a window and axis.
-const NUMBERS: usize = 9;
-/// Places among them.
+/// Parameters of a window and axis: start state and unknown inputs.
+const THETA_LEN: usize = 9;
+/// Indices among them.
 const FORCE: usize = 4;
 const FLOW_A: usize = 6;
 const FLOW_B: usize = 7;
@@ -40,7 +40,7 @@ const OPPOSITE: usize = OFFSET + 1;
 const NUDGES: [f64; OFFSET] = [1e-5, 5e-4, 200.0, 200.0, 1.0, 1.0, 3e-5, 3e-5];
 /// Standard deviations of the weak priors, in the same units. A guess: some ten times the errors of points and the size of
 /// effects.
-const PRIORS: [f64; NUMBERS] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 100.0];
+const PRIORS: [f64; THETA_LEN] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 100.0];
 /// Prior of the force sensor's offset in the solution without one, N.
 const NO_OFFSET_N: f64 = 1e-3;
 /// Ratio of posterior to prior above which an input is not observable.
@@ -52,8 +52,8 @@ const FILLING: usize = 5;
 /// Threshold of significant offsets of the force sensor.
 const OFFSET_OVER_NOISE: f64 = 1.15;
 
-type Normal = SMatrix<f64, NUMBERS, NUMBERS>;
-type Theta = SVector<f64, NUMBERS>;
+type Normal = SMatrix<f64, THETA_LEN, THETA_LEN>;
+type Theta = SVector<f64, THETA_LEN>;
 
 /// Collected unknown inputs of all balances.
 #[derive(Debug, Default)]
@@ -108,30 +108,42 @@ struct Solution {
 pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &mut Unknowns) {
     let Some(mut pass) = Pass::new(rig, gridded) else { return };
     let axes: Vec<usize> = (0..2).filter(|axis| gridded.measured[*axis]).collect();
-    let colours =
-        [0, 1].map(|axis| if gridded.measured[axis] { colours(gridded, axis) } else { [0.0; CHANNELS] });
+    let ar1_coefficients = [0, 1]
+        .map(|axis| if gridded.measured[axis] { ar1_coefficients(gridded, axis) } else { [0.0; CHANNELS] });
     let nudges = nudges();
     let mut solved: [Vec<Solved>; 2] = [Vec::new(), Vec::new()];
     let mut filled = 0;
     // The last window needs one more period.
     for window in 0..(gridded.len() - 1) / WINDOW {
         let from = window * WINDOW;
-        let whole = !gridded.gaps[from..=from + WINDOW].iter().any(|gap| *gap);
+        let whole = !gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap);
         filled = if whole { filled + 1 } else { 0 };
         if filled > FILLING
-            && let Some(looks) = pass.look(from, &nudges)
+            && let Some(perturbed_outputs) = pass.simulate_window(from, &nudges)
         {
             for axis in &axes {
-                let seen = Seen { gridded, axis: *axis, from, colours: &colours[*axis], looks: &looks };
-                solved[*axis].extend(seen.solve());
+                let window = LinearisedWindow {
+                    gridded,
+                    axis: *axis,
+                    from,
+                    ar1_coefficients: &ar1_coefficients[*axis],
+                    perturbed_outputs: &perturbed_outputs,
+                };
+                solved[*axis].extend(window.solve());
             }
         }
-        pass.go_on(from, WINDOW);
+        pass.advance(from, WINDOW);
     }
     for axis in axes {
         gather(rig, gridded, axis, &solved[axis], &mut unknowns.axes[axis]);
     }
-    linkage::gather(rig, gridded, pass.contact_n(), [colours[0][0], colours[1][0]], &mut unknowns.linkage);
+    linkage::gather(
+        rig,
+        gridded,
+        pass.contact_n(),
+        [ar1_coefficients[0][0], ar1_coefficients[1][0]],
+        &mut unknowns.linkage,
+    );
 }
 
 /// The baseline, a nudge of each number but the last, and the force's nudge the other way.
@@ -151,15 +163,15 @@ fn nudges() -> Vec<Nudge> {
 }
 
 /// A window of an axis with its nudged simulations.
-struct Seen<'a> {
+struct LinearisedWindow<'a> {
     gridded: &'a GriddedRecord,
     axis: usize,
     from: usize,
-    colours: &'a [f64; CHANNELS],
-    looks: &'a [Readings],
+    ar1_coefficients: &'a [f64; CHANNELS],
+    perturbed_outputs: &'a [Readings],
 }
 
-impl Seen<'_> {
+impl LinearisedWindow<'_> {
     /// Solves the window; `None` when it has too few samples.
     fn solve(&self) -> Option<Solved> {
         let mut normal = Normal::zeros();
@@ -167,7 +179,7 @@ impl Seen<'_> {
         let mut pressure = [Theta::zeros(), Theta::zeros()];
         let (mut squares, mut used) = (0.0, 0);
         for channel in (0..CHANNELS).filter(|channel| *channel != 1 || !self.force_is_input()) {
-            let phi = self.colours[channel];
+            let phi = self.ar1_coefficients[channel];
             let white = (1.0 - phi * phi).sqrt();
             let mut before: Option<(Theta, f64)> = None;
             for at in 0..WINDOW {
@@ -195,9 +207,9 @@ impl Seen<'_> {
             return None;
         }
         normal.fill_upper_triangle_with_lower_triangle();
-        let equations = Equations { normal, right, squares, dof: (used - NUMBERS) as f64, pressure };
+        let equations = Equations { normal, right, squares, dof: (used - THETA_LEN) as f64, pressure };
         let bound = equations.solve(NO_OFFSET_N)?;
-        let forces_n = self.looks[0][self.axis].iter().map(|reading| reading[1]);
+        let forces_n = self.perturbed_outputs[0][self.axis].iter().map(|reading| reading[1]);
         let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
         Some(Solved {
             from: self.from,
@@ -213,13 +225,14 @@ impl Seen<'_> {
         let sample = self.gridded.samples[self.from + at][self.axis][channel]?;
         let rests = self.gridded.points[self.from][self.axis].rod_velocity_m_per_s == 0.0;
         let weight = 1.0 / self.noise(channel);
-        let baseline = self.looks[0][self.axis][at][channel];
+        let baseline = self.perturbed_outputs[0][self.axis][at][channel];
         let mut row = Theta::zeros();
         for number in 0..OFFSET {
             // A speed known to be 0 is not estimated.
             if number != 1 || !rests {
-                row[number] =
-                    (self.looks[number + 1][self.axis][at][channel] - baseline) / NUDGES[number] * weight;
+                row[number] = (self.perturbed_outputs[number + 1][self.axis][at][channel] - baseline)
+                    / NUDGES[number]
+                    * weight;
             }
         }
         if channel == 1 {
@@ -233,7 +246,8 @@ impl Seen<'_> {
         let (mut sum, mut difference) = (0.0, 0.0);
         for at in 0..WINDOW {
             for channel in 0..CHANNELS {
-                let of = |look: usize| self.looks[look][self.axis][at][channel] / self.noise(channel);
+                let of =
+                    |run: usize| self.perturbed_outputs[run][self.axis][at][channel] / self.noise(channel);
                 let (plus, minus) = (of(1 + FORCE) - of(0), of(OPPOSITE) - of(0));
                 sum += (plus + minus).powi(2);
                 difference += (plus - minus).powi(2);
@@ -271,9 +285,9 @@ impl Equations {
         let left = self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
         let birge = (left / self.dof).max(1.0).sqrt();
         let mut deviation = Theta::zeros();
-        for number in 0..NUMBERS {
+        for number in 0..THETA_LEN {
             // Under the null, unknown inputs are 0 and start values vary within their priors.
-            let unknown: f64 = (FORCE..NUMBERS).map(|at| (p[(number, at)] / prior(at)).powi(2)).sum();
+            let unknown: f64 = (FORCE..THETA_LEN).map(|at| (p[(number, at)] / prior(at)).powi(2)).sum();
             deviation[number] = (p[(number, number)] - unknown).max(0.0).sqrt() * birge;
         }
         Some(Solution {

@@ -10,7 +10,7 @@
 //! Source: rig-model.md, Masses and linkage.
 
 use super::estimate::variables;
-use super::noise_colour::widens;
+use super::noise_colour::ar1_se_factor;
 use super::regime::Regimes;
 use super::{UnknownPoint, VARIABLES, WINDOW};
 use crate::gridded_record::GriddedRecord;
@@ -24,7 +24,7 @@ pub(super) fn gather(
     rig: &RigParameters,
     gridded: &GriddedRecord,
     contact_n: &[f64],
-    position_colours: [f64; 2],
+    position_ar1_coefficients: [f64; 2],
     points: &mut Vec<UnknownPoint>,
 ) {
     if !gridded.linked || gridded.measured != [true, true] {
@@ -37,7 +37,7 @@ pub(super) fn gather(
         let forces = &contact_n[from..from + WINDOW];
         let side = forces[0].signum();
         let touching = forces.iter().all(|force| force * side > least_n);
-        if !touching || gridded.gaps[from..=from + WINDOW].iter().any(|gap| *gap) {
+        if !touching || gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap) {
             continue;
         }
         let mut sum_n = 0.0;
@@ -55,7 +55,8 @@ pub(super) fn gather(
             continue;
         }
         let parted_m_per_s = slope(&ends_m) / PERIOD_S;
-        let [drive_m, load_m] = [0, 1].map(|axis| gridded.noise[axis][0] * widens(position_colours[axis]));
+        let [drive_m, load_m] =
+            [0, 1].map(|axis| gridded.noise[axis][0] * ar1_se_factor(position_ar1_coefficients[axis]));
         let noise_m = drive_m.hypot(load_m);
         let n = count;
         // The damping takes the slope of the same distances; both are independent about the middle of a window.

@@ -21,15 +21,15 @@ const JOLT: f64 = 3.0;
 /// Difference of phi that a second of readings does not resolve.
 const ALIKE: f64 = 0.2;
 /// Upper bound of phi.
-const MOST: f64 = 0.95;
+const MAX_PHI: f64 = 0.95;
 
 /// phi of each channel of an axis.
-pub(super) fn colours(record: &GriddedRecord, axis: usize) -> [f64; CHANNELS] {
+pub(super) fn ar1_coefficients(record: &GriddedRecord, axis: usize) -> [f64; CHANNELS] {
     let mut windows: [Vec<[f64; 2]>; CHANNELS] = Default::default();
     for from in (0..record.len().saturating_sub(WINDOW)).step_by(WINDOW) {
         let command = |at: usize| record.inputs[at].valve[axis];
         let since = from.saturating_sub(2 * WINDOW);
-        if !(since..from + WINDOW).all(|at| !record.gaps[at] && command(at) == command(since)) {
+        if !(since..from + WINDOW).all(|at| !record.excluded_periods[at] && command(at) == command(since)) {
             continue;
         }
         for (channel, windows) in windows.iter_mut().enumerate() {
@@ -41,14 +41,18 @@ pub(super) fn colours(record: &GriddedRecord, axis: usize) -> [f64; CHANNELS] {
             );
         }
     }
-    let colours = windows.map(colour);
-    let mean = colours.iter().sum::<f64>() / CHANNELS as f64;
+    let ar1_coefficients = windows.map(ar1_coefficient);
+    let mean = ar1_coefficients.iter().sum::<f64>() / CHANNELS as f64;
     // One filter before one converter: channels without a significant difference share their mean.
-    if colours.iter().all(|phi| (phi - mean).abs() < ALIKE) { [mean; CHANNELS] } else { colours }
+    if ar1_coefficients.iter().all(|phi| (phi - mean).abs() < ALIKE) {
+        [mean; CHANNELS]
+    } else {
+        ar1_coefficients
+    }
 }
 
 /// phi from the variances of first and second differences.
-fn colour(mut windows: Vec<[f64; 2]>) -> f64 {
+fn ar1_coefficient(mut windows: Vec<[f64; 2]>) -> f64 {
     if windows.len() < LEAST {
         return 0.0;
     }
@@ -58,7 +62,7 @@ fn colour(mut windows: Vec<[f64; 2]>) -> f64 {
     let calm = windows.iter().filter(|window| window[0] <= most);
     let [first, second] = calm.fold([0.0; 2], |sum, window| [sum[0] + window[0], sum[1] + window[1]]);
     let phi = if first > 0.0 { 3.0 - second / first } else { 0.0 };
-    if phi < WHITE { 0.0 } else { phi.min(MOST) }
+    if phi < WHITE { 0.0 } else { phi.min(MAX_PHI) }
 }
 
 fn variance(values: Vec<f64>) -> f64 {
@@ -68,6 +72,6 @@ fn variance(values: Vec<f64>) -> f64 {
 }
 
 /// Factor of AR(1) noise on the standard error of a mean.
-pub(super) fn widens(phi: f64) -> f64 {
+pub(super) fn ar1_se_factor(phi: f64) -> f64 {
     ((1.0 + phi) / (1.0 - phi)).sqrt()
 }

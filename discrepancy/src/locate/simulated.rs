@@ -55,7 +55,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Readings of the window at a period with each nudge; `None` for a state that the rig cannot have.
-    pub(super) fn look(&self, from: usize, nudges: &[Nudge]) -> Option<Vec<Readings>> {
+    pub(super) fn simulate_window(&self, from: usize, nudges: &[Nudge]) -> Option<Vec<Readings>> {
         nudges.iter().map(|nudge| self.run(from, nudge)).collect()
     }
 
@@ -101,8 +101,8 @@ impl<'a> Pass<'a> {
     }
 
     /// Advances to the next window from the state of the record.
-    pub(super) fn go_on(&mut self, from: usize, periods: usize) {
-        if !self.record.gaps[from] {
+    pub(super) fn advance(&mut self, from: usize, periods: usize) {
+        if !self.record.excluded_periods[from] {
             let start = state_at(&self.plant, &self.record.points[from], self.record.measured);
             // Impossible points come from a broken record; the plant then continues from its state.
             let _ = self.plant.go_on_in(&start);

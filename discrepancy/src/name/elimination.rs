@@ -1,22 +1,25 @@
 //! Backward elimination of effects, swaps between rounds, and alternatives.
 
 use super::null_distribution::NullDistribution;
-use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, relinearise};
+use super::{Alternative, EFFECT_PARAMETER_PENALTY, STEPS, THRESHOLD_FACTOR_SINGLE, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
-use crate::refit::{Placed, Refit, linearise, refit_steps};
+use crate::refit::{EffectEstimate, Refit, linearise, refit_steps};
 use crate::screen::Columns;
 use rayon::prelude::*;
 
 /// Runners-up of an earlier round that are tried again after another effect joined.
 const SWAPPED: usize = 3;
-/// Fits are indistinguishable when their losses differ by less than this times the design effect. Noise alone makes the wrong
-/// one of two better by more in one record of 700 at most.
-const ALIKE: f64 = 9.0;
+/// Fits are indistinguishable when their objectives differ by less than this times the design effect. Noise alone makes the wrong
+/// one of two better by more in one record of 700 at most, if both have the same number of effect parameters; each further
+/// parameter shifts the difference by [`EFFECT_PARAMETER_PENALTY`].
+const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;
 /// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
-const ALIKE_SHARE: f64 = 0.02;
+const INDISTINGUISHABLE_LOSS_SHARE: f64 = 0.02;
 /// Multiple of the null threshold required of every further effect, since no model is exact.
-const SAFETY_BESIDE: f64 = 3.0;
+const THRESHOLD_FACTOR_SEVERAL: f64 = 3.0;
+/// Share of the loss reduction of all effects together below which an effect is eliminated, whatever the threshold.
+const MIN_SHARE_OF_REDUCTION: f64 = 0.002;
 
 /// Swaps the winner of an earlier round for one of its runners-up where that lowers the loss beside the effects that joined
 /// since.
@@ -41,7 +44,7 @@ pub(super) fn swap(
     let best = tried
         .par_iter()
         .filter_map(|(at, rank, placed)| {
-            Some((*at, *rank, refit_steps(engine, &point, placed, NUMBER_COSTS, STEPS)?))
+            Some((*at, *rank, refit_steps(engine, &point, placed, EFFECT_PARAMETER_PENALTY, STEPS)?))
         })
         .collect::<Vec<_>>()
         .into_iter()
@@ -59,11 +62,12 @@ pub(super) fn swap(
 
 /// Largest difference in loss at which an explanation is indistinguishable from the best.
 fn alike(best: &Refit, calibrated: &Calibrated) -> f64 {
-    (ALIKE * best.design_effect).max(ALIKE_SHARE * best.loss.min(calibrated.fit.loss - best.loss))
+    (INDISTINGUISHABLE_LOSS_DIFFERENCE * best.design_effect)
+        .max(INDISTINGUISHABLE_LOSS_SHARE * best.loss.min(calibrated.fit.loss - best.loss))
 }
 
 /// Eliminates effects whose removal raises the loss by less than a multiple of the null threshold.
-pub(super) fn drop_unneeded<'a>(
+pub(super) fn eliminate_backward<'a>(
     engine: &Engine<'a>,
     calibrated: &Calibrated,
     columns: &Columns,
@@ -82,7 +86,7 @@ pub(super) fn drop_unneeded<'a>(
                 if placed.is_empty() {
                     return Some(calibrated.fit.clone());
                 }
-                refit_steps(engine, &linearisation, &placed, NUMBER_COSTS, 4)
+                refit_steps(engine, &linearisation, &placed, EFFECT_PARAMETER_PENALTY, 4)
             })
             .collect();
         let least = without
@@ -92,9 +96,9 @@ pub(super) fn drop_unneeded<'a>(
             .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
         let Some((at, fit)) = least else { break };
         let loss_rise = left.loss_rise(engine, &fit, model);
-        let safety = if fit.placed.is_empty() { SAFETY } else { SAFETY_BESIDE };
+        let safety = if fit.placed.is_empty() { THRESHOLD_FACTOR_SINGLE } else { THRESHOLD_FACTOR_SEVERAL };
         let share = loss_rise / (calibrated.fit.loss - model.loss).max(1e-9);
-        if loss_rise > safety * threshold && share > 0.002 {
+        if loss_rise > safety * threshold && share > MIN_SHARE_OF_REDUCTION {
             break;
         }
         rounds.remove(at.min(rounds.len() - 1));
@@ -103,13 +107,13 @@ pub(super) fn drop_unneeded<'a>(
 }
 
 /// Whether two are the same effect at the same place.
-pub(crate) fn same(left: &Placed, right: &Placed) -> bool {
+pub(crate) fn same(left: &EffectEstimate, right: &EffectEstimate) -> bool {
     left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
 }
 
 /// Alternatives to an effect of the model; `share` is the share of the excess that the effect removes.
 pub(super) fn alternatives(
-    placed: &Placed,
+    placed: &EffectEstimate,
     share: f64,
     model: &Refit,
     calibrated: &Calibrated,

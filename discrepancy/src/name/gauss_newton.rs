@@ -7,14 +7,15 @@
 //! Forward selection moves the parameters on the linearised model, which suffices to compare models. The final numbers come from
 //! the simulator.
 
-use super::NUMBER_COSTS;
-use super::null_distribution::above_far_off;
+use super::EFFECT_PARAMETER_PENALTY;
+use super::null_distribution::above_outlier_limit;
 use crate::descent::descend;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
-    MOST_OFF, Placed, Refit, coordinate_columns, model_penalty, prior_deviations, prior_precisions, rig_of,
+    EffectEstimate, MOST_OFF, Refit, coordinate_columns, model_penalty, prior_deviations, prior_precisions,
+    rig_of,
 };
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -38,7 +39,7 @@ const SHRINK_FACTORS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = SHRINK_FACTORS.map(|shrink| model.factors.map(|factor| 1.0 + shrink * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {
-        point(engine, model.placed.clone(), *factors).map_or(f64::INFINITY, |point| point.loss)
+        iterate(engine, model.placed.clone(), *factors).map_or(f64::INFINITY, |iterate| iterate.loss)
     };
     let losses: Vec<f64> = tried.par_iter().map(loss).collect();
     let best = (0..SHRINK_FACTORS.len()).min_by(|one, other| losses[*one].total_cmp(&losses[*other]));
@@ -49,13 +50,13 @@ pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
 /// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
-    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors, NUMBER_COSTS);
+    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors, EFFECT_PARAMETER_PENALTY);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 
 /// A simulated model.
-struct Point {
-    placed: Vec<Placed>,
+struct Iterate {
+    placed: Vec<EffectEstimate>,
     factors: [f64; COUNT],
     simulated: Vec<f64>,
     residual: Vec<f64>,
@@ -72,22 +73,22 @@ pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; C
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
         *factor = 1.0;
     }
-    let start = point(engine, model.placed.clone(), factors)?;
+    let start = iterate(engine, model.placed.clone(), factors)?;
     let chosen: Vec<usize> =
         (0..COUNT + coordinates(&start.placed)).filter(|at| *at >= COUNT || needed[*at]).collect();
-    let point = descend(
+    let iterate = descend(
         start,
         STEPS,
         CONVERGED,
-        |point| point.loss,
-        |point| stepped(engine, point, &linearised(engine, point)?, &chosen),
+        |iterate| iterate.loss,
+        |iterate| stepped(engine, iterate, &linearised(engine, iterate)?, &chosen),
     );
-    let errors = errors(engine, &linearised(engine, &point)?, &point);
-    let Point { placed, factors, squares, loss, .. } = point;
+    let errors = errors(engine, &linearised(engine, &iterate)?, &iterate);
+    let Iterate { placed, factors, squares, loss, .. } = iterate;
     Some(Refit { placed, factors, loss, squares, errors, design_effect: model.design_effect })
 }
 
-fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Option<Point> {
+fn iterate(engine: &Engine<'_>, placed: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Iterate> {
     let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
     let residual = engine.residual(&simulated);
     let squares = engine.squares(&residual);
@@ -96,11 +97,11 @@ fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Opt
     let loss = loss(&squares, engine.scaled_dof())
         + prior[..COUNT].iter().sum::<f64>()
         + prior[COUNT..].iter().sum::<f64>();
-    Some(Point { placed, factors, simulated, residual, squares, loss })
+    Some(Iterate { placed, factors, simulated, residual, squares, loss })
 }
 
 /// Number of coordinates of the effects.
-fn coordinates(placed: &[Placed]) -> usize {
+fn coordinates(placed: &[EffectEstimate]) -> usize {
     placed.iter().map(|effect| effect.coordinates.len()).sum()
 }
 
@@ -115,36 +116,37 @@ struct JointLinearisation {
 
 impl JointLinearisation {
     /// Normal equations with the sensitivities of some windows set to zero.
-    fn products(&self, engine: &Engine<'_>, point: &Point, out: &[usize]) -> Products {
+    fn products(&self, engine: &Engine<'_>, iterate: &Iterate, out: &[usize]) -> Products {
         let mut columns = Cow::from(&self.columns);
         if !out.is_empty() {
             for column in columns.to_mut() {
                 out.iter().for_each(|at| column[at * engine.rows()..][..engine.rows()].fill(0.0));
             }
         }
-        engine.products(&point.residual, &columns)
+        engine.products(&iterate.residual, &columns)
     }
 }
 
-fn linearised(engine: &Engine<'_>, point: &Point) -> Option<JointLinearisation> {
-    let rig = rig_of(engine.rig(), &point.placed, &[1.0; COUNT])?;
-    let mut columns = engine.parameter_columns(&rig, &point.factors);
-    columns.extend(coordinate_columns(engine, &point.factors, &point.placed, &point.simulated)?);
+fn linearised(engine: &Engine<'_>, iterate: &Iterate) -> Option<JointLinearisation> {
+    let rig = rig_of(engine.rig(), &iterate.placed, &[1.0; COUNT])?;
+    let mut columns = engine.parameter_columns(&rig, &iterate.factors);
+    columns.extend(coordinate_columns(engine, &iterate.factors, &iterate.placed, &iterate.simulated)?);
     let (precisions, from) =
-        (prior_precisions(&point.placed), prior_deviations(&point.factors, &point.placed));
+        (prior_precisions(&iterate.placed), prior_deviations(&iterate.factors, &iterate.placed));
     Some(JointLinearisation { columns, precisions, from })
 }
 
 /// The better of two Gauss-Newton steps: with all windows, and without outlying windows, whose linearisation is unreliable.
 fn stepped(
     engine: &Engine<'_>,
-    point: &Point,
+    iterate: &Iterate,
     linearisation: &JointLinearisation,
     chosen: &[usize],
-) -> Option<Point> {
-    let far: Vec<usize> = above_far_off(&point.squares, engine.scaled_dof()).collect();
-    let with_all = line_search(engine, point, linearisation, chosen, &[]);
-    let without = if far.is_empty() { None } else { line_search(engine, point, linearisation, chosen, &far) };
+) -> Option<Iterate> {
+    let far: Vec<usize> = above_outlier_limit(&iterate.squares, engine.scaled_dof()).collect();
+    let with_all = line_search(engine, iterate, linearisation, chosen, &[]);
+    let without =
+        if far.is_empty() { None } else { line_search(engine, iterate, linearisation, chosen, &far) };
     [with_all, without].into_iter().flatten().min_by(|left, right| left.loss.total_cmp(&right.loss))
 }
 
@@ -152,18 +154,18 @@ fn stepped(
 /// as around a break-away, are excluded too; then the step is shortened.
 fn line_search(
     engine: &Engine<'_>,
-    point: &Point,
+    iterate: &Iterate,
     linearisation: &JointLinearisation,
     chosen: &[usize],
     out: &[usize],
-) -> Option<Point> {
+) -> Option<Iterate> {
     let part = |of: &[f64]| chosen.iter().map(|at| of[*at]).collect::<Vec<_>>();
     let (precisions, from) = (part(&linearisation.precisions), part(&linearisation.from));
     let mut out = out.to_vec();
     for _ in 0..EXCLUSIONS {
-        let fit = linearisation.products(engine, point, &out).fit_from(chosen, &precisions, &from);
-        let tried = step_by(engine, point, chosen, &fit, 1.0)?;
-        if tried.loss < point.loss {
+        let fit = linearisation.products(engine, iterate, &out).fit_from(chosen, &precisions, &from);
+        let tried = step_by(engine, iterate, chosen, &fit, 1.0)?;
+        if tried.loss < iterate.loss {
             return Some(tried);
         }
         let nonlinear = |window: &usize| {
@@ -176,8 +178,8 @@ fn line_search(
         out.dedup();
         if out.len() == before {
             return (1..=SHORTENINGS).find_map(|times| {
-                step_by(engine, point, chosen, &fit, SHORTER.powi(times))
-                    .filter(|tried| tried.loss < point.loss)
+                step_by(engine, iterate, chosen, &fit, SHORTER.powi(times))
+                    .filter(|tried| tried.loss < iterate.loss)
             });
         }
     }
@@ -185,7 +187,7 @@ fn line_search(
 }
 
 /// The point after a fraction of a step.
-fn step_by(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share: f64) -> Option<Point> {
+fn step_by(engine: &Engine<'_>, from: &Iterate, chosen: &[usize], step: &Fit, share: f64) -> Option<Iterate> {
     let (mut placed, mut factors) = (from.placed.clone(), from.factors);
     let mut changes = vec![0.0; COUNT + coordinates(&placed)];
     chosen.iter().zip(&step.coefficients).for_each(|(at, coefficient)| changes[*at] = share * coefficient);
@@ -195,21 +197,25 @@ fn step_by(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, shar
     let mut changes = changes[COUNT..].iter();
     for effect in &mut placed {
         for key in 0..effect.coordinates.len() {
-            let [least, most] = effect.candidate.reach(key);
+            let [least, most] = effect.candidate.fit_bounds(key);
             effect.coordinates[key] =
                 (effect.coordinates[key] + changes.next().expect("one each")).clamp(least, most);
         }
     }
-    point(engine, placed, factors)
+    iterate(engine, placed, factors)
 }
 
 /// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.
-fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, point: &Point) -> Vec<f64> {
-    let products = linearisation.products(engine, point, &[]);
+fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, iterate: &Iterate) -> Vec<f64> {
+    let products = linearisation.products(engine, iterate, &[]);
     let all: Vec<usize> = (0..products.columns()).collect();
-    let weights = products.weights(&point.squares);
-    let stays =
-        Fit { coefficients: vec![0.0; all.len()], loss: point.loss, squares: point.squares.clone(), weights };
+    let weights = products.weights(&iterate.squares);
+    let stays = Fit {
+        coefficients: vec![0.0; all.len()],
+        loss: iterate.loss,
+        squares: iterate.squares.clone(),
+        weights,
+    };
     let errors = products
         .jackknife(&all, &stays, &linearisation.precisions)
         .unwrap_or_else(|| vec![f64::INFINITY; all.len()]);

@@ -11,16 +11,16 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Draws of the null distribution.
-const NULLS: usize = 300;
+const SIGN_FLIP_DRAWS: usize = 300;
 /// Quantile of the draws that is the threshold.
-const NULL_SHARE: f64 = 0.99;
+const NULL_QUANTILE: f64 = 0.99;
 /// Fixed seed: the threshold is part of the result and has the same bits in each run.
 const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
 
 /// Chi2 per degree of freedom of an outlying window, and the largest share of outliers that is excluded. In such a window the
 /// break-away came at another moment.
-pub(super) const FAR_OFF: f64 = 3.0;
-const FEW: f64 = 0.05;
+pub(super) const OUTLIER_CHI2_PER_DOF: f64 = 3.0;
+const MAX_OUTLIER_SHARE: f64 = 0.05;
 
 /// Window scores of all candidates against a model's residual.
 pub(super) struct NullDistribution {
@@ -53,7 +53,7 @@ impl NullDistribution {
         let parameters: Vec<usize> = (0..COUNT).collect();
         let weights = &products.fit_from(&parameters, &precisions, &linearisation.deviations()).weights;
         let scores = products.efficient_scores(&parameters, weights, &precisions);
-        let far = far_off(&engine.squares(&residual), engine.scaled_dof());
+        let far = outliers(&engine.squares(&residual), engine.scaled_dof());
         let probes = of
             .into_iter()
             .zip(scores)
@@ -79,7 +79,7 @@ impl NullDistribution {
     pub(super) fn threshold(&self) -> f64 {
         let windows = self.probes.first().map_or(0, |(_, _, scores, _)| scores.len());
         let mut random = Pcg64::seed_from_u64(SEED);
-        let mut most: Vec<f64> = (0..NULLS)
+        let mut most: Vec<f64> = (0..SIGN_FLIP_DRAWS)
             .map(|_| {
                 let signs: Vec<f64> =
                     (0..windows).map(|_| if random.next_u64() >> 63 == 0 { 1.0 } else { -1.0 }).collect();
@@ -92,7 +92,7 @@ impl NullDistribution {
                     .fold(0.0, f64::max)
             })
             .collect();
-        let rank = ((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1);
+        let rank = ((SIGN_FLIP_DRAWS as f64 * NULL_QUANTILE) as usize).min(SIGN_FLIP_DRAWS - 1);
         order_statistic(&mut most, rank).expect("the rank is one of the draws")
     }
 
@@ -110,27 +110,27 @@ impl NullDistribution {
 }
 
 /// Outlying windows; none where they are more than a few.
-fn far_off(squares: &[f64], dof: &[f64]) -> Vec<usize> {
-    let far: Vec<usize> = above_far_off(squares, dof).collect();
-    let most = (FEW * dof.len() as f64).max(1.0);
+fn outliers(squares: &[f64], dof: &[f64]) -> Vec<usize> {
+    let far: Vec<usize> = above_outlier_limit(squares, dof).collect();
+    let most = (MAX_OUTLIER_SHARE * dof.len() as f64).max(1.0);
     if far.len() as f64 <= most { far } else { Vec::new() }
 }
 
-/// Windows beyond [`FAR_OFF`], however many.
-pub(super) fn above_far_off(squares: &[f64], dof: &[f64]) -> impl Iterator<Item = usize> {
+/// Windows beyond [`OUTLIER_CHI2_PER_DOF`], however many.
+pub(super) fn above_outlier_limit(squares: &[f64], dof: &[f64]) -> impl Iterator<Item = usize> {
     let off = squares.iter().zip(dof).enumerate();
-    off.filter(|(_, (square, dof))| **square > FAR_OFF * **dof).map(|(at, _)| at)
+    off.filter(|(_, (square, dof))| **square > OUTLIER_CHI2_PER_DOF * **dof).map(|(at, _)| at)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::far_off;
+    use super::outliers;
 
     #[test]
     fn windows_that_are_far_off_are_left_out_only_where_they_are_few() {
         let squares =
             |off: usize| -> Vec<f64> { (0..40).map(|at| if at < off { 40.0 } else { 10.0 }).collect() };
-        let far = |off: usize| far_off(&squares(off), &[10.0; 40]);
+        let far = |off: usize| outliers(&squares(off), &[10.0; 40]);
         assert_eq!(far(0), Vec::<usize>::new());
         assert_eq!(far(2), [0, 1]);
         // A model that leaves so many is wrong in them.

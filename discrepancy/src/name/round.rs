@@ -8,10 +8,12 @@
 use super::elimination::same;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
-use super::start_states::{Restarted, gap_start, refit_with_starts};
-use super::{EXCESS, NUMBER_COSTS, STEPS, WORTH_A_FIT, is_large, relinearise};
+use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_starts};
+use super::{
+    EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, is_large, relinearise,
+};
 use crate::engine::Engine;
-use crate::refit::{Linearisation, Placed, Refit, loss_at, refit_steps};
+use crate::refit::{EffectEstimate, Linearisation, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
 use rayon::prelude::*;
 
@@ -36,7 +38,7 @@ pub(super) struct Contenders {
     null_loss: f64,
     best: Vec<Screened>,
     /// The backlash of linked rods, whatever its screened gain.
-    gap: Option<Screened>,
+    backlash: Option<Screened>,
 }
 
 impl Contenders {
@@ -55,14 +57,14 @@ impl Contenders {
         let mut best: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
         best.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let most = null_loss - best.first()?.loss;
-        if most < WORTH_A_FIT.max(SEARCHED_SHARE * threshold) {
+        if most < MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold) {
             return None;
         }
-        let is_gap = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
-        let gap = if engine.is_linked() { best.iter().find(is_gap).cloned() } else { None };
+        let is_backlash = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
+        let backlash = if engine.is_linked() { best.iter().find(is_backlash).cloned() } else { None };
         best.truncate(CONTENDERS);
         best.retain(|screened| null_loss - screened.loss > CONTENDER_SHARE * most);
-        Some(Self { null_loss, best, gap })
+        Some(Self { null_loss, best, backlash })
     }
 
     pub(super) fn count(&self) -> usize {
@@ -74,24 +76,24 @@ impl Contenders {
 pub(super) struct Round<'a> {
     pub(super) fits: Vec<Refit>,
     /// Their relinearised refits, each with its start states.
-    restarted: Vec<Restarted<'a>>,
+    restarted: Vec<RefitWithInitialStates<'a>>,
 }
 
 impl<'a> Round<'a> {
-    /// Fits the model with each contender; `point` holds the parameter sensitivities. `None` where no fit is possible.
+    /// Fits the model with each contender; `linearisation` holds the parameter sensitivities. `None` where no fit is possible.
     pub(super) fn fitted(
         engine: &Engine<'a>,
-        point: &Linearisation,
+        linearisation: &Linearisation,
         model: &Refit,
         contenders: &Contenders,
         progress: &mut dyn FnMut(&str),
     ) -> Option<Self> {
-        let Contenders { null_loss, best, gap } = contenders;
+        let Contenders { null_loss, best, backlash } = contenders;
         let mut fits: Vec<Refit> = best
             .par_iter()
             .filter_map(|screened| {
-                let start = best_start(engine, point, &model.placed, screened, *null_loss);
-                refit_steps(engine, point, &start, NUMBER_COSTS, STEPS)
+                let start = best_start(engine, linearisation, &model.placed, screened, *null_loss);
+                refit_steps(engine, linearisation, &start, EFFECT_PARAMETER_PENALTY, STEPS)
             })
             .collect();
         sort(&mut fits);
@@ -103,26 +105,30 @@ impl<'a> Round<'a> {
         let restarted = fits[..near]
             .par_iter()
             .map(|fit| {
-                refit_with_starts(engine, &relinearise(engine, at_best_pitch(engine, fit)), NUMBER_COSTS)
+                refit_with_starts(
+                    engine,
+                    &relinearise(engine, at_best_pitch(engine, fit)),
+                    EFFECT_PARAMETER_PENALTY,
+                )
             })
             .collect();
         let mut round = Self { fits, restarted };
         round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
         let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
-        if let Some(gap) = gap
-            && least > EXCESS * engine.scaled_dof().iter().sum::<f64>()
+        if let Some(backlash) = backlash
+            && least > LACK_OF_FIT_PER_DOF * engine.scaled_dof().iter().sum::<f64>()
         {
             progress("trying other gaps");
-            round.with_gap(engine, point, model, gap);
+            round.with_backlash(engine, linearisation, model, backlash);
         }
         sort(&mut round.fits);
-        round.run_off(engine, model);
+        round.refit_close_jointly(engine, model);
         Some(round)
     }
 
     /// Where several fits are close, fits all numbers of each in the simulator: with linearised parameters, a wrong effect that
     /// moves all parameters may beat the right one.
-    fn run_off(&mut self, engine: &Engine<'a>, model: &Refit) {
+    fn refit_close_jointly(&mut self, engine: &Engine<'a>, model: &Refit) {
         let Some(best) = self.fits.first().map(|fit| fit.loss) else { return };
         let is_close = |fit: &&Refit| fit.loss - best < CLOSE * (model.loss - best);
         let close = self.fits.iter().take(RELINEARISED).filter(is_close).count();
@@ -135,14 +141,23 @@ impl<'a> Round<'a> {
     }
 
     /// Fits the backlash from other starting widths than the screened one.
-    fn with_gap(&mut self, engine: &Engine<'a>, point: &Linearisation, model: &Refit, gap: &Screened) {
-        let start = gap_start(engine, point, &model.placed, &gap.start);
-        let Some(fit) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
-        let restarted = refit_with_starts(engine, &relinearise(engine, fit), NUMBER_COSTS);
+    fn with_backlash(
+        &mut self,
+        engine: &Engine<'a>,
+        linearisation: &Linearisation,
+        model: &Refit,
+        backlash: &Screened,
+    ) {
+        let start = backlash_start(engine, linearisation, &model.placed, &backlash.start);
+        let Some(fit) = refit_steps(engine, linearisation, &start, EFFECT_PARAMETER_PENALTY, STEPS) else {
+            return;
+        };
+        let restarted = refit_with_starts(engine, &relinearise(engine, fit), EFFECT_PARAMETER_PENALTY);
         // The fit from the screened width is the same effect, not an alternative.
-        let is_gap = |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &gap.start));
-        if self.fits.iter().filter(|other| is_gap(other)).all(|other| restarted.fit.loss < other.loss) {
-            self.fits.retain(|other| !is_gap(other));
+        let is_backlash =
+            |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &backlash.start));
+        if self.fits.iter().filter(|other| is_backlash(other)).all(|other| restarted.fit.loss < other.loss) {
+            self.fits.retain(|other| !is_backlash(other));
             self.fits.push(restarted.fit.clone());
             self.restarted.push(restarted);
         }
@@ -171,11 +186,11 @@ fn sort(fits: &mut [Refit]) {
 /// above the predicted one.
 fn best_start(
     engine: &Engine<'_>,
-    point: &Linearisation,
-    model: &[Placed],
+    linearisation: &Linearisation,
+    model: &[EffectEstimate],
     screened: &Screened,
     null_loss: f64,
-) -> Vec<Placed> {
+) -> Vec<EffectEstimate> {
     let with = |amplitude: f64| {
         let mut placed = model.to_vec();
         let mut effect = screened.start.clone();
@@ -184,14 +199,14 @@ fn best_start(
         placed
     };
     let screened_z = screened.start.coordinates[0];
-    let loss = loss_at(engine, point, &with(screened_z));
+    let loss = loss_at(engine, linearisation, &with(screened_z));
     if loss < screened.loss + MOST_SHORTFALL * (null_loss - screened.loss) {
         return with(screened_z);
     }
     let [least, most] = screened.start.candidate.range(0);
     let tried =
         AMPLITUDES.iter().map(|size| size * screened_z.signum()).filter(|z| *z >= least && *z <= most);
-    let losses = tried.map(|z| (loss_at(engine, point, &with(z)), z));
+    let losses = tried.map(|z| (loss_at(engine, linearisation, &with(z)), z));
     let (_, best) =
         losses.chain([(loss, screened_z)]).min_by(|a, b| a.0.total_cmp(&b.0)).expect("one at least");
     with(best)

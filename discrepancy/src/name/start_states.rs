@@ -1,34 +1,39 @@
 //! Refits of models of linked rods with the window start states re-estimated under the model itself.
 
 use crate::engine::Engine;
-use crate::refit::{Linearisation, Placed, Refit, linearise, loss_at, refit, rig_of};
+use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, loss_at, refit, rig_of};
 use rayon::prelude::*;
 
 /// Starting amplitudes of the backlash.
 const AMPLITUDES: [f64; 5] = [0.12, 0.25, 0.45, 0.7, 1.0];
 /// Maximum number of alternations between start states and model, and the relative fall of the loss that ends them.
-const MOVES: usize = 3;
-const MOVED: f64 = 0.05;
+const MAX_ALTERNATIONS: usize = 3;
+const RELATIVE_TOLERANCE: f64 = 0.05;
 
 /// A fitted model, and the engine whose start states were estimated under it; `None` where the rods are not linked.
-pub(super) struct Restarted<'a> {
+pub(super) struct RefitWithInitialStates<'a> {
     pub(super) engine: Option<Engine<'a>>,
     pub(super) fit: Refit,
 }
 
 /// Refits a model of linked rods, alternating with estimates of the window start states under it.
-pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty: f64) -> Restarted<'a> {
-    let mut best = Restarted { engine: None, fit: model.clone() };
-    for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
+pub(super) fn refit_with_starts<'a>(
+    engine: &Engine<'a>,
+    model: &Refit,
+    penalty: f64,
+) -> RefitWithInitialStates<'a> {
+    let mut best = RefitWithInitialStates { engine: None, fit: model.clone() };
+    for _ in 0..if engine.is_linked() { MAX_ALTERNATIONS } else { 0 } {
         let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
         let restarted = engine.with_starts_under(&rig);
         let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.placed, penalty)
         else {
             break;
         };
-        let converged = best.engine.is_some() && fit.loss > best.fit.loss - MOVED * best.fit.loss.abs();
+        let converged =
+            best.engine.is_some() && fit.loss > best.fit.loss - RELATIVE_TOLERANCE * best.fit.loss.abs();
         if best.engine.is_none() || fit.loss < best.fit.loss {
-            best = Restarted { engine: Some(restarted), fit };
+            best = RefitWithInitialStates { engine: Some(restarted), fit };
         }
         if converged {
             break;
@@ -39,15 +44,15 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty:
 
 /// Start of the fit of a backlash: the amplitude with the smallest loss, each under its own start states. Under the start states
 /// of another backlash even the true one fits badly.
-pub(super) fn gap_start(
+pub(super) fn backlash_start(
     engine: &Engine<'_>,
-    point: &Linearisation,
-    model: &[Placed],
-    start: &Placed,
-) -> Vec<Placed> {
+    linearisation: &Linearisation,
+    model: &[EffectEstimate],
+    start: &EffectEstimate,
+) -> Vec<EffectEstimate> {
     let [least, most] = start.candidate.range(0);
     let screened_z = start.coordinates[0];
-    let tried: Vec<Vec<Placed>> = AMPLITUDES
+    let tried: Vec<Vec<EffectEstimate>> = AMPLITUDES
         .iter()
         .map(|size| size * screened_z.signum())
         .filter(|size| *size >= least && *size <= most)
@@ -61,8 +66,8 @@ pub(super) fn gap_start(
     let losses: Vec<f64> = tried
         .par_iter()
         .map(|placed| {
-            rig_of(engine.rig(), placed, &point.factors)
-                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), point, placed))
+            rig_of(engine.rig(), placed, &linearisation.factors)
+                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), linearisation, placed))
         })
         .collect();
     let best = (0..tried.len()).min_by(|left, right| losses[*left].total_cmp(&losses[*right]));

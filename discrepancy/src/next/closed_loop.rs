@@ -7,7 +7,7 @@
 //! The run is the experiment if the explanation were true, closed loop included. Sensor noise has one seed.
 
 use super::menu::{Entry, program};
-use crate::gridded_record::Point;
+use crate::gridded_record::AxisState;
 use axis_control::axis::AxisRecord;
 use axis_control::setup::InputError;
 use axis_control::setup::{Inputs as Files, Mode};
@@ -49,7 +49,7 @@ pub struct ClosedLoopRun {
     pub start: State,
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.
-    pub points: Vec<[Point; 2]>,
+    pub points: Vec<[AxisState; 2]>,
     /// Period in which the experiment began, behind the initial positioning; `None` when it never did.
     pub began: Option<usize>,
     pub done: bool,
@@ -60,7 +60,7 @@ impl ClosedLoopRun {
     pub(crate) fn ends_well(&self, stroke_m: f64) -> bool {
         let Some(began) = self.began else { return false };
         let keeps_away = |axis: usize| {
-            let of = |point: &[Point; 2]| point[axis].extension_m;
+            let of = |point: &[AxisState; 2]| point[axis].extension_m;
             let least = self.points[began..].iter().map(of).fold(f64::INFINITY, f64::min);
             let most = self.points[began..].iter().map(of).fold(f64::NEG_INFINITY, f64::max);
             most - least < PARKED_M || (least > NEAR_M && most < stroke_m - NEAR_M)
@@ -103,14 +103,14 @@ pub fn drive(
     Ok(ClosedLoopRun { linked: scene.linked, start, inputs, points, began, done })
 }
 
-fn points_of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
+fn points_of(truth: &Truth, stroke_m: f64) -> [AxisState; 2] {
     std::array::from_fn(|i| {
         let axis = &truth.axes[i];
         let extension_m = if i == 0 { axis.position_m } else { stroke_m - axis.position_m };
-        Point {
+        AxisState {
             extension_m: extension_m.clamp(0.0, stroke_m),
             rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
-            or_else_m_per_s: None,
+            alternative_velocity_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         }
     })

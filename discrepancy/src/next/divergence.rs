@@ -21,7 +21,7 @@
 
 use super::closed_loop::ClosedLoopRun;
 use super::nuisance::Product;
-use crate::gridded_record::{CHANNELS, Point};
+use crate::gridded_record::{AxisState, CHANNELS};
 use crate::windows::{FORCE, dot, project, state_at};
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
@@ -65,19 +65,19 @@ impl Divergence {
     }
 }
 
-/// Divergence of the first of `rigs`, which made the run, from each of the others. `numbers` are baselines with one parameter off
-/// by a prior standard deviation each.
+/// Divergence of the first of `rigs`, which made the run, from each of the others. `perturbed` are baselines with one parameter
+/// off by a prior standard deviation each.
 pub(crate) fn divergences(
     driven: &ClosedLoopRun,
     baseline: &RigParameters,
     rigs: &[&RigParameters],
-    numbers: &[RigParameters],
+    perturbed: &[RigParameters],
     measured: [bool; 2],
 ) -> Vec<Divergence> {
-    let all: Vec<&RigParameters> = rigs.iter().copied().chain(numbers).collect();
+    let all: Vec<&RigParameters> = rigs.iter().copied().chain(perturbed).collect();
     let signatures = signatures(driven, baseline, &all, measured);
-    let (signatures, numbers) = signatures.split_at(rigs.len());
-    let product = Product::new(numbers);
+    let (signatures, sensitivities) = signatures.split_at(rigs.len());
+    let product = Product::new(sensitivities);
     let Some((truth, rivals)) = signatures.split_first() else { return Vec::new() };
     let square = product.of(truth, truth).max(0.0);
     let from = |rival: &Vec<f64>| {
@@ -149,10 +149,10 @@ impl<'a> Observer<'a> {
 
     /// Start states of a window, with creep set to rest, as in the workflow: friction then holds the piston in both directions. A
     /// piston still sliding would respond to one sign of a nudge only.
-    fn points(&self, window: usize) -> [Point; 2] {
+    fn points(&self, window: usize) -> [AxisState; 2] {
         self.driven.points[window * WINDOW].map(|point| {
             let creeps = point.rod_velocity_m_per_s.abs() < REST_M_PER_S;
-            if creeps { Point { rod_velocity_m_per_s: 0.0, ..point } } else { point }
+            if creeps { AxisState { rod_velocity_m_per_s: 0.0, ..point } } else { point }
         })
     }
 
@@ -220,7 +220,7 @@ impl<'a> Observer<'a> {
         };
         let mut columns = Vec::new();
         for axes in together {
-            for number in 0..Point::NUDGES.len() {
+            for number in 0..AxisState::NUDGES.len() {
                 let mut points = self.points(window);
                 for axis in &axes {
                     points[*axis] = points[*axis].nudged(number);

@@ -8,7 +8,7 @@ pub struct Entry {
     /// Its title, and its file without `.toml`.
     pub name: &'static str,
     /// What it tells apart, as the end of "to tell ... apart".
-    pub serves: &'static str,
+    pub purpose: &'static str,
     pub toml: &'static str,
 }
 
@@ -24,10 +24,10 @@ impl Entry {
 }
 
 macro_rules! menu {
-    ($($name:literal: $serves:literal,)*) => {
+    ($($name:literal: $purpose:literal,)*) => {
         /// All of them; of equals the first is proposed.
         pub const MENU: &[Entry] = &[
-            $(Entry { name: $name, serves: $serves, toml: include_str!(concat!("../../experiments/", $name, ".toml")) },)*
+            $(Entry { name: $name, purpose: $purpose, toml: include_str!(concat!("../../experiments/", $name, ".toml")) },)*
         ];
     };
 }

@@ -1,11 +1,11 @@
 //! Nuisance parameters of the design: signatures count only outside their span.
 //!
 //! ```text
-//! <a, b> = a.b - (N'a).(1 + N'N)^-1 (N'b)          N: change of the readings with one prior standard deviation of each number
+//! <a, b> = a.b - (N'a).(1 + N'N)^-1 (N'b)          N: change of the readings with one prior standard deviation of each parameter
 //! ```
 //!
-//! Each number is known to its prior's 3 %, a guess of what data sheets and a calibration leave; the product is that of the
-//! readings whitened by noise and numbers together. Source: Kay 1998, Fundamentals of Statistical Signal Processing II, 7.8
+//! Each parameter is known to its prior's 3 %, a guess of what data sheets and a calibration leave; the product is that of the
+//! readings whitened by noise and parameters together. Source: Kay 1998, Fundamentals of Statistical Signal Processing II, 7.8
 //! (nuisance with a prior); the names are those of effects.md.
 
 use crate::parameters::{PARAMETERS, Parameter};
@@ -13,44 +13,44 @@ use crate::windows::dot;
 use nalgebra::{DMatrix, DVector};
 use plant::{ParameterError, RigParameters};
 
-/// One prior standard deviation of a number, relative.
+/// One prior standard deviation of a parameter, relative.
 const PRIOR_STD: f64 = 0.03;
 
 /// All but the area, which is known from the drawing.
-pub(crate) fn numbers() -> impl Iterator<Item = &'static Parameter> {
+pub(crate) fn nuisance_parameters() -> impl Iterator<Item = &'static Parameter> {
     PARAMETERS.iter().filter(|parameter| parameter.name != "parameter:piston-area")
 }
 
-/// The rig with a number larger by one standard deviation.
-pub(crate) fn off(rig: &RigParameters, parameter: &Parameter) -> Result<RigParameters, ParameterError> {
+/// The rig with a parameter larger by one standard deviation.
+pub(crate) fn perturbed(rig: &RigParameters, parameter: &Parameter) -> Result<RigParameters, ParameterError> {
     parameter.scaled(rig, 1.0 + PRIOR_STD)
 }
 
 /// Inner product of signatures with nuisance parameters marginalised.
 #[derive(Debug)]
 pub(crate) struct Product<'a> {
-    numbers: &'a [Vec<f64>],
+    sensitivities: &'a [Vec<f64>],
     inverse: DMatrix<f64>,
 }
 
 impl<'a> Product<'a> {
     /// The product for these changes of the readings.
-    pub(crate) fn new(numbers: &'a [Vec<f64>]) -> Self {
-        let count = numbers.len();
+    pub(crate) fn new(sensitivities: &'a [Vec<f64>]) -> Self {
+        let count = sensitivities.len();
         let gram = DMatrix::from_fn(count, count, |row, column| {
-            f64::from(u8::from(row == column)) + dot(&numbers[row], &numbers[column])
+            f64::from(u8::from(row == column)) + dot(&sensitivities[row], &sensitivities[column])
         });
         // One more than positive semidefinite in every direction.
         let inverse = gram.cholesky().map_or_else(|| DMatrix::zeros(count, count), |factor| factor.inverse());
-        Product { numbers, inverse }
+        Product { sensitivities, inverse }
     }
 
     /// The product of two signatures.
     pub(crate) fn of(&self, left: &[f64], right: &[f64]) -> f64 {
         let along = |signature: &[f64]| {
             DVector::from_iterator(
-                self.numbers.len(),
-                self.numbers.iter().map(|number| dot(number, signature)),
+                self.sensitivities.len(),
+                self.sensitivities.iter().map(|column| dot(column, signature)),
             )
         };
         dot(left, right) - along(left).dot(&(&self.inverse * along(right)))
@@ -63,9 +63,9 @@ mod tests {
 
     #[test]
     fn what_a_number_explains_counts_by_no_more_than_its_prior() {
-        let numbers = [vec![10.0, 0.0, 0.0]];
-        let product = Product::new(&numbers);
-        // Along the number: 1 / (1 + 100) of its square is left; across it, all.
+        let sensitivities = [vec![10.0, 0.0, 0.0]];
+        let product = Product::new(&sensitivities);
+        // Along the parameter: 1 / (1 + 100) of its square is left; across it, all.
         assert!((product.of(&[1.0, 0.0, 0.0], &[1.0, 0.0, 0.0]) - 1.0 / 101.0).abs() < 1e-12);
         assert_eq!(product.of(&[0.0, 2.0, 0.0], &[0.0, 2.0, 0.0]), 4.0);
         assert_eq!(Product::new(&[]).of(&[3.0], &[3.0]), 9.0);
@@ -74,8 +74,8 @@ mod tests {
     #[test]
     fn every_number_can_be_off() {
         let rig = RigParameters::baseline();
-        for number in numbers() {
-            assert_ne!(off(&rig, number).expect(number.name), rig, "{}", number.name);
+        for parameter in nuisance_parameters() {
+            assert_ne!(perturbed(&rig, parameter).expect(parameter.name), rig, "{}", parameter.name);
         }
     }
 }

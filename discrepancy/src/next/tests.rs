@@ -108,7 +108,7 @@ fn an_explanation_does_not_differ_from_itself_and_differs_from_another() {
     };
     // Another amplitude of the same effect is refitted; what is left comes from stick and slip.
     assert!(of(0, 1) < 0.2 * of(0, 2), "{} and {}", of(0, 1), of(0, 2));
-    assert!(of(2, 0) > WANTED, "{}", of(2, 0));
+    assert!(of(2, 0) > TARGET_DIVERGENCE, "{}", of(2, 0));
 }
 
 #[test]
@@ -119,7 +119,11 @@ fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
         explained(&[("valve-offset", "drive", &[("offset_percent", 0.5)])]),
     ];
     let proposal = propose(&rig, &explanations, [true, false], &mut |_| {});
-    assert!(proposal.next.divergence.is_some_and(|divergence| divergence >= WANTED), "{:?}", proposal.next);
+    assert!(
+        proposal.next.divergence.is_some_and(|divergence| divergence >= TARGET_DIVERGENCE),
+        "{:?}",
+        proposal.next
+    );
     let file = proposal.next.experiment.clone().expect("an experiment");
     assert!(file.starts_with("next-") && file.ends_with(".toml"), "{file}");
     let toml = proposal.experiment_toml.clone().expect("its file");
@@ -130,7 +134,9 @@ fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
         proposal.next
     );
     // The drive's record alone says nothing of what the load does on linked rods.
-    let linked = |judged: &Judged| MENU.iter().any(|entry| entry.name == judged.name && entry.is_linked());
+    let linked = |judged: &ExperimentDivergences| {
+        MENU.iter().any(|entry| entry.name == judged.name && entry.is_linked())
+    };
     assert!(!proposal.table.iter().any(linked));
     let again = propose(&rig, &explanations, [true, false], &mut |_| {});
     assert_eq!(proposal.table, again.table);
@@ -140,12 +146,12 @@ fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
 fn what_no_experiment_separates_is_reported_with_what_would() {
     let one = |name: &str| Explanation { rig: RigParameters::baseline(), names: vec![name.to_owned()] };
     let explanations = [one("inclination drive"), one("force-sensor-offset drive")];
-    let table = [Judged { name: "chirps", pairs: vec![(0, 1, weak(1.0)), (1, 0, weak(2.0))] }];
+    let table = [ExperimentDivergences { name: "chirps", pairs: vec![(0, 1, weak(1.0)), (1, 0, weak(2.0))] }];
     let (next, toml) = choose(&explanations, &table);
     assert!(toml.is_none() && next.experiment.is_none(), "{next:?}");
     assert!(next.otherwise.is_some_and(|what| what.contains("tilting")));
     // Some repetitions would: five times 5.6 against noise, of which the model's own error takes a tenth.
-    let table = [Judged { name: "chirps", pairs: vec![(0, 1, weak(5.6)), (1, 0, weak(7.0))] }];
+    let table = [ExperimentDivergences { name: "chirps", pairs: vec![(0, 1, weak(5.6)), (1, 0, weak(7.0))] }];
     let (next, toml) = choose(&explanations, &table);
     assert!(toml.is_some_and(|toml| toml.contains("repetitions = 5")), "{next:?}");
     assert!(next.divergence.is_some_and(|total| (total - 28.0 / (1.0 + 28.0 / 256.0)).abs() < 1e-9));
@@ -162,8 +168,8 @@ fn an_entry_that_separates_more_pairs_wins_over_one_that_separates_fewer_by_more
         places.iter().zip(values).map(|((one, other), value)| (*one, *other, weak(value))).collect()
     };
     let table = [
-        Judged { name: "chirps", pairs: pairs([900.0, 0.0, 0.0]) },
-        Judged { name: "ends", pairs: pairs([30.0, 40.0, 0.0]) },
+        ExperimentDivergences { name: "chirps", pairs: pairs([900.0, 0.0, 0.0]) },
+        ExperimentDivergences { name: "ends", pairs: pairs([30.0, 40.0, 0.0]) },
     ];
     let (next, _) = choose(&explanations, &table);
     assert_eq!(next.experiment.as_deref(), Some("next-ends.toml"));
@@ -182,5 +188,5 @@ fn a_piston_at_rest_does_not_tell_the_gains_of_its_chambers_apart() {
     ];
     let judged =
         judge(entry, &RigParameters::baseline(), &gains, [true, false]).expect("it can be rehearsed");
-    assert!(judged.least() < WANTED, "{:?}", judged.pairs);
+    assert!(judged.least() < TARGET_DIVERGENCE, "{:?}", judged.pairs);
 }

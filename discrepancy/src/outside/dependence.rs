@@ -33,14 +33,14 @@ pub(crate) struct Sample {
 /// The bin of each window.
 #[derive(Clone, Debug)]
 pub(crate) struct Bins {
-    places: Vec<usize>,
+    bin_index: Vec<usize>,
     count: usize,
 }
 
 impl Bins {
     pub(crate) fn of(sample: &Sample, variable: usize) -> Self {
         let values: Vec<f64> = sample.variables.iter().map(|variables| variables[variable]).collect();
-        Bins { places: bins(&values), count: BINS }
+        Bins { bin_index: bins(&values), count: BINS }
     }
 
     /// Bins of equal width, which isolate a pulse of few windows.
@@ -48,8 +48,8 @@ impl Bins {
         let values = || sample.variables.iter().map(|variables| variables[variable]);
         let least = values().fold(f64::INFINITY, f64::min);
         let width = (values().fold(f64::NEG_INFINITY, f64::max) - least) / BINS as f64;
-        let place = |value: f64| if width > 0.0 { ((value - least) / width) as usize } else { 0 };
-        Bins { places: values().map(|value| place(value).min(BINS - 1)).collect(), count: BINS }
+        let index = |value: f64| if width > 0.0 { ((value - least) / width) as usize } else { 0 };
+        Bins { bin_index: values().map(|value| index(value).min(BINS - 1)).collect(), count: BINS }
     }
 
     pub(crate) fn of_pair(sample: &Sample, left: usize, right: usize) -> Self {
@@ -61,7 +61,7 @@ impl Bins {
         };
         let both = of(left).into_iter().zip(of(right));
         Bins {
-            places: both.map(|(left, right)| left * PAIR_BINS + right).collect(),
+            bin_index: both.map(|(left, right)| left * PAIR_BINS + right).collect(),
             count: PAIR_BINS * PAIR_BINS,
         }
     }
@@ -112,7 +112,7 @@ impl Sample {
         for at in 0..n {
             let (value, weight) = (self.values[from(at)], self.weights[from(at)]);
             let fold = self.folds[at];
-            for sum in [&mut sums[bins.places[at]][fold], &mut all[fold]] {
+            for sum in [&mut sums[bins.bin_index[at]][fold], &mut all[fold]] {
                 sum[0] += weight * value;
                 sum[1] += weight;
             }
@@ -122,7 +122,7 @@ impl Sample {
         for at in 0..n {
             let (value, weight) = (self.values[from(at)], self.weights[from(at)]);
             let other = 1 - self.folds[at];
-            let bin = &sums[bins.places[at]][other];
+            let bin = &sums[bins.bin_index[at]][other];
             let middle = mean(&all[other]);
             let predicted = if bin[1] > 0.0 { mean(bin) } else { middle };
             left += weight * (value - predicted).powi(2);

@@ -1,7 +1,7 @@
 //! The ranking of candidates, effects that are not excited, and detection limits.
 
 use super::draw::{Bar, bars, figure};
-use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as said};
+use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as text_cell};
 use super::words;
 use crate::report::{Candidate, Report, Verdict};
 use crate::workflow::place_name;
@@ -29,12 +29,12 @@ pub(super) fn candidates(report: &Report) -> String {
     );
     let row = |one: &Candidate| {
         vec![
-            said(&one.effect),
-            said(words::place(&one.effect, &one.place)),
+            text_cell(&one.effect),
+            text_cell(words::place(&one.effect, &one.place)),
             number(words::short(one.score)),
             number(one.share_explained.map_or_else(|| words::NOTHING.to_owned(), words::percent)),
             number(words::with_unit(&words::short(one.amplitude), &one.unit)),
-            Cell::Sentence(one.fate.clone()),
+            Cell::Sentence(one.decision.clone()),
         ]
     };
     let heads = ["effect", "where", "score", "explains alone", "amplitude", "what became of it"];
@@ -51,7 +51,7 @@ pub(super) fn limits(report: &Report) -> String {
         let rows = report
             .not_excited
             .iter()
-            .map(|one| vec![said(&one.effect), said(words::place(&one.effect, &one.place))]);
+            .map(|one| vec![text_cell(&one.effect), text_cell(words::place(&one.effect, &one.place))]);
         text += &table("Not excited", &["effect", "where"], rows);
     }
     // Without anything missing the limits are the answer, and stand further up.
@@ -71,9 +71,9 @@ pub(super) fn limits(report: &Report) -> String {
 pub(super) fn limits_table(report: &Report) -> String {
     let rows = report.detection_limits.iter().map(|one| {
         vec![
-            said(&one.effect),
-            said(words::place(&one.effect, &one.place)),
-            said(&one.name),
+            text_cell(&one.effect),
+            text_cell(words::place(&one.effect, &one.place)),
+            text_cell(&one.name),
             number(words::with_unit(&words::short(one.value), &one.unit)),
         ]
     });

@@ -1,6 +1,6 @@
 //! The records: usability, findings, noise and quantum of channels.
 
-use super::markup::{Cell, folded, heading, number, table, words as said};
+use super::markup::{Cell, folded, heading, number, table, words as text_cell};
 use super::words;
 use crate::report::{ChannelCheck, Finding, RecordCheck, Report};
 use pagekit::page::escaped;
@@ -30,7 +30,7 @@ fn record(check: &RecordCheck) -> String {
             ))
         };
         vec![
-            said(column),
+            text_cell(column),
             size(channel.noise),
             size(channel.quantum),
             number(words::percent(channel.unusable)),

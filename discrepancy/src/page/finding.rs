@@ -2,7 +2,7 @@
 
 use super::candidates;
 use super::draw::{Plot, Sample, figure, range};
-use super::markup::{Cell, charts, heading, number, paragraph, table, words as said};
+use super::markup::{Cell, charts, heading, number, paragraph, table, words as text_cell};
 use super::words;
 use crate::outside::SHIFTS;
 use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Surface, Verdict, listed};
@@ -41,11 +41,11 @@ pub(super) fn finding(report: &Report) -> String {
         }
         text += &quantities("Parameters", "parameter", &report.parameters, |_| String::new());
     }
-    if !report.carried.is_empty() {
+    if !report.insignificant.is_empty() {
         text += &paragraph(
             "Moved along with the fit, by too little to call them off; the extended rig file has them as well:",
         );
-        text += &quantities("Moved along", "parameter", &report.carried, |_| String::new());
+        text += &quantities("Moved along", "parameter", &report.insignificant, |_| String::new());
     }
     if let Some(outside) = &report.outside {
         text += &unknown(outside);
@@ -71,8 +71,8 @@ fn effect(named: &NamedEffect) -> String {
             let law = plant::effects::sheet(&other.effect).map_or("", |sheet| sheet.law);
             vec![
                 Cell::About(other.effect.clone(), law.to_owned()),
-                said(words::place(&other.effect, &other.place)),
-                said(words::numbers(other)),
+                text_cell(words::place(&other.effect, &other.place)),
+                text_cell(words::numbers(other)),
                 number(words::percent(other.share_explained)),
             ]
         };
@@ -126,7 +126,7 @@ fn unknown(outside: &Outside) -> String {
         let least = 1.0 / (SHIFTS + 1) as f64;
         let chance =
             if one.p_value <= least { format!("none of {SHIFTS}") } else { words::percent(one.p_value) };
-        vec![said(&one.variable), number(words::percent(one.r2.max(0.0))), number(chance)]
+        vec![text_cell(&one.variable), number(words::percent(one.r2.max(0.0))), number(chance)]
     });
     text += &table(
         "Dependence",

@@ -1,22 +1,28 @@
 //! What the held-out record says: the gap of each signal, and whether the extended model is confirmed.
 
-use super::markup::{Cell, number, paragraph, table, words as said};
+use super::markup::{Cell, number, paragraph, table, words as text_cell};
 use super::words;
-use crate::report::{BeforeAfter, Gap, Report};
+use crate::report::{BeforeAfter, Misfit, Report};
 use std::collections::BTreeMap;
 
-pub(super) fn gap(report: &Report) -> String {
-    let row = |(signal, gap): (&String, &Gap)| {
+pub(super) fn misfit(report: &Report) -> String {
+    let row = |(signal, misfit): (&String, &Misfit)| {
         let (unit, factor) = words::shown_small(words::unit_of(signal));
         let size = |value: f64| number(words::with_unit(&words::short(value * factor), &unit));
-        let closed = match gap.closed {
+        let closed = match misfit.closed {
             Some(closed) => Cell::Judged(closed >= 0.95, words::percent(closed)),
-            None => said("not significant"),
+            None => text_cell("not significant"),
         };
-        vec![said(words::signal(signal)), size(gap.before), size(gap.after), size(gap.floor), closed]
+        vec![
+            text_cell(words::signal(signal)),
+            size(misfit.before),
+            size(misfit.after),
+            size(misfit.floor),
+            closed,
+        ]
     };
     let heads = ["signal", "before", "after", "noise alone", "closed"];
-    let table = table("Gap of each signal", &heads, report.gap.iter().map(row));
+    let table = table("Gap of each signal", &heads, report.misfit.iter().map(row));
     if table.is_empty() {
         return table;
     }
@@ -27,39 +33,40 @@ pub(super) fn gap(report: &Report) -> String {
 }
 
 pub(super) fn verification(report: &Report) -> String {
-    let Some(seen) = &report.verification else { return String::new() };
-    let [low, high] = seen.chi2_null.map(words::short);
-    let within = seen.chi2_after >= seen.chi2_null[0] && seen.chi2_after <= seen.chi2_null[1];
+    let Some(verification) = &report.verification else { return String::new() };
+    let [low, high] = verification.chi2_null.map(words::short);
+    let within = verification.chi2_after >= verification.chi2_null[0]
+        && verification.chi2_after <= verification.chi2_null[1];
     let mut rows = vec![
         vec![
-            said("extended model better, no signal worse"),
+            text_cell("extended model better, no signal worse"),
             Cell::Judged(
-                seen.confirmed,
-                if seen.confirmed { "confirmed" } else { "not confirmed" }.to_owned(),
+                verification.confirmed,
+                if verification.confirmed { "confirmed" } else { "not confirmed" }.to_owned(),
             ),
         ],
         vec![
-            said("windowed \u{3c7}\u{b2} per degree of freedom, before"),
-            said(words::short(seen.chi2_before)),
+            text_cell("windowed \u{3c7}\u{b2} per degree of freedom, before"),
+            text_cell(words::short(verification.chi2_before)),
         ],
         vec![
-            said("the same, after"),
+            text_cell("the same, after"),
             Cell::Judged(
                 within,
-                format!("{}; the 95 % null range is {low} to {high}", words::short(seen.chi2_after)),
+                format!("{}; the 95 % null range is {low} to {high}", words::short(verification.chi2_after)),
             ),
         ],
     ];
-    let sound = if seen.physical.is_empty() {
+    let sound = if verification.physical.is_empty() {
         Cell::Judged(true, "no unphysical state".to_owned())
     } else {
-        Cell::Judged(false, seen.physical.join("; "))
+        Cell::Judged(false, verification.physical.join("; "))
     };
-    rows.push(vec![said("free run"), sound]);
+    rows.push(vec![text_cell("free run"), sound]);
     let mut text =
-        paragraph(&format!("Record: {}. The models were frozen before it was opened.", seen.record));
+        paragraph(&format!("Record: {}. The models were frozen before it was opened.", verification.record));
     text += &table("Verification", &["what", "result"], rows);
-    text + &signals(&seen.free_run_nrmse_percent, &seen.whiteness)
+    text + &signals(&verification.free_run_nrmse_percent, &verification.whiteness)
 }
 
 fn signals(errors: &BTreeMap<String, BeforeAfter>, whiteness: &BTreeMap<String, BeforeAfter>) -> String {
@@ -75,7 +82,7 @@ fn signals(errors: &BTreeMap<String, BeforeAfter>, whiteness: &BTreeMap<String, 
     };
     let rows = names.into_iter().map(|name| {
         let cells = two(errors.get(name), "%").into_iter().chain(two(whiteness.get(name), ""));
-        std::iter::once(said(words::signal(name))).chain(cells).collect()
+        std::iter::once(text_cell(words::signal(name))).chain(cells).collect()
     });
     table(
         "Free run and whiteness",

@@ -3,7 +3,7 @@
 use super::decimate::{COLUMNS, columns};
 use super::draw::{Bar, Plot, Sample, bars, figure, range};
 use super::finding::curve_figure;
-use super::markup::{Cell, charts, folded, heading, paragraph, table, words as said};
+use super::markup::{Cell, charts, folded, heading, paragraph, table, words as text_cell};
 use super::words;
 use crate::locate::regime::REGIMES;
 use crate::report::{Location, Report, UnknownInput};
@@ -88,7 +88,7 @@ fn regimes(location: &Location) -> String {
                 None => Cell::Shaded(0.0, words::NOTHING.to_owned()),
             }
         };
-        std::iter::once(said(words::balance(balance))).chain(names.iter().map(shaded)).collect()
+        std::iter::once(text_cell(words::balance(balance))).chain(names.iter().map(shaded)).collect()
     };
     let table = table("Regimes", &heads, balances.iter().map(row));
     if table.is_empty() {

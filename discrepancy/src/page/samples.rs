@@ -47,12 +47,12 @@ pub(super) fn pictures(size: f64) -> Pictures {
         let time_s: Vec<f64> = (0..20_000).map(|ms| f64::from(ms) * 1e-3).collect();
         let shape =
             |t: f64| offset + scale * ((0.9 * t).sin() + 0.3 * (3.1 * t + 0.4 * (0.7 * t).sin()).sin());
-        let gap =
+        let misfit =
             |t: f64| size * over * noise_value * (0.9 * t).cos().powi(3) * (1.0 + 0.5 * (0.23 * t).sin());
         let truth: Vec<f64> = time_s.iter().map(|t| shape(*t)).collect();
         let measured: Vec<f64> = truth.iter().map(|value| value + noise_value * random()).collect();
-        let before: Vec<f64> = time_s.iter().zip(&truth).map(|(t, value)| value - gap(*t)).collect();
-        let after: Vec<f64> = time_s.iter().zip(&truth).map(|(t, value)| value - 0.03 * gap(*t)).collect();
+        let before: Vec<f64> = time_s.iter().zip(&truth).map(|(t, value)| value - misfit(*t)).collect();
+        let after: Vec<f64> = time_s.iter().zip(&truth).map(|(t, value)| value - 0.03 * misfit(*t)).collect();
         let minus = |model: &[f64]| measured.iter().zip(model).map(|(one, other)| one - other).collect();
         Trace {
             signal: signal.to_owned(),
@@ -78,14 +78,16 @@ pub(super) fn pictures(size: f64) -> Pictures {
     }
 }
 
-fn gap() -> BTreeMap<String, Gap> {
+fn misfit() -> BTreeMap<String, Misfit> {
     [
         ("drive_force_N", 2.1, 0.53, 0.5, Some(0.993)),
         ("drive_position_m", 1.9e-4, 2.4e-5, 2.1e-5, Some(0.996)),
         ("drive_pressure_a_Pa", 9.1e3, 2.6e3, 404.0, Some(0.920)),
         ("drive_pressure_b_Pa", 404.5, 404.4, 404.0, None),
     ]
-    .map(|(signal, before, after, floor, closed)| (signal.to_owned(), Gap { before, after, floor, closed }))
+    .map(|(signal, before, after, floor, closed)| {
+        (signal.to_owned(), Misfit { before, after, floor, closed })
+    })
     .into_iter()
     .collect()
 }
@@ -177,7 +179,7 @@ fn candidates(size: f64) -> Vec<Candidate> {
                 share_explained: (at_place < 4).then(|| 0.97 / (1.0 + at_place as f64)),
                 amplitude: sheet.keys[0].drawn[0],
                 unit: sheet.keys[0].unit.name().to_owned(),
-                fate: if at_place == 0 { "named" } else { "explained by the first" }.to_owned(),
+                decision: if at_place == 0 { "named" } else { "explained by the first" }.to_owned(),
             }
         })
         .collect()
@@ -213,7 +215,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             axes: vec!["drive".into()],
             searched_share: 1.0,
         },
-        gap: gap(),
+        misfit: misfit(),
         verification: Some(verification()),
         candidates: candidates(size),
         not_excited: vec![
@@ -333,7 +335,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             ];
             report.candidates.clear();
             report.location = None;
-            report.gap.clear();
+            report.misfit.clear();
             report.verification = None;
             report.detection_limits.clear();
             report.not_excited.clear();

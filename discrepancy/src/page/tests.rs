@@ -2,7 +2,7 @@
 
 use super::samples::{VERDICTS, at, pictures, sample};
 use super::*;
-use crate::report::{Gap, NamedEffect, Verdict};
+use crate::report::{Misfit, NamedEffect, Verdict};
 use plant::effects::SHEETS;
 
 fn parsed(page: &str) -> roxmltree::Document<'_> {
@@ -151,8 +151,8 @@ fn text_of_the_report_cannot_become_markup_and_strange_numbers_draw_nothing_stra
         share_explained: f64::NAN,
         alternatives: Vec::new(),
     });
-    let gap = Gap { before: f64::NAN, after: f64::INFINITY, floor: 0.0, closed: Some(f64::NAN) };
-    report.gap.insert("a'<_x".to_owned(), gap);
+    let misfit = Misfit { before: f64::NAN, after: f64::INFINITY, floor: 0.0, closed: Some(f64::NAN) };
+    report.misfit.insert("a'<_x".to_owned(), misfit);
     report.candidates[0].score = f64::NAN;
     report.candidates[1].score = f64::INFINITY;
     report.candidates[2].score = 0.0;
@@ -178,7 +178,7 @@ fn text_of_the_report_cannot_become_markup_and_strange_numbers_draw_nothing_stra
 #[test]
 fn a_report_without_anything_else_still_has_a_page() {
     let (mut report, _) = sample(Verdict::Named);
-    report.gap.clear();
+    report.misfit.clear();
     report.verification = None;
     report.candidates.clear();
     report.location = None;

@@ -42,7 +42,7 @@ pub(super) fn head(report: &Report) -> String {
             escaped(&before)
         )
     }));
-    points.extend(gap(report));
+    points.extend(misfit(report));
     if let Some(next) = &report.next {
         let what = next.experiment.as_ref().or(next.otherwise.as_ref());
         points.extend(what.map(|what| format!("To run next: {}", escaped(what))));
@@ -77,12 +77,12 @@ fn one(named: &NamedEffect, before: &str) -> String {
 }
 
 /// How much of the gap of the held-out record is closed, over the signals that had one.
-fn gap(report: &Report) -> Option<String> {
+fn misfit(report: &Report) -> Option<String> {
     if matches!(report.verdict, Verdict::NothingMissing | Verdict::BadData) {
         return None;
     }
     let record = escaped(&report.verification.as_ref()?.record);
-    let mut closed: Vec<f64> = report.gap.values().filter_map(|gap| gap.closed).collect();
+    let mut closed: Vec<f64> = report.misfit.values().filter_map(|misfit| misfit.closed).collect();
     closed.sort_by(f64::total_cmp);
     let (least, most) = (closed.first()?, closed.last()?);
     let range = if words::percent(*least) == words::percent(*most) {

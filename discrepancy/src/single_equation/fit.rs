@@ -8,7 +8,8 @@
 //! For the same reason a count of rows is replaced by n / (1 + 2 sum rho_k), the sum ending where the autocorrelation first is
 //! not positive.
 //!
-//! Source: Liang, Zeger 1986, Biometrika 73(1) (clusters); Geyer 1992, Statistical Science 7(4) (the sum's end).
+//! Source: Liang, Zeger 1986, Biometrika 73(1) (clusters). The sum ends on a single lag; Geyer 1992, Statistical Science 7(4),
+//! ends it on sums of adjacent pairs of lags.
 
 use crate::stats::mean;
 use nalgebra::{DMatrix, DVector};
@@ -29,7 +30,7 @@ pub(super) struct Fit {
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     pub(super) target: Vec<f64>,
-    pub(super) judged: Vec<bool>,
+    pub(super) in_score: Vec<bool>,
     /// Ranges of rows that are one record each.
     pub(super) records: Vec<std::ops::Range<usize>>,
 }
@@ -102,9 +103,9 @@ impl Rows {
             let held_out = normal(columns, &scales, &self.target, fold.iter().copied());
             let rest = Normal { gram: &all.gram - held_out.gram, right: &all.right - held_out.right };
             let numbers = rest.inverse(self.target.len() - fold.len())? * &rest.right;
-            let judged = fold.iter().filter(|row| self.judged[**row]);
+            let in_score = fold.iter().filter(|row| self.in_score[**row]);
             Some(
-                judged
+                in_score
                     .map(|row| {
                         let modelled: f64 =
                             (0..columns.len()).map(|i| numbers[i] * scales[i] * columns[i][*row]).sum();
@@ -136,12 +137,12 @@ impl Rows {
 
     /// Sum of squares of judged rows.
     pub(super) fn rss(&self, residual: &[f64]) -> f64 {
-        residual.iter().zip(&self.judged).filter(|(_, judged)| **judged).map(|(r, _)| r * r).sum()
+        residual.iter().zip(&self.in_score).filter(|(_, in_score)| **in_score).map(|(r, _)| r * r).sum()
     }
 
     /// How many independent rows a residual is worth.
     pub(super) fn effective_sample_size(&self, residual: &[f64]) -> f64 {
-        let judged = self.judged.iter().filter(|judged| **judged).count() as f64;
+        let in_score = self.in_score.iter().filter(|in_score| **in_score).count() as f64;
         let rss = residual.iter().map(|r| r * r).sum::<f64>().max(f64::MIN_POSITIVE);
         let longest = self.records.iter().map(ExactSizeIterator::len).max().unwrap_or(0) / 4;
         let mut sum = 0.0;
@@ -155,7 +156,7 @@ impl Rows {
             }
             sum += rho;
         }
-        (judged / (1.0 + 2.0 * sum)).max(2.0)
+        (in_score / (1.0 + 2.0 * sum)).max(2.0)
     }
 
     /// Folds in time: each record in blocks.
@@ -194,7 +195,7 @@ pub(super) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Mean over its standard error, of differences that are one for each fold.
+/// Mean over its standard error, of differences that are one for each fold and taken as independent.
 pub(super) fn clustered_t(differences: &[f64]) -> f64 {
     let count = differences.len() as f64;
     let mean = mean(differences);
@@ -208,7 +209,7 @@ mod tests {
 
     fn rows(target: Vec<f64>) -> Rows {
         let count = target.len();
-        Rows { target, judged: vec![true; count], records: std::iter::once(0..count).collect() }
+        Rows { target, in_score: vec![true; count], records: std::iter::once(0..count).collect() }
     }
 
     fn line() -> (Rows, Columns) {

@@ -31,8 +31,8 @@ impl Study {
         let shown = |value: &dyn Fn(usize) -> f64| drawn(&|row| factor * value(row), &|_| f64::NAN);
         let time_s = |row: usize| run.time_s[run.kept[row - range.start]];
         // Filters settle at the ends: differences there are no model error.
-        let judged = |value: &dyn Fn(usize) -> f64| {
-            shown(&|row| if fitted.rows.judged[row] { value(row) } else { f64::NAN })
+        let in_score = |value: &dyn Fn(usize) -> f64| {
+            shown(&|row| if fitted.rows.in_score[row] { value(row) } else { f64::NAN })
         };
         let target = &fitted.rows.target;
         let [before, after] = &fitted.residuals;
@@ -43,8 +43,8 @@ impl Study {
             measured: shown(&|row| target[row]),
             before: shown(&|row| target[row] - before[row]),
             after: shown(&|row| target[row] - after[row]),
-            before_residual: judged(&|row| before[row]),
-            after_residual: judged(&|row| after[row]),
+            before_residual: in_score(&|row| before[row]),
+            after_residual: in_score(&|row| after[row]),
             // Nobody knows the sensors of a foreign record.
             noise: 0.0,
         };

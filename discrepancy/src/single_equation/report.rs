@@ -1,18 +1,18 @@
 //! The report of a balance: selected and rejected terms, and the held-out record.
 //!
-//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the same
-//! reason `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their
+//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the
+//! same reason `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their
 //! folds.
 
 use super::fit::{clustered_t, rms};
 use super::model::{Kind, TermEntry};
 use super::runs::Run;
-use super::select::{Judged, Taken, describe};
+use super::select::{CandidateEvaluation, Taken, describe};
 use super::terms::{self, shape_unit, shown};
 use super::{Fitted, Study};
 use crate::report::{
-    BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, Gap, InputFiles, Location, NamedEffect, Next,
-    Outside, Quantity, Report, Verdict, Verification, Where,
+    BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, InputFiles, Location, Misfit, NamedEffect,
+    Next, Outside, Quantity, Report, Verdict, Verification, Where,
 };
 use crate::workflow::empty;
 use std::collections::BTreeMap;
@@ -164,11 +164,11 @@ impl Study {
 
     fn named(&self) -> Vec<NamedEffect> {
         let effect = |(taken, entry, numbers): (&Taken, &TermEntry, Vec<Quantity>)| {
-            let judged = &taken.judged;
-            let forms = judged.ties.iter().map(|variant| (judged.place, *variant));
+            let evaluation = &taken.evaluation;
+            let forms = evaluation.ties.iter().map(|variant| (evaluation.place, *variant));
             let twins = forms.chain(taken.alternatives.iter().copied()).map(|twin| self.alternative(twin));
             let alternatives = twins.chain(alias(entry, &numbers, self)).collect();
-            NamedEffect { alternatives, ..named_effect(&entry.effect, finite(numbers), judged.share) }
+            NamedEffect { alternatives, ..named_effect(&entry.effect, finite(numbers), evaluation.share) }
         };
         self.taken(false).map(effect).collect()
     }
@@ -178,10 +178,10 @@ impl Study {
         let errors = self.errors(&self.extended, &self.extended_fit);
         let mut next = self.base.len();
         let all = self.found.taken.iter().map(move |taken| {
-            let prepared = &self.families[taken.judged.place];
-            let entry = &prepared.family.variants[taken.judged.variant];
+            let prepared = &self.families[taken.evaluation.place];
+            let entry = &prepared.family.variants[taken.evaluation.variant];
             let first = next;
-            next += prepared.columns[taken.judged.variant].len();
+            next += prepared.columns[taken.evaluation.variant].len();
             (taken, entry, self.quantities(entry, first, &self.extended_fit.numbers, &errors))
         });
         all.filter(move |(_, entry, _)| entry.effect.starts_with("parameter:") == parameters)
@@ -192,12 +192,12 @@ impl Study {
         let prepared = &self.families[place_of];
         let entry = &prepared.family.variants[variant];
         let columns: super::Columns = self.base.iter().chain(&prepared.columns[variant]).cloned().collect();
-        let first = self.found.first.iter().find(|judged| judged.place == place_of);
+        let first = self.found.first.iter().find(|evaluation| evaluation.place == place_of);
         let parameters = self.rows.fit(&columns).map_or_else(Vec::new, |fit| {
             let errors = self.errors(&columns, &fit);
             finite(self.quantities(entry, self.base.len(), &fit.numbers, &errors))
         });
-        named_effect(&entry.effect, parameters, first.map_or(0.0, |judged| judged.share))
+        named_effect(&entry.effect, parameters, first.map_or(0.0, |evaluation| evaluation.share))
     }
 
     fn parameters(&self) -> Vec<Quantity> {
@@ -209,18 +209,18 @@ impl Study {
     }
 
     fn candidates(&self) -> Vec<Candidate> {
-        let taken = |candidate: &Judged| {
-            self.found.taken.iter().position(|taken| taken.judged.place == candidate.place)
+        let taken = |candidate: &CandidateEvaluation| {
+            self.found.taken.iter().position(|taken| taken.evaluation.place == candidate.place)
         };
         let mut candidates: Vec<Candidate> = self
             .found
             .first
             .iter()
-            .map(|judged| {
-                let entry = &self.families[judged.place].family.variants[judged.variant];
+            .map(|evaluation| {
+                let entry = &self.families[evaluation.place].family.variants[evaluation.variant];
                 let (_, unit, factor) = shown(entry);
-                let last = self.found.last.iter().find(|last| last.place == judged.place);
-                let fate = match (taken(judged), last) {
+                let last = self.found.last.iter().find(|last| last.place == evaluation.place);
+                let decision = match (taken(evaluation), last) {
                     (Some(round), _) => {
                         let ordinal = ["first", "second", "third"]
                             .get(round)
@@ -239,11 +239,11 @@ impl Study {
                 Candidate {
                     effect: entry.effect.clone(),
                     place: place(&entry.effect),
-                    score: judged.score,
-                    share_explained: Some(judged.share),
-                    amplitude: judged.number * factor,
+                    score: evaluation.score,
+                    share_explained: Some(evaluation.share),
+                    amplitude: evaluation.number * factor,
                     unit: unit.into(),
-                    fate,
+                    decision,
                 }
             })
             .collect();
@@ -253,8 +253,9 @@ impl Study {
 
     /// Families collinear with the baseline.
     fn not_excited(&self) -> Vec<EffectPlace> {
-        let describe = self.found.first.iter().filter(|judged| !judged.is_excited);
-        let effects = describe.map(|judged| self.families[judged.place].family.variants[0].effect.clone());
+        let describe = self.found.first.iter().filter(|evaluation| !evaluation.is_excited);
+        let effects =
+            describe.map(|evaluation| self.families[evaluation.place].family.variants[0].effect.clone());
         effects.map(|effect| EffectPlace { place: place(&effect), effect }).collect()
     }
 
@@ -262,15 +263,15 @@ impl Study {
     fn detection_limits(&self) -> Vec<DetectionLimit> {
         let rss = self.rows.rss(&self.extended_fit.residual);
         let mut limits = Vec::new();
-        for judged in &self.found.last {
-            let prepared = &self.families[judged.place];
-            let entry = &prepared.family.variants[judged.variant];
+        for evaluation in &self.found.last {
+            let prepared = &self.families[evaluation.place];
+            let entry = &prepared.family.variants[evaluation.variant];
             let (name, unit, factor) = shown(entry);
-            if entry.effect.starts_with("decoy:") || !judged.is_excited {
+            if entry.effect.starts_with("decoy:") || !evaluation.is_excited {
                 continue;
             }
             let column =
-                super::Rows { target: prepared.columns[judged.variant][0].clone(), ..self.rows.clone() };
+                super::Rows { target: prepared.columns[evaluation.variant][0].clone(), ..self.rows.clone() };
             let Some(alone) = column.fit(&self.extended) else { continue };
             let alone_rss = column.rss(&alone.residual);
             if alone_rss > 0.0 {
@@ -351,7 +352,9 @@ impl Study {
         };
         let [before_rms, after_rms] = [before, after].map(|values| rms(values));
         let closed = (before_rms > 0.0).then(|| 1.0 - (after_rms / before_rms).powi(2));
-        report.gap.insert(signal.clone(), Gap { before: before_rms, after: after_rms, floor: 0.0, closed });
+        report
+            .misfit
+            .insert(signal.clone(), Misfit { before: before_rms, after: after_rms, floor: 0.0, closed });
         let cut = rows.in_time(self.model.selection.blocks);
         let squares = |residual: &[f64]| -> Vec<f64> {
             cut.folds.iter().map(|fold| fold.iter().map(|row| residual[*row].powi(2)).sum()).collect()

@@ -39,7 +39,7 @@ pub(super) struct Run {
     /// Samples that are rows.
     pub(super) kept: Vec<usize>,
     /// Whether selection looks at the row.
-    pub(super) judged: Vec<bool>,
+    pub(super) in_score: Vec<bool>,
 }
 
 /// What a chamber's terms need.
@@ -123,7 +123,7 @@ impl Run {
         let (first_s, last_s) = (grid.time_s[0], grid.time_s[grid.time_s.len() - 1]);
         let ends_s = processing.ends_s;
         let inside = |at: &usize| grid.time_s[*at] - first_s >= ends_s && last_s - grid.time_s[*at] >= ends_s;
-        let judged = kept.iter().map(inside).collect();
+        let in_score = kept.iter().map(inside).collect();
         let time_s = grid.time_s;
         Ok(Self {
             name,
@@ -137,7 +137,7 @@ impl Run {
             chamber,
             thinning,
             kept,
-            judged,
+            in_score,
         })
     }
 

@@ -14,19 +14,21 @@
 //! what passes is taken; another effect that passes and leaves no more on the same folds (3 clustered standard errors) explains
 //! the records as well.
 //!
-//! Source: Schwarz 1978 (penalty); discrepancy-notes.md, 3, 5 and Pipeline 5; Roberts et al. 2017, Ecography 40(8) (blocked
-//! folds).
+//! Source: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); discrepancy-notes.md, 3, 5 and Pipeline 5; Roberts et al.
+//! 2017, Ecography 40(8) (blocked folds).
 
 use super::fit::{Columns, Cut, Rows, clustered_t};
 use super::model::{Selection, TermEntry};
 use super::terms::{Family, amplitude};
 
-/// Clustered standard errors that folds in time ask, and those in bands.
+/// Clustered standard errors that folds in time ask, and those in bands. Folds are taken as independent, although their training
+/// rows overlap [Bengio, Grandvalet 2004, JMLR 5]; for ten folds 2 is about 4 % one-sided.
 const T_TIME: f64 = 3.0;
 const T_BANDS: f64 = 2.0;
 /// Significance of a difference between two effects, in clustered standard errors.
 const T_APART: f64 = 3.0;
-/// Twice the difference of log likelihoods that does the same: "very strong" is 10 [Kass, Raftery 1995, JASA 90(430)].
+/// Twice the difference of log likelihoods that does the same. "Very strong" is 10 for twice the log Bayes factor [Kass, Raftery
+/// 1995, JASA 90(430)], which this difference approximates for equal numbers of parameters only.
 const GAIN_APART: f64 = 10.0;
 
 /// A family with its columns over the training rows.
@@ -51,7 +53,7 @@ pub(super) struct Cuts {
 
 /// How a family did in a round.
 #[derive(Clone, Debug)]
-pub(super) struct Judged {
+pub(super) struct CandidateEvaluation {
     pub(super) place: usize,
     pub(super) variant: usize,
     /// Of the variant, the first where it has two; its spread when the columns cannot be distinguished is not here.
@@ -77,20 +79,20 @@ pub(super) struct Judged {
 /// A term that was taken.
 #[derive(Clone, Debug)]
 pub(super) struct Taken {
-    pub(super) judged: Judged,
+    pub(super) evaluation: CandidateEvaluation,
     /// Other effects that explain the same: place and variant.
     pub(super) alternatives: Vec<(usize, usize)>,
 }
 
 /// What came of the search.
-pub(super) struct Found {
+pub(super) struct SearchResult {
     pub(super) taken: Vec<Taken>,
     /// All families alone, in their order.
-    pub(super) first: Vec<Judged>,
+    pub(super) first: Vec<CandidateEvaluation>,
     /// All families beside the selected terms.
-    pub(super) last: Vec<Judged>,
+    pub(super) last: Vec<CandidateEvaluation>,
     /// The decoy that did better than every effect, where that ended the search.
-    pub(super) decoy: Option<Judged>,
+    pub(super) decoy: Option<CandidateEvaluation>,
 }
 
 /// Searches beside `base`; sizes count in what `plain`, the baseline without terms that were added before, leaves out.
@@ -101,20 +103,21 @@ pub(super) fn search(
     families: &[Prepared],
     selection: &Selection,
     progress: &mut dyn FnMut(&str),
-) -> Found {
-    let mut found = Found { taken: Vec::new(), first: Vec::new(), last: Vec::new(), decoy: None };
+) -> SearchResult {
+    let mut found = SearchResult { taken: Vec::new(), first: Vec::new(), last: Vec::new(), decoy: None };
     let mut columns = base.clone();
     let excess = Excess::of(rows, cuts, plain);
     loop {
-        let round: Vec<Judged> = (0..families.len())
-            .filter(|place| found.taken.iter().all(|taken| taken.judged.place != *place))
+        let round: Vec<CandidateEvaluation> = (0..families.len())
+            .filter(|place| found.taken.iter().all(|taken| taken.evaluation.place != *place))
             .map(|place| judge(rows, cuts, &columns, (families, place), selection, &excess))
             .collect();
         if found.first.is_empty() {
             found.first.clone_from(&round);
         }
         found.last.clone_from(&round);
-        let best = round.iter().filter(|judged| judged.passes).max_by(|a, b| a.share.total_cmp(&b.share));
+        let best =
+            round.iter().filter(|evaluation| evaluation.passes).max_by(|a, b| a.share.total_cmp(&b.share));
         let Some(best) = best.filter(|_| found.taken.len() < selection.most) else { return found };
         if families[best.place].is_decoy() {
             found.decoy = Some(best.clone());
@@ -129,7 +132,7 @@ pub(super) fn search(
             .map(|other| (other.place, other.variant))
             .collect();
         columns.extend(families[best.place].columns[best.variant].iter().cloned());
-        found.taken.push(Taken { judged: best.clone(), alternatives });
+        found.taken.push(Taken { evaluation: best.clone(), alternatives });
     }
 }
 
@@ -152,7 +155,7 @@ impl Excess {
 }
 
 /// Whether one is better than the other beyond doubt: on the same folds, or by its likelihood.
-fn apart(best: &Judged, other: &Judged) -> bool {
+fn apart(best: &CandidateEvaluation, other: &CandidateEvaluation) -> bool {
     if best.effective * (other.rss / best.rss).ln() > GAIN_APART {
         return true;
     }
@@ -174,9 +177,9 @@ fn judge(
     (families, place): (&[Prepared], usize),
     selection: &Selection,
     excess: &Excess,
-) -> Judged {
+) -> CandidateEvaluation {
     let Prepared { family, columns: variants } = &families[place];
-    let refused = |gate: String, variant: usize, number: f64| Judged {
+    let refused = |gate: String, variant: usize, number: f64| CandidateEvaluation {
         place,
         variant,
         number,
@@ -203,7 +206,7 @@ fn judge(
         .collect();
     if tried.is_empty() {
         let alike = refused("these records cannot tell it from the baseline".into(), 0, 0.0);
-        return Judged { is_excited: false, ..alike };
+        return CandidateEvaluation { is_excited: false, ..alike };
     }
     let number_of = |fit: &super::fit::Fit| fit.numbers[columns.len()];
     let allowed = tried.iter().filter(|(_, fit, _)| !family.positive || number_of(fit) >= 0.0);
@@ -260,7 +263,7 @@ fn judge(
     }
     let (score, gate) =
         gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is one gate at least");
-    Judged {
+    CandidateEvaluation {
         place,
         variant,
         number,
@@ -297,7 +300,7 @@ mod tests {
     fn taken(target: Vec<f64>) -> Vec<String> {
         let (x, v, _) = path();
         let count = target.len();
-        let rows = Rows { target, judged: vec![true; count], records: std::iter::once(0..count).collect() };
+        let rows = Rows { target, in_score: vec![true; count], records: std::iter::once(0..count).collect() };
         let free = |name: &str, column: Vec<f64>| Prepared {
             family: Family {
                 variants: vec![term(name, "", &[])],
@@ -319,7 +322,7 @@ mod tests {
         let mut names: Vec<String> = found
             .taken
             .iter()
-            .map(|taken| families[taken.judged.place].family.variants[0].effect.clone())
+            .map(|taken| families[taken.evaluation.place].family.variants[0].effect.clone())
             .collect();
         names.extend(found.decoy.map(|_| "decoy".to_owned()));
         names

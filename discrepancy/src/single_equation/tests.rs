@@ -89,8 +89,8 @@ fn a_hidden_dead_volume_is_named_in_the_flow_of_its_chamber() {
     assert_eq!(report.named[0].alternatives[0].effect, "position-sensor-offset");
     assert_eq!((report.named.len(), report.verdict), (1, Verdict::Ambiguous));
     assert!(report.next.unwrap().otherwise.unwrap().contains("other chamber"));
-    let gap = report.gap["drive_flow_a_m3_per_s"].clone();
-    assert!(gap.after < 0.8 * gap.before, "{gap:?}");
+    let misfit = report.misfit["drive_flow_a_m3_per_s"].clone();
+    assert!(misfit.after < 0.8 * misfit.before, "{misfit:?}");
     assert!(report.verification.unwrap().confirmed);
     assert!(extended.contains("effect = \"dead-volume\""), "{extended}");
 }

@@ -12,10 +12,10 @@ use super::with_tables;
 use crate::descent::descend;
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Products, loss};
-use crate::name::NUMBER_COSTS;
+use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
-use crate::windows::{Reach, ReferenceRun};
+use crate::windows::{ReferenceRun, VariableRanges};
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
@@ -42,16 +42,16 @@ pub(super) struct FittedTable {
     /// Whether all values are equal.
     pub(super) is_constant: bool,
     /// Sorted values of its variable in the windows.
-    pub(super) seen: Vec<f64>,
+    pub(super) sorted_samples: Vec<f64>,
 }
 
 impl FittedTable {
     /// Whether a point acts in a window.
-    fn acts(&self, point: usize, reach: &Reach) -> bool {
+    fn acts(&self, point: usize, ranges: &VariableRanges) -> bool {
         let Tabulated { axis, variable, at, .. } = &self.table;
         let before = point.checked_sub(1).map_or(f64::NEG_INFINITY, |before| at[before]);
         let after = at.get(point + 1).copied().unwrap_or(f64::INFINITY);
-        self.is_constant || reach.meets(*axis, *variable, [before, after])
+        self.is_constant || ranges.overlaps(*axis, *variable, [before, after])
     }
 }
 
@@ -74,12 +74,12 @@ enum Coordinate {
 
 impl Model {
     /// Parameters without tables; those not free are at the rig file's values.
-    pub(super) fn alone(factors: [f64; COUNT], free: [bool; COUNT]) -> Self {
-        Model { factors, free: [true; COUNT], tables: Vec::new() }.held(free)
+    pub(super) fn without_tables(factors: [f64; COUNT], free: [bool; COUNT]) -> Self {
+        Model { factors, free: [true; COUNT], tables: Vec::new() }.with_fixed(free)
     }
 
     /// The same with only some parameters free, the others at the rig file's values.
-    pub(super) fn held(mut self, free: [bool; COUNT]) -> Self {
+    pub(super) fn with_fixed(mut self, free: [bool; COUNT]) -> Self {
         self.free = free;
         for (factor, _) in self.factors.iter_mut().zip(free).filter(|(_, free)| !free) {
             *factor = 1.0;
@@ -152,7 +152,7 @@ impl Model {
     }
 
     /// Deviation of a coordinate from its neutral value.
-    fn off(&self, coordinate: Coordinate) -> f64 {
+    fn deviation(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
             Coordinate::Factor(at) => self.factors[at] - 1.0,
             Coordinate::Value(at, point) => self.tables[at].table.value[point],
@@ -161,32 +161,33 @@ impl Model {
 
     /// Prior penalty of the factors and penalty for the points.
     fn penalty(&self) -> f64 {
-        let factors: f64 =
-            (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].prior_std).powi(2)).sum();
+        let factors: f64 = (0..COUNT)
+            .map(|at| (self.deviation(Coordinate::Factor(at)) / PARAMETERS[at].prior_std).powi(2))
+            .sum();
         let points = self
             .coordinates()
             .iter()
             .filter(|coordinate| matches!(coordinate, Coordinate::Value(..)))
             .count();
-        factors + NUMBER_COSTS * points as f64
+        factors + EFFECT_PARAMETER_PENALTY * points as f64
     }
 }
 
 /// A simulated model.
 #[derive(Clone, Debug)]
-pub(super) struct Point {
+pub(super) struct Iterate {
     pub(super) model: Model,
     residual: Vec<f64>,
     /// Loss of the windows plus penalties.
     pub(super) loss: f64,
 }
 
-impl Point {
+impl Iterate {
     /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
         let loss = loss(&engine.squares(&residual), engine.scaled_dof()) + model.penalty();
-        loss.is_finite().then_some(Point { model, residual, loss })
+        loss.is_finite().then_some(Iterate { model, residual, loss })
     }
 
     /// The parameters with standard errors, as a fit without effects; `linearisation` is the linearisation at the model.
@@ -232,7 +233,7 @@ fn columns(
                 Coordinate::Factor(_) => engine.simulate_coarsely(&rig),
                 Coordinate::Value(at, point) => {
                     let fitted = &model.tables[*at];
-                    engine.simulate_where(&rig, reference_runs, |reach| fitted.acts(*point, reach))
+                    engine.simulate_where(&rig, reference_runs, |ranges| fitted.acts(*point, ranges))
                 }
             };
             let mut column = engine.difference(&simulated, &from);
@@ -286,11 +287,11 @@ impl TableLinearisation {
     }
 
     /// Cross-validated loss of the linearised model, without penalties.
-    pub(super) fn cross_validated_loss(&self, engine: &Engine<'_>, point: &Point) -> f64 {
+    pub(super) fn cross_validated_loss(&self, engine: &Engine<'_>, point: &Iterate) -> f64 {
         let products = engine.products(&point.residual, &self.columns);
         let coordinates = self.model.coordinates();
         let precisions = self.model.precisions();
-        let from: Vec<f64> = coordinates.iter().map(|coordinate| self.model.off(*coordinate)).collect();
+        let from: Vec<f64> = coordinates.iter().map(|coordinate| self.model.deviation(*coordinate)).collect();
         products.cross_validated_loss(&(0..coordinates.len()).collect::<Vec<_>>(), &precisions, &from, FOLDS)
     }
 
@@ -298,7 +299,7 @@ impl TableLinearisation {
     pub(super) fn predicted_loss(
         &self,
         engine: &Engine<'_>,
-        point: &Point,
+        point: &Iterate,
         tables: &[&LinearisedTable],
     ) -> f64 {
         let mut model = self.model.clone();
@@ -312,7 +313,7 @@ impl TableLinearisation {
 /// Forward selection of parameters beside the tables on the linearised model, while the loss falls by `gain`.
 pub(super) fn needed(
     engine: &Engine<'_>,
-    point: &Point,
+    point: &Iterate,
     linearisation: &[&[f64]],
     gain: f64,
 ) -> [bool; COUNT] {
@@ -345,8 +346,8 @@ pub(super) fn needed(
 }
 
 /// Gauss-Newton until convergence.
-pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
-    let loss = |point: &Point| point.loss;
+pub(super) fn fit(engine: &Engine<'_>, start: Iterate, steps: usize) -> Iterate {
+    let loss = |point: &Iterate| point.loss;
     descend(start, steps, CONVERGED, loss, |point| {
         let linearisation = TableLinearisation::of(engine, point.model.clone())?;
         Some(self::steps(engine, point.clone(), &linearisation.with(&[])))
@@ -354,10 +355,10 @@ pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
 }
 
 /// Steps with the same sensitivities, one column for each free coordinate.
-pub(super) fn steps(engine: &Engine<'_>, start: Point, linearisation: &[&[f64]]) -> Point {
+pub(super) fn steps(engine: &Engine<'_>, start: Iterate, linearisation: &[&[f64]]) -> Iterate {
     let (coordinates, precisions) = (start.model.coordinates(), start.model.precisions());
     let mut products = engine.products(&start.residual, linearisation);
-    let loss = |point: &Point| point.loss;
+    let loss = |point: &Iterate| point.loss;
     descend(start, STEPS_PER_LINEARISATION, CONVERGED, loss, |point| {
         products.set_residual(&point.residual, linearisation, engine.rows());
         line_search(engine, point, &coordinates, &products, &precisions)
@@ -367,17 +368,17 @@ pub(super) fn steps(engine: &Engine<'_>, start: Point, linearisation: &[&[f64]])
 /// Backtracking line search: the longest step that lowers the loss.
 fn line_search(
     engine: &Engine<'_>,
-    point: &Point,
+    point: &Iterate,
     coordinates: &[Coordinate],
     products: &Products,
     precisions: &[f64],
-) -> Option<Point> {
+) -> Option<Iterate> {
     let joint = products.fit(&(0..coordinates.len()).collect::<Vec<_>>(), precisions);
     SHARES.iter().find_map(|share| {
         let changes = coordinates.iter().zip(&joint.coefficients);
         let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {
             model.perturbed(*coordinate, share * change)
         });
-        Point::of(engine, model).filter(|tried| tried.loss < point.loss)
+        Iterate::of(engine, model).filter(|tried| tried.loss < point.loss)
     })
 }

@@ -1,6 +1,6 @@
 //! Open-loop simulation of the whole record from its first samples at rest, judged after 0.1 s.
 
-use crate::gridded_record::{CHANNELS, GriddedRecord, Point};
+use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::report::BeforeAfter;
 use crate::windows::{first_state, set_state};
 use plant::{Axis, PERIOD_S, Plant, RigParameters};
@@ -24,7 +24,7 @@ pub(super) struct FreeRun {
 pub(super) fn free_run(record: &GriddedRecord, rig: &RigParameters) -> FreeRun {
     let mut plant =
         Plant::in_state(rig, &first_state(record, rig)).expect("a start state is one of the rig's");
-    let at_rest = record.points[0].map(|point| Point { rod_velocity_m_per_s: 0.0, ..point });
+    let at_rest = record.points[0].map(|point| AxisState { rod_velocity_m_per_s: 0.0, ..point });
     set_state(&mut plant, record, &at_rest);
     let stroke_m = rig.cylinder().stroke_m;
     let highest_pa = HIGHEST * plant.supply_pressure_pa();

@@ -1,6 +1,6 @@
 //! Residual power of each window and output over its null expectation.
 
-use super::LEVELS;
+use super::VARIANCE_FACTOR_BOUNDS;
 use super::null_power::NullPower;
 use crate::stats::order_statistic;
 use crate::windows::WINDOW;
@@ -8,7 +8,7 @@ use crate::windows::WINDOW;
 /// Share of trimmed windows.
 const LEFT_OUT: f64 = 0.02;
 /// Quantile of the windows that measures the noise level.
-const QUIET: f64 = 0.1;
+const DECILE: f64 = 0.1;
 
 /// Squares of a window and their null expectation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,7 +20,7 @@ pub(super) struct Squares {
 }
 
 impl Squares {
-    pub(super) fn over(self) -> f64 {
+    pub(super) fn ratio(self) -> f64 {
         self.sum / self.expected
     }
 }
@@ -67,7 +67,7 @@ impl Power {
     }
 
     /// The same with the level of each output divided out.
-    pub(super) fn over(&self, levels: &[f64]) -> Power {
+    pub(super) fn divided_by_levels(&self, levels: &[f64]) -> Power {
         let squares = self
             .squares
             .iter()
@@ -94,13 +94,13 @@ impl Power {
     }
 
     /// The quantile of each output's windows that measures its level.
-    pub(super) fn quiet(&self) -> Vec<f64> {
+    pub(super) fn lower_decile(&self) -> Vec<f64> {
         (0..self.outputs)
             .map(|output| {
                 let squares = self.output(output);
                 let mut ratios: Vec<f64> =
-                    squares.into_iter().filter(|window| window.expected > 0.0).map(Squares::over).collect();
-                let rank = (QUIET * ratios.len() as f64) as usize;
+                    squares.into_iter().filter(|window| window.expected > 0.0).map(Squares::ratio).collect();
+                let rank = (DECILE * ratios.len() as f64) as usize;
                 order_statistic(&mut ratios, rank).unwrap_or(1.0)
             })
             .collect()
@@ -109,11 +109,11 @@ impl Power {
 
 /// Level of each output's noise, as a factor on its power.
 pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
-    let quiet = power.quiet();
-    quiet
+    let lower_decile = power.lower_decile();
+    lower_decile
         .iter()
-        .zip(&null.quiet)
-        .map(|(quantile, mean)| (quantile / mean).clamp(LEVELS[0], LEVELS[1]))
+        .zip(&null.lower_decile)
+        .map(|(quantile, mean)| (quantile / mean).clamp(VARIANCE_FACTOR_BOUNDS[0], VARIANCE_FACTOR_BOUNDS[1]))
         .collect()
 }
 
@@ -121,7 +121,7 @@ pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
 pub(super) fn kept(squares: &[Squares]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..squares.len()).filter(|at| squares[*at].expected > 0.0).collect();
     // A stable sort: equal windows stay in their order.
-    order.sort_by(|left, right| squares[*right].over().total_cmp(&squares[*left].over()));
+    order.sort_by(|left, right| squares[*right].ratio().total_cmp(&squares[*left].ratio()));
     let out = (LEFT_OUT * order.len() as f64).ceil() as usize;
     let mut kept: Vec<bool> = squares.iter().map(|squares| squares.expected > 0.0).collect();
     // At least one window remains.

@@ -1,7 +1,7 @@
 //! Held-out figures of models that are known to be right, wrong or unchanged.
 
 use super::*;
-use crate::gridded_record::Point;
+use crate::gridded_record::AxisState;
 use crate::next::divergence::noise_with_rounding;
 use crate::windows::first_state;
 use plant::{Inputs, Plant, Sensors};
@@ -13,9 +13,9 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
         name: "made".to_owned(),
         measured: [true, false],
         inputs: vec![Inputs::default(); PERIODS],
-        points: vec![[Point { extension_m: 0.1, ..Point::default() }; 2]],
+        points: vec![[AxisState { extension_m: 0.1, ..AxisState::default() }; 2]],
         noise: [noise_with_rounding(baseline), [0.0; CHANNELS]],
-        gaps: vec![false; PERIODS],
+        excluded_periods: vec![false; PERIODS],
         ..GriddedRecord::default()
     };
     for (period, inputs) in record.inputs.iter_mut().enumerate() {
@@ -31,13 +31,13 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
         let samples = [reading.position, reading.force, reading.pressure_a, reading.pressure_b]
             .map(|reading| Some(reading.value));
         record.samples.push([samples, [None; CHANNELS]]);
-        let point = Point {
+        let point = AxisState {
             extension_m: axis.position_m,
             rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
-            or_else_m_per_s: None,
+            alternative_velocity_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         };
-        record.points.push([point, Point::default()]);
+        record.points.push([point, AxisState::default()]);
         plant.step(inputs);
     }
     record
@@ -62,11 +62,11 @@ fn where_nothing_is_missing_nothing_changes() {
     // Four sevenths of a per cent of spread on each side of the range: 30 windows hold 1 % of it.
     assert!((seen.chi2_after - 1.0).abs() < 0.06, "{}", seen.chi2_after);
     assert_eq!(seen.physical, Vec::<String>::new());
-    for (signal, gap) in &verified.gap {
-        assert_eq!(gap.closed, None, "{signal}: {gap:?}");
-        assert_eq!(gap.before.to_bits(), gap.after.to_bits(), "{signal}");
+    for (signal, misfit) in &verified.misfit {
+        assert_eq!(misfit.closed, None, "{signal}: {misfit:?}");
+        assert_eq!(misfit.before.to_bits(), misfit.after.to_bits(), "{signal}");
     }
-    assert_eq!(verified.gap.len(), CHANNELS);
+    assert_eq!(verified.misfit.len(), CHANNELS);
     assert_eq!(seen.free_run_nrmse_percent.len(), CHANNELS);
 }
 
@@ -78,11 +78,11 @@ fn the_true_model_closes_the_gap_and_a_wrong_sign_does_not() {
     let verified = judged(&rig, &truth, &record);
     let seen = &verified.verification;
     assert!(seen.confirmed, "{seen:?}");
-    let closed_shares: Vec<f64> = verified.gap.values().filter_map(|gap| gap.closed).collect();
+    let closed_shares: Vec<f64> = verified.misfit.values().filter_map(|misfit| misfit.closed).collect();
     assert!(
         !closed_shares.is_empty() && closed_shares.iter().all(|closed| *closed > 0.95),
         "{:?}",
-        verified.gap
+        verified.misfit
     );
     let run = seen.free_run_nrmse_percent["drive_position_m"];
     assert!(run.after < 0.2 * run.before, "{run:?}");
@@ -100,8 +100,8 @@ fn a_hidden_leak_is_closed_by_itself() {
     let truth = rig.with_effect("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)]).unwrap();
     let verified = judged(&rig, &truth, &record(&truth, &rig, 3));
     assert!(verified.verification.confirmed, "{:?}", verified.verification);
-    let closed: Vec<f64> = verified.gap.values().filter_map(|gap| gap.closed).collect();
-    assert!(!closed.is_empty() && closed.iter().all(|closed| *closed > 0.95), "{:?}", verified.gap);
+    let closed: Vec<f64> = verified.misfit.values().filter_map(|misfit| misfit.closed).collect();
+    assert!(!closed.is_empty() && closed.iter().all(|closed| *closed > 0.95), "{:?}", verified.misfit);
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn traces_hold_the_whole_record_and_nothing_where_it_is_not_judged() {
     let rig = RigParameters::baseline();
     let mut record = record(&rig, &rig, 4);
     record.samples[555][0][2] = None;
-    record.gaps[1010] = true;
+    record.excluded_periods[1010] = true;
     let traces = judged(&rig, &rig, &record).traces;
     assert_eq!(traces.len(), CHANNELS);
     let pressure = traces.iter().find(|trace| trace.signal == "drive_pressure_a_Pa").unwrap();

@@ -19,7 +19,7 @@ pub struct ReferenceRun {
     simulated: Vec<f64>,
     /// Start state of each judged window; empty for rigs with effects, whose memories are no part of it.
     states: Vec<State>,
-    reaches: Vec<Reach>,
+    ranges_of_windows: Vec<VariableRanges>,
 }
 
 impl ReferenceRun {
@@ -31,10 +31,11 @@ impl ReferenceRun {
 
 /// Smallest and largest value of each table variable in a window.
 #[derive(Clone, Copy, Debug)]
-pub struct Reach([[[f64; 2]; Variable::ALL.len()]; 2]);
+pub struct VariableRanges([[[f64; 2]; Variable::ALL.len()]; 2]);
 
-impl Reach {
-    const EMPTY: Reach = Reach([[[f64::INFINITY, f64::NEG_INFINITY]; Variable::ALL.len()]; 2]);
+impl VariableRanges {
+    const EMPTY: VariableRanges =
+        VariableRanges([[[f64::INFINITY, f64::NEG_INFINITY]; Variable::ALL.len()]; 2]);
 
     fn add(&mut self, plant: &Plant) {
         let truth = plant.truth(&plant::Inputs::default());
@@ -48,7 +49,7 @@ impl Reach {
     }
 
     /// Whether a variable of an axis lies between two values anywhere in the window.
-    pub fn meets(&self, axis: Axis, variable: Variable, between: [f64; 2]) -> bool {
+    pub fn overlaps(&self, axis: Axis, variable: Variable, between: [f64; 2]) -> bool {
         let place = Variable::ALL.iter().position(|known| *known == variable).expect("all of them");
         let [least, most] = self.0[axis.index()][place];
         least < between[1] && most > between[0]
@@ -66,19 +67,19 @@ impl Windows<'_> {
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
             super::set_state(&mut plant, self.record, &points);
-            let judged = self.starts.get(reference_run.reaches.len()) == Some(&start);
+            let judged = self.starts.get(reference_run.ranges_of_windows.len()) == Some(&start);
             let state = *plant.state();
-            let mut reach = Reach::EMPTY;
+            let mut ranges = VariableRanges::EMPTY;
             for inputs in &self.record.inputs[start..start + WINDOW] {
                 if judged {
                     self.read(&plant, inputs, &mut reference_run.simulated);
-                    reach.add(&plant);
+                    ranges.add(&plant);
                 }
                 plant.step(inputs);
             }
             if judged {
-                reach.add(&plant);
-                reference_run.reaches.push(reach);
+                ranges.add(&plant);
+                reference_run.ranges_of_windows.push(ranges);
                 if !remembers {
                     reference_run.states.push(state);
                 }
@@ -93,7 +94,7 @@ impl Windows<'_> {
         &self,
         rig: &RigParameters,
         reference_run: &ReferenceRun,
-        differs: impl Fn(&Reach) -> bool,
+        differs: impl Fn(&VariableRanges) -> bool,
     ) -> Vec<f64> {
         if reference_run.states.is_empty() {
             return self.simulate_coarsely(rig);
@@ -101,10 +102,13 @@ impl Windows<'_> {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
         let mut simulated = Vec::with_capacity(reference_run.simulated.len());
         let known = reference_run.simulated.chunks_exact(self.rows());
-        for ((start, known), (state, reach)) in
-            self.starts.iter().zip(known).zip(reference_run.states.iter().zip(&reference_run.reaches))
+        for ((start, known), (state, ranges)) in self
+            .starts
+            .iter()
+            .zip(known)
+            .zip(reference_run.states.iter().zip(&reference_run.ranges_of_windows))
         {
-            if !differs(reach) {
+            if !differs(ranges) {
                 simulated.extend_from_slice(known);
                 continue;
             }

@@ -1,7 +1,7 @@
 //! Start states of windows: their sensitivities, and their estimation.
 
 use super::{COARSE_SUBSTEPS, WINDOW, Windows, dot, project};
-use crate::gridded_record::{GriddedRecord, Point};
+use crate::gridded_record::{AxisState, GriddedRecord};
 use nalgebra::{DMatrix, DVector};
 use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
 use rand_pcg::Pcg64;
@@ -14,7 +14,7 @@ const SHORTER: f64 = 0.3;
 /// Speeds of a piston that seems at rest, m/s: too slow to measure, but sliding pistons need no break-away force.
 const SLIDES_M_PER_S: [f64; 2] = [1e-4, -1e-4];
 /// Fall of a window's squares at which another speed is taken.
-const MET_BETTER: f64 = 10.0;
+const MIN_CHI2_DROP: f64 = 10.0;
 /// Gauss-Newton passes after each search on linked records.
 const LINKED_PASSES: usize = 3;
 /// Grids of relative shifts of the two pistons: first over the noise of two sensors, then finer.
@@ -55,7 +55,7 @@ impl Windows<'_> {
             for start in &self.starts {
                 for point in &mut self.points[start / WINDOW] {
                     let rests = point.rod_velocity_m_per_s == 0.0;
-                    let other = point.or_else_m_per_s.or(rests.then_some(slide_m_per_s));
+                    let other = point.alternative_velocity_m_per_s.or(rests.then_some(slide_m_per_s));
                     point.rod_velocity_m_per_s = other.unwrap_or(point.rod_velocity_m_per_s);
                 }
             }
@@ -67,7 +67,7 @@ impl Windows<'_> {
             let points = std::mem::replace(&mut self.points, tried);
             let all_new = self.squares_of(&self.simulate_coarsely(&self.rig));
             for ((start, old), new) in self.starts.iter().zip(squares).zip(all_new) {
-                if new < *old - MET_BETTER {
+                if new < *old - MIN_CHI2_DROP {
                     *old = new;
                 } else {
                     self.points[start / WINDOW] = points[start / WINDOW];
@@ -122,7 +122,8 @@ impl Windows<'_> {
                 let part = |number: usize| {
                     let most = if self.record.linked { MOST_STEP[number] } else { PRIOR_STD[number] };
                     shares[at]
-                        * (moved[place * Point::NUDGES.len() + number] * PRIOR_STD[number]).clamp(-most, most)
+                        * (moved[place * AxisState::NUDGES.len() + number] * PRIOR_STD[number])
+                            .clamp(-most, most)
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
                 point.extension_m += part(0);
@@ -195,7 +196,7 @@ impl Windows<'_> {
         let rows = self.rows();
         let nudges: Vec<(usize, usize)> = (0..2)
             .filter(|axis| self.record.measured[*axis])
-            .flat_map(|axis| (0..Point::NUDGES.len()).map(move |number| (axis, number)))
+            .flat_map(|axis| (0..AxisState::NUDGES.len()).map(move |number| (axis, number)))
             .collect();
         let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
@@ -222,7 +223,7 @@ impl Windows<'_> {
                 }
                 // Removes jumps that moved by a sample before the difference is scaled up.
                 self.flatten(&mut column, JUMP);
-                let scale = PRIOR_STD[*number] / Point::NUDGES[*number];
+                let scale = PRIOR_STD[*number] / AxisState::NUDGES[*number];
                 column.iter_mut().for_each(|value| *value *= scale);
                 self.whiten(all.len(), &mut column);
                 column
@@ -252,7 +253,7 @@ pub(crate) fn first_state(record: &GriddedRecord, rig: &RigParameters) -> State 
 }
 
 /// A plant's state with these points on the measured axes, otherwise unchanged.
-pub(crate) fn state_at(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
+pub(crate) fn state_at(plant: &Plant, points: &[AxisState; 2], measured: [bool; 2]) -> State {
     let mut state = *plant.state();
     let truth = plant.truth(&Inputs::default());
     let cylinder = plant.rig().cylinder();
@@ -272,7 +273,7 @@ pub(crate) fn state_at(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) 
 }
 
 /// Sets the measured axes of a plant to these points.
-pub(crate) fn set_state(plant: &mut Plant, record: &GriddedRecord, points: &[Point; 2]) {
+pub(crate) fn set_state(plant: &mut Plant, record: &GriddedRecord, points: &[AxisState; 2]) {
     let state = state_at(plant, points, record.measured);
     plant.go_on_in(&state).expect("the points of a record are states of the rig");
 }

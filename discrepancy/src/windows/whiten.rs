@@ -24,14 +24,17 @@ impl Windows<'_> {
     /// A draw of noise with the autocorrelation and the jitter of the record.
     pub(super) fn raw_noise(&self, random: &mut Pcg64) -> Vec<f64> {
         let width = self.outputs.len();
-        let memories: Vec<f64> =
-            self.outputs.iter().map(|(axis, channel)| self.record.memory[*axis][*channel]).collect();
+        let autocorrelations: Vec<f64> = self
+            .outputs
+            .iter()
+            .map(|(axis, channel)| self.record.lag1_autocorrelation[*axis][*channel])
+            .collect();
         let mut noise = Vec::with_capacity(self.readings.len());
         for sensitivities in self.jitter_sensitivity.chunks_exact(self.rows().max(1)) {
             let mut coloured = vec![0.0; width];
             for (period, sensitivities) in sensitivities.chunks_exact(width).enumerate() {
-                for (coloured, memory) in coloured.iter_mut().zip(&memories) {
-                    let kept = if period == 0 { 0.0 } else { *memory };
+                for (coloured, lag1_autocorrelation) in coloured.iter_mut().zip(&autocorrelations) {
+                    let kept = if period == 0 { 0.0 } else { *lag1_autocorrelation };
                     *coloured = kept * *coloured + (1.0 - kept * kept).sqrt() * gaussian(random);
                 }
                 let instant = gaussian(random);
@@ -62,8 +65,8 @@ impl Windows<'_> {
             }
         }
         for (output, (axis, channel)) in self.outputs.iter().enumerate() {
-            let memory = self.record.memory[*axis][*channel];
-            if memory == 0.0 {
+            let lag1_autocorrelation = self.record.lag1_autocorrelation[*axis][*channel];
+            if lag1_autocorrelation == 0.0 {
                 continue;
             }
             for period in (1..WINDOW).rev() {
@@ -72,7 +75,7 @@ impl Windows<'_> {
                     continue;
                 }
                 // Jitter lowers the correlation of neighbours.
-                let correlation = memory / (1.0 + sensitivities[place] * sensitivities[place]);
+                let correlation = lag1_autocorrelation / (1.0 + sensitivities[place] * sensitivities[place]);
                 window[place] =
                     (window[place] - correlation * window[before]) / (1.0 - correlation * correlation).sqrt();
             }

@@ -2,9 +2,9 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{Found, same};
+use crate::name::{SelectionResult, same};
 use crate::parameters::COUNT;
-use crate::refit::{Placed, Refit};
+use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
     self, DetectionLimit, EffectPlace, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, Where,
 };
@@ -14,9 +14,9 @@ const OFF_ERRORS: f64 = 4.0;
 /// Smallest relative deviation of a reported parameter.
 const OFF_LEAST: f64 = 0.01;
 
-pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
+pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report {
     let named = named(found);
-    let (parameters, carried) = parameters(engine, &found.reported);
+    let (parameters, insignificant) = parameters(engine, &found.reported);
     let verdict = if found.inadequate {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
@@ -33,7 +33,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     Report {
         named,
         parameters,
-        carried,
+        insignificant,
         candidates: candidates(found),
         not_excited,
         detection_limits,
@@ -41,7 +41,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     }
 }
 
-fn named(found: &Found) -> Vec<NamedEffect> {
+fn named(found: &SelectionResult) -> Vec<NamedEffect> {
     let mut at = 0;
     let mut all = Vec::new();
     for ((placed, share), alternatives) in
@@ -63,9 +63,14 @@ fn named(found: &Found) -> Vec<NamedEffect> {
     all
 }
 
-fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<NamedEffect>) -> NamedEffect {
+fn named_effect(
+    placed: &EffectEstimate,
+    errors: &[f64],
+    share: f64,
+    alternatives: Vec<NamedEffect>,
+) -> NamedEffect {
     let candidate = &placed.candidate;
-    let numbers = candidate.numbers(&placed.coordinates);
+    let numbers = candidate.effect_parameters(&placed.coordinates);
     let parameters = candidate
         .sheet
         .keys
@@ -93,14 +98,14 @@ fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<N
 fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantity>) {
     let errors = &model.errors[model.errors.len() - COUNT..];
     let by = |at: usize| (model.factors[at] - 1.0).abs();
-    let (off, carried): (Vec<usize>, Vec<usize>) = (0..COUNT)
+    let (off, insignificant): (Vec<usize>, Vec<usize>) = (0..COUNT)
         .filter(|at| by(*at) > 0.0)
         .partition(|at| by(*at) > OFF_LEAST && by(*at) > OFF_ERRORS * errors[*at]);
     let quantities = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, model)).collect();
-    (quantities(off), quantities(carried))
+    (quantities(off), quantities(insignificant))
 }
 
-fn candidates(found: &Found) -> Vec<report::Candidate> {
+fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
     let null_loss = found.null_loss;
     found
         .screened
@@ -108,7 +113,7 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
         .map(|screened| {
             let placed = &screened.start;
             let candidate = &placed.candidate;
-            let is_it = |other: &Placed| same(other, placed);
+            let is_it = |other: &EffectEstimate| same(other, placed);
             let is_last = |fit: &&Refit| fit.placed.last().is_some_and(is_it);
             let alone = found.fitted.iter().filter(|fit| fit.placed.len() == 1).find(is_last);
             let is_named = found.model.placed.iter().any(is_it);
@@ -117,7 +122,7 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
             let share = alone.map(|fit| {
                 ((found.calibrated.fit.loss - fit.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
             });
-            let fate = if is_named && !found.inadequate {
+            let decision = if is_named && !found.inadequate {
                 "named"
             } else if is_named {
                 "explains too little"
@@ -135,16 +140,16 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
                 place: Where::from(candidate.place),
                 score: (null_loss - screened.loss) / found.threshold.max(1e-9),
                 share_explained: share,
-                amplitude: candidate.numbers(&shown.coordinates)[0],
+                amplitude: candidate.effect_parameters(&shown.coordinates)[0],
                 unit: candidate.sheet.keys[0].unit.name().to_owned(),
-                fate: fate.to_owned(),
+                decision: decision.to_owned(),
             }
         })
         .collect()
 }
 
 /// Candidates that the records do not excite, and the detection limits of the others.
-fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
+fn limits(found: &SelectionResult) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
     let mut not_excited = Vec::new();
     let mut limits = Vec::new();
     for (candidate, limit) in found.columns.candidates.iter().zip(&found.limits) {
@@ -153,7 +158,7 @@ fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
         match limit {
             Some(z) if *z <= 1.0 => {
                 let key = &candidate.sheet.keys[0];
-                let at = candidate.numbers(&{
+                let at = candidate.effect_parameters(&{
                     let mut coordinates = candidate.origin();
                     coordinates[0] = *z;
                     coordinates

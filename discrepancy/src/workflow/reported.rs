@@ -11,8 +11,8 @@ pub struct Reported {
     /// Parameters that were off.
     pub parameters: Vec<Quantity>,
     /// Parameters that the model moved by less.
-    #[serde(default)]
-    pub(crate) carried: Vec<Quantity>,
+    #[serde(default, rename = "carried")]
+    pub(crate) insignificant: Vec<Quantity>,
     pub inputs: InputFiles,
     /// Term outside the catalogue.
     #[serde(default)]
@@ -24,7 +24,7 @@ impl From<&Report> for Reported {
         Reported {
             named: report.named.clone(),
             parameters: report.parameters.clone(),
-            carried: report.carried.clone(),
+            insignificant: report.insignificant.clone(),
             inputs: report.inputs.clone(),
             outside: report
                 .outside

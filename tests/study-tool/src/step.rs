@@ -13,7 +13,7 @@ use crate::program::{Identity, Interrupted, Program, Start, Taken};
 use crate::report::{self, Report};
 use plant::RigParameters;
 use record_maker::{Experiment, Recipe};
-use records::{ReadError, ReadOptions, Unknown};
+use records::{ReadError, ReadOptions, UnlistedColumns};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::fs::{self, File};
@@ -233,7 +233,7 @@ impl Step<'_> {
 
 /// A record that holds more than a measurement could tell what is hidden.
 pub(crate) fn check_blind(number: usize, record: &Path) -> Result<(), StepError> {
-    let blind = ReadOptions { unknown: Unknown::Refused, ..ReadOptions::default() };
+    let blind = ReadOptions { unknown: UnlistedColumns::Refused, ..ReadOptions::default() };
     records::read(record, &blind).map(drop).map_err(|error| StepError::Record { number, error })
 }
 

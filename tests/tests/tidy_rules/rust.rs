@@ -313,7 +313,7 @@ const DIMENSIONLESS: &[&str] = &[
     "error_ratio",           // standard error over truth
     "quantiles",             // of a spread, whose field has the unit
     "samples",               // readings, in the units of their sensors
-    "memory",                // share of a noise that lasts
+    "lag1_autocorrelation",  // of a noise
     "shape",                 // of a regressor
     "coefficients",          // of whitened columns
     "squares",               // in squared standard deviations
