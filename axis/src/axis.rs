@@ -11,7 +11,7 @@
 pub(crate) mod average;
 mod by_hand;
 mod changes;
-mod heard;
+mod received;
 mod range;
 mod record;
 mod slow;
@@ -31,7 +31,7 @@ use crate::program::{Hand, Program};
 use algorithms::guard::AlgorithmFault;
 use average::Average;
 use changes::Changes;
-use heard::Heard;
+use received::Received;
 use nominal::Axis;
 use protocol::frames::{
     ALIVE_RANGE, ECHO_RANGE, EmergencyStop, EmergencyStopChainState, Frame, MainChainState, RigStatus,
@@ -59,7 +59,7 @@ pub struct AxisController {
     work: Work,
     leading: Leading,
     main_config: MainConfig,
-    heard: Heard,
+    received: Received,
     changes: Changes,
     supply_pressure_pa: f64,
     record_every: u64,
@@ -84,7 +84,7 @@ impl AxisController {
             changes: Changes::new(changes, &program),
             program,
             leading: Leading::new(main.clone(), supply_pressure_pa),
-            heard: Heard::new(axis, main.experiment),
+            received: Received::new(axis, main.experiment),
             main_config: main,
             supply_pressure_pa,
             record_every,
@@ -102,7 +102,7 @@ impl AxisController {
 
     /// Takes a frame that is none of the own sensors and nothing of the rig's.
     pub fn hear(&mut self, frame: &Frame) {
-        self.heard.take(frame);
+        self.received.take(frame);
     }
 
     /// The answer to the sensors of `cycle`; `rig` is the rig's status if it is fresh.
@@ -116,10 +116,10 @@ impl AxisController {
         let supply_pa = self.rig.map_or(self.supply_pressure_pa, |rig| rig.supply_pressure_pa);
         self.program.observe(cycle, sensors, supply_pa);
         self.average.take(sensors.position_m);
-        self.heard.listen(cycle);
+        self.received.listen(cycle);
         let output = self.advance(cycle, rig, self.rig.map(|_| self.own_axis(sensors)));
-        let partner = &self.heard.partner;
-        let hand = self.heard.hand.take();
+        let partner = &self.received.partner;
+        let hand = self.received.hand.take();
         let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.main.still(), hand };
         self.asked = self.work.ask(&output, &seen, &mut self.program);
         let beyond = self.range.take(self.axis, rig, output.phase);
@@ -152,9 +152,9 @@ impl AxisController {
             rig: rig.copied(),
             own,
             prepared: self.work.prepared(),
-            partner: self.heard.partner,
-            frame: self.heard.stop.take(),
-            console: std::mem::take(&mut self.heard.console),
+            partner: self.received.partner,
+            frame: self.received.stop.take(),
+            console: std::mem::take(&mut self.received.console),
             fault: self.fault.take(),
         });
         if output.state == MainChainState::InitialPositioning && before != Some(output.state) {
@@ -234,7 +234,7 @@ impl AxisController {
         self.work.restart();
         self.changes.take_back(&mut self.program);
         self.program.restart();
-        self.heard = Heard::new(self.axis, self.main_config.experiment);
+        self.received = Received::new(self.axis, self.main_config.experiment);
         self.figures = PositionFigures::default();
         self.average = Average::default();
         self.range = Range::default();

@@ -43,7 +43,7 @@ pub struct Partner {
     pub status: Option<ChainStatus>,
     pub values: Option<ChainValues>,
     /// Cycle in which its last status came.
-    pub heard: Option<u64>,
+    pub received: Option<u64>,
 }
 
 impl Partner {
@@ -51,8 +51,8 @@ impl Partner {
     ///
     /// A status "from later" is of another rig's time and counts by its distance too.
     pub fn fresh(&self, cycle: u64) -> Option<&ChainStatus> {
-        let heard = self.heard.filter(|heard| cycle.abs_diff(*heard) <= PARTNER_LOST_CYCLES);
-        heard.and(self.status.as_ref())
+        let received = self.received.filter(|received| cycle.abs_diff(*received) <= PARTNER_LOST_CYCLES);
+        received.and(self.status.as_ref())
     }
 }
 
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn a_partner_is_fresh_for_a_hundred_cycles() {
         let partner =
-            Partner { status: Some(ChainStatus::default()), heard: Some(1000), ..Partner::default() };
+            Partner { status: Some(ChainStatus::default()), received: Some(1000), ..Partner::default() };
         for (cycle, fresh) in [(1000, true), (1100, true), (1101, false), (900, true), (899, false)] {
             assert_eq!(partner.fresh(cycle).is_some(), fresh, "cycle {cycle}");
         }

@@ -86,7 +86,7 @@ impl Mail {
         self.0.push_back((cycle, frame));
     }
 
-    fn heard_in(&mut self, cycle: u64) -> Option<Frame> {
+    fn received_in(&mut self, cycle: u64) -> Option<Frame> {
         self.0.pop_front_if(|(sent, _)| *sent < cycle).map(|(_, frame)| frame)
     }
 }
@@ -221,7 +221,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
             if let Some((cycle, sensors)) = self.view.fresh_sensors(axis) {
                 let status = self.view.status().copied();
                 let member = &mut self.members[place];
-                while let Some(frame) = member.mail.heard_in(cycle) {
+                while let Some(frame) = member.mail.received_in(cycle) {
                     member.controller.hear(&frame);
                 }
                 let answer = member.controller.answer(cycle, &sensors, status.as_ref());
@@ -412,16 +412,16 @@ mod tests {
         let mut mail = Mail::new();
         let frame = Frame::DriveChainStatus(ChainStatus::default());
         mail.post(7, frame);
-        assert!(mail.heard_in(7).is_none());
+        assert!(mail.received_in(7).is_none());
         mail.post(8, frame);
-        assert!(mail.heard_in(8).is_some() && mail.heard_in(8).is_none());
-        assert!(mail.heard_in(9).is_some());
+        assert!(mail.received_in(8).is_some() && mail.received_in(8).is_none());
+        assert!(mail.received_in(9).is_some());
     }
 
     #[test]
     fn a_partner_that_is_not_heard_for_long_leaves_the_newest() {
         let mut mail = Mail::new();
         (0..100).for_each(|cycle| mail.post(cycle, Frame::DriveChainStatus(ChainStatus::default())));
-        assert_eq!((0..200).filter(|_| mail.heard_in(1000).is_some()).count(), MAIL_ROOM);
+        assert_eq!((0..200).filter(|_| mail.received_in(1000).is_some()).count(), MAIL_ROOM);
     }
 }

@@ -36,25 +36,25 @@ fn under_way() -> (AxisController, u64) {
 
 #[test]
 fn a_partner_is_lost_after_100_cycles_of_silence() {
-    let (mut drive, heard) = under_way();
-    for cycle in heard + 1..=heard + 100 {
+    let (mut drive, received) = under_way();
+    for cycle in received + 1..=received + 100 {
         answer(&mut drive, cycle);
         assert_eq!(drive.state(), MainChainState::InitialPositioning, "cycle {cycle}");
     }
-    answer(&mut drive, heard + 101);
+    answer(&mut drive, received + 101);
     assert_eq!(drive.state(), MainChainState::Fault);
 }
 
 #[test]
 fn cycles_that_nobody_answered_are_no_silence_of_the_partner() {
-    let (mut drive, heard) = under_way();
+    let (mut drive, received) = under_way();
     let skipped = 150;
-    for cycle in heard + 1 + skipped..=heard + 100 + skipped {
+    for cycle in received + 1 + skipped..=received + 100 + skipped {
         answer(&mut drive, cycle);
         assert_eq!(drive.state(), MainChainState::InitialPositioning, "cycle {cycle}");
     }
     // Those that were answered count as ever.
-    answer(&mut drive, heard + 101 + skipped);
+    answer(&mut drive, received + 101 + skipped);
     assert_eq!(drive.state(), MainChainState::Fault);
 }
 

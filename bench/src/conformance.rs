@@ -212,7 +212,7 @@ fn emergency_stop(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceErro
     }
     let from = session.cycle;
     session.cycles(STOP_CYCLES, Disturbance { stopped_since: Some(from), ..Disturbance::default() })?;
-    let mut cases = judge::emergency_stop(&session.watch.heard, from..session.cycle);
+    let mut cases = judge::emergency_stop(&session.watch.received, from..session.cycle);
     cases.push(session.about_the_end("emergency-stop"));
     Ok(cases)
 }
@@ -231,7 +231,7 @@ fn sensor_loss(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> 
     session.cycles(LOSS_CYCLES, Disturbance { sensors_lost: true, ..Disturbance::default() })?;
     let back = session.cycle;
     session.cycles(BACK_CYCLES, Disturbance::default())?;
-    let mut cases = judge::sensor_loss(&session.watch.heard, from..back, back..session.cycle);
+    let mut cases = judge::sensor_loss(&session.watch.received, from..back, back..session.cycle);
     cases.push(session.about_the_end("sensor-loss"));
     Ok(cases)
 }
@@ -297,11 +297,11 @@ impl<'a> Session<'a> {
     fn wait_for_answers(&mut self) -> Result<bool, ConformanceError> {
         for _ in 0..self.patience_cycles() {
             self.cycles(1, Disturbance::default())?;
-            if !self.watch.heard.is_empty() || self.broken.is_some() {
+            if !self.watch.received.is_empty() || self.broken.is_some() {
                 break;
             }
         }
-        Ok(!self.watch.heard.is_empty())
+        Ok(!self.watch.received.is_empty())
     }
 
     /// Waits until the valve has been open for a while, and pushes the carriage when that takes long.
@@ -325,12 +325,12 @@ impl<'a> Session<'a> {
 
     fn phase(&self, from: u64) -> Phase<'_> {
         let first = self.cycles.partition_point(|(cycle, _)| *cycle < from);
-        let heard = self.watch.heard.partition_point(|heard| heard.cycle < from);
-        Phase { cycles: &self.cycles[first..], heard: &self.watch.heard[heard..] }
+        let received = self.watch.received.partition_point(|received| received.cycle < from);
+        Phase { cycles: &self.cycles[first..], received: &self.watch.received[received..] }
     }
 
     fn about_answers(&self) -> String {
-        match (&self.broken, self.watch.heard.first()) {
+        match (&self.broken, self.watch.received.first()) {
             (_, Some(first)) => format!("the first frame came in cycle {}", first.cycle),
             (Some(Broken::NobodyThere), _) => "nobody is in the barrier".into(),
             (Some(Broken::TimedOut(name)), _) => format!("{name} did not answer cycle {}", self.cycle),
@@ -343,7 +343,7 @@ impl<'a> Session<'a> {
         let ended = self.controller.as_mut().and_then(Controller::ended);
         let why = match (&self.broken, ended) {
             (Some(broken), _) => format!("{broken:?}"),
-            (None, _) if self.watch.babbles() => format!("it babbles, {} frames", self.watch.heard.len()),
+            (None, _) if self.watch.babbles() => format!("it babbles, {} frames", self.watch.received.len()),
             (None, Some(status)) => format!("its process has ended: {status}"),
             (None, None) => {
                 let detail = format!("{} cycles", self.cycles.len());

@@ -45,13 +45,13 @@ pub enum ReplayError {
     #[error("nothing of {0} is left to be sent")]
     Nothing(PathBuf),
     #[error(
-        "a rig is live on {bus} ({heard} of its frames in {listened_ms} ms), and the log holds {commands} commands and \
+        "a rig is live on {bus} ({received} of its frames in {listened_ms} ms), and the log holds {commands} commands and \
          {of_the_rig} frames of a rig, all of the past: leave them out with --leave-out commands,rig, or take another bus"
     )]
     LiveRig {
         bus: String,
         /// Frames of the live rig.
-        heard: u64,
+        received: u64,
         listened_ms: u64,
         /// Commands that would have been sent.
         commands: u64,
@@ -102,11 +102,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     if !connected(bus.as_mut(), Duration::from_secs(arguments.wait_s), &interrupt) {
         return if interrupt.came() { Ok(Exit::Interrupted) } else { Err(no_bus(arguments)) };
     }
-    let heard = listen(bus.as_mut(), Duration::from_millis(arguments.listen_ms), &interrupt);
-    if heard > 0 && schedule.disturbs_a_rig() {
+    let received = listen(bus.as_mut(), Duration::from_millis(arguments.listen_ms), &interrupt);
+    if received > 0 && schedule.disturbs_a_rig() {
         return Err(ReplayError::LiveRig {
             bus: arguments.bus.to_string(),
-            heard,
+            received,
             listened_ms: arguments.listen_ms,
             commands: schedule.commands,
             of_the_rig: schedule.of_the_rig,
@@ -144,12 +144,12 @@ fn connected(bus: &mut dyn Bus, patience: Duration, interrupt: &Interrupt) -> bo
 /// Frames of a rig that come within so long; a rig sends thousands a second.
 fn listen(bus: &mut dyn Bus, length: Duration, interrupt: &Interrupt) -> u64 {
     let until = MonotonicClock.now() + length;
-    let mut heard = 0;
+    let mut received = 0;
     while MonotonicClock.now() < until && !interrupt.came() {
-        heard += heard_of_a_rig(bus);
+        received += heard_of_a_rig(bus);
         MonotonicClock.wait_until(until.min(MonotonicClock.now() + LOOK_PERIOD));
     }
-    heard + heard_of_a_rig(bus)
+    received + heard_of_a_rig(bus)
 }
 
 fn tell(schedule: &Schedule, played: &Played) {

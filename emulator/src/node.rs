@@ -328,7 +328,7 @@ impl EmulatorNode {
     }
 
     /// Whether any valve command was accepted.
-    pub fn controller_heard(&self) -> bool {
+    pub fn controller_received(&self) -> bool {
         self.node.commands().iter().any(|intake| intake.counters().accepted > 0)
     }
 

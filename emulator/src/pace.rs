@@ -86,7 +86,7 @@ pub struct Shared {
     /// Skipped cycles, for the progress line.
     pub skipped: AtomicU64,
     /// Whether a controller was heard, for the progress line.
-    pub controller_heard: AtomicBool,
+    pub controller_received: AtomicBool,
 }
 
 /// When a run ends by itself.
@@ -128,7 +128,7 @@ impl RunContext<'_> {
         let Self { node, limits, shared, .. } = self;
         shared.cycle.store(cycles, Ordering::Relaxed);
         shared.skipped.store(node.skipped(), Ordering::Relaxed);
-        shared.controller_heard.store(node.controller_heard(), Ordering::Relaxed);
+        shared.controller_received.store(node.controller_received(), Ordering::Relaxed);
         if !node.is_finite(cycles - 1) {
             Some(End::NotFinite)
         } else if shared.interrupt.came() {

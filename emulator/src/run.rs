@@ -404,8 +404,8 @@ fn tell_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
             reported = Instant::now();
             let seconds = shared.cycle.load(Ordering::Relaxed) as f64 / 1000.0;
             let skipped = shared.skipped.load(Ordering::Relaxed);
-            let heard = shared.controller_heard.load(Ordering::Relaxed);
-            let waiting = if heard { "" } else { ", no valve command heard yet" };
+            let received = shared.controller_received.load(Ordering::Relaxed);
+            let waiting = if received { "" } else { ", no valve command heard yet" };
             eprintln!("emulator: {seconds:.0} s simulated, {skipped} cycles skipped{waiting}");
         }
     }

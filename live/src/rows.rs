@@ -56,10 +56,10 @@ impl Rows {
     /// Completes the rows that need wait no longer, `newest` being the newest cycle.
     fn settle(&mut self, newest: u64) {
         while let Some(row) = self.waiting.front() {
-            let heard = |said: &VecDeque<(u64, ChainValues)>| {
+            let received = |said: &VecDeque<(u64, ChainValues)>| {
                 said.back().is_some_and(|(cycle, _)| *cycle >= row.cycle)
             };
-            if !self.said.iter().all(heard) && newest < row.cycle + PATIENCE_CYCLES {
+            if !self.said.iter().all(received) && newest < row.cycle + PATIENCE_CYCLES {
                 return;
             }
             let Some(mut row) = self.waiting.pop_front() else { return };

@@ -212,8 +212,8 @@ impl Wire {
 
     /// The states of the chains of both axes; null of a controller that is silent.
     pub fn chains(&self, now_ms: u64) -> Value {
-        let fresh = self.chains.map(|heard| {
-            heard
+        let fresh = self.chains.map(|received| {
+            received
                 .filter(|(at_ms, _)| now_ms.saturating_sub(*at_ms) < STATUS_HOLDS_MS)
                 .map(|(_, status)| status)
         });

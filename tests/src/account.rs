@@ -16,21 +16,21 @@ pub struct SensorAccount {
 }
 
 /// The account of the sensor frames with identifier `id`, from the beginning of the run to the last tick heard.
-pub fn of_sensors(heard: &[CanFrame], id: u16) -> SensorAccount {
+pub fn of_sensors(received: &[CanFrame], id: u16) -> SensorAccount {
     let mut frames = 0;
     let mut at_ticks = Vec::new();
-    for frame in heard {
+    for frame in received {
         match Frame::decode(frame) {
             Ok(Frame::Tick(tick)) => at_ticks.push((sent_by(&tick), frames)),
             _ if frame.standard_id() == Some(id) => frames += 1,
             _ => {}
         }
     }
-    let ((sent_first, heard_first), (sent_last, heard_last)) =
+    let ((sent_first, received_first), (sent_last, received_last)) =
         (at_ticks[0], *at_ticks.last().expect("at least one tick"));
     SensorAccount {
-        missing_before_first_tick: sent_first - heard_first,
-        missing_between_ticks: sent_last - sent_first - (heard_last - heard_first),
+        missing_before_first_tick: sent_first - received_first,
+        missing_between_ticks: sent_last - sent_first - (received_last - received_first),
     }
 }
 
@@ -42,8 +42,8 @@ fn sent_by(tick: &Tick) -> u64 {
 }
 
 /// Counters of the valve commands with identifier `id`, in the order heard.
-pub fn command_counters(heard: &[CanFrame], id: u16) -> Vec<u8> {
-    let commands = heard.iter().filter(|frame| frame.standard_id() == Some(id));
+pub fn command_counters(received: &[CanFrame], id: u16) -> Vec<u8> {
+    let commands = received.iter().filter(|frame| frame.standard_id() == Some(id));
     commands
         .filter_map(|frame| match Frame::decode(frame) {
             Ok(Frame::DriveValveCommand(command) | Frame::LoadValveCommand(command)) => Some(command.alive),
@@ -69,19 +69,19 @@ mod tests {
     fn what_is_missing_is_counted_on_its_side_of_the_first_tick() {
         let sensors = CanFrame::new(0x120, &[0; 8]);
         // Cycles 0 to 10, of which one is missing; 11 to 20, of which two were skipped and three are missing.
-        let heard = [vec![sensors; 10], vec![tick(10, 0, false)], vec![sensors; 5], vec![tick(20, 2, false)]]
+        let received = [vec![sensors; 10], vec![tick(10, 0, false)], vec![sensors; 5], vec![tick(20, 2, false)]]
             .concat();
         let expected = SensorAccount { missing_before_first_tick: 1, missing_between_ticks: 3 };
-        assert_eq!(of_sensors(&heard, 0x120), expected);
+        assert_eq!(of_sensors(&received, 0x120), expected);
     }
 
     #[test]
     fn the_last_tick_names_a_cycle_that_was_not_sent() {
         let sensors = CanFrame::new(0x121, &[0; 8]);
-        let heard =
+        let received =
             [vec![sensors], vec![tick(0, 0, false)], vec![sensors; 4], vec![tick(5, 0, true)]].concat();
         let expected = SensorAccount { missing_before_first_tick: 0, missing_between_ticks: 0 };
-        assert_eq!(of_sensors(&heard, 0x121), expected);
+        assert_eq!(of_sensors(&received, 0x121), expected);
     }
 
     #[test]

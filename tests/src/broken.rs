@@ -36,7 +36,7 @@ pub struct Left {
     /// `bus.log`, as the rig had it.
     pub log: Vec<CanFrame>,
     /// What the member heard in each cycle.
-    pub heard: Vec<Vec<CanFrame>>,
+    pub received: Vec<Vec<CanFrame>>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -97,10 +97,10 @@ impl Plan<'_> {
             emulator = emulator.with("--faults").with(&script.display().to_string());
         }
         let emulator = emulator.start();
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         let mut alive = 0;
         scene.peer().take_part("member", |peer, cycle, frames| {
-            heard.push(frames.to_vec());
+            received.push(frames.to_vec());
             let Some(openings) = (self.act)(cycle) else { return };
             alive = (alive + 1) % 16;
             let echo = (cycle % 4096) as u16;
@@ -118,7 +118,7 @@ impl Plan<'_> {
             truth: Table::read(&scene.path("emulator/truth.csv")),
             summary: json(&scene.path("emulator/summary.json")),
             log: bus_log(&scene.path("emulator/bus.log")),
-            heard,
+            received,
             scene,
         }
     }
@@ -188,10 +188,10 @@ impl Left {
     }
 
     /// Frames of an identifier that the member heard, by the cycle.
-    pub fn heard_of(&self, id: u16) -> Vec<Vec<CanFrame>> {
+    pub fn received_of(&self, id: u16) -> Vec<Vec<CanFrame>> {
         let of_id = |frames: &Vec<CanFrame>| {
             frames.iter().filter(|frame| frame.standard_id() == Some(id)).copied().collect()
         };
-        self.heard.iter().map(of_id).collect()
+        self.received.iter().map(of_id).collect()
     }
 }

@@ -151,8 +151,8 @@ impl Breaking {
     }
 
     fn act(&mut self, peer: &Peer, cycle: u32, frames: &[CanFrame]) {
-        let heard = |id: u16| frames.iter().any(|frame| frame.standard_id() == Some(id));
-        if heard(0x108) {
+        let received = |id: u16| frames.iter().any(|frame| frame.standard_id() == Some(id));
+        if received(0x108) {
             self.stopped_since.get_or_insert(cycle);
         }
         let sensors = frames.iter().any(|frame| matches!(Frame::decode(frame), Ok(Frame::DriveSensors(_))));
@@ -180,7 +180,7 @@ impl Breaking {
         if answers {
             self.answer(peer, cycle);
         }
-        if self.fault == Fault::AnswersNoise && heard(0x5A5) {
+        if self.fault == Fault::AnswersNoise && received(0x5A5) {
             self.answer(peer, cycle);
         }
         if self.fault == Fault::AnswersTwice && cycle % 100 == 50 {

@@ -80,13 +80,13 @@ fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the
     let emulator = scene.emulator(Pace::Real).start();
     // 2000 cycles are some 9000 frames; the longest queue that the host asks for holds 5600.
     scene.wait_for_rows("emulator", 2000);
-    let heard = std::thread::spawn(move || listener.frames_to_the_end());
+    let received = std::thread::spawn(move || listener.frames_to_the_end());
     scene.wait_for_more_rows("emulator", 500);
     let _ = emulator.interrupt();
     let _ = controller.wait().expect_code(0);
     host.signal(Signal::INT);
     let host = host.wait().expect_code(130);
-    let heard = heard.join().expect("the listener listens at last");
+    let received = received.join().expect("the listener listens at last");
     drop(never);
 
     let report: serde_json::Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
@@ -98,11 +98,11 @@ fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the
             frames.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
         };
         let dropped = count_of_id(of_peer(0), &format!("{id:03X}"));
-        assert_eq!(of_id(&log), of_id(&heard) + dropped, "{id:#x}: sent is heard and dropped");
+        assert_eq!(of_id(&log), of_id(&received) + dropped, "{id:#x}: sent is heard and dropped");
         assert!(of_id(&log) > 0, "{id:#x} was on the bus");
     }
     for (id, name) in [(0x120, "120"), (0x121, "121")] {
-        let gaps = of_sensors(&heard, id).missing_between_ticks;
+        let gaps = of_sensors(&received, id).missing_between_ticks;
         assert_eq!(gaps, count_of_id(of_peer(0), name), "gaps in {id:#x} are what its queue dropped");
         assert!(gaps > 0, "{id:#x}: the listener was late enough to lose some");
         assert!(count_of_id(of_peer(1), name) > gaps, "who never reads loses more");

@@ -40,7 +40,7 @@ fn alive(frame: &CanFrame) -> u64 {
 
 /// Counters of the drive's sensors that the member heard, cycle by cycle.
 fn counters(left: &Left, id: u16) -> Vec<Vec<u64>> {
-    left.heard_of(id).iter().map(|frames| frames.iter().map(alive).collect()).collect()
+    left.received_of(id).iter().map(|frames| frames.iter().map(alive).collect()).collect()
 }
 
 /// What a sound bus brings: one frame in each cycle, with the cycle's counter.
@@ -48,18 +48,18 @@ fn sound(cycle: usize) -> Vec<u64> {
     vec![cycle as u64 % 16]
 }
 
-fn expect_sound_outside(heard: &[Vec<u64>], ends: usize) {
-    for (cycle, heard) in heard.iter().enumerate().filter(|(cycle, _)| !(BEGINS..ends).contains(cycle)) {
-        assert_eq!(*heard, sound(cycle), "cycle {cycle}");
+fn expect_sound_outside(received: &[Vec<u64>], ends: usize) {
+    for (cycle, received) in received.iter().enumerate().filter(|(cycle, _)| !(BEGINS..ends).contains(cycle)) {
+        assert_eq!(*received, sound(cycle), "cycle {cycle}");
     }
 }
 
 #[test]
 fn lost_frames_are_lost_for_all_and_counted() {
     let left = run("bus-loss", "bus.DriveSensors", "");
-    let heard = counters(&left, DRIVE_SENSORS.id);
-    expect_sound_outside(&heard, ENDS);
-    assert!(heard[BEGINS..ENDS].iter().all(Vec::is_empty), "not one is heard");
+    let received = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&received, ENDS);
+    assert!(received[BEGINS..ENDS].iter().all(Vec::is_empty), "not one is heard");
     expect_sound_outside(&counters(&left, LOAD_SENSORS.id), 0);
     assert_eq!(met(&left, "bus-loss", DRIVE_SENSORS.id), 100);
     assert_eq!(count_of_id(&left.summary["bus_host"]["injected_loss"], "120"), 100);
@@ -77,21 +77,21 @@ fn the_bus_url_loses_by_the_same_fault_from_start_to_end() {
     let left = Plan { bus: "loss=0.5&seed=3", act: |_| Some([0.0; 2]), ..Plan::default() }.run();
     let lost = count_of_id(&left.summary["bus_host"]["injected_loss"], "120");
     assert_eq!(met(&left, "bus-loss", DRIVE_SENSORS.id), lost);
-    let heard = counters(&left, DRIVE_SENSORS.id).iter().map(Vec::len).sum::<usize>();
-    assert_eq!(heard as u64 + lost, 400);
+    let received = counters(&left, DRIVE_SENSORS.id).iter().map(Vec::len).sum::<usize>();
+    assert_eq!(received as u64 + lost, 400);
 }
 
 #[test]
 fn delayed_frames_come_so_much_later_in_their_order() {
     let left = run("bus-delay", "bus.LoadSensors", "delay_ms = 7");
-    let heard = counters(&left, LOAD_SENSORS.id);
-    assert!(heard[BEGINS..BEGINS + 7].iter().all(Vec::is_empty), "{:?}", &heard[BEGINS..BEGINS + 7]);
-    for (cycle, heard) in heard.iter().enumerate().take(ENDS).skip(BEGINS + 7) {
-        assert_eq!(*heard, sound(cycle - 7), "cycle {cycle}");
+    let received = counters(&left, LOAD_SENSORS.id);
+    assert!(received[BEGINS..BEGINS + 7].iter().all(Vec::is_empty), "{:?}", &received[BEGINS..BEGINS + 7]);
+    for (cycle, received) in received.iter().enumerate().take(ENDS).skip(BEGINS + 7) {
+        assert_eq!(*received, sound(cycle - 7), "cycle {cycle}");
     }
     // What is under way at the end comes at once, before the first that is not delayed.
     let last: Vec<u64> = (ENDS - 7..=ENDS).map(|cycle| cycle as u64 % 16).collect();
-    assert_eq!(heard[ENDS], last);
+    assert_eq!(received[ENDS], last);
     assert_eq!(met(&left, "bus-delay", LOAD_SENSORS.id), 100);
 }
 
@@ -109,21 +109,21 @@ fn commands_that_are_delayed_beyond_their_age_shut_the_valve() {
 #[test]
 fn frames_come_more_than_once_and_overtake_each_other() {
     let left = run("bus-duplication", "bus.DriveSensors", "probability = 1.0\ncopies = 2");
-    let heard = counters(&left, DRIVE_SENSORS.id);
-    expect_sound_outside(&heard, ENDS);
-    for (cycle, heard) in heard.iter().enumerate().take(ENDS).skip(BEGINS) {
-        assert_eq!(*heard, vec![cycle as u64 % 16; 3], "cycle {cycle}");
+    let received = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&received, ENDS);
+    for (cycle, received) in received.iter().enumerate().take(ENDS).skip(BEGINS) {
+        assert_eq!(*received, vec![cycle as u64 % 16; 3], "cycle {cycle}");
     }
     let left = run("bus-duplication", "bus.DriveValveCommand", "probability = 1.0");
     assert!(count(&left.summary, "/frames_duplicate") >= 100, "the rig finds them");
 
     let left = run("bus-reordering", "bus.DriveSensors", "probability = 1.0");
-    let heard = counters(&left, DRIVE_SENSORS.id);
-    expect_sound_outside(&heard, ENDS);
+    let received = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&received, ENDS);
     for cycle in (BEGINS..ENDS).step_by(2) {
         let (first, second) = (cycle as u64 % 16, (cycle as u64 + 1) % 16);
         assert_eq!(
-            [&heard[cycle][..], &heard[cycle + 1][..]],
+            [&received[cycle][..], &received[cycle + 1][..]],
             [&[][..], &[second, first][..]],
             "cycle {cycle}"
         );
@@ -169,9 +169,9 @@ fn a_counter_that_is_off_is_found_and_never_malformed() {
     assert_eq!(count(&left.summary, "/frames_malformed"), 0, "length and checksum are right");
     assert_eq!(count(&left.summary, "/load_commands/lost"), 0);
     let left = run("wrong-counter", "bus.DriveSensors", "probability = 1.0\nstep = 3");
-    let heard = counters(&left, DRIVE_SENSORS.id);
-    expect_sound_outside(&heard, ENDS);
-    assert!((BEGINS..ENDS).all(|cycle| heard[cycle] == [(cycle as u64 + 3) % 16]));
+    let received = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&received, ENDS);
+    assert!((BEGINS..ENDS).all(|cycle| received[cycle] == [(cycle as u64 + 3) % 16]));
 }
 
 /// Bits of the frames of a wire that keeps time, by identifier and in all, ppm of the time observed.
@@ -194,8 +194,8 @@ fn a_babbling_node_raises_the_load_of_the_bus_and_takes_the_others_time() {
     let nodes = loud.summary["bus_host"]["wire_time"]["nodes"].as_array().expect("nodes").clone();
     assert!(nodes.iter().any(|node| node["name"] == "babbling node" && node["sent"] == 300), "{nodes:?}");
     // Over a wire that takes no time everybody hears it all the same.
-    let heard = run_over("", &babble).heard_of(16);
-    assert_eq!(heard.iter().map(Vec::len).sum::<usize>(), 300);
+    let received = run_over("", &babble).received_of(16);
+    assert_eq!(received.iter().map(Vec::len).sum::<usize>(), 300);
     assert_eq!(count(&loud.summary, "/frames_ignored/unknown"), 300, "the rig hears it, and minds it not");
 }
 
@@ -203,16 +203,16 @@ fn a_babbling_node_raises_the_load_of_the_bus_and_takes_the_others_time() {
 fn a_node_that_is_off_the_bus_is_not_heard_and_hears_nothing() {
     let left = run("bus-off", "rig", "");
     for id in [DRIVE_SENSORS.id, LOAD_SENSORS.id, TICK.id, RIG_STATUS.id] {
-        let heard = left.heard_of(id);
-        assert!(heard[BEGINS..ENDS].iter().all(Vec::is_empty), "{id:#x} is heard");
-        assert!(heard[ENDS..].iter().any(|frames| !frames.is_empty()), "{id:#x} does not come back");
+        let received = left.received_of(id);
+        assert!(received[BEGINS..ENDS].iter().all(Vec::is_empty), "{id:#x} is heard");
+        assert!(received[ENDS..].iter().any(|frames| !frames.is_empty()), "{id:#x} does not come back");
     }
     let valve = left.measurement.column("drive_valve");
     assert!(valve[BEGINS + 25..ENDS].iter().all(|opening| *opening == 0.0), "no command comes through");
 
     // The member is both controllers: it hears nothing, and no command of it comes through.
     let left = run("bus-off", "load-controller", "");
-    assert!(left.heard[BEGINS + 1..ENDS].iter().all(Vec::is_empty));
+    assert!(left.received[BEGINS + 1..ENDS].iter().all(Vec::is_empty));
     for axis in ["drive", "load"] {
         let valve = left.measurement.column(&format!("{axis}_valve"));
         assert!(valve[BEGINS + 25..ENDS].iter().all(|opening| *opening == 0.0), "{axis}");
@@ -232,7 +232,7 @@ fn a_node_that_is_off_the_bus_is_not_heard_and_hears_nothing() {
     let faults = fault("bus-off", "rig", "") + &babble.replace("to_s = 0.3", "to_s = 0.25");
     for wire in ["", "bitrate=1000000"] {
         let left = run_over(wire, &faults);
-        assert_eq!(left.heard_of(16).iter().map(Vec::len).sum::<usize>(), 150, "others hear it: {wire}");
+        assert_eq!(left.received_of(16).iter().map(Vec::len).sum::<usize>(), 150, "others hear it: {wire}");
         assert_eq!(count(&left.summary, "/frames_ignored/unknown"), 0, "{wire}");
     }
 }

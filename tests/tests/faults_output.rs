@@ -79,13 +79,13 @@ fn an_emulator_that_is_killed_leaves_files_that_read_to_their_last_whole_line() 
     let scene = Scene::new(RESTLESS);
     let emulator = scene.emulator(Pace::Real).start();
     let listener = scene.peer();
-    let heard = std::thread::spawn(move || listener.frames_to_the_end());
+    let received = std::thread::spawn(move || listener.frames_to_the_end());
     let controller = scene.controller(Pace::Real).with("--repeat --bus-grace 0.5").start();
     scene.wait_for_rows("emulator", 1500);
     let _ = emulator.kill();
-    let heard = heard.join().expect("the listener listens");
+    let received = received.join().expect("the listener listens");
     let _ = controller.wait().expect_code(3);
-    let last = heard.iter().rev().find_map(|frame| match protocol::frames::Frame::decode(frame) {
+    let last = received.iter().rev().find_map(|frame| match protocol::frames::Frame::decode(frame) {
         Ok(protocol::frames::Frame::Tick(tick)) => Some(u64::from(tick.cycle)),
         _ => None,
     });

@@ -83,9 +83,9 @@ fn the_same_script_breaks_the_same_in_real_time_and_in_lockstep() {
             assert!(count_of_id(&faults[name], id) > 0, "{name}: {faults}");
         }
         let babble = count_of_id(&faults["babbling-node"], "010");
-        let heard = bus_log(&scene.path("emulator/bus.log"));
-        let heard = heard.iter().filter(|frame| frame.standard_id() == Some(16)).count() as u64;
-        assert_eq!(heard, babble, "what it says is heard");
+        let received = bus_log(&scene.path("emulator/bus.log"));
+        let received = received.iter().filter(|frame| frame.standard_id() == Some(16)).count() as u64;
+        assert_eq!(received, babble, "what it says is heard");
         let drive = |row: &Row| row.fault == "friction-rise";
         assert!(marks(scene).iter().any(|row| drive(row) && row.what == "begins"), "the condition was met");
         assert!(json(&scene.path("emulator/run.json"))["faults_toml"].as_str() == Some(SCRIPT));

@@ -222,7 +222,7 @@ fn what_is_typed_is_done_told_and_recorded() {
     }
     scene.wait_for_more_rows("emulator", 300);
     emulator.type_line("quit");
-    let heard = peer.frames_to_the_end();
+    let received = peer.frames_to_the_end();
     let _ = emulator.wait().expect_code(0).expect_said(&["ended at the console"]);
     let events = reported(&scene);
     for kind in ["emergency-stop", "emergency-stop-released", "link-refused", "unlinked", "weights"] {
@@ -240,7 +240,7 @@ fn what_is_typed_is_done_told_and_recorded() {
     let logged = releases(&bus_log(&scene.path("emulator/bus.log")));
     assert_eq!((logged.first(), logged.last()), (Some(&false), Some(&true)));
     assert_eq!(logged.iter().filter(|release| **release).count(), 1);
-    assert_eq!(releases(&heard), logged);
+    assert_eq!(releases(&received), logged);
     let truth = Table::read(&scene.path("emulator/truth.csv"));
     let last = truth.len() - 1;
     assert_eq!(truth.column("drive_hand_force_N")[last], -80.0);

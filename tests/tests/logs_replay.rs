@@ -23,7 +23,7 @@ fn replay(scene: &Scene, log: &Path, options: &str) -> Running {
 }
 
 /// Frames that came until there were `least` of them, and a silence.
-fn heard(peer: &Peer, least: usize) -> Vec<CanFrame> {
+fn received(peer: &Peer, least: usize) -> Vec<CanFrame> {
     let mut frames = Vec::new();
     loop {
         let patience = if frames.len() < least { system_tests::process::PATIENCE } else { SILENCE };
@@ -66,7 +66,7 @@ fn every_frame_of_a_run_is_on_the_bus_again_in_its_order() {
     let peer = scene.peer();
     let replayed = replay(&scene, &short, "");
     let expected = frames_of(&fs::read_to_string(&short).expect("it was written"));
-    let came = heard(&peer, expected.len());
+    let came = received(&peer, expected.len());
     assert!(came == expected, "first difference: {:?}", came.iter().zip(&expected).position(|(a, b)| a != b));
     let reported = replayed.wait().expect_code(0).stdout;
     assert!(reported.contains("timing error: p50"), "{reported}");
@@ -114,18 +114,18 @@ fn a_rig_that_comes_alive_ends_a_replay_that_would_disturb_it() {
     let _host = scene.bus_host("");
     let peer = scene.peer();
     let replayed = replay(&scene, &log, "");
-    let before = heard_some(&peer, 5);
+    let before = received_some(&peer, 5);
     peer.send(&CanFrame::new(0x120, &[0; 8]).to_bytes());
     let ended = replayed.wait().expect_code(3).stdout;
     assert!(ended.contains("a rig came alive"), "{ended}");
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!(report["ended"], "live-rig");
-    assert_eq!(count(&report, "/frames_sent"), (before + heard(&peer, 0).len()) as u64);
+    assert_eq!(count(&report, "/frames_sent"), (before + received(&peer, 0).len()) as u64);
     // Without what disturbs there is nothing to be sent, and with something else it goes on beside the rig.
     let _ = replay(&scene, &log, "--leave-out 110").wait().expect_code(2).expect_said(&["nothing of"]);
 }
 
-fn heard_some(peer: &Peer, count: usize) -> usize {
+fn received_some(peer: &Peer, count: usize) -> usize {
     for _ in 0..count {
         let came = peer.receive(system_tests::process::PATIENCE);
         assert!(matches!(came, Some(Packet::Frame(_))), "{came:?}");
@@ -140,11 +140,11 @@ fn an_interrupted_replay_keeps_what_was_done() {
     let _host = scene.bus_host("");
     let peer = scene.peer();
     let replayed = replay(&scene, &log, "--spin-us 100");
-    let before = heard_some(&peer, 10);
+    let before = received_some(&peer, 10);
     let _ = replayed.interrupt();
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!(report["ended"], "interrupted");
-    let sent = (before + heard(&peer, 0).len()) as u64;
+    let sent = (before + received(&peer, 0).len()) as u64;
     assert!(sent < 6000);
     assert_eq!((count(&report, "/frames_sent"), count(&report, "/timing_error_ns/count")), (sent, sent));
 }
@@ -163,7 +163,7 @@ fn nothing_is_sent_of_a_log_that_is_not_right_to_its_last_line() {
         let log = scene.write("hostile.log", &format!("{}{more}", commands(3)));
         let _ = replay(&scene, &log, "").wait().expect_code(2).expect_said(&[words]);
     }
-    assert!(heard(&peer, 0).is_empty());
+    assert!(received(&peer, 0).is_empty());
     let log = scene.write("good.log", &commands(3));
     let other = Scene::new(SHORT);
     let _ = replay(&other, &log, "--wait-s 0").wait().expect_code(3).expect_said(&["needs a host"]);

@@ -23,7 +23,7 @@ use system_tests::turn;
 const WIRE: &str = "loss=0.01&seed=7";
 
 struct Counted {
-    heard: Vec<CanFrame>,
+    received: Vec<CanFrame>,
     host: Value,
     summary: Value,
     controller: Value,
@@ -34,8 +34,8 @@ impl Counted {
         count_of_id(&self.host["injected_loss"], id)
     }
 
-    fn heard(&self, id: u16) -> u64 {
-        self.heard.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
+    fn received(&self, id: u16) -> u64 {
+        self.received.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
     }
 
     /// Nobody's queue was full, so that what one receiver missed all missed.
@@ -50,11 +50,11 @@ impl Counted {
         let sent = count(&self.summary, "/cycles") - count(&self.summary, "/skipped");
         let injected = self.injected(name);
         assert_eq!(
-            sent - self.heard(id),
+            sent - self.received(id),
             injected,
             "{axis} sensors: what the trace misses is what the wire lost"
         );
-        let account = of_sensors(&self.heard, id);
+        let account = of_sensors(&self.received, id);
         let lost = count(&self.controller, &format!("/axes/{axis}/sensors_lost"));
         assert_eq!(
             lost, account.missing_between_ticks,
@@ -70,7 +70,7 @@ impl Counted {
     }
 
     fn check_commands(&self, axis: &str, id: u16, name: &str) {
-        let counters = command_counters(&self.heard, id);
+        let counters = command_counters(&self.received, id);
         let commands = &self.summary[format!("{axis}_commands")];
         assert_eq!(
             count(commands, "/accepted"),
@@ -92,7 +92,7 @@ impl Counted {
         let answered = count(&self.controller, &format!("/axes/{axis}/cycles_answered"));
         assert_eq!(
             answered,
-            self.heard(id) + injected,
+            self.received(id) + injected,
             "{axis}: each command sent was heard or lost on the wire"
         );
     }
@@ -113,14 +113,14 @@ fn run_in_lockstep(wire: &str) -> (Scene, Counted) {
     let url = format!("{}?{wire}", scene.url());
     let emulator = scene.emulator(Pace::Lockstep).bus(url).with("--members 2 --seconds 4").start();
     let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    let mut heard = Vec::new();
-    scene.peer().take_part("listener", |_, _, frames| heard.extend_from_slice(frames));
+    let mut received = Vec::new();
+    scene.peer().take_part("listener", |_, _, frames| received.extend_from_slice(frames));
     let _ = emulator.wait().expect_code(0);
     // Good, unless the wire lost the rig's farewell.
     let _ = controller.wait();
     let summary = json(&scene.path("emulator/summary.json"));
     let controller = json(&scene.path("controller/controller.json"));
-    let counted = Counted { heard, host: summary["bus_host"].clone(), summary, controller };
+    let counted = Counted { received, host: summary["bus_host"].clone(), summary, controller };
     (scene, counted)
 }
 
@@ -170,5 +170,5 @@ fn in_real_time_both_sums_agree_for_each_identifier() {
     let host: Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
     let read = |file: &str| json(Path::new(&scene.path(file)));
     let (summary, controller) = (read("emulator/summary.json"), read("controller/controller.json"));
-    Counted { heard: trace.join().expect("the listener listens"), host, summary, controller }.check();
+    Counted { received: trace.join().expect("the listener listens"), host, summary, controller }.check();
 }

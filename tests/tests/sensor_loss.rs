@@ -19,7 +19,7 @@ const CYCLES: u64 = 4000;
 
 /// What the controllers did, by the rig's cycles.
 #[derive(Debug, Default)]
-struct Heard {
+struct Received {
     stop: Option<(u64, EmergencyStop)>,
     /// The other axis says that it aborted.
     aborted: Option<u64>,
@@ -55,33 +55,33 @@ fn publish(peer: &Peer, cycle: u64, silent: Option<&str>, emergency_stop: bool) 
 }
 
 /// Plays the rig; `silent` names the axis whose sensors stop.
-fn play(peer: &Peer, silent: &str) -> Heard {
-    let mut heard = Heard::default();
+fn play(peer: &Peer, silent: &str) -> Received {
+    let mut received = Received::default();
     for cycle in 0..CYCLES {
-        publish(peer, cycle, (cycle >= SILENT_FROM).then_some(silent), heard.stop.is_some());
+        publish(peer, cycle, (cycle >= SILENT_FROM).then_some(silent), received.stop.is_some());
         loop {
             let Some(packet) = peer.receive(if cycle == 0 { PATIENCE } else { Duration::from_secs(2) })
             else {
                 // The controllers have ended: two seconds after the fault.
-                return heard;
+                return received;
             };
             let Packet::Frame(frame) = packet else { continue };
             match (silent, Frame::decode(&frame)) {
                 ("drive", Ok(Frame::DriveEmergencyStop(stop)))
                 | ("load", Ok(Frame::LoadEmergencyStop(stop))) => {
-                    heard.stop = heard.stop.or(Some((cycle, stop)));
+                    received.stop = received.stop.or(Some((cycle, stop)));
                 }
                 ("drive", Ok(Frame::LoadChainStatus(status)))
                 | ("load", Ok(Frame::DriveChainStatus(status)))
                     if status.main_chain == MainChainState::Aborted =>
                 {
-                    heard.aborted = heard.aborted.or(Some(cycle));
+                    received.aborted = received.aborted.or(Some(cycle));
                 }
                 ("drive", Ok(Frame::DriveValveCommand(command)))
                 | ("load", Ok(Frame::LoadValveCommand(command)))
                     if cycle > SILENT_FROM && command.enable =>
                 {
-                    heard.opened.push(cycle);
+                    received.opened.push(cycle);
                 }
                 ("drive", Ok(Frame::LoadValveCommand(command)))
                 | ("load", Ok(Frame::DriveValveCommand(command)))
@@ -93,7 +93,7 @@ fn play(peer: &Peer, silent: &str) -> Heard {
             }
         }
     }
-    heard
+    received
 }
 
 #[test]
@@ -104,17 +104,17 @@ fn an_axis_without_sensors_trips_the_emergency_stop_after_five_ticks_of_the_rig(
         let rig = scene.peer();
         let controller = scene.controller(Pace::Real).with("--no-realtime --bus-grace 60").start();
         scene.wait_for_peers(2);
-        let heard = play(&rig, silent);
+        let received = play(&rig, silent);
         let ended = controller.wait().expect_code(1);
         let _ = ended.expect_said(&[&format!("stopped before the end: {silent}: sensor-loss")]);
-        let (cycle, stop) = heard.stop.expect("it trips the emergency stop");
+        let (cycle, stop) = received.stop.expect("it trips the emergency stop");
         assert_eq!((stop.reason, stop.release), (EmergencyStopReason::SensorLoss, false), "{silent}");
         eprintln!("{silent}: emergency stop {} cycles after the last sensors", cycle - SILENT_FROM + 1);
         assert!((AT_EARLIEST..=AT_LATEST).contains(&cycle), "{silent}: in cycle {cycle}");
         // By the stop itself, not by the rig's status five cycles after the tick.
-        let aborted = heard.aborted.expect("the other axis aborts");
+        let aborted = received.aborted.expect("the other axis aborts");
         assert!(aborted - cycle <= 2, "{silent}: the other axis aborts {} cycles later", aborted - cycle);
-        assert!(heard.opened.is_empty(), "{silent}: opened without sensors in {:?}", heard.opened);
+        assert!(received.opened.is_empty(), "{silent}: opened without sensors in {:?}", received.opened);
         let report = json(&scene.path("controller/controller.json"));
         assert_eq!(report["axes"][silent]["chain_state"], "fault");
         let other = if silent == "drive" { "load" } else { "drive" };

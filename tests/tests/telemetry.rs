@@ -170,11 +170,11 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
     let is_weights = |event: &Value| event["kind"]["weights"]["added_mass_kg"] == 3.0;
     // A viewer that connects later receives it too.
     let mut later = viewer(&scene);
-    let heard = std::iter::from_fn(|| later.packet()).find_map(|packet| match packet {
+    let received = std::iter::from_fn(|| later.packet()).find_map(|packet| match packet {
         Packet::Event(text) => serde_json::from_str::<Value>(&text).ok().filter(is_weights),
         _ => None,
     });
-    assert_eq!(heard.expect("the event")["text"], "weights on the carriage: 3 kg");
+    assert_eq!(received.expect("the event")["text"], "weights on the carriage: 3 kg");
     assert_eq!(one.ask("quit")["ok"], true);
     let _ = emulator.wait().expect_code(0);
     assert!(!scene.path("telemetry").exists(), "the socket went with the run");

@@ -19,7 +19,7 @@ pub(super) struct One {
     pub(super) prepared: bool,
     pub(super) sensors: bool,
     /// Its status frames reach the other.
-    pub(super) heard: bool,
+    pub(super) received: bool,
     pub(super) alive: bool,
     pub(super) fault: Option<Fault>,
     partner: Partner,
@@ -39,7 +39,7 @@ impl One {
             error: ControlError::None,
             prepared: true,
             sensors: true,
-            heard: true,
+            received: true,
             alive: true,
             fault: None,
             partner: Partner::default(),
@@ -154,13 +154,13 @@ impl Duo {
         let console = std::mem::take(&mut self.console);
         let said = [0, 1].map(|index| {
             let one = &self.axes[index];
-            one.status().filter(|_| one.alive && one.heard)
+            one.status().filter(|_| one.alive && one.received)
         });
         let sent = self.sent;
         for index in [0, 1] {
             let one = &mut self.axes[index];
             if let Some(status) = said[1 - index] {
-                one.partner = Partner { status: Some(status), values: None, heard: Some(self.cycle) };
+                one.partner = Partner { status: Some(status), values: None, received: Some(self.cycle) };
             }
             self.sent[index] = one.advance(self.cycle, rig, sent[1 - index], console);
         }

@@ -74,7 +74,7 @@ mod tests {
     fn seen(own: (S, u32), partner: (S, u8, bool)) -> Relation {
         let (main_chain, repetition, ok) = partner;
         let status = ChainStatus { main_chain, repetition, ok, ..ChainStatus::default() };
-        let partner = Partner { status: Some(status), heard: Some(0), ..Partner::default() };
+        let partner = Partner { status: Some(status), received: Some(0), ..Partner::default() };
         relation(own.0, own.1, &partner, 0)
     }
 

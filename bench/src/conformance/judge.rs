@@ -4,7 +4,7 @@
 //! `docs/buses.md`.
 
 use super::cli::{CheckPace, ConformanceArguments};
-use super::watch::{Heard, What, Wrong};
+use super::watch::{Received, What, Wrong};
 use crate::junit::Case;
 use crate::soak::model::{Check, CheckResult};
 use std::collections::BTreeMap;
@@ -25,19 +25,19 @@ pub(super) struct Phase<'a> {
     /// Cycles whose sensors were sent, with their stamps; `None` for the time of a cycle that this process disturbed.
     pub(super) cycles: &'a [(u64, Option<u64>)],
     /// What came in them.
-    pub(super) heard: &'a [Heard],
+    pub(super) received: &'a [Received],
 }
 
 impl Phase<'_> {
-    fn commands(&self) -> impl Iterator<Item = (&Heard, f64, Option<u64>, Option<u8>)> {
-        self.heard.iter().filter_map(|heard| match heard.what {
-            What::Command { opening, age, step } => Some((heard, opening, age, step)),
+    fn commands(&self) -> impl Iterator<Item = (&Received, f64, Option<u64>, Option<u8>)> {
+        self.received.iter().filter_map(|received| match received.what {
+            What::Command { opening, age, step } => Some((received, opening, age, step)),
             _ => None,
         })
     }
 
     fn broken(&self, wrong: Wrong) -> usize {
-        self.heard.iter().filter(|heard| heard.what == What::Broken(wrong)).count()
+        self.received.iter().filter(|received| received.what == What::Broken(wrong)).count()
     }
 }
 
@@ -75,9 +75,9 @@ pub(super) fn regular(phase: &Phase<'_>, arguments: &ConformanceArguments) -> Ve
 pub(super) fn every_cycle(class: &str, phase: &Phase<'_>, arguments: &ConformanceArguments) -> Case {
     let cycles = phase.cycles.len();
     let mut counts = BTreeMap::new();
-    for (heard, _, age, _) in phase.commands() {
+    for (received, _, age, _) in phase.commands() {
         if let Some(age) = age {
-            *counts.entry(heard.cycle - age).or_insert(0_usize) += 1;
+            *counts.entry(received.cycle - age).or_insert(0_usize) += 1;
         }
     }
     let count = |cycle: &u64| counts.get(cycle).copied().unwrap_or(0);
@@ -134,7 +134,7 @@ fn command_age(phase: &Phase<'_>) -> Case {
 
 /// It sends nothing but what is its own to send, as rig.dbc has it.
 fn identifiers(phase: &Phase<'_>) -> Case {
-    let mut others = phase.heard.iter().filter_map(|heard| match &heard.what {
+    let mut others = phase.received.iter().filter_map(|received| match &received.what {
         What::NotItsOwn(frame) => Some(frame),
         _ => None,
     });
@@ -159,19 +159,19 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     let quiet = |cycle: u64| stamps.get(&cycle).copied().flatten();
     let (mut spreads, mut periods, mut responses) = (Vec::new(), Vec::new(), Vec::new());
     let mut last: Option<(u64, u64)> = None;
-    for (heard, _, age, _) in phase.commands() {
-        let Some(answered) = age.and_then(|age| heard.cycle.checked_sub(age)) else { continue };
+    for (received, _, age, _) in phase.commands() {
+        let Some(answered) = age.and_then(|age| received.cycle.checked_sub(age)) else { continue };
         if let Some(sent_ns) = quiet(answered) {
-            responses.push(heard.stamp_ns.saturating_sub(sent_ns));
+            responses.push(received.stamp_ns.saturating_sub(sent_ns));
             if let Some((cycle, stamp_ns)) = last.filter(|(cycle, _)| *cycle + 1 == answered)
                 && quiet(cycle).is_some()
             {
-                let period_ns = heard.stamp_ns.saturating_sub(stamp_ns);
+                let period_ns = received.stamp_ns.saturating_sub(stamp_ns);
                 periods.push(period_ns);
                 spreads.push(period_ns.abs_diff(1_000_000));
             }
         }
-        last = Some((answered, heard.stamp_ns));
+        last = Some((answered, received.stamp_ns));
     }
     spreads.sort_unstable();
     responses.sort_unstable();
@@ -202,21 +202,21 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     ]
 }
 
-fn during<'a>(heard: &'a [Heard], window: &'a Range<u64>) -> impl Iterator<Item = &'a Heard> {
-    heard.iter().filter(|heard| window.contains(&heard.cycle))
+fn during<'a>(received: &'a [Received], window: &'a Range<u64>) -> impl Iterator<Item = &'a Received> {
+    received.iter().filter(|received| window.contains(&received.cycle))
 }
 
 /// Until when a valve was open after a cycle; `None` when nothing opened it any more.
-fn last_open(heard: &[Heard], window: Range<u64>) -> Option<u64> {
-    let open = |heard: &&Heard| {
-        window.contains(&heard.cycle) && matches!(heard.what, What::Command { opening, .. } if opening != 0.0)
+fn last_open(received: &[Received], window: Range<u64>) -> Option<u64> {
+    let open = |received: &&Received| {
+        window.contains(&received.cycle) && matches!(received.what, What::Command { opening, .. } if opening != 0.0)
     };
-    heard.iter().rev().find(open).map(|heard| heard.cycle)
+    received.iter().rev().find(open).map(|received| received.cycle)
 }
 
-fn valve_shut(class: &str, heard: &[Heard], window: Range<u64>, within: u64) -> Case {
+fn valve_shut(class: &str, received: &[Received], window: Range<u64>, within: u64) -> Case {
     let began = window.start;
-    let last = last_open(heard, window.clone());
+    let last = last_open(received, window.clone());
     let after = last.map_or(0, |cycle| cycle - began + 1);
     let detail = format!(
         "the last command that opened the valve came in cycle {after} after it began ({within} are allowed); watched for {}",
@@ -226,25 +226,25 @@ fn valve_shut(class: &str, heard: &[Heard], window: Range<u64>, within: u64) -> 
 }
 
 /// After an emergency stop the valve is shut, and stays so while it lasts.
-pub(super) fn emergency_stop(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
-    vec![valve_shut("emergency-stop", heard, window, STOP_WITHIN_CYCLES)]
+pub(super) fn emergency_stop(received: &[Received], window: Range<u64>) -> Vec<Case> {
+    vec![valve_shut("emergency-stop", received, window, STOP_WITHIN_CYCLES)]
 }
 
 /// Without sensors the controller shuts the valve and may trip the emergency stop. It sends no command with an invented echo,
 /// then or when the sensors are `back`.
-pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
+pub(super) fn sensor_loss(received: &[Received], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
     let class = "sensor-loss";
     let [without, again] = [&window, &back].map(|window| {
-        during(heard, window).filter(|heard| matches!(heard.what, What::Command { age: None, .. })).count()
+        during(received, window).filter(|received| matches!(received.what, What::Command { age: None, .. })).count()
     });
     let reported =
-        during(heard, &window).find(|heard| matches!(&heard.what, What::Stop(stop) if !stop.release));
+        during(received, &window).find(|received| matches!(&received.what, What::Stop(stop) if !stop.release));
     let reported = match reported {
-        Some(heard) => (
+        Some(received) => (
             CheckResult::Passed,
             format!(
                 "tripped the emergency stop {} cycles after the last sensors",
-                heard.cycle - window.start + 1
+                received.cycle - window.start + 1
             ),
         ),
         None => {
@@ -252,7 +252,7 @@ pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>, back: Range<u64>)
         }
     };
     vec![
-        valve_shut(class, heard, window.clone(), LOSS_WITHIN_CYCLES),
+        valve_shut(class, received, window.clone(), LOSS_WITHIN_CYCLES),
         case(
             class,
             "no-invented-echo",

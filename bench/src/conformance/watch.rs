@@ -42,7 +42,7 @@ pub(super) enum Wrong {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Heard {
+pub(super) struct Received {
     /// The newest cycle that was sent when it came.
     pub(super) cycle: u64,
     pub(super) stamp_ns: u64,
@@ -56,7 +56,7 @@ pub(super) struct Watch {
     /// By cycle: whether the sensors of the axis were sent.
     sent: Vec<bool>,
     last_alive: Option<u8>,
-    pub(super) heard: Vec<Heard>,
+    pub(super) received: Vec<Received>,
     /// The opening that acts.
     pub(super) opening: f64,
 }
@@ -70,7 +70,7 @@ impl Watch {
             command: axis.command(),
             sent: Vec::new(),
             last_alive: None,
-            heard: Vec::new(),
+            received: Vec::new(),
             opening: 0.0,
         }
     }
@@ -83,15 +83,15 @@ impl Watch {
 
     /// Takes a frame that came at `stamp_ns`, after the cycle noted last.
     pub(super) fn take(&mut self, frame: &CanFrame, stamp_ns: u64) {
-        if self.heard.len() < MOST_FRAMES {
+        if self.received.len() < MOST_FRAMES {
             let what = self.judge(frame);
-            self.heard.push(Heard { cycle: (self.sent.len() as u64).saturating_sub(1), stamp_ns, what });
+            self.received.push(Received { cycle: (self.sent.len() as u64).saturating_sub(1), stamp_ns, what });
         }
     }
 
     /// Whether it sent more than anybody could.
     pub(super) fn babbles(&self) -> bool {
-        self.heard.len() >= MOST_FRAMES
+        self.received.len() >= MOST_FRAMES
     }
 
     fn judge(&mut self, frame: &CanFrame) -> What {
@@ -157,7 +157,7 @@ mod tests {
         let mut watch = Watch::new(CheckedAxis::Drive, false);
         (0..5000).filter(|cycle| *cycle != 4990).for_each(|cycle| watch.note_sent(cycle, cycle != 4995));
         frames.iter().for_each(|frame| watch.take(frame, 0));
-        watch.heard.into_iter().map(|heard| heard.what).collect()
+        watch.received.into_iter().map(|received| received.what).collect()
     }
 
     #[test]

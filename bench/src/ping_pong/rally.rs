@@ -85,16 +85,16 @@ pub(super) fn ask(
 
 /// Answers until the other side is gone or silent for `silence`.
 pub(super) fn answer(line: &mut dyn Line, clock: &impl Clock, silence: Duration) {
-    let mut heard = clock.now();
+    let mut received = clock.now();
     loop {
         // Answered once the batch is taken, as the controller does; there is one ping at a time.
         let mut asked = None;
         let waited = line.wait(&mut |frame, _| asked = number(frame, PING_ID).or(asked));
         if let Some(number) = asked {
             line.send(&CanFrame::new(PONG_ID, &number.to_le_bytes()));
-            heard = clock.now();
+            received = clock.now();
         }
-        if waited.is_err() || clock.now().saturating_duration_since(heard) > silence {
+        if waited.is_err() || clock.now().saturating_duration_since(received) > silence {
             return;
         }
     }

@@ -306,9 +306,9 @@ proptest! {
     ) {
         let mut play = Play::new(after);
         let mut before = S::Ready;
-        for (cycles, [tripped, still, fresh, start, release, heard], frame, fault) in row {
+        for (cycles, [tripped, still, fresh, start, release, received], frame, fault) in row {
             play.inputs.cycle += cycles;
-            play.inputs.rig = heard.then_some(rig(tripped && frame < 10));
+            play.inputs.rig = received.then_some(rig(tripped && frame < 10));
             play.inputs.at_standstill = still;
             play.inputs.partner_fresh = fresh;
             play.inputs.console = Console { start, release, abort: false };

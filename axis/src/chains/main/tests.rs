@@ -28,7 +28,7 @@ fn reported(cycle: u64, status: ChainStatus) -> MainInputs {
     MainInputs {
         cycle,
         own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
-        partner: Partner { status: Some(status), values: None, heard: Some(cycle) },
+        partner: Partner { status: Some(status), values: None, received: Some(cycle) },
         ..MainInputs::default()
     }
 }

@@ -13,7 +13,7 @@ struct Play {
     inputs: MatchingInputs,
     values: Vec<f64>,
     drive_m: f64,
-    heard: bool,
+    received: bool,
 }
 
 impl Play {
@@ -27,13 +27,13 @@ impl Play {
             ..MatchingInputs::default()
         };
         let values = Parameters::TABLE.iter().map(|parameter| parameter.default).collect();
-        Self { chain: MatchingChain::default(), inputs, values, drive_m: 0.1, heard: true }
+        Self { chain: MatchingChain::default(), inputs, values, drive_m: 0.1, received: true }
     }
 
     fn step(&mut self) -> MatchingOutput {
         self.inputs.cycle += 1;
-        if self.heard && self.inputs.cycle % 10 == 1 {
-            self.inputs.partner.heard = Some(self.inputs.cycle);
+        if self.received && self.inputs.cycle % 10 == 1 {
+            self.inputs.partner.received = Some(self.inputs.cycle);
             let averaged_position_m = self.drive_m;
             self.inputs.partner.values = Some(ChainValues { averaged_position_m, ..ChainValues::default() });
         }
@@ -85,7 +85,7 @@ fn nothing_is_averaged_before_rest_and_linkage() {
     let cases: [fn(&mut Play); 4] = [
         |play| play.inputs.linked = false,
         |play| play.inputs.still = false,
-        |play| play.heard = false,
+        |play| play.received = false,
         |play| play.drive_m += 1e-4,
     ];
     for spoil in cases {
@@ -108,7 +108,7 @@ fn what_moves_while_averaging_breaks_it_off() {
         (|play| play.inputs.linked = false, MatchingCause::NotLinked, 1),
         (|play| play.inputs.position_m += 0.31e-3, MatchingCause::Moved, 1),
         (|play| play.drive_m += 0.31e-3, MatchingCause::Moved, 20),
-        (|play| play.heard = false, MatchingCause::Silent, 101),
+        (|play| play.received = false, MatchingCause::Silent, 101),
         (|play| play.inputs.position_m = f64::NAN, MatchingCause::Moved, 1),
     ];
     for (spoil, cause, within) in cases {
@@ -213,12 +213,12 @@ proptest! {
         ),
     ) {
         let mut play = Play::new();
-        for (cycles, [still, heard], rare, position_m) in row {
+        for (cycles, [still, received], rare, position_m) in row {
             play.inputs.cycle += cycles;
             play.inputs.asked = rare != 0;
             play.inputs.linked = rare != 1;
             play.inputs.still = still || rare > 3;
-            play.heard = heard;
+            play.received = received;
             play.inputs.position_m = position_m;
             let before = play.chain.entered.state;
             let output = play.step();

@@ -41,7 +41,7 @@ prop_compose! {
             cycle: 0,
             own: own.then_some(OwnAxis { position_m, error: ControlError::None }),
             prepared,
-            partner: Partner { status: Some(status), values: None, heard: Some(age) },
+            partner: Partner { status: Some(status), values: None, received: Some(age) },
             emergency_stop: EmergencyStopChainState::from_raw(stop).unwrap(),
             console: Console { start: console < 10, abort: console == 10, release: false },
             fault: Fault::ALL.get(fault).copied(),
@@ -60,7 +60,7 @@ proptest! {
         for (cycles, mut inputs) in row {
             cycle += cycles;
             inputs.cycle = cycle;
-            inputs.partner.heard = inputs.partner.heard.map(|age| cycle.saturating_sub(age));
+            inputs.partner.received = inputs.partner.received.map(|age| cycle.saturating_sub(age));
             if follow {
                 // A partner that goes along gets further than chance does.
                 let status = ChainStatus { main_chain: before, ok: true, repetition: 0, ..ChainStatus::default() };

@@ -36,13 +36,13 @@ fn a_partner_that_falls_silent_is_lost_after_a_hundred_cycles() {
 #[test]
 fn a_lost_partner_cannot_be_released_before_it_is_heard() {
     let mut duo = both_in(S::Experiment);
-    duo.axes[1].heard = false;
+    duo.axes[1].received = false;
     duo.run(500);
     assert_eq!(duo.faults(), [Some(Fault::PartnerLost), None]);
     duo.console.release = true;
     duo.run(1000);
     assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::PartnerLost));
-    duo.axes[1].heard = true;
+    duo.axes[1].received = true;
     duo.run(1000);
     assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::PartnerLost), "the release came too early");
     duo.console.release = true;
@@ -54,9 +54,9 @@ fn a_lost_partner_cannot_be_released_before_it_is_heard() {
 fn status_frames_may_be_lost_for_a_while() {
     let mut duo = Duo::new(&short());
     for round in 0..60 {
-        duo.axes[round % 2].heard = false;
+        duo.axes[round % 2].received = false;
         duo.run(90);
-        duo.axes[round % 2].heard = true;
+        duo.axes[round % 2].received = true;
         duo.run(10);
     }
     assert_eq!((duo.states(), duo.faults()), ([S::Done; 2], [None; 2]));

@@ -4,7 +4,7 @@ use crate::chains::{Console, Partner};
 use nominal::Axis;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis};
 
-pub(super) struct Heard {
+pub(super) struct Received {
     own: Axis,
     experiment: u8,
     pub(super) partner: Partner,
@@ -15,7 +15,7 @@ pub(super) struct Heard {
     answered: Option<u64>,
 }
 
-impl Heard {
+impl Received {
     /// Nothing, by the axis `own` in experiment number `experiment`.
     pub(super) fn new(own: Axis, experiment: u8) -> Self {
         Self {
@@ -64,10 +64,10 @@ impl Heard {
     pub(super) fn listen(&mut self, cycle: u64) {
         let missed = self.answered.map_or(0, |last| cycle.saturating_sub(last + 1));
         self.answered = Some(cycle);
-        let heard = &mut self.partner.heard;
-        *heard = heard.map(|heard| heard + missed);
+        let received = &mut self.partner.received;
+        *received = received.map(|received| received + missed);
         if std::mem::take(&mut self.partner_spoke) {
-            *heard = Some(cycle);
+            *received = Some(cycle);
         }
     }
 }
