@@ -145,10 +145,10 @@ impl RunSection {
         };
         if run.settling_timeout_s <= run.settling_s {
             let Self { settling_s, settling_timeout_s, .. } = run;
-            let said = format!(
+            let message = format!(
                 "settling_timeout_s = {settling_timeout_s} s; allowed is above settling_s, which is {settling_s} s"
             );
-            return Err(section.wrong_at("settling_timeout_s", &said));
+            return Err(section.wrong_at("settling_timeout_s", &message));
         }
         section.finish()?;
         Ok(run)

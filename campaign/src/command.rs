@@ -79,10 +79,10 @@ pub fn run(
         Err(Cut::System(error)) => return Err(error.into()),
         Err(cut @ Cut::TooLong(_)) => return Ok(Some(Outcome::failed(format!("the program {cut}")))),
     };
-    let said = |listener: Option<thread::JoinHandle<String>>| {
+    let output = |listener: Option<thread::JoinHandle<String>>| {
         listener.and_then(|listener| listener.join().ok()).unwrap_or_default()
     };
-    let (out, err) = (said(out), said(err));
+    let (out, err) = (output(out), output(err));
     if status.code() == Some(NOT_TRIED) {
         return Err(CommandError::NotTried(last_words(&err)));
     }
@@ -136,16 +136,16 @@ fn last_words(text: &str) -> String {
 /// Reads to the end, so that a program never waits for its listener, and keeps the end.
 fn listen(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
     thread::spawn(move || {
-        let mut said = Vec::new();
+        let mut output = Vec::new();
         let mut piece = [0; 1 << 16];
         // What cannot be read any more is over.
         while let Ok(length @ 1..) = pipe.read(&mut piece) {
-            said.extend_from_slice(&piece[..length]);
-            if said.len() > 2 * MOST_SAID {
-                said.drain(..said.len() - MOST_SAID);
+            output.extend_from_slice(&piece[..length]);
+            if output.len() > 2 * MOST_SAID {
+                output.drain(..output.len() - MOST_SAID);
             }
         }
-        String::from_utf8_lossy(&said).into_owned()
+        String::from_utf8_lossy(&output).into_owned()
     })
 }
 

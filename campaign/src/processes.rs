@@ -62,8 +62,8 @@ pub fn run(
         command.args(["run", "--pace", "lockstep", "--bus", &bus, "--out"]).arg(folder);
         command.arg("--experiment").arg(&files.experiment);
         add(&mut command);
-        let said = fs::File::create(folder.join(format!("{name}.txt"))).map_err(system(name))?;
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said);
+        let log = fs::File::create(folder.join(format!("{name}.txt"))).map_err(system(name))?;
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
         Own::start(&mut command).map_err(system(name))
     };
     let mut emulator = start("emulator", &|command| {

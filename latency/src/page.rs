@@ -31,7 +31,7 @@ pub fn page(report: &Report) -> String {
     let sections = [
         ("figures", "Key figures", figures::key_figures(&families)),
         ("ratios", "Ours against the reference", figures::ratios(&report.ratios)),
-        ("histograms", "Histograms", said(HISTOGRAMS) + &histograms::histograms(&families)),
+        ("histograms", "Histograms", pagekit::markup::paragraph(HISTOGRAMS) + &histograms::histograms(&families)),
         ("maxima", "Largest values over time", maxima::maxima(report, &families)),
         ("worst", "The worst events", events::worst(report)),
         ("findings", "Findings", events::findings(&report.findings)),
@@ -61,10 +61,6 @@ pub fn page(report: &Report) -> String {
 
 const HISTOGRAMS: &str = "Markers stand at p50, p99, p99.9 and the maximum. The reference is the grey area. Both axes are \
                           logarithmic: the tail would not be seen otherwise.";
-
-fn said(sentence: &str) -> String {
-    pagekit::markup::paragraph(sentence)
-}
 
 fn head(report: &Report) -> String {
     let number = report.runs.len() as u64;

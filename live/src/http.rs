@@ -147,7 +147,7 @@ pub fn json_response(status: Status, value: &Value) -> Vec<u8> {
 }
 
 /// What is said when something was refused or done.
-pub fn said(status: Status, message: &str) -> Vec<u8> {
+pub fn message_response(status: Status, message: &str) -> Vec<u8> {
     json_response(status, &json!({ "ok": status == Status::Good, "message": message }))
 }
 

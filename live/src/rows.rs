@@ -30,7 +30,7 @@ struct Row {
 pub struct Rows {
     /// Those that wait for the controllers.
     waiting: VecDeque<Row>,
-    said: [VecDeque<(u64, ChainValues)>; 2],
+    chain_values: [VecDeque<(u64, ChainValues)>; 2],
     kept: VecDeque<Row>,
     /// Rows at the end of those kept that were not handed out yet.
     fresh: usize,
@@ -39,10 +39,10 @@ pub struct Rows {
 impl Rows {
     /// Takes what the controller of an axis said after the sensors of `cycle`.
     pub fn hear(&mut self, axis: usize, cycle: u64, values: ChainValues) {
-        let said = &mut self.said[axis];
-        said.push_back((cycle, values));
-        if said.len() > VALUES_KEPT {
-            said.pop_front();
+        let chain_values = &mut self.chain_values[axis];
+        chain_values.push_back((cycle, values));
+        if chain_values.len() > VALUES_KEPT {
+            chain_values.pop_front();
         }
     }
 
@@ -56,16 +56,16 @@ impl Rows {
     /// Completes the rows that need wait no longer, `newest` being the newest cycle.
     fn settle(&mut self, newest: u64) {
         while let Some(row) = self.waiting.front() {
-            let received = |said: &VecDeque<(u64, ChainValues)>| {
-                said.back().is_some_and(|(cycle, _)| *cycle >= row.cycle)
+            let received = |chain_values: &VecDeque<(u64, ChainValues)>| {
+                chain_values.back().is_some_and(|(cycle, _)| *cycle >= row.cycle)
             };
-            if !self.said.iter().all(received) && newest < row.cycle + PATIENCE_CYCLES {
+            if !self.chain_values.iter().all(received) && newest < row.cycle + PATIENCE_CYCLES {
                 return;
             }
             let Some(mut row) = self.waiting.pop_front() else { return };
             for (value, column) in row.values.iter_mut().zip(COLUMNS.iter()) {
                 if let Source::Said(axis, what) = column.source {
-                    *value = between(&self.said[axis], row.cycle, what).map(|value| value as f32);
+                    *value = between(&self.chain_values[axis], row.cycle, what).map(|value| value as f32);
                 }
             }
             self.kept.push_back(row);
@@ -96,14 +96,14 @@ impl Rows {
 }
 
 /// What a controller said of a cycle, or between what it said before and after.
-fn between(said: &VecDeque<(u64, ChainValues)>, cycle: u64, what: Said) -> Option<f64> {
+fn between(chain_values: &VecDeque<(u64, ChainValues)>, cycle: u64, what: Said) -> Option<f64> {
     let value = |values: &ChainValues| match what {
         Said::Position => values.position_set_point_m,
         Said::Force => values.force_set_point_n,
         Said::Error => values.control_error_m,
     };
-    let after = said.iter().find(|(at, _)| *at >= cycle);
-    let before = said.iter().rev().find(|(at, _)| *at <= cycle);
+    let after = chain_values.iter().find(|(at, _)| *at >= cycle);
+    let before = chain_values.iter().rev().find(|(at, _)| *at <= cycle);
     match (before, after) {
         (Some((at, values)), _) if *at == cycle => Some(value(values)),
         (Some((from, first)), Some((to, second))) if to - from <= BRIDGED_CYCLES => {

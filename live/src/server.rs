@@ -6,7 +6,7 @@ use super::cli::WatchArguments;
 use super::client::{Client, refusal, wait};
 use super::control::{self, Order};
 use super::feed::Feed;
-use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, response, said};
+use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, response, message_response};
 use super::metrics;
 use super::view::{Audience, View};
 use super::wire::CONSOLE;
@@ -197,7 +197,7 @@ impl Server {
         if gone {
             self.view.telemetry = false;
             for number in std::mem::take(&mut self.asked) {
-                self.answer(number, said(Status::Busy, "the emulator is gone"), now_ms);
+                self.answer(number, message_response(Status::Busy, "the emulator is gone"), now_ms);
             }
         }
         // Connected is reported with the description, not before it: who hears of it asks for that at once.
@@ -211,9 +211,9 @@ impl Server {
         let Some(number) = self.asked.pop_front() else { return };
         let answer: Value = serde_json::from_str(text).unwrap_or_default();
         let reported = match (answer["ok"] == true, answer["text"].as_str().unwrap_or_default()) {
-            (true, "") => said(Status::Good, "the emulator obeys"),
-            (true, text) => said(Status::Good, text),
-            (false, text) => said(Status::BadRequest, text),
+            (true, "") => message_response(Status::Good, "the emulator obeys"),
+            (true, text) => message_response(Status::Good, text),
+            (false, text) => message_response(Status::BadRequest, text),
         };
         self.answer(number, reported, now_ms);
     }
@@ -249,8 +249,8 @@ impl Server {
         if let Ok((number, saved)) = self.saved.1.try_recv() {
             self.saving = false;
             let reported = match saved {
-                Ok(reported) => said(Status::Good, &reported),
-                Err(error) => said(Status::BadRequest, &error.to_string()),
+                Ok(reported) => message_response(Status::Good, &reported),
+                Err(error) => message_response(Status::BadRequest, &error.to_string()),
             };
             self.answer(number, reported, now_ms);
         }
@@ -290,7 +290,7 @@ impl Server {
         let is_for_us = request.host.as_deref().is_some_and(|host| is_ours(host, self.address.port()));
         if !is_for_us {
             let why = "ask by the address that was printed: this server goes by no other name";
-            return self.clients[place].answer(said(Status::Forbidden, why), now_ms);
+            return self.clients[place].answer(message_response(Status::Forbidden, why), now_ms);
         }
         if request.path == "/api/control" {
             let number = self.clients[place].number;
@@ -301,7 +301,7 @@ impl Server {
         }
         if request.method != "GET" {
             let why = "only GET here; POST goes to /api/control";
-            return self.clients[place].answer(said(Status::MethodNotAllowed, why), now_ms);
+            return self.clients[place].answer(message_response(Status::MethodNotAllowed, why), now_ms);
         }
         let answer = match request.path.as_str() {
             "/api/events" => {
@@ -320,7 +320,7 @@ impl Server {
             }
             path => match assets::find(path) {
                 Some(asset) => response(Status::Good, asset.content_type, asset.body),
-                None => said(Status::NotFound, "there is nothing by this name"),
+                None => message_response(Status::NotFound, "there is nothing by this name"),
             },
         };
         self.clients[place].answer(answer, now_ms);
@@ -333,17 +333,17 @@ impl Server {
             Ok(seconds) if (0.0..=LONGEST_HISTORY_S).contains(&seconds) => {
                 json_response(Status::Good, &self.view.rows.last(seconds))
             }
-            _ => said(Status::BadRequest, &format!("seconds: 0 to {LONGEST_HISTORY_S}")),
+            _ => message_response(Status::BadRequest, &format!("seconds: 0 to {LONGEST_HISTORY_S}")),
         }
     }
 
     /// Obeys an order if it may be given; `None` when the answer comes later.
     fn control(&mut self, number: u64, request: &Request, now_ms: u64) -> Option<Vec<u8>> {
         if request.method != "POST" {
-            return Some(said(Status::MethodNotAllowed, "orders come by POST"));
+            return Some(message_response(Status::MethodNotAllowed, "orders come by POST"));
         }
         let Some(token) = &self.token else {
-            return Some(said(
+            return Some(message_response(
                 Status::Forbidden,
                 "this page only looks on: it was started without --control",
             ));
@@ -351,18 +351,18 @@ impl Server {
         // Browsers tell which page a request comes from; programs tell nothing, and need the token all the same.
         let host = request.host.as_deref().unwrap_or_default();
         if request.origin.as_deref().is_some_and(|origin| origin != format!("http://{host}")) {
-            return Some(said(Status::Forbidden, "this request comes from another page"));
+            return Some(message_response(Status::Forbidden, "this request comes from another page"));
         }
         let shown = request.token.as_deref().unwrap_or_default();
         if !is_same(token.as_bytes(), shown.as_bytes()) {
-            return Some(said(
+            return Some(message_response(
                 Status::Unauthorized,
                 "the token is missing or wrong: open the address that was printed",
             ));
         }
         match control::read(&request.body) {
             Ok(order) => self.obey(number, order, now_ms),
-            Err(why) => Some(said(Status::BadRequest, &why)),
+            Err(why) => Some(message_response(Status::BadRequest, &why)),
         }
     }
 
@@ -381,7 +381,7 @@ impl Server {
                 let asked = self.view.wire.hand_set_point(axis, position_m, force_n);
                 Some(match asked {
                     Some(asked) => self.send(&Frame::HandSetPoint(asked), now_ms),
-                    None => said(Status::Busy, "no controller of this axis is heard"),
+                    None => message_response(Status::Busy, "no controller of this axis is heard"),
                 })
             }
             Order::Line(line) => {
@@ -390,7 +390,7 @@ impl Server {
                     self.asked.push_back(number);
                     return None;
                 }
-                Some(said(Status::Busy, "no emulator listens: start it with --telemetry and --console"))
+                Some(message_response(Status::Busy, "no emulator listens: start it with --telemetry and --console"))
             }
             Order::Save(seconds) => self.save(number, seconds),
         }
@@ -400,7 +400,7 @@ impl Server {
     fn send(&mut self, frame: &Frame, now_ms: u64) -> Vec<u8> {
         let encoded = match frame.encode() {
             Ok(encoded) => encoded,
-            Err(error) => return said(Status::BadRequest, &error.to_string()),
+            Err(error) => return message_response(Status::BadRequest, &error.to_string()),
         };
         match self.bus.send(&encoded) {
             Ok(_) => {
@@ -409,9 +409,9 @@ impl Server {
                 if let Frame::ConsoleEmergencyStop(stop) = frame {
                     self.view.wire.note_stop(CONSOLE, *stop, now_ms);
                 }
-                said(Status::Good, "on the bus")
+                message_response(Status::Good, "on the bus")
             }
-            Err(error) => said(Status::Busy, &error.to_string()),
+            Err(error) => message_response(Status::Busy, &error.to_string()),
         }
     }
 
@@ -425,10 +425,10 @@ impl Server {
 
     fn save(&mut self, number: u64, seconds: f64) -> Option<Vec<u8>> {
         let Some(folder) = self.save_to.clone().or_else(|| self.view.run_folder()) else {
-            return Some(said(Status::BadRequest, "no folder is known: start with --save DIR"));
+            return Some(message_response(Status::BadRequest, "no folder is known: start with --save DIR"));
         };
         if std::mem::replace(&mut self.saving, true) {
-            return Some(said(Status::Busy, "a record is being saved already"));
+            return Some(message_response(Status::Busy, "a record is being saved already"));
         }
         let interface = self.url.name().unwrap_or_else(|| NAMELESS.into());
         let record = self.view.minute.last(seconds, &folder, &interface, self.view.set_up());

@@ -36,7 +36,7 @@ pub struct Wire {
     cycle: Option<u64>,
     /// Low bits of the cycle that each controller answered last, as its command to the valve tells.
     echo: [Option<u16>; 2],
-    said: [Option<ChainValues>; 2],
+    chain_values: [Option<ChainValues>; 2],
     /// Sensors of each axis, since the first tick.
     sensors: [Came; 2],
     /// Cycles that the rig skipped since then, and what its own count was when it reported it last.
@@ -113,7 +113,7 @@ impl Wire {
     }
 
     fn hear(&mut self, axis: usize, values: ChainValues) -> Option<News> {
-        self.said[axis] = Some(values);
+        self.chain_values[axis] = Some(values);
         Some(News::Said(axis, self.answered(axis)?, values))
     }
 
@@ -180,12 +180,12 @@ impl Wire {
         position_m: Option<f64>,
         force_n: Option<f64>,
     ) -> Option<HandSetPoint> {
-        let said = match axis {
-            HandSetPointAxis::Drive => self.said[0]?,
-            HandSetPointAxis::Load => self.said[1]?,
+        let chain_values = match axis {
+            HandSetPointAxis::Drive => self.chain_values[0]?,
+            HandSetPointAxis::Load => self.chain_values[1]?,
         };
-        let position_m = position_m.unwrap_or(said.position_set_point_m);
-        let force_n = force_n.unwrap_or(said.force_set_point_n);
+        let position_m = position_m.unwrap_or(chain_values.position_set_point_m);
+        let force_n = force_n.unwrap_or(chain_values.force_set_point_n);
         Some(HandSetPoint { axis, position_m, force_n })
     }
 
@@ -438,12 +438,12 @@ mod tests {
 
     #[test]
     fn what_a_late_controller_says_is_of_the_cycle_that_it_answers() {
-        let said = Frame::DriveChainValues(VALUES).encode().unwrap();
+        let chain_values = Frame::DriveChainValues(VALUES).encode().unwrap();
         let mut wire = wire(58, &[], 0);
-        assert_eq!(wire.take(&said, 0), None, "nobody knows of which cycle");
+        assert_eq!(wire.take(&chain_values, 0), None, "nobody knows of which cycle");
         let command = ValveCommand { opening: 0.0, enable: true, alive: 1, echo: 154 };
         wire.take(&Frame::DriveValveCommand(command).encode().unwrap(), 0);
-        let reported = wire.take(&said, 0);
+        let reported = wire.take(&chain_values, 0);
         assert!(
             matches!(reported, Some(News::Said(0, 154, _))),
             "the newest sensors are of 157: {reported:?}"

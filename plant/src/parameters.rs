@@ -233,6 +233,6 @@ fn check_together(entries: &Entries) -> Result<(), ParameterError> {
 
 fn inconsistent(entries: &Entries, table: &str, name: &str, rule: String) -> ParameterError {
     let entry = entries.entry(table, name);
-    let said = format!("{table}.{name} = {} contradicts another key: {rule}", entry.text);
-    ParameterError::at(&entries.file, entry.line, &said)
+    let message = format!("{table}.{name} = {} contradicts another key: {rule}", entry.text);
+    ParameterError::at(&entries.file, entry.line, &message)
 }

@@ -72,9 +72,9 @@ impl Trier {
         // The command holds the pipe's other end; its text ends only when nobody does.
         drop(command);
         let mut child = started.map_err(Wrong::NoChild)?;
-        let said = read_aside(reader);
+        let output = read_aside(reader);
         let status = wait(&mut child, self.limit).map_err(Wrong::NoChild)?;
-        judge(self, status, &collect(&said))
+        judge(self, status, &collect(&output))
     }
 }
 
@@ -127,9 +127,9 @@ fn read_aside(mut reader: PipeReader) -> Said {
 }
 
 /// What was read until the pipe's end; a grandchild that holds it open is not waited for.
-fn collect(said: &Said) -> String {
-    let _ = said.ended.recv_timeout(Duration::from_secs(1));
-    String::from_utf8_lossy(&said.tail.lock().expect("the reader does not panic with it")).into_owned()
+fn collect(output: &Said) -> String {
+    let _ = output.ended.recv_timeout(Duration::from_secs(1));
+    String::from_utf8_lossy(&output.tail.lock().expect("the reader does not panic with it")).into_owned()
 }
 
 /// The exit status, or None when the child had to be killed.
@@ -158,8 +158,8 @@ fn judge(trier: &Trier, status: Option<ExitStatus>, text: &str) -> Result<(), Wr
             None => last = line,
         }
     }
-    let said = if last.is_empty() { String::new() } else { format!(" (it said: {last})") };
-    let during = format!("{}{said}", stage.as_deref().unwrap_or("an unknown step"));
+    let output = if last.is_empty() { String::new() } else { format!(" (it said: {last})") };
+    let during = format!("{}{output}", stage.as_deref().unwrap_or("an unknown step"));
     match (status, verdict) {
         (None, _) => Err(Wrong::Hung { limit: trier.limit, during }),
         (Some(status), _) if status.signal().is_some() => Err(Wrong::Crashed { status, during }),

@@ -55,8 +55,8 @@ fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, R
     for (line, text) in (1..).zip(whole.lines()).filter(|(_, text)| !text.trim().is_empty()) {
         let Some(read) = candump::read_line(text) else {
             let text: String = text.chars().take(80).collect();
-            let said = "is no line of candump -L, such as (1700000000.123456) can0 120#0011AABB";
-            return Err(ReadError::at(file, line, format!("'{text}' {said}")));
+            let message = "is no line of candump -L, such as (1700000000.123456) can0 120#0011AABB";
+            return Err(ReadError::at(file, line, format!("'{text}' {message}")));
         };
         match Frame::decode(&read.frame) {
             Ok(frame) => log.push(Logged { line, stamp_ns: read.stamp_ns, frame }),
@@ -130,9 +130,9 @@ fn expect_no_long_hole(file: &Path, log: &[Logged], cycles: &Cycles) -> Result<(
     for ((before, _), (after, line)) in lines.iter().zip(lines.iter().skip(1)) {
         let hole_s = (after - before) as f64 * PERIOD_S;
         if hole_s > LONGEST_HOLE_S as f64 {
-            let said = format!("{hole_s:.0} s without a frame of sensors before this line");
+            let message = format!("{hole_s:.0} s without a frame of sensors before this line");
             let advice = format!("{LONGEST_HOLE_S} s at most: split the log there");
-            return Err(ReadError::at(file, *line, format!("{said}, {advice}")));
+            return Err(ReadError::at(file, *line, format!("{message}, {advice}")));
         }
     }
     Ok(())
@@ -232,8 +232,8 @@ impl Row {
         self.line.get_or_insert(line);
         match self.sensors[axis].replace(sensors) {
             Some(before) if before != sensors => {
-                let said = format!("other sensors of cycle {cycle} than before: two rigs on one bus?");
-                Err(ReadError::at(file, line, said + " Record each alone"))
+                let message = format!("other sensors of cycle {cycle} than before: two rigs on one bus?");
+                Err(ReadError::at(file, line, message + " Record each alone"))
             }
             _ => Ok(()),
         }

@@ -69,8 +69,8 @@ pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
                         let cycle = wrapped(newest, tick.cycle);
                         if cycle < newest - ROUND {
                             let cycles = format!("cycle {} after {}", tick.cycle, newest.cast_unsigned());
-                            let said = format!("the rig starts anew ({cycles}): split the log there");
-                            return Err(ReadError::at(file, logged.line, said));
+                            let message = format!("the rig starts anew ({cycles}): split the log there");
+                            return Err(ReadError::at(file, logged.line, message));
                         }
                         cycle
                     }

@@ -10,8 +10,8 @@ pub enum ReadError {
     Open { file: PathBuf, reason: String },
     #[error("{} has no rows: a record needs a head with column names, and one row for each sample", file.display())]
     Empty { file: PathBuf },
-    #[error("{}:{line}: {said}", file.display())]
-    Line { file: PathBuf, line: u64, said: String },
+    #[error("{}:{line}: {message}", file.display())]
+    Line { file: PathBuf, line: u64, message: String },
     #[error("{}: no frame of sensors (0x120, 0x121) in {frames} frames: was the rig on this bus?", file.display())]
     NoSensors { file: PathBuf, frames: usize },
     #[error(transparent)]
@@ -19,7 +19,7 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    pub(super) fn at(file: &Path, line: u64, said: String) -> Self {
-        ReadError::Line { file: file.into(), line, said }
+    pub(super) fn at(file: &Path, line: u64, message: String) -> Self {
+        ReadError::Line { file: file.into(), line, message }
     }
 }

@@ -47,8 +47,8 @@ fn read_comments(table: &Table, unknown: UnlistedColumns, record: &mut Record) -
 }
 
 fn not_blind(table: &Table, line: u64, text: &str, allowed: &str) -> ReadError {
-    let said = format!("'{text}' is refused in a blind record; allowed are {allowed}");
-    ReadError::at(&table.file, line, said)
+    let message = format!("'{text}' is refused in a blind record; allowed are {allowed}");
+    ReadError::at(&table.file, line, message)
 }
 
 fn read_setup(

@@ -106,16 +106,16 @@ impl Table {
         let expected = self.head.len();
         for (place, column) in self.head.iter().enumerate() {
             if self.head[..place].contains(column) {
-                let said = format!("column {column} stands twice: delete or rename one");
-                return Err(ReadError::at(&self.file, self.head_line, said));
+                let message = format!("column {column} stands twice: delete or rename one");
+                return Err(ReadError::at(&self.file, self.head_line, message));
             }
         }
         if !whole && self.rows.last().is_some_and(|(_, row)| row.len() < expected) {
             self.cut = self.rows.pop().map(|(line, _)| line);
         }
         if let Some((line, row)) = self.rows.iter().find(|(_, row)| row.len() != expected) {
-            let said = format!("{} cells, but the head has {expected}", row.len());
-            return Err(ReadError::at(&self.file, *line, said));
+            let message = format!("{} cells, but the head has {expected}", row.len());
+            return Err(ReadError::at(&self.file, *line, message));
         }
         if self.rows.is_empty() {
             return Err(ReadError::Empty { file: self.file.clone() });
@@ -130,8 +130,8 @@ impl Table {
     /// The place of a column that must be there.
     pub(super) fn required(&self, column: &str) -> Result<usize, ReadError> {
         self.place(column).ok_or_else(|| {
-            let said = format!("column {column} is missing; the file has {}", self.head.join(", "));
-            ReadError::at(&self.file, self.head_line, said)
+            let message = format!("column {column} is missing; the file has {}", self.head.join(", "));
+            ReadError::at(&self.file, self.head_line, message)
         })
     }
 

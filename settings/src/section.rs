@@ -42,8 +42,8 @@ impl<'a> Source<'a> {
         line_of(self.text, at)
     }
 
-    fn error_at(&self, line: usize, said: &str) -> SettingsError {
-        SettingsError(format!("{}:{line}: {said}", self.file.display()))
+    fn error_at(&self, line: usize, message: &str) -> SettingsError {
+        SettingsError(format!("{}:{line}: {message}", self.file.display()))
     }
 }
 
@@ -132,8 +132,8 @@ impl<'a> Section<'a> {
         if number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number) {
             return Ok(number as u32);
         }
-        let said = format!("{} = {number}; allowed is a whole number", parameter.name);
-        Err(self.wrong_at(&parameter.name, &said))
+        let message = format!("{} = {number}; allowed is a whole number", parameter.name);
+        Err(self.wrong_at(&parameter.name, &message))
     }
 
     /// The text under `key`; `None` when it is absent.
@@ -244,24 +244,24 @@ impl<'a> Section<'a> {
 
     /// An error of the whole table.
     #[must_use]
-    pub fn wrong(&self, said: &str) -> SettingsError {
+    pub fn wrong(&self, message: &str) -> SettingsError {
         let dot = if self.path.is_empty() { "" } else { "." };
-        self.source.error_at(self.line(), &format!("{}{dot}{said}", self.path))
+        self.source.error_at(self.line(), &format!("{}{dot}{message}", self.path))
     }
 
     /// An error of the value under `key`, which begins with that key.
     #[must_use]
-    pub fn wrong_at(&self, key: &str, said: &str) -> SettingsError {
+    pub fn wrong_at(&self, key: &str, message: &str) -> SettingsError {
         match self.table.iter().find(|(name, _)| name.get_ref() == key) {
-            Some((_, value)) => self.reported(value, said),
-            None => self.wrong(said),
+            Some((_, value)) => self.reported(value, message),
+            None => self.wrong(message),
         }
     }
 
     /// A missing key, with those that are there: it may be one of them, misspelt.
-    fn lacks(&self, said: &str) -> SettingsError {
+    fn lacks(&self, message: &str) -> SettingsError {
         let keys: Vec<&str> = self.table.keys().map(|name| name.get_ref().as_ref()).collect();
-        self.wrong(&format!("{said}; the keys here are {}", keys.join(", ")))
+        self.wrong(&format!("{message}; the keys here are {}", keys.join(", ")))
     }
 
     fn not_allowed(&self, value: &Spanned<DeValue<'_>>, key: &str, allowed: &str) -> SettingsError {
@@ -269,8 +269,8 @@ impl<'a> Section<'a> {
         self.reported(value, &format!("{key} = {written}; allowed is {allowed}"))
     }
 
-    fn reported(&self, value: &Spanned<DeValue<'_>>, said: &str) -> SettingsError {
-        self.source.error_at(self.source.line(value.span().start), &self.path_of(said))
+    fn reported(&self, value: &Spanned<DeValue<'_>>, message: &str) -> SettingsError {
+        self.source.error_at(self.source.line(value.span().start), &self.path_of(message))
     }
 
     fn path_of(&self, key: &str) -> String {

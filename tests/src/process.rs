@@ -18,7 +18,7 @@ pub struct Running {
     name: String,
     child: Child,
     input: Option<ChildStdin>,
-    said: [Said; 2],
+    output: [Said; 2],
 }
 
 /// What a program wrote to a stream, gathered as it comes.
@@ -44,7 +44,7 @@ impl Running {
         let stderr = Said::gather(child.stderr.take().expect("stderr is piped"));
         let stdout = Said::gather(child.stdout.take().expect("stdout is piped"));
         let input = child.stdin.take();
-        Self { name: name.into(), child, input, said: [stderr, stdout] }
+        Self { name: name.into(), child, input, output: [stderr, stdout] }
     }
 
     /// Sends a signal to the program, which must still be there: else the test is about something else than it says.
@@ -77,7 +77,7 @@ impl Running {
     }
 
     pub fn stderr(&self) -> String {
-        self.said[0].so_far()
+        self.output[0].so_far()
     }
 
     pub fn number(&self) -> u32 {
@@ -94,9 +94,9 @@ impl Running {
         while self.stderr().matches(text).count() < times {
             let gone = self.child.try_wait().expect("a child can be waited for").is_some();
             if gone {
-                self.said.iter_mut().for_each(Said::finish);
-                let said = self.stderr();
-                assert!(said.matches(text).count() >= times, "{} ended without '{text}':\n{said}", self.name);
+                self.output.iter_mut().for_each(Said::finish);
+                let output = self.stderr();
+                assert!(output.matches(text).count() >= times, "{} ended without '{text}':\n{output}", self.name);
                 return;
             }
             assert!(Instant::now() < until, "{} does not say '{text}':\n{}", self.name, self.stderr());
@@ -117,13 +117,13 @@ impl Running {
             assert!(Instant::now() < until, "{} hangs; it said:\n{}", self.name, self.stderr());
             std::thread::sleep(POLL);
         };
-        self.said.iter_mut().for_each(Said::finish);
+        self.output.iter_mut().for_each(Said::finish);
         Ended {
             name: self.name.clone(),
             code: status.code(),
             signal: status.signal(),
-            stderr: self.said[0].so_far(),
-            stdout: self.said[1].so_far(),
+            stderr: self.output[0].so_far(),
+            stdout: self.output[1].so_far(),
         }
     }
 

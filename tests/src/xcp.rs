@@ -29,7 +29,7 @@ pub fn command(packet: &[u8]) -> CanFrame {
 }
 
 /// What the drive's controller says over XCP in a frame, if it is one of its.
-pub fn said(frame: &CanFrame) -> Option<[u8; 8]> {
+pub fn xcp_packet(frame: &CanFrame) -> Option<[u8; 8]> {
     (frame.standard_id() == Some(0x1E1)).then(|| frame.data().try_into().expect("padded to 8 bytes"))
 }
 
@@ -42,7 +42,7 @@ impl Talk<'_> {
         self.0.send(&command(packet).to_bytes());
         loop {
             match self.0.receive(PATIENCE) {
-                Some(Packet::Frame(frame)) => match said(&frame) {
+                Some(Packet::Frame(frame)) => match xcp_packet(&frame) {
                     Some(answer) if answer[0] >= 0xFE => return answer,
                     _ => {}
                 },

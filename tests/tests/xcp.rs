@@ -11,7 +11,7 @@ use system_tests::process::Running;
 use system_tests::records::{Table, bus_log, count, json};
 use system_tests::scene::{RESTLESS, Scene};
 use system_tests::turn;
-use system_tests::xcp::{Foreign, config, said, wait_for_a2l};
+use system_tests::xcp::{Foreign, config, xcp_packet, wait_for_a2l};
 
 /// pyXCP takes its time to start, on a busy machine more than a controller waits for those that are missing.
 const PATIENT: &str = "--bus-grace 60";
@@ -219,7 +219,7 @@ fn measured_cycles(scene: &Scene) -> Vec<usize> {
     let frames = bus_log(&scene.path("emulator/bus.log")).into_iter();
     let mut cycle = 0;
     frames
-        .filter_map(|frame| said(&frame).filter(|packet| packet[0] == 0))
+        .filter_map(|frame| xcp_packet(&frame).filter(|packet| packet[0] == 0))
         .map(|[_, low, high, ..]| {
             cycle += usize::from(u16::from_le_bytes([low, high]).wrapping_sub(cycle as u16));
             cycle

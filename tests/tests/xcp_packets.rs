@@ -6,7 +6,7 @@ use system_tests::axis_table::AxisTable;
 use system_tests::launch::{Pace, run_both};
 use system_tests::records::{count, json};
 use system_tests::scene::{PROGRAM, SHORT, Scene};
-use system_tests::xcp::{SECRET, command, config, said};
+use system_tests::xcp::{SECRET, command, config, xcp_packet};
 
 /// Cycle of the first command: the experiment moves.
 const START: u32 = 852;
@@ -27,10 +27,10 @@ fn run(scene: &Scene, options: &str, axes: &[&str], script: &Script) -> Vec<[u8;
     let mut answers = Vec::new();
     let mut spoken = 0;
     client.take_part("client", |peer, cycle, frames| {
-        answers.extend(frames.iter().filter_map(said));
-        let said = script(&answers);
-        if cycle >= START && cycle.is_multiple_of(4) && spoken < said.len() {
-            peer.send(&command(&said[spoken]).to_bytes());
+        answers.extend(frames.iter().filter_map(xcp_packet));
+        let xcp_packet = script(&answers);
+        if cycle >= START && cycle.is_multiple_of(4) && spoken < xcp_packet.len() {
+            peer.send(&command(&xcp_packet[spoken]).to_bytes());
             spoken += 1;
         }
     });
@@ -47,25 +47,25 @@ fn set_address(address: u32) -> Vec<u8> {
 
 /// Connects and unlocks; the key is made of the seed that was answered.
 fn unlock(answers: &[[u8; 8]]) -> Vec<Vec<u8>> {
-    let mut said = vec![vec![0xFF, 0], vec![0xF8, 0, 1], vec![0xF8, 1, 0]];
+    let mut xcp_packet = vec![vec![0xFF, 0], vec![0xF8, 0, 1], vec![0xF8, 1, 0]];
     if let [_, first, second, ..] = answers {
         let seed = [&first[2..8], &second[2..4]].concat().try_into().expect("8 bytes");
         let key = xcp::lock::key(&SECRET, seed);
-        said.push([&[0xF7, 8], &key[..6]].concat());
-        said.push([&[0xF7, 2], &key[6..]].concat());
+        xcp_packet.push([&[0xF7, 8], &key[..6]].concat());
+        xcp_packet.push([&[0xF7, 2], &key[6..]].concat());
     }
-    said
+    xcp_packet
 }
 
 fn write_gain(answers: &[[u8; 8]]) -> Vec<Vec<u8>> {
-    let mut said = unlock(answers);
-    if said.len() == 5 {
+    let mut xcp_packet = unlock(answers);
+    if xcp_packet.len() == 5 {
         let value = 20.0_f64.to_le_bytes();
-        said.push(set_address(GAIN));
-        said.push([&[0xF0, 6], &value[..6]].concat());
-        said.push([&[0xF0, 2], &value[6..]].concat());
+        xcp_packet.push(set_address(GAIN));
+        xcp_packet.push([&[0xF0, 6], &value[..6]].concat());
+        xcp_packet.push([&[0xF0, 2], &value[6..]].concat());
     }
-    said
+    xcp_packet
 }
 
 /// Measures the position with time stamps, and reads a parameter.
@@ -191,7 +191,7 @@ fn a_flood_of_commands_is_dropped_and_counted_and_the_valve_is_served() {
     let client = scene.peer();
     let (mut sent, mut received) = (0, 0);
     client.take_part("client", |peer, cycle, frames| {
-        received += frames.iter().filter(|frame| said(frame).is_some()).count();
+        received += frames.iter().filter(|frame| xcp_packet(frame).is_some()).count();
         if cycle < 1000 {
             (0..20).for_each(|_| peer.send(&command(&[0xFF, 0]).to_bytes()));
             // Of another length than rig.dbc has it, as a client without padding sends it.

@@ -147,8 +147,8 @@ impl AxisExperiment {
         let set_points = match quantity {
             Quantity::Position => {
                 if let Some(key) = FORCE_KEYS.iter().find(|key| section.has(key)) {
-                    let said = format!("{key} is for set-points of force; these are of position");
-                    return Err(section.wrong_at(key, &said));
+                    let message = format!("{key} is for set-points of force; these are of position");
+                    return Err(section.wrong_at(key, &message));
                 }
                 let start_m = section.needed_number(&start)?;
                 let speed = section.number(&BY_HAND_SPEED)?;
@@ -171,8 +171,8 @@ impl AxisExperiment {
             }
         };
         if by_hand.is_some() && manual {
-            let said = "during = \"manual\" leaves no set-points to be given by hand: leave one of both out";
-            return Err(section.wrong_at("during", said));
+            let message = "during = \"manual\" leaves no set-points to be given by hand: leave one of both out";
+            return Err(section.wrong_at("during", message));
         }
         let changes = section.sections("change")?.into_iter().map(change).collect::<Result<Vec<_>, _>>();
         let mut changes = changes?;
@@ -207,11 +207,11 @@ fn program(section: &mut Section<'_>) -> Result<ProgramReference, SettingsError>
     if program.text.ends_with(".toml") || (!program.text.is_empty() && program.text.chars().all(is_name)) {
         return Ok(ProgramReference { written: program.text, line: program.line });
     }
-    let said = format!(
+    let message = format!(
         "program = \"{}\"; allowed is a name of letters, digits, - and _, or a path ending in .toml",
         program.text
     );
-    Err(section.wrong_at("program", &said))
+    Err(section.wrong_at("program", &message))
 }
 
 fn change(mut section: Section<'_>) -> Result<Change, SettingsError> {

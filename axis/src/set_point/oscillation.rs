@@ -66,18 +66,18 @@ impl Oscillation {
         let fade_s = given.section.number_or_default(&FADE)?;
         if 2.0 * fade_s > duration_s {
             let most_s = 0.5 * duration_s;
-            let said = format!("fade_s = {fade_s} s; allowed is 0 to {most_s} s, half of duration_s");
-            return Err(given.section.wrong_at("fade_s", &said));
+            let message = format!("fade_s = {fade_s} s; allowed is 0 to {most_s} s, half of duration_s");
+            return Err(given.section.wrong_at("fade_s", &message));
         }
         let halves = (from_hz + to_hz) * duration_s;
         if fade_s == 0.0 && (halves - halves.round()).abs() > PHASE_TOLERANCE {
             let mean_hz = 0.5 * (from_hz + to_hz);
             let [shorter_s, longer_s] = [halves.floor(), halves.ceil()].map(|whole| whole / (2.0 * mean_hz));
-            let said = format!(
+            let message = format!(
                 "duration_s = {duration_s} s ends off the middle; allowed is a multiple of half a period, such as {shorter_s} \
                  or {longer_s} s, or a fade_s above 0"
             );
-            return Err(given.section.wrong_at("duration_s", &said));
+            return Err(given.section.wrong_at("duration_s", &message));
         }
         Ok(Arc::new(Self { from: given.from, amplitude, from_hz, to_hz, duration_s, fade_s }))
     }

@@ -37,8 +37,8 @@ fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
     let seed = given.section.whole_or_default(&SEED)?;
     let levels = given.section.whole_or_default(&LEVELS)?;
     if duration_s / hold_s > MOST_STEPS {
-        let said = format!("hold_s = {hold_s} s; allowed are at most {MOST_STEPS} steps in duration_s");
-        return Err(given.section.wrong_at("hold_s", &said));
+        let message = format!("hold_s = {hold_s} s; allowed are at most {MOST_STEPS} steps in duration_s");
+        return Err(given.section.wrong_at("hold_s", &message));
     }
     let around = [given.from, amplitude];
     Ok(Arc::new(PseudoRandomSteps::new(around, [hold_s, duration_s], seed.into(), levels)))

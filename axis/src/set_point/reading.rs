@@ -24,9 +24,9 @@ pub(crate) fn quantity(segments: &[Section<'_>]) -> Result<Option<Quantity>, Set
         let (quantity, line) = *first.get_or_insert((own, segment.line()));
         if own != quantity {
             let (own, other) = (own.name(), quantity.name());
-            let said =
+            let message =
                 format!("law is of {own}s, line {line} of {other}s: a row mixes no positions and forces");
-            return Err(segment.wrong_at("law", &said));
+            return Err(segment.wrong_at("law", &message));
         }
     }
     Ok(first.map(|(quantity, _)| quantity))
@@ -98,8 +98,8 @@ fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, Settings
     let quantity = given.scale.quantity;
     let kind = law::KINDS.iter().find(|kind| kind.name == name && kind.serves.contains(&quantity));
     let Some(kind) = kind else {
-        let said = format!("law = \"{name}\"; allowed is {}", names(quantity));
-        return Err(given.section.wrong_at("law", &said));
+        let message = format!("law = \"{name}\"; allowed is {}", names(quantity));
+        return Err(given.section.wrong_at("law", &message));
     };
     let law = (kind.read)(given)?;
     let ([least, most], unit) = (law.extent().reach, given.scale.unit());
@@ -107,9 +107,9 @@ fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, Settings
         return Ok(law);
     }
     let allowed = given.scale.most();
-    let said =
+    let message =
         format!("law = \"{name}\" goes from {least} to {most} {unit}; allowed is 0 to {allowed} {unit}");
-    Err(given.section.wrong_at("law", &said))
+    Err(given.section.wrong_at("law", &message))
 }
 
 fn names(quantity: Quantity) -> String {

@@ -28,11 +28,11 @@ pub(super) fn comparison(comparison: Option<&Comparison>) -> String {
         }
         table.row(cells);
     }
-    let said = format!(
+    let sentence = format!(
         "In brackets the least and the largest of the group's runs. Changes are against {first}. A change is beyond the noise \
          when repeated runs of one group do not differ that much among themselves."
     );
-    format!("{}{}", paragraph(&said), table.html_or("No figure was measured in these groups."))
+    format!("{}{}", paragraph(&sentence), table.html_or("No figure was measured in these groups."))
 }
 
 fn median(cell: &ComparisonCell) -> String {
@@ -74,10 +74,10 @@ pub(super) fn bounds(bounds: &[BoundResult]) -> String {
             verdict,
         ]);
     }
-    let said = "A ratio is judged by the interval of its median. Where the interval crosses the bound, or there are fewer than \
+    let sentence = "A ratio is judged by the interval of its median. Where the interval crosses the bound, or there are fewer than \
          six \
                 pairs and so no interval, the bound is not resolved: neither kept nor broken. The pairs that would resolve it \
                 follow from an interval that shrinks as one over the root of their number, around a median that stays.";
-    let lead = if bounds.is_empty() { String::new() } else { paragraph(said) };
+    let lead = if bounds.is_empty() { String::new() } else { paragraph(sentence) };
     format!("{lead}{}", table.html_or("No threshold file was given."))
 }

@@ -69,11 +69,11 @@ pub(super) fn ratios(ratios: &[Ratio]) -> String {
             ]);
         }
     }
-    let said = "Each dot is a pair: our run and the reference's slice beside it, one after the other on the same CPU. The \
+    let sentence = "Each dot is a pair: our run and the reference's slice beside it, one after the other on the same CPU. The \
                 diamond is the median, the bar its interval, which ranks give without assuming a distribution; fewer than six \
                 pairs give none. Left of 1 ours is the shorter.";
     let pairs = folded("Each pair", &pairs.html_or("No pair was measured."));
-    format!("{}{}{}{pairs}", paragraph(said), forest(ratios), table.html_or("No ratio was measured."))
+    format!("{}{}{}{pairs}", paragraph(sentence), forest(ratios), table.html_or("No ratio was measured."))
 }
 
 fn two(value: f64) -> String {

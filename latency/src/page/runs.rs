@@ -54,15 +54,15 @@ pub(super) fn arrivals(runs: &[RunPart]) -> String {
     for ((receiver, frame), sum) in &sums {
         table.row([text(*receiver)].into_iter().chain(arrival_cells(frame, sum)));
     }
-    let said = "Over all runs; of the percentiles the largest of any run. A gap is an interval longer than one and a half \
+    let lead = "Over all runs; of the percentiles the largest of any run. A gap is an interval longer than one and a half \
                 periods, a burst one shorter than half a period; cycles that the rig missed are gaps too.";
     let all = table.html_or("None was measured.");
     if sums.is_empty() || runs.len() < 2 {
-        return format!("{}{all}", pagekit::markup::paragraph(said));
+        return format!("{}{all}", pagekit::markup::paragraph(lead));
     }
     format!(
         "{}{all}{}",
-        pagekit::markup::paragraph(said),
+        pagekit::markup::paragraph(lead),
         folded("Each run", &each.html_or("None was measured."))
     )
 }
@@ -113,9 +113,9 @@ fn tally(title: &str, grid: Option<Grid>) -> String {
 
 /// What folders do not hold, and the page therefore does not say.
 fn lacking(runs: &[RunPart]) -> String {
-    let said = runs.iter().enumerate().filter(|(_, part)| !part.lacks.is_empty());
-    let said = said.map(|(run, part)| format!("<h3>Run {run} lacks</h3>\n{}", list(&part.lacks, "")));
-    said.collect()
+    let sections = runs.iter().enumerate().filter(|(_, part)| !part.lacks.is_empty());
+    let sections = sections.map(|(run, part)| format!("<h3>Run {run} lacks</h3>\n{}", list(&part.lacks, "")));
+    sections.collect()
 }
 
 /// A row for each count, its sum first. Counts of parts that are 0 throughout are folded away; those of the whole always stand.

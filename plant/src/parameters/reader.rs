@@ -20,8 +20,8 @@ pub struct ParameterError(String);
 
 impl ParameterError {
     /// Of a line, from 1, of a file.
-    pub(super) fn at(file: &str, line: usize, said: &str) -> Self {
-        ParameterError(format!("{file}:{line}: {said}"))
+    pub(super) fn at(file: &str, line: usize, message: &str) -> Self {
+        ParameterError(format!("{file}:{line}: {message}"))
     }
 }
 
@@ -87,8 +87,8 @@ impl Entries {
         };
         let Some(key) = KEYS.iter().find(|key| key.path() == path) else {
             let known = KEYS.iter().map(Key::path).collect::<Vec<_>>().join(", ");
-            let said = format!("unknown key {path} = {text}; known here: {known}");
-            return Err(ParameterError::at(&self.file, 0, &said));
+            let message = format!("unknown key {path} = {text}; known here: {known}");
+            return Err(ParameterError::at(&self.file, 0, &message));
         };
         let line = self.entries[&(key.table, key.name)].line;
         let entry = Entry { numbers: numbers.to_vec(), text, line };
@@ -165,8 +165,8 @@ impl Place<'_> {
         settings::written(self.text, value.span())
     }
 
-    fn refused(&self, line: usize, said: &str) -> ParameterError {
-        ParameterError::at(self.file, line, said)
+    fn refused(&self, line: usize, message: &str) -> ParameterError {
+        ParameterError::at(self.file, line, message)
     }
 
     /// A key or table that no rig has, `key` in the file and `path` in full.
@@ -177,14 +177,14 @@ impl Place<'_> {
         value: &Spanned<DeValue<'_>>,
         known: &str,
     ) -> ParameterError {
-        let said = format!("unknown key {path} = {}; known here: {known}", self.written(value));
-        self.refused(self.line(key.span().start), &said)
+        let message = format!("unknown key {path} = {}; known here: {known}", self.written(value));
+        self.refused(self.line(key.span().start), &message)
     }
 
     /// A key that is not there, in a table that starts in this line.
     pub(super) fn missing(&self, line: usize, path: &str, range: &str) -> ParameterError {
-        let said = format!("key {path} is missing from the table that starts here; allowed: {range}");
-        self.refused(line, &said)
+        let message = format!("key {path} is missing from the table that starts here; allowed: {range}");
+        self.refused(line, &message)
     }
 
     /// A value of the wrong type.
@@ -202,8 +202,8 @@ impl Place<'_> {
     }
 
     /// What is said of a value, behind it.
-    pub(super) fn of_value(&self, path: &str, value: &Spanned<DeValue<'_>>, said: &str) -> ParameterError {
-        self.refused(self.line(value.span().start), &format!("{path} = {} {said}", self.written(value)))
+    pub(super) fn of_value(&self, path: &str, value: &Spanned<DeValue<'_>>, message: &str) -> ParameterError {
+        self.refused(self.line(value.span().start), &format!("{path} = {} {message}", self.written(value)))
     }
 
     fn refuse_unknown(&self, root: &DeTable<'_>) -> Result<(), ParameterError> {
@@ -258,6 +258,6 @@ fn check_range(key: &Key, entry: &Entry, file: &str) -> Result<(), ParameterErro
     if entry.numbers.len() == key.count && entry.numbers.iter().all(good) {
         return Ok(());
     }
-    let said = format!("{key} = {} is out of range; allowed: {}", entry.text, key.range());
-    Err(ParameterError::at(file, entry.line, &said))
+    let message = format!("{key} = {} is out of range; allowed: {}", entry.text, key.range());
+    Err(ParameterError::at(file, entry.line, &message))
 }

@@ -127,8 +127,8 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn refused(&self, offset: usize, said: &str) -> SceneError {
-        SceneError(format!("{}:{}: {said}", self.file, settings::line_of(self.text, offset)))
+    fn refused(&self, offset: usize, message: &str) -> SceneError {
+        SceneError(format!("{}:{}: {message}", self.file, settings::line_of(self.text, offset)))
     }
 
     /// A place on the stroke.
@@ -148,8 +148,8 @@ impl Check<'_> {
         if (least..=most).contains(&number) {
             return Ok(number);
         }
-        let said = format!("{path} = {number}: allowed are {least} to {most} {unit}");
-        Err(self.refused(value.span().start, &said))
+        let message = format!("{path} = {number}: allowed are {least} to {most} {unit}");
+        Err(self.refused(value.span().start, &message))
     }
 
     fn or(&self, key: Key, value: Option<&Spanned<f64>>, default: f64) -> Result<f64, SceneError> {

@@ -125,7 +125,7 @@ impl FromStr for BusUrl {
 fn parse_wire(options: &str) -> Result<WireOptions, UrlError> {
     let mut wire = WireOptions::default();
     // Until a bit rate is given, what is said of its errors is kept with the first option that said it.
-    let (mut timing, mut said, mut needs) = (WireTiming::at(FASTEST_BITS_PER_S), false, None);
+    let (mut timing, mut rate_given, mut needs) = (WireTiming::at(FASTEST_BITS_PER_S), false, None);
     for option in options.split('&').filter(|option| !option.is_empty()) {
         let refused = || UrlError::Option(option.into());
         let (key, value) = option.split_once('=').ok_or_else(refused)?;
@@ -136,7 +136,7 @@ fn parse_wire(options: &str) -> Result<WireOptions, UrlError> {
                 let rates = SLOWEST_BITS_PER_S..=FASTEST_BITS_PER_S;
                 timing.bits_per_s =
                     value.parse().ok().filter(|rate| rates.contains(rate)).ok_or_else(refused)?;
-                said = true;
+                rate_given = true;
             }
             _ => {
                 take_timing(&mut timing, key, value).ok_or_else(refused)?;
@@ -144,8 +144,8 @@ fn parse_wire(options: &str) -> Result<WireOptions, UrlError> {
             }
         }
     }
-    wire.timing = said.then_some(timing);
-    match needs.filter(|_| !said) {
+    wire.timing = rate_given.then_some(timing);
+    match needs.filter(|_| !rate_given) {
         Some(option) => Err(UrlError::NeedsBitRate(option.into())),
         None => Ok(wire),
     }

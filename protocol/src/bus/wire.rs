@@ -194,7 +194,7 @@ impl Wire {
     }
 
     /// What babbling nodes say up to `now_ns`.
-    pub(super) fn babble(&mut self, now_ns: u64, said: &mut Vec<CanFrame>) {
+    pub(super) fn babble(&mut self, now_ns: u64, babbled: &mut Vec<CanFrame>) {
         for active in &mut self.active {
             let WireFault::Babbling { id, frames_per_ms, bytes } = active.fault else { continue };
             let since_ms = now_ns.saturating_sub(active.spoken_ns) as f64 / MS_NS as f64;
@@ -205,7 +205,7 @@ impl Wire {
             let frame = CanFrame::new(id, &[0; 8][..usize::from(bytes.min(8))]);
             for _ in 0..whole as usize {
                 self.met.entry(active.fault.name()).or_default().count(&frame);
-                said.push(frame);
+                babbled.push(frame);
             }
         }
     }

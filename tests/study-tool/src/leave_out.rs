@@ -172,7 +172,7 @@ mod tests {
         draw
     }
 
-    fn said(verdict: &str, balance: &str, variables: &[&str]) -> Report {
+    fn reported(verdict: &str, balance: &str, variables: &[&str]) -> Report {
         let variables: Vec<_> = variables
             .iter()
             .map(|name| serde_json::json!({"variable": name, "r2": 0.5, "p_value": 0.005}))
@@ -219,7 +219,7 @@ mod tests {
     fn balance_and_variable_are_right_by_the_table_alone() {
         let table = expectations();
         let judged = |effect, place, balance, variables: &[&str]| {
-            let report = said("outside-catalogue", balance, variables);
+            let report = reported("outside-catalogue", balance, variables);
             let judged = judge(&draw(effect, place), &[], &table, Some(&report));
             assert!(judged.no_wrong_name && judged.verdict == "outside-catalogue");
             (judged.balance_right, judged.variable_right)

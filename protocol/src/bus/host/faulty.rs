@@ -95,10 +95,10 @@ impl Host {
     }
 
     fn let_babble(&mut self, now_ns: u64) {
-        let mut said = std::mem::take(&mut self.babble);
-        self.wire.babble(now_ns, &mut said);
-        let space_ns = CYCLE_NS / said.len().max(1) as u64;
-        for (frame, place) in said.drain(..).zip(0..) {
+        let mut babbled = std::mem::take(&mut self.babble);
+        self.wire.babble(now_ns, &mut babbled);
+        let space_ns = CYCLE_NS / babbled.len().max(1) as u64;
+        for (frame, place) in babbled.drain(..).zip(0..) {
             let Some(timed) = &mut self.timed else {
                 self.deliver(&frame, BABBLER, &[]);
                 continue;
@@ -110,6 +110,6 @@ impl Host {
             let begins_ns = if self.barrier.is_some() { now_ns + place * space_ns } else { timed.time_ns(0) };
             timed.enter(BABBLER, &frame, begins_ns);
         }
-        self.babble = said;
+        self.babble = babbled;
     }
 }

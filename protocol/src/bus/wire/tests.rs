@@ -137,13 +137,13 @@ fn a_corrupted_frame_is_one_that_the_checksum_finds_and_a_wrong_counter_is_not()
 fn a_babbling_node_says_so_many_frames_in_a_millisecond() {
     let fault = WireFault::Babbling { id: 0x10, frames_per_ms: 2.5, bytes: 4 };
     let mut wire = with(fault, Frames::All);
-    let mut said = Vec::new();
-    (1..=10).for_each(|ms| wire.babble(ms * MS_NS, &mut said));
-    assert_eq!(said, vec![CanFrame::new(0x10, &[0; 4]); 25]);
+    let mut babbled = Vec::new();
+    (1..=10).for_each(|ms| wire.babble(ms * MS_NS, &mut babbled));
+    assert_eq!(babbled, vec![CanFrame::new(0x10, &[0; 4]); 25]);
     assert_eq!(wire.patience_ns(0), Some(MS_NS));
-    said.clear();
-    wire.babble(u64::MAX / 2, &mut said);
-    assert_eq!(said.len(), 200, "a pause is not caught up without bounds");
+    babbled.clear();
+    wire.babble(u64::MAX / 2, &mut babbled);
+    assert_eq!(babbled.len(), 200, "a pause is not caught up without bounds");
 }
 
 #[test]

@@ -39,13 +39,13 @@ fn entry(text: &str) -> String {
     )
 }
 
-pub(crate) fn said(verdict: &str, names: &[&str]) -> Result<Report, String> {
+pub(crate) fn reported(verdict: &str, names: &[&str]) -> Result<Report, String> {
     let names: Vec<_> = names.iter().map(|name| entry(name)).collect();
     parse(format!(r#"{{"verdict": "{verdict}", "named": [{}]}}"#, names.join(",")).as_bytes())
 }
 
 fn single(class: &[Member], verdict: &str, names: &[&str]) -> Judgement {
-    judge(&draw(Kind::Single, &["inclination"]), &[class.to_vec()], &TAKEN, &said(verdict, names))
+    judge(&draw(Kind::Single, &["inclination"]), &[class.to_vec()], &TAKEN, &reported(verdict, names))
 }
 
 #[test]
@@ -74,7 +74,7 @@ fn the_same_effect_at_a_place_that_looks_alike_is_at_the_right_place() {
         &draw(Kind::Single, &["pressure-sensor-offset"]),
         &[vec![twin("pressure-sensor-offset", "drive.b", 0.99)]],
         &TAKEN,
-        &said("named", &["pressure-sensor-offset@drive.b"]),
+        &reported("named", &["pressure-sensor-offset@drive.b"]),
     );
     assert!(judged.hidden[0].right && judged.hidden[0].where_right);
     assert_eq!(judged.hidden[0].class_size, 1);
@@ -121,7 +121,7 @@ fn of_two_effects_each_name_stands_for_one() {
     let pair = draw(Kind::Pair, &["inclination", "friction-asymmetry"]);
     let both_alike =
         [vec![twin("friction-asymmetry", "drive", 0.97)], vec![twin("inclination", "drive", 0.97)]];
-    let judged = |names: &[&str]| judge(&pair, &both_alike, &TAKEN, &said("named", names));
+    let judged = |names: &[&str]| judge(&pair, &both_alike, &TAKEN, &reported("named", names));
     let right = |judged: &Judgement| judged.hidden.iter().filter(|hidden| hidden.right).count();
     assert_eq!(right(&judged(&["inclination", "friction-asymmetry"])), 2);
     // One name cannot stand for both, whichever it is.
@@ -130,7 +130,7 @@ fn of_two_effects_each_name_stands_for_one() {
     assert_eq!((right(&third), third.too_many), (2, 1));
     // The first name fits both; the second only one of them: an assignment for both exists.
     let one_way = [vec![twin("valve-offset", "drive", 0.99)], vec![]];
-    let judged = judge(&pair, &one_way, &TAKEN, &said("named", &["friction-asymmetry", "valve-offset"]));
+    let judged = judge(&pair, &one_way, &TAKEN, &reported("named", &["friction-asymmetry", "valve-offset"]));
     assert_eq!(right(&judged), 2);
 }
 
@@ -138,10 +138,10 @@ fn of_two_effects_each_name_stands_for_one() {
 fn nothing_hidden_and_something_named_is_a_false_alarm() {
     let null = draw(Kind::Null, &[]);
     let alarm = |report: Result<Report, String>| judge(&null, &[], &TAKEN, &report).false_alarm;
-    assert!(alarm(said("named", &["inclination"])));
-    assert!(alarm(said("ambiguous", &["inclination[valve-offset]"])));
-    assert!(alarm(said("outside-catalogue", &[])));
-    assert!(!alarm(said("nothing-missing", &[])));
+    assert!(alarm(reported("named", &["inclination"])));
+    assert!(alarm(reported("ambiguous", &["inclination[valve-offset]"])));
+    assert!(alarm(reported("outside-catalogue", &[])));
+    assert!(!alarm(reported("nothing-missing", &[])));
     assert!(!alarm(parse(
         br#"{"verdict": "parameters-only", "parameters": [{"name": "parameter:mass",
         "value": 5.1, "unit": "kg", "standard_error": 0.1}]}"#
@@ -165,7 +165,7 @@ fn a_wrong_parameter_is_right_when_it_is_reported_and_no_effect_is_named() {
     assert!(right(report("parameters-only", "parameter:mass", "")));
     assert!(!right(report("parameters-only", "parameter:kv-scale", "")));
     assert!(!right(report("named", "parameter:mass", &entry("inclination"))));
-    assert!(!right(said("nothing-missing", &[])));
+    assert!(!right(reported("nothing-missing", &[])));
 }
 
 #[test]
@@ -195,15 +195,15 @@ fn numbers_are_compared_in_their_unit_and_with_two_standard_errors() {
 #[test]
 fn what_is_no_report_is_an_error_with_its_reason() {
     let case = draw(Kind::Single, &["inclination"]);
-    let good = || said("named", &["inclination"]);
+    let good = || reported("named", &["inclination"]);
     for (ended, report, reason) in [
         (Ended::TimedOut, good(), "time limit"),
         (Ended::Signalled(11), good(), "signal 11"),
         (Ended::NotStarted, good(), "not be started"),
         (Ended::Exited(101), Err("wrote no report.json".to_owned()), "exit code 101"),
         (Ended::Exited(0), parse(b"{\"verdict\": NaN}"), "report.json"),
-        (Ended::Exited(0), said("named", &["phlogiston"]), "phlogiston"),
-        (Ended::Exited(0), said("bad-data", &[]), "bad-data"),
+        (Ended::Exited(0), reported("named", &["phlogiston"]), "phlogiston"),
+        (Ended::Exited(0), reported("bad-data", &[]), "bad-data"),
     ] {
         let judged = judge(&case, &[], &Taken { ended, ..TAKEN }, &report);
         assert_eq!(judged.called, "error");

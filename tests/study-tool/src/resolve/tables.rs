@@ -225,8 +225,8 @@ fn case(
     let report = report::read(&folder.join("report.json"));
     case.outcome = Some(resolution.taken.map_or(Outcome::Error, |taken| judge(hidden, &taken, &report)));
     case.problem = resolution.problem.or_else(|| {
-        let said = fs::read_to_string(folder.join("stderr.txt")).unwrap_or_default();
-        let last = said.lines().last().unwrap_or_default();
+        let reported = fs::read_to_string(folder.join("stderr.txt")).unwrap_or_default();
+        let last = reported.lines().last().unwrap_or_default();
         report.as_ref().err().map(|error| format!("{error}: {last}"))
     });
     case.named = report.iter().flat_map(|report| &report.named).map(with_alternatives).collect();

@@ -3,7 +3,7 @@
 use super::*;
 use crate::draws::Shape;
 use crate::folder::{Plan, Study};
-use crate::judge::tests::{TAKEN, draw, said};
+use crate::judge::tests::{TAKEN, draw, reported};
 use crate::program::tests::script;
 use crate::step::make_record;
 use discrepancy::next::menu::MENU;
@@ -12,7 +12,7 @@ use std::time::Duration;
 use tempfile::TempDir;
 
 fn outcome(verdict: &str, names: &[&str]) -> Outcome {
-    judge(&draw(Kind::Single, &["inclination"]).recipe.hidden[0], &TAKEN, &said(verdict, names))
+    judge(&draw(Kind::Single, &["inclination"]).recipe.hidden[0], &TAKEN, &reported(verdict, names))
 }
 
 #[test]
@@ -49,21 +49,21 @@ fn a_right_name_that_is_gone_is_wrong_and_no_report_an_error() {
     assert_eq!(outcome("named", &[]), Outcome::Error);
     let hidden = &draw(Kind::Single, &["inclination"]).recipe.hidden[0];
     let late = Taken { ended: Ended::TimedOut, ..TAKEN };
-    assert_eq!(judge(hidden, &late, &said("named", &["inclination@drive"])), Outcome::Error);
+    assert_eq!(judge(hidden, &late, &reported("named", &["inclination@drive"])), Outcome::Error);
 }
 
 #[test]
 fn what_is_left_open_counts_only_with_the_truth_among_it() {
     let single = draw(Kind::Single, &["inclination"]);
     let entry_of = |names: &[&str]| {
-        let report = said("ambiguous", names).unwrap();
+        let report = reported("ambiguous", names).unwrap();
         assert!(leaves_open(&report));
         ambiguous(&single, &report).map(|entry| entry.sheet.name)
     };
     assert_eq!(entry_of(&["valve-offset@drive[inclination@drive]"]), Some("valve-offset"));
     assert_eq!(entry_of(&["inclination@drive", "valve-offset@drive[rod-leakage@drive.a]"]), None);
     assert_eq!(entry_of(&["valve-offset@drive[inclination@load]"]), None);
-    assert!(!leaves_open(&said("named", &["inclination@drive"]).unwrap()));
+    assert!(!leaves_open(&reported("named", &["inclination@drive"]).unwrap()));
 }
 
 #[test]

@@ -98,9 +98,9 @@ fn a_program_sees_copies_in_an_empty_folder_and_its_report_is_kept() {
     for draw in &bench.study.draws {
         let result = read_result(&bench.path(draw.number, "result.json")).unwrap();
         assert_eq!(results[draw.number].as_ref(), Some(&result));
-        let said = fs::read_to_string(bench.path(draw.number, "stderr.txt")).unwrap();
-        assert_eq!((result.number, result.taken.ended), (draw.number, Ended::Exited(0)), "{said}");
-        assert_eq!(said, "seen: # linked=false added_mass_kg=0\n");
+        let reported = fs::read_to_string(bench.path(draw.number, "stderr.txt")).unwrap();
+        assert_eq!((result.number, result.taken.ended), (draw.number, Ended::Exited(0)), "{reported}");
+        assert_eq!(reported, "seen: # linked=false added_mass_kg=0\n");
         assert!(report::read(&bench.path(draw.number, "report.json")).is_ok());
         assert!(!bench.study.truth(draw.number).join("train/truth.csv").exists());
         assert!(bench.study.truth(draw.number).join("held-out-1/truth.json").exists());
@@ -195,8 +195,8 @@ fn what_is_left_out_is_said_on_the_command_line() {
     let result = results[2].as_ref().unwrap();
     assert_eq!(result.without, ["inclination"]);
     assert!(result.program.leave_out);
-    let said = fs::read_to_string(bench.path(2, "stderr.txt")).unwrap();
-    assert_eq!(said, "--without inclination\n");
+    let reported = fs::read_to_string(bench.path(2, "stderr.txt")).unwrap();
+    assert_eq!(reported, "--without inclination\n");
     // The same program with its whole catalogue is another one.
     assert!(bench.run(|_, _| {}).unwrap_err().to_string().contains("another --label"));
 }
