@@ -11,8 +11,8 @@
 pub(crate) mod average;
 mod by_hand;
 mod changes;
-mod received;
 mod range;
+mod received;
 mod record;
 mod slow;
 mod work;
@@ -31,13 +31,13 @@ use crate::program::{Hand, Program};
 use algorithms::guard::AlgorithmFault;
 use average::Average;
 use changes::Changes;
-use received::Received;
 use nominal::Axis;
 use protocol::frames::{
     ALIVE_RANGE, ECHO_RANGE, EmergencyStop, EmergencyStopChainState, Frame, MainChainState, RigStatus,
     Sensors, ValveCommand,
 };
 use range::Range;
+use received::Received;
 use slow::Slow;
 use work::{Asked, Seen, Work};
 

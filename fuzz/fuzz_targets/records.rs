@@ -4,7 +4,7 @@
 //! `m` a measurement, `l` a log, `f` a mapping, a line `---`, and its CSV.
 #![no_main]
 
-use records::{Mapping, ReadOptions, Unknown};
+use records::{Mapping, ReadOptions, UnlistedColumns};
 use libfuzzer_sys::fuzz_target;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -13,7 +13,7 @@ fuzz_target!(|bytes: &[u8]| {
     let Some((kind, rest)) = bytes.split_first() else { return };
     match kind {
         b'm' => {
-            for unknown in [Unknown::Ignored, Unknown::Refused] {
+            for unknown in [UnlistedColumns::Ignored, UnlistedColumns::Refused] {
                 let options = ReadOptions { unknown, ..ReadOptions::default() };
                 reported(records::read(&written("measurement.csv", rest), &options));
             }

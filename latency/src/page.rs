@@ -31,7 +31,11 @@ pub fn page(report: &Report) -> String {
     let sections = [
         ("figures", "Key figures", figures::key_figures(&families)),
         ("ratios", "Ours against the reference", figures::ratios(&report.ratios)),
-        ("histograms", "Histograms", pagekit::markup::paragraph(HISTOGRAMS) + &histograms::histograms(&families)),
+        (
+            "histograms",
+            "Histograms",
+            pagekit::markup::paragraph(HISTOGRAMS) + &histograms::histograms(&families),
+        ),
         ("maxima", "Largest values over time", maxima::maxima(report, &families)),
         ("worst", "The worst events", events::worst(report)),
         ("findings", "Findings", events::findings(&report.findings)),

@@ -116,7 +116,7 @@ impl Client {
             }
             Progress::Refused(status) => {
                 self.incoming = Vec::new();
-                self.answer(http::said(status, "this request cannot be read"), now_ms);
+                self.answer(http::message_response(status, "this request cannot be read"), now_ms);
                 None
             }
         }
@@ -171,7 +171,7 @@ impl Client {
             }
         }
         if self.stage == Stage::Waiting && now_ms.saturating_sub(self.last_progress_ms) >= ANSWER_MS {
-            self.answer(http::said(Status::NoAnswer, "there was no answer in time"), now_ms);
+            self.answer(http::message_response(Status::NoAnswer, "there was no answer in time"), now_ms);
         }
         if self.stage == Stage::Ending && self.outgoing.is_empty() {
             // One that is gone already is as good as shut down.
@@ -220,7 +220,7 @@ pub fn is_for_later(error: &io::Error) -> bool {
 
 /// What to say to whom there is no room for.
 pub(super) fn refusal() -> Vec<u8> {
-    http::said(Status::Busy, "too many clients; --clients N allows more")
+    http::message_response(Status::Busy, "too many clients; --clients N allows more")
 }
 
 #[cfg(test)]
@@ -272,7 +272,7 @@ mod tests {
         let mut answer = String::new();
         far.read_to_string(&mut answer).unwrap();
         assert!(answer.starts_with("HTTP/1.1 504"), "{answer}");
-        client.answer(http::said(Status::Good, "too late"), 1000 + ANSWER_MS);
+        client.answer(http::message_response(Status::Good, "too late"), 1000 + ANSWER_MS);
         assert!(!client.has_something_to_write());
         // It has its answer and does not go.
         assert!(!is_gone(&mut client, 1000 + ANSWER_MS + CLOSING_MS - 1));

@@ -6,7 +6,7 @@ use super::cli::WatchArguments;
 use super::client::{Client, refusal, wait};
 use super::control::{self, Order};
 use super::feed::Feed;
-use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, response, message_response};
+use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, message_response, response};
 use super::metrics;
 use super::view::{Audience, View};
 use super::wire::CONSOLE;
@@ -390,7 +390,10 @@ impl Server {
                     self.asked.push_back(number);
                     return None;
                 }
-                Some(message_response(Status::Busy, "no emulator listens: start it with --telemetry and --console"))
+                Some(message_response(
+                    Status::Busy,
+                    "no emulator listens: start it with --telemetry and --console",
+                ))
             }
             Order::Save(seconds) => self.save(number, seconds),
         }

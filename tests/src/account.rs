@@ -69,8 +69,9 @@ mod tests {
     fn what_is_missing_is_counted_on_its_side_of_the_first_tick() {
         let sensors = CanFrame::new(0x120, &[0; 8]);
         // Cycles 0 to 10, of which one is missing; 11 to 20, of which two were skipped and three are missing.
-        let received = [vec![sensors; 10], vec![tick(10, 0, false)], vec![sensors; 5], vec![tick(20, 2, false)]]
-            .concat();
+        let received =
+            [vec![sensors; 10], vec![tick(10, 0, false)], vec![sensors; 5], vec![tick(20, 2, false)]]
+                .concat();
         let expected = SensorAccount { missing_before_first_tick: 1, missing_between_ticks: 3 };
         assert_eq!(of_sensors(&received, 0x120), expected);
     }

@@ -96,7 +96,11 @@ impl Running {
             if gone {
                 self.output.iter_mut().for_each(Said::finish);
                 let output = self.stderr();
-                assert!(output.matches(text).count() >= times, "{} ended without '{text}':\n{output}", self.name);
+                assert!(
+                    output.matches(text).count() >= times,
+                    "{} ended without '{text}':\n{output}",
+                    self.name
+                );
                 return;
             }
             assert!(Instant::now() < until, "{} does not say '{text}':\n{}", self.name, self.stderr());

@@ -49,7 +49,8 @@ fn sound(cycle: usize) -> Vec<u64> {
 }
 
 fn expect_sound_outside(received: &[Vec<u64>], ends: usize) {
-    for (cycle, received) in received.iter().enumerate().filter(|(cycle, _)| !(BEGINS..ends).contains(cycle)) {
+    for (cycle, received) in received.iter().enumerate().filter(|(cycle, _)| !(BEGINS..ends).contains(cycle))
+    {
         assert_eq!(*received, sound(cycle), "cycle {cycle}");
     }
 }

@@ -11,7 +11,7 @@ use system_tests::process::Running;
 use system_tests::records::{Table, bus_log, count, json};
 use system_tests::scene::{RESTLESS, Scene};
 use system_tests::turn;
-use system_tests::xcp::{Foreign, config, xcp_packet, wait_for_a2l};
+use system_tests::xcp::{Foreign, config, wait_for_a2l, xcp_packet};
 
 /// pyXCP takes its time to start, on a busy machine more than a controller waits for those that are missing.
 const PATIENT: &str = "--bus-grace 60";

@@ -171,7 +171,8 @@ impl AxisExperiment {
             }
         };
         if by_hand.is_some() && manual {
-            let message = "during = \"manual\" leaves no set-points to be given by hand: leave one of both out";
+            let message =
+                "during = \"manual\" leaves no set-points to be given by hand: leave one of both out";
             return Err(section.wrong_at("during", message));
         }
         let changes = section.sections("change")?.into_iter().map(change).collect::<Result<Vec<_>, _>>();

@@ -209,7 +209,8 @@ fn during<'a>(received: &'a [Received], window: &'a Range<u64>) -> impl Iterator
 /// Until when a valve was open after a cycle; `None` when nothing opened it any more.
 fn last_open(received: &[Received], window: Range<u64>) -> Option<u64> {
     let open = |received: &&Received| {
-        window.contains(&received.cycle) && matches!(received.what, What::Command { opening, .. } if opening != 0.0)
+        window.contains(&received.cycle)
+            && matches!(received.what, What::Command { opening, .. } if opening != 0.0)
     };
     received.iter().rev().find(open).map(|received| received.cycle)
 }
@@ -235,10 +236,12 @@ pub(super) fn emergency_stop(received: &[Received], window: Range<u64>) -> Vec<C
 pub(super) fn sensor_loss(received: &[Received], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
     let class = "sensor-loss";
     let [without, again] = [&window, &back].map(|window| {
-        during(received, window).filter(|received| matches!(received.what, What::Command { age: None, .. })).count()
+        during(received, window)
+            .filter(|received| matches!(received.what, What::Command { age: None, .. }))
+            .count()
     });
-    let reported =
-        during(received, &window).find(|received| matches!(&received.what, What::Stop(stop) if !stop.release));
+    let reported = during(received, &window)
+        .find(|received| matches!(&received.what, What::Stop(stop) if !stop.release));
     let reported = match reported {
         Some(received) => (
             CheckResult::Passed,

@@ -85,7 +85,11 @@ impl Watch {
     pub(super) fn take(&mut self, frame: &CanFrame, stamp_ns: u64) {
         if self.received.len() < MOST_FRAMES {
             let what = self.judge(frame);
-            self.received.push(Received { cycle: (self.sent.len() as u64).saturating_sub(1), stamp_ns, what });
+            self.received.push(Received {
+                cycle: (self.sent.len() as u64).saturating_sub(1),
+                stamp_ns,
+                what,
+            });
         }
     }
 

@@ -99,7 +99,8 @@ const HOW_TO_READ: [(&str, &str); 9] = [
 ];
 
 pub(super) fn how_to_read() -> String {
-    let entries =
-        HOW_TO_READ.iter().map(|(term, sentence)| format!("<dt><strong>{term}</strong></dt>\n<dd>{sentence}</dd>\n"));
+    let entries = HOW_TO_READ
+        .iter()
+        .map(|(term, sentence)| format!("<dt><strong>{term}</strong></dt>\n<dd>{sentence}</dd>\n"));
     format!("<dl class=\"lead\">\n{}</dl>\n", entries.collect::<String>())
 }
