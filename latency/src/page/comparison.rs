@@ -74,10 +74,10 @@ pub(super) fn bounds(bounds: &[BoundResult]) -> String {
             verdict,
         ]);
     }
-    let sentence = "A ratio is judged by the interval of its median. Where the interval crosses the bound, or there are fewer than \
-         six \
-                pairs and so no interval, the bound is not resolved: neither kept nor broken. The pairs that would resolve it \
-                follow from an interval that shrinks as one over the root of their number, around a median that stays.";
+    let sentence = "A ratio is judged by the interval of its median. Where the interval crosses the bound, or there are fewer \
+                    than six pairs and so no interval, the bound is not resolved: neither kept nor broken. The pairs that would \
+                    resolve it follow from an interval that shrinks as one over the root of their number, around a median that \
+                    stays.";
     let lead = if bounds.is_empty() { String::new() } else { paragraph(sentence) };
     format!("{lead}{}", table.html_or("No threshold file was given."))
 }
