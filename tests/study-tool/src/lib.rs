@@ -16,6 +16,7 @@
 //! | [`answer`] | what a campaign is given of it |
 //! | [`report`] | `report.json`, read as strictly as it is promised |
 //! | [`judge`] | one case: what was hidden against what was named |
+//! | [`ledger`] | which seeds were opened, and which may be drawn |
 //! | [`leave_out`] | one case whose effect is left out of the program's catalogue |
 //! | [`resolve`] | whether the experiment that a program proposes resolves what it could not tell apart |
 //! | [`interval`] | what so many of so many prove |
@@ -42,6 +43,7 @@ pub mod folder;
 pub mod interval;
 pub mod judge;
 pub mod leave_out;
+pub mod ledger;
 pub mod limits;
 pub mod page;
 pub mod program;

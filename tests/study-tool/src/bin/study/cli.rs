@@ -30,6 +30,8 @@ pub(crate) enum Command {
     Compare(CompareArguments),
     /// How rates fall over noise and amplitude: curve-LABEL.md and curve-LABEL.svg.
     Curve(CurveArguments),
+    /// Which seeds were opened, with the figures of their first opening beside later ones.
+    Ledger(LedgerArguments),
     /// What came of the experiments that the program proposed where it could not tell effects apart: resolve-LABEL.json and .md.
     Resolve(ResolveArguments),
 }
@@ -211,6 +213,13 @@ pub(crate) struct CurveArguments {
     #[arg(long)]
     pub(crate) to: PathBuf,
     /// Writes the tables into tests/docs/study.md, and the picture beside it.
+    #[arg(long)]
+    pub(crate) write: bool,
+}
+
+#[derive(Args)]
+pub(crate) struct LedgerArguments {
+    /// Writes the tables into tests/docs/study.md.
     #[arg(long)]
     pub(crate) write: bool,
 }

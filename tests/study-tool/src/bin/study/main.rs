@@ -1,11 +1,14 @@
-//! The study's commands, for `scripts/study`: draws, limits, cosines, one, score, compare, curve, resolve.
+//! The study's commands, for `scripts/study`: draws, limits, cosines, one, score, compare, curve, ledger, resolve.
 
 mod cli;
 mod one;
 mod scores;
 
 use clap::Parser;
-use cli::{Cli, Command, CosinesArguments, DrawsArguments, LimitsArguments, ResolveArguments};
+use cli::{
+    Cli, Command, CosinesArguments, DrawsArguments, LedgerArguments, LimitsArguments, PlanArguments,
+    ResolveArguments,
+};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -15,6 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use study::classes::{Classes, DrawClasses};
 use study::draws::Draw;
 use study::folder::{Study, read, write_whole};
+use study::ledger::Ledger;
 use study::resolve::Table;
 use study::{compute, document};
 
@@ -40,6 +44,7 @@ fn main() -> ExitCode {
         Command::Score(arguments) => scores::score(&arguments),
         Command::Compare(arguments) => scores::compare(&arguments),
         Command::Curve(arguments) => scores::curve(&arguments),
+        Command::Ledger(arguments) => ledger(&arguments),
         Command::Resolve(arguments) => resolve(&arguments),
     };
     match done {
@@ -65,9 +70,11 @@ fn committed(name: &str) -> PathBuf {
 const PAGE: &str = "docs/study.md";
 const LIMITS: &str = "study/limits.json";
 const CLASSES: &str = "study/classes.json";
+const LEDGER: &str = "study/evidence/ledger.toml";
 const EXPECTED: &str = "study/outside-expected.json";
 
 fn draws(arguments: &DrawsArguments) -> Done {
+    admit(&arguments.plan)?;
     let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
     say(&format!("{} draws in {}", study.draws.len(), arguments.out.display()));
     Ok(())
@@ -95,6 +102,21 @@ fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
         document::put(&committed(PAGE), "twins", &text)?;
     }
     Ok(())
+}
+
+fn ledger(arguments: &LedgerArguments) -> Done {
+    let text = Ledger::read(&committed(LEDGER))?.markdown();
+    if arguments.write {
+        document::put(&committed(PAGE), "ledger", &text)?;
+    } else {
+        say(&format!("\n{text}"));
+    }
+    Ok(())
+}
+
+/// Refuses a seed that is neither for development nor in the ledger.
+fn admit(plan: &PlanArguments) -> Done {
+    Ok(Ledger::read(&committed(LEDGER))?.admit(plan.seed)?)
 }
 
 fn resolve(arguments: &ResolveArguments) -> Done {

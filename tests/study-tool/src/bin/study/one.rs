@@ -7,7 +7,7 @@
 //! ```
 
 use crate::cli::{Deed, OneArguments};
-use crate::{EXPECTED, INTERRUPTED, LIMITS, committed, known_classes, read_if_there};
+use crate::{EXPECTED, INTERRUPTED, LIMITS, admit, committed, known_classes, read_if_there};
 use campaign::command::NOT_TRIED;
 use serde_json::{Value, json};
 use std::error::Error;
@@ -48,6 +48,7 @@ pub(crate) fn one(arguments: &OneArguments, stop: &AtomicBool) -> ExitCode {
 
 /// Takes the step; `None` when it was asked to stop in its midst.
 fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Box<dyn Error>> {
+    admit(&arguments.plan)?;
     let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
     let (number, again) = arguments.draw.map_or_else(asked, |draw| Ok((draw, true)))?;
     let draw = study.draws.get(number).ok_or_else(|| {

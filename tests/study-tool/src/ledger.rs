@@ -1,0 +1,234 @@
+//! The ledger of seeds: which ones somebody has opened, with which program, and what was changed afterwards.
+//!
+//! ```text
+//! seed < 100        development: thresholds may be chosen on its draws
+//! any other seed    SHA-256 of the frozen program's sources, entered as [[fresh]] before its first draw is made
+//! opened            development from then on; figures of its first opening stand beside those of any later one
+//! ```
+//!
+//! A figure that was measured on draws whose failures had been read before is optimistic by an unknown amount. The ledger
+//! makes that visible; it cannot prevent somebody from drawing with another copy of this program.
+
+use crate::compare::{grid, reported};
+use crate::folder::{FolderError, read};
+use crate::interval::Rate;
+use serde::Deserialize;
+use std::fmt::Write;
+use std::path::Path;
+use toml::value::Datetime;
+
+/// Seeds below this one are development seeds.
+pub const FIRST_FRESH_SEED: u64 = 100;
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ledger {
+    #[serde(default)]
+    pub fresh: Vec<Fresh>,
+    #[serde(default)]
+    pub opening: Vec<Opening>,
+}
+
+/// A seed that was entered before its first draw.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fresh {
+    pub seed: u64,
+    /// Of the sources of the program that is judged, in hexadecimal; the seed is its first 13 digits.
+    pub sha256: String,
+    pub commit: String,
+    pub date: Datetime,
+}
+
+/// One run of a study whose results somebody saw.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Opening {
+    pub seed: u64,
+    pub study: String,
+    pub date: Datetime,
+    pub commit: String,
+    /// Of the program's executable, as results identify it; absent where several were judged.
+    pub crc32: Option<String>,
+    pub command: String,
+    /// What was changed after the results had been read.
+    pub after: String,
+    /// Name and `count/of`.
+    pub figures: Vec<(String, Count)>,
+}
+
+/// `202/218`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct Count {
+    pub count: usize,
+    pub of: usize,
+}
+
+impl TryFrom<String> for Count {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let parts =
+            text.split_once('/').and_then(|(count, of)| Some((count.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((count, of)) if count <= of && of > 0 => Ok(Count { count, of }),
+            _ => Err(format!("'{text}' is no count of so many, as 202/218")),
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SeedError {
+    #[error(
+        "seed {0} is not in the ledger: seeds below {FIRST_FRESH_SEED} are for development; a fresh one comes from \
+         `scripts/study seed` and is entered in tests/study/evidence/ledger.toml before its first draw"
+    )]
+    NotEntered(u64),
+}
+
+impl Ledger {
+    /// Reads the ledger.
+    ///
+    /// # Errors
+    /// [`FolderError`] when it cannot be read, has an unknown key, or enters a seed that its hash does not give.
+    pub fn read(path: &Path) -> Result<Self, FolderError> {
+        let ledger: Ledger =
+            toml::from_str(&read(path)?).map_err(|error| FolderError::content(path, error))?;
+        if let Some(wrong) = ledger.fresh.iter().find(|fresh| seed_of(&fresh.sha256) != Some(fresh.seed)) {
+            let what =
+                format!("the seed of {} is {:?}, not {}", wrong.sha256, seed_of(&wrong.sha256), wrong.seed);
+            return Err(FolderError::content(path, what));
+        }
+        Ok(ledger)
+    }
+
+    /// Whether draws of this seed may be made.
+    ///
+    /// # Errors
+    /// [`SeedError`] when the seed is neither for development nor entered.
+    pub fn admit(&self, seed: u64) -> Result<(), SeedError> {
+        let is_entered = || self.fresh.iter().any(|fresh| fresh.seed == seed);
+        if seed < FIRST_FRESH_SEED || is_entered() { Ok(()) } else { Err(SeedError::NotEntered(seed)) }
+    }
+
+    /// Every opening, and for each study of a seed its figures side by side, the first opening first.
+    pub fn markdown(&self) -> String {
+        let heads = [
+            "seed",
+            "study",
+            "date",
+            "commit",
+            "program, CRC-32",
+            "opened by",
+            "after its failures were read",
+        ];
+        let openings = self.opening.iter().map(|opening| {
+            let Opening { seed, study, date, commit, crc32, command, after, .. } = opening;
+            let crc32 = crc32.clone().unwrap_or_default();
+            vec![
+                seed.to_string(),
+                study.clone(),
+                date.to_string(),
+                commit.clone(),
+                crc32,
+                format!("`{command}`"),
+                after.clone(),
+            ]
+        });
+        let mut text = grid(&heads.map(str::to_owned), openings);
+        for fresh in &self.fresh {
+            let Fresh { seed, sha256, commit, date } = fresh;
+            let _ = writeln!(
+                text,
+                "\nSeed {seed} was entered on {date} for the sources of {commit}, SHA-256 {sha256}."
+            );
+        }
+        let mut studies: Vec<(u64, &str)> = Vec::new();
+        for opening in self.opening.iter().filter(|opening| !opening.figures.is_empty()) {
+            if !studies.contains(&(opening.seed, &opening.study)) {
+                studies.push((opening.seed, &opening.study));
+            }
+        }
+        for (seed, study) in studies {
+            let openings: Vec<_> = self
+                .opening
+                .iter()
+                .filter(|opening| opening.seed == seed && opening.study == study)
+                .collect();
+            let mut heads = vec![format!("{study}, seed {seed}")];
+            heads.extend(openings.iter().enumerate().map(|(at, opening)| {
+                format!("{}, {}", if at == 0 { "first opening" } else { "opened again" }, opening.commit)
+            }));
+            let rows = openings[0].figures.iter().map(|(name, _)| {
+                let cell = |opening: &&Opening| {
+                    let found = opening.figures.iter().find(|(other, _)| other == name);
+                    found.map_or(String::new(), |(_, Count { count, of })| reported(&Rate::new(*count, *of)))
+                };
+                let mut cells = vec![name.clone()];
+                cells.extend(openings.iter().map(cell));
+                cells
+            });
+            let _ = write!(text, "\n{}", grid(&heads, rows));
+        }
+        text
+    }
+}
+
+/// The seed of a hash: its first 13 hexadecimal digits, which a number of JSON holds exactly.
+fn seed_of(sha256: &str) -> Option<u64> {
+    let is_whole = sha256.len() == 64 && sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
+    is_whole.then(|| u64::from_str_radix(&sha256[..13], 16).ok()).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HASH: &str = "00000000000ff000000000000000000000000000000000000000000000000000";
+
+    fn ledger(text: &str) -> Result<Ledger, FolderError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ledger.toml");
+        std::fs::write(&path, text).unwrap();
+        Ledger::read(&path)
+    }
+
+    fn opening(commit: &str, figure: &str) -> String {
+        format!(
+            "[[opening]]\nseed = 4\nstudy = \"s\"\ndate = 2026-11-23\ncommit = \"{commit}\"\ncommand = \"run\"\n\
+             after = \"mended\"\nfigures = [[\"named\", \"{figure}\"]]\n"
+        )
+    }
+
+    #[test]
+    fn a_seed_is_for_development_or_entered_with_its_hash() {
+        let text = format!("[[fresh]]\nseed = 255\nsha256 = \"{HASH}\"\ncommit = \"a\"\ndate = 2026-11-25\n");
+        let fresh = ledger(&text).unwrap();
+        assert_eq!(fresh.admit(99), Ok(()));
+        assert_eq!(fresh.admit(255), Ok(()));
+        assert_eq!(fresh.admit(256), Err(SeedError::NotEntered(256)));
+        let chosen = ledger(&text.replace("255", "256")).unwrap_err().to_string();
+        assert!(chosen.contains("Some(255), not 256"), "{chosen}");
+    }
+
+    #[test]
+    fn the_page_shows_the_committed_ledger() {
+        let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let table = Ledger::read(&tests.join("study/evidence/ledger.toml")).unwrap().markdown();
+        let page = std::fs::read_to_string(tests.join("docs/study.md")).unwrap();
+        assert!(page.contains(table.trim()), "run scripts/study ledger --write");
+    }
+
+    #[test]
+    fn the_first_opening_stands_beside_later_ones_and_counts_are_counts() {
+        let text = [opening("a", "9/10"), opening("b", "10/10")].concat();
+        let page = ledger(&text).unwrap().markdown();
+        assert!(page.contains("| s, seed 4 | first opening, a | opened again, b |"), "{page}");
+        assert!(page.contains("| named | 9/10 (60 to 98 %) | 10/10 (72 to 100 %) |"), "{page}");
+        for bad in ["11/10", "9 of 10", "0/0"] {
+            assert!(ledger(&opening("a", bad)).unwrap_err().to_string().contains("no count"), "{bad}");
+        }
+        assert!(ledger("[[opened]]\n").unwrap_err().to_string().contains("opened"));
+    }
+}
