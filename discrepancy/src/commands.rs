@@ -125,8 +125,14 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         out.write(name, experiment)?;
     }
     progress(&format!("report.json and report.html are in {}", out.path().display()));
-    let is_good = report.verdict != Verdict::BadData && not_judged.is_none();
-    Ok(if is_good { Exit::Good } else { Exit::BadInput })
+    if report.verdict == Verdict::BadData || not_judged.is_some() {
+        return Ok(Exit::BadInput);
+    }
+    // A finding that a held-out record makes worse, or does not confirm, is a broken bound for who asked to be strict.
+    let is_found = report.verdict != Verdict::NothingMissing;
+    let is_unconfirmed =
+        is_found && report.verification.as_ref().is_some_and(|verification| !verification.confirmed);
+    Ok(if records.read.strict && is_unconfirmed { Exit::BoundBroken } else { Exit::Good })
 }
 
 fn one_balance_outcome(
@@ -261,7 +267,9 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let out = folder(arguments)?;
     let (rig_file, gridded) = gridded_records(arguments)?;
     let mut progress = progress();
-    let located = locate::locate(&rig_file.rig, &gridded, &mut progress);
+    let mut located = locate::locate(&rig_file.rig, &gridded, &mut progress);
+    let engine = Engine::new(&gridded, &rig_file.rig);
+    let dependence = workflow::term_of_rig_file(&engine, &located.unknowns, &mut progress);
     let mut text = String::new();
     for bar in &located.location.balances {
         let _ = writeln!(
@@ -270,6 +278,10 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
             bar.balance, bar.over_noise, bar.rms, bar.unit
         );
     }
+    if let Some(term) = &dependence {
+        let _ = writeln!(text, "{} depends on {}", term.balance, term.strongest());
+    }
+    located.location.dependence = dependence;
     print(&text)?;
     if let Some(out) = out {
         out.write_json("location.json", &located.location)?;
@@ -423,6 +435,13 @@ fn in_words(report: &Report) -> String {
     }
     for quantity in &report.parameters {
         let _ = writeln!(text, "  {}", quantity_in_words(quantity));
+    }
+    let unconfirmed = report.verification.as_ref().filter(|verification| !verification.confirmed);
+    if report.verdict != Verdict::NothingMissing
+        && let Some(verification) = unconfirmed
+    {
+        let how = if verification.worse { "gets worse with it" } else { "does not confirm it" };
+        let _ = writeln!(text, "  the held-out record {how}");
     }
     for (signal, misfit) in &report.misfit {
         if let Some(closed) = misfit.closed {

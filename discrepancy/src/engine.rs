@@ -111,6 +111,11 @@ impl<'a> Engine<'a> {
         self.windows.iter().flat_map(|windows| windows.simulate(rig)).collect()
     }
 
+    /// The same with half the step, to estimate the error of integration.
+    pub(crate) fn simulate_finely(&self, rig: &RigParameters) -> Vec<f64> {
+        self.windows.iter().flat_map(|windows| windows.simulate_finely(rig)).collect()
+    }
+
     /// The same with longer steps, for differences.
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.windows.iter().flat_map(|windows| windows.simulate_coarsely(rig)).collect()

@@ -19,6 +19,7 @@
 //! | [`name`](mod@name) | forward selection and backward elimination of effects |
 //! | [`extend`] | the extended rig file |
 //! | [`locate`] | unknown inputs of each balance |
+//! | [`discrepancy_term`] | the discrepancy term of a model: its balance and variables, by evidence |
 //! | [`outside`] | terms outside the catalogue: dependence, curve, formula |
 //! | `tabulate` | such terms as tables of the rig file |
 //! | [`next`] | experiment design for ambiguous explanations |
@@ -34,6 +35,7 @@ pub mod check;
 pub mod cli;
 pub mod commands;
 pub(crate) mod descent;
+pub mod discrepancy_term;
 pub mod engine;
 pub mod extend;
 pub(crate) mod fit;

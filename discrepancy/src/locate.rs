@@ -145,6 +145,7 @@ pub fn locate(rig: &RigParameters, gridded: &[GriddedRecord], progress: &mut dyn
         regimes,
         maps: maps::maps(&series),
         series: series.iter().filter(|series| !series.points.is_empty()).map(thinned).collect(),
+        dependence: None,
         sensor_ratio: (!notes.is_empty()).then(|| notes.join("; ")),
     };
     Located { location, unknowns: series }

@@ -16,7 +16,7 @@ pub(crate) mod formula;
 
 use crate::locate::maps::{map, surface};
 use crate::locate::{TIME, UnknownSeries, VARIABLES};
-use crate::report::{Curve, Dependence, Outside};
+use crate::report::{Curve, Dependence, LocatedTerm, Outside};
 pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
 
@@ -35,6 +35,10 @@ const MIN_BIRGE_RATIO: f64 = 1.15;
 const MIN_SHIFT_Z: f64 = 7.0;
 /// Significance of a mean, in standard errors from the propagated noise (z test).
 const MIN_MEAN_Z: f64 = 6.0;
+/// Name of a term that is always there.
+pub(crate) const CONSTANT: &str = "constant";
+/// Variables of a located term that come first.
+const LOCATED: usize = 2;
 /// Fewest windows of a balance.
 const MIN_WINDOWS: usize = 100;
 
@@ -46,8 +50,13 @@ struct BalanceTests<'a> {
     tests: Vec<(f64, f64, f64)>,
 }
 
-/// Describes the term outside the catalogue; `None` where no balance is significant.
-pub fn outside(unknowns: &[UnknownSeries], progress: &mut dyn FnMut(&str)) -> Option<Outside> {
+/// Describes the term outside the catalogue, in the balance and over the variables of `located` where there is one; `None` where
+/// no balance is significant.
+pub fn outside(
+    unknowns: &[UnknownSeries],
+    located: Option<&LocatedTerm>,
+    progress: &mut dyn FnMut(&str),
+) -> Option<Outside> {
     let mut best: Option<(f64, BalanceTests<'_>)> = None;
     for series in unknowns.iter().filter(|series| series.points.len() >= MIN_WINDOWS) {
         progress(&format!("outside: {}", series.balance));
@@ -55,20 +64,37 @@ pub fn outside(unknowns: &[UnknownSeries], progress: &mut dyn FnMut(&str)) -> Op
         let tests: Vec<_> = (0..VARIABLES.len()).map(|variable| sample.test(variable)).collect();
         let stands_out = tests.iter().map(|test| test.2).fold(0.0, f64::max);
         let lifted = series.over_noise().is_some_and(|over| over > MIN_BIRGE_RATIO);
-        if !lifted && stands_out < MIN_SHIFT_Z && sample.mean_over_error().abs() < MIN_MEAN_Z {
+        let is_located = located.is_some_and(|located| located.balance == series.balance);
+        if !is_located && !lifted && stands_out < MIN_SHIFT_Z && sample.mean_over_error().abs() < MIN_MEAN_Z {
             continue;
         }
-        let excess = sample.excess();
+        let excess = if is_located { f64::INFINITY } else { sample.excess() };
         if best.as_ref().is_none_or(|(most, _)| excess > *most) {
             best = Some((excess, BalanceTests { series, sample, tests }));
         }
     }
-    best.map(|(_, tests)| tests.report())
+    best.map(|(_, tests)| tests.report(located.filter(|located| located.balance == tests.series.balance)))
+}
+
+impl LocatedTerm {
+    /// The places of its variables among [`VARIABLES`], taken out of `order`.
+    fn places(&self, order: &mut Vec<usize>) -> Vec<usize> {
+        let place = |name: &str| VARIABLES.iter().position(|known| known.name == name);
+        let places: Vec<usize> =
+            self.variables.iter().take(LOCATED).filter_map(|variable| place(&variable.variable)).collect();
+        order.retain(|variable| !places.contains(variable));
+        places
+    }
 }
 
 impl BalanceTests<'_> {
-    fn report(&self) -> Outside {
-        let (order, pair) = self.order();
+    fn report(&self, located: Option<&LocatedTerm>) -> Outside {
+        let (mut order, mut pair) = self.order();
+        if let Some(located) = located {
+            let first = located.places(&mut order);
+            pair = pair.filter(|pair| pair.iter().all(|variable| first.contains(variable)));
+            order.splice(0..0, first);
+        }
         let constant = self.sample.constant_share();
         let explained = order.first().map_or(0.0, |first| self.tests[*first].0);
         let mut variables: Vec<Dependence> = order
@@ -79,12 +105,18 @@ impl BalanceTests<'_> {
             })
             .collect();
         let mean = self.sample.mean_over_error().abs();
-        if mean > MIN_MEAN_Z && constant > explained * (1.0 - constant) {
+        let of_constant = located.map(|located| {
+            let first = located.variables.iter().take(LOCATED);
+            first.into_iter().position(|variable| variable.variable == CONSTANT)
+        });
+        let is_constant = mean > MIN_MEAN_Z && constant > explained * (1.0 - constant);
+        if of_constant.unwrap_or(None).is_some() || located.is_none() && is_constant {
             // No permutation p value: a circular shift leaves the mean unchanged. The z test above decides, and the smallest p
             // value of the other variables stands for it.
             let p_value = 1.0 / (SHIFTS as f64 + 1.0);
-            let place = usize::from(explained > R2_BEFORE_CONSTANT);
-            variables.insert(place, Dependence { variable: "constant".to_owned(), r2: constant, p_value });
+            let by_share = usize::from(explained > R2_BEFORE_CONSTANT);
+            let place = of_constant.flatten().unwrap_or(by_share).min(variables.len());
+            variables.insert(place, Dependence { variable: CONSTANT.to_owned(), r2: constant, p_value });
         }
         let formula =
             if variables.is_empty() { None } else { formula::formula(&self.sample, self.series.unit) };

@@ -88,7 +88,7 @@ pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
     let body: String =
         sections.iter().map(|(name, title, inside)| markup::section(name, title, inside)).collect();
     document(
-        verdict::title(report.verdict),
+        verdict::title(report),
         &format!(
             "{}<nav aria-label=\"Contents\">\n<ul class=\"contents\">\n{contents}</ul>\n</nav>\n<main>\n{body}</main>\n\
              <footer class=\"page-foot\">\n<p>Schema version {}. The same for programs is in report.json beside this page. \

@@ -256,8 +256,17 @@ pub(crate) fn refit_steps(
 
 /// Parameter sensitivities linearised at a model.
 pub(crate) fn linearise(engine: &Engine<'_>, model: &Refit) -> Linearisation {
-    let rig = rig_of(engine.rig(), &model.placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
-    Linearisation { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
+    linearise_at(engine, &model.placed, model.factors)
+}
+
+/// The same at effects and factors.
+pub(crate) fn linearise_at(
+    engine: &Engine<'_>,
+    placed: &[EffectEstimate],
+    factors: [f64; COUNT],
+) -> Linearisation {
+    let rig = rig_of(engine.rig(), placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
+    Linearisation { columns: engine.parameter_columns(&rig, &factors), factors }
 }
 
 /// Refits a model with the parameters linearised anew at its own values, until the loss converges.

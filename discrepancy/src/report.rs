@@ -44,8 +44,14 @@ pub struct Report {
     /// Parameters that the model moved by an insignificant amount; the extended rig file has them.
     #[serde(rename = "carried")]
     pub(crate) insignificant: Vec<Quantity>,
+    /// Whether the reported model leaves no more on the training records than their noise; null where none was judged.
+    pub adequate: Option<bool>,
     /// The missing term outside the catalogue.
     pub outside: Option<Outside>,
+    /// The effect of the catalogue that comes nearest to a term outside it.
+    pub nearest: Option<NamedEffect>,
+    /// Where an inadequate model, or the nearest effect, still disagrees with the training records.
+    pub remaining: Option<LocatedTerm>,
     /// Per signal of the held-out record, as `drive_position_m`; empty without `--test`.
     #[serde(rename = "gap")]
     pub misfit: BTreeMap<String, Misfit>,
@@ -197,6 +203,49 @@ pub struct Outside {
     pub share_explained: Option<f64>,
 }
 
+/// The balance that disagrees most, and what its unknown input depends on.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct LocatedTerm {
+    /// As in [`BalanceBar::balance`].
+    pub balance: String,
+    /// What its unknown input depends on, strongest first; names as in [`Dependence::variable`].
+    pub variables: Vec<LocatedVariable>,
+}
+
+/// A variable that the disagreement of a balance depends on.
+#[derive(Clone, Debug, Serialize)]
+pub struct LocatedVariable {
+    pub variable: String,
+    /// Log evidence of a term over this variable against none; null for linked rods, where windows of 20 ms decide.
+    pub(crate) log_evidence: Option<f64>,
+    /// Share of the explained loss, or of the variance of the unknown input on folds it was not fitted on.
+    pub(crate) share: f64,
+}
+
+impl From<Outside> for LocatedTerm {
+    fn from(outside: Outside) -> Self {
+        let Outside { balance, variables, .. } = outside;
+        let of = |Dependence { variable, r2, .. }: Dependence| LocatedVariable {
+            variable,
+            log_evidence: None,
+            share: r2.clamp(0.0, 1.0),
+        };
+        LocatedTerm { balance, variables: variables.into_iter().map(of).collect() }
+    }
+}
+
+impl LocatedTerm {
+    /// Its strongest variable, in a sentence.
+    pub(crate) fn strongest(&self) -> &str {
+        strongest(self.variables.first().map(|variable| variable.variable.as_str()))
+    }
+}
+
+/// The strongest variable, in a sentence.
+pub(crate) fn strongest(first: Option<&str>) -> &str {
+    first.unwrap_or("nothing that was measured")
+}
+
 /// A term that the extended rig file has as a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TableTerm {
@@ -286,6 +335,10 @@ pub struct Verification {
     pub(crate) physical: Vec<String>,
     /// Whether the extended model is better by more than three clustered standard errors and no signal worse by more than 2 %.
     pub confirmed: bool,
+    /// Whether a signal's rms rises by more than 2 %.
+    pub worse: bool,
+    /// Whether `chi2_after` is not above its null range.
+    pub adequate: bool,
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -305,6 +358,8 @@ pub struct Location {
     pub(crate) maps: Vec<Curve>,
     /// Series of the unknown inputs, thinned out for a picture.
     pub series: Vec<UnknownInput>,
+    /// The balance that disagrees most under the rig file's own values, and what it depends on; null where none does.
+    pub dependence: Option<LocatedTerm>,
     /// Balances that move together as a fault of a sensor would move them, in words; null when none do.
     pub sensor_ratio: Option<String>,
 }

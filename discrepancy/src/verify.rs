@@ -45,7 +45,7 @@ pub(crate) const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.75, 1.15];
 /// Significance of an improvement, in standard errors.
 const BETTER_ERRORS: f64 = 3.0;
 /// Largest ratio of a signal's rms after to before.
-const WORSE: f64 = 1.02;
+pub(crate) const WORSE: f64 = 1.02;
 /// Smallest excess in null standard deviations; below, the closed share is not known to a tenth.
 const EXCESS_SPREADS: f64 = 10.0;
 
@@ -99,15 +99,18 @@ pub(crate) fn verify(
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
     let worse = misfit.values().any(|misfit| misfit.after > WORSE * misfit.before);
+    let chi2_after = pooled(&power_after.joint(), &all_kept);
     let verification = Verification {
         record: record.name.clone(),
         chi2_before: pooled(&power_before.joint(), &all_kept),
-        chi2_after: pooled(&power_after.joint(), &all_kept),
+        chi2_after,
         chi2_null: null.range,
         free_run_nrmse_percent: free_run::both(&run_before, &run_after, &column),
         whiteness,
         physical: run_after.unphysical,
         confirmed: !worse && is_better(power_before, power_after),
+        worse,
+        adequate: chi2_after <= null.range[1],
     };
     let traces = traces::traces(&before, &after);
     Verified { misfit, verification, traces }

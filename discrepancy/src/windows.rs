@@ -16,12 +16,14 @@
 //! Source: discrepancy-notes.md, 1 (the share of right names is the same from 100 ms to 2 s; longer windows show smaller slow
 //! effects, such as leaks), 6.
 
+mod input_responses;
 mod reference_run;
 mod starts;
 mod whiten;
 
 use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::sensor_inverse::SensorInverse;
+pub(crate) use input_responses::{BLOCK, BLOCKS, InputProducts, UnknownKind};
 use plant::{Batch, Inputs, Plant, RigParameters};
 pub use reference_run::{ReferenceRun, VariableRanges};
 use starts::START_PASSES;
@@ -34,6 +36,8 @@ pub(crate) const WINDOW: usize = 400;
 pub(crate) const FORCE: usize = 1;
 /// Integration substeps of a period for differences.
 const COARSE_SUBSTEPS: u32 = 5;
+/// The same to estimate the error of integration: twice those of a plant.
+const FINE_SUBSTEPS: u32 = 20;
 
 /// The windows of a record, with the subspaces that their start states span.
 #[derive(Clone, Debug)]
@@ -138,6 +142,11 @@ impl<'a> Windows<'a> {
     /// Noise-free readings of a rig over their noise.
     pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
         self.run(vec![self.plant(rig)]).remove(0)
+    }
+
+    /// The same with half the step, to estimate the error of integration.
+    pub(crate) fn simulate_finely(&self, rig: &RigParameters) -> Vec<f64> {
+        self.run(vec![self.plant(rig).with_substeps(FINE_SUBSTEPS)]).remove(0)
     }
 
     /// The same with longer steps: half the cost, accurate enough for differences.

@@ -12,15 +12,18 @@ mod reported;
 
 use crate::candidates::Candidate;
 use crate::check::{Checked, check};
+use crate::discrepancy_term::{Beside, located_term};
 use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
-use crate::locate::locate;
-use crate::name::{name, on_all};
+use crate::locate::{UnknownSeries, locate};
+use crate::name::{SelectionResult, name, on_all};
 use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
-use crate::report::{self, InputFiles, NamedEffect, Next, Report, Verdict};
+use crate::parameters::COUNT;
+use crate::refit::{Refit, rig_of};
+use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Next, Report, Verdict};
 use crate::single_equation::is_model_file;
 use crate::tabulate::{tables, tabulate};
 use crate::verify::verify;
@@ -175,12 +178,17 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     report.inputs = inputs;
     report.checks = checks;
     progress("locating");
-    report.location = Some(locate(rig, &records, progress).location);
+    // Under the rig file's own values, whatever the verdict: parameters that were fitted without the effect absorb it.
+    let located = locate(rig, &records, progress);
+    let mut location = located.location;
+    location.dependence = term_of_rig_file(&engine, &located.unknowns, progress);
+    report.location = Some(location);
     if report.verdict == Verdict::OutsideCatalogue {
         // Under the calibrated rig, so that a wrong mass is not an unknown force.
         let calibrated = found.calibrated.rig(rig);
         let unknowns = locate(&calibrated, &records, progress).unknowns;
-        report.outside = outside(&unknowns, progress);
+        let located = report.location.as_ref().and_then(|location| location.dependence.as_ref());
+        report.outside = outside(&unknowns, located, progress);
         if let Some(reported) = &mut report.outside {
             match tabulate(&engine, &found.calibrated, &found.reported, reported, &unknowns, progress) {
                 Ok(found) => {
@@ -193,6 +201,14 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
                 Err(why_not) => reported.why_not = Some(why_not),
             }
         }
+    }
+    if report.adequate == Some(false)
+        && let Some(model) = remaining_beside(&report, &found)
+    {
+        let beside = Beside { placed: &model.placed, factors: model.factors };
+        let rig = rig_of(rig, &model.placed, &model.factors);
+        let unknowns = rig.filter(|_| linked).map(|rig| locate(&rig, &records, progress).unknowns);
+        report.remaining = term_beside(&engine, &beside, &unknowns.unwrap_or_default(), progress);
     }
     let reported = Reported::from(&report);
     let mut experiment = None;
@@ -211,6 +227,43 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
         Err(error) => (Pictures::default(), Some(error.to_string())),
     };
     Ok(Outcome { report, extended: Some(text), pictures, experiment, not_judged })
+}
+
+/// The inadequate model, or the effect nearest to what is outside the catalogue, beside which more is missing; `None` where
+/// [`Report::outside`] has it already.
+fn remaining_beside<'a>(report: &Report, found: &'a SelectionResult) -> Option<&'a Refit> {
+    match report.verdict {
+        Verdict::OutsideCatalogue if report.nearest.is_none() => None,
+        Verdict::OutsideCatalogue => Some(&found.model),
+        _ => Some(&found.reported),
+    }
+}
+
+/// Which balance disagrees under the rig file's own values, and on what it depends.
+pub(crate) fn term_of_rig_file(
+    engine: &Engine<'_>,
+    unknowns: &[UnknownSeries],
+    progress: &mut dyn FnMut(&str),
+) -> Option<LocatedTerm> {
+    term_beside(engine, &Beside { placed: &[], factors: [1.0; COUNT] }, unknowns, progress)
+}
+
+/// Which balance disagrees beside a model, and on what it depends. The contact of linked rods is no input of an axis: the unknown
+/// inputs of short windows show it.
+fn term_beside(
+    engine: &Engine<'_>,
+    beside: &Beside<'_>,
+    unknowns: &[UnknownSeries],
+    progress: &mut dyn FnMut(&str),
+) -> Option<LocatedTerm> {
+    if engine.is_linked()
+        && let Some(outside) = outside(unknowns, None, progress)
+        && outside.balance == "linkage"
+    {
+        return Some(LocatedTerm::from(outside));
+    }
+    progress("what the disagreement depends on");
+    located_term(engine, beside)
 }
 
 /// Subsamples each record.

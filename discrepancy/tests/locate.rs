@@ -1,6 +1,8 @@
 //! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
 
 use crate::record::{Hidden, gridded, hiding};
+use discrepancy::discrepancy_term::{Beside, located_term};
+use discrepancy::engine::Engine;
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
 use discrepancy::report::Outside;
@@ -10,7 +12,7 @@ fn located(effects: &[Hidden<'_>]) -> (Located, Option<Outside>) {
     let rig = RigParameters::baseline();
     let records = [gridded(&hiding(effects), &rig)];
     let located = locate(&rig, &records, &mut |_| ());
-    let outside = outside(&located.unknowns, &mut |_| ());
+    let outside = outside(&located.unknowns, None, &mut |_| ());
     (located, outside)
 }
 
@@ -83,4 +85,31 @@ fn a_pressure_sensors_offset_moves_two_balances_in_the_ratio_of_geometry() {
 fn the_same_records_give_the_same_bits() {
     let tell = || format!("{:?}", located(&[]).0.location);
     assert_eq!(tell(), tell());
+}
+
+/// Balance and first two variables of the discrepancy term of the baseline.
+fn term(effects: &[Hidden<'_>]) -> Option<(String, Vec<String>)> {
+    let rig = RigParameters::baseline();
+    let records = [gridded(&hiding(effects), &rig)];
+    let engine = Engine::new(&records, &rig);
+    let term = located_term(&engine, &Beside { placed: &[], factors: [1.0; 9] })?;
+    Some((term.balance, term.variables.into_iter().take(2).map(|variable| variable.variable).collect()))
+}
+
+#[test]
+fn the_discrepancy_term_has_the_balance_and_the_variable_of_what_is_missing() {
+    assert_eq!(term(&[]), None, "nothing is missing");
+    let cases: [(Hidden<'_>, &str, &str); 5] = [
+        (("inclination", "drive", &[("force_n", 20.0)]), "drive.force", "constant"),
+        (("position-dependent-force", "drive", &[("spring_n", 40.0)]), "drive.force", "x"),
+        (("friction-asymmetry", "drive", &[("asymmetry_percent", 30.0)]), "drive.force", "v"),
+        (("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)]), "drive.flow-b", "p_b"),
+        (("valve-dead-zone", "drive", &[("dead_zone_percent", 3.0)]), "drive.flow", "u"),
+    ];
+    for (hidden, balance, variable) in cases {
+        let name = hidden.0;
+        let (located, variables) = term(&[hidden]).unwrap_or_else(|| panic!("{name}: no term"));
+        assert!(located.starts_with(balance), "{name}: {located} over {variables:?}");
+        assert!(variables.iter().any(|known| known == variable), "{name}: {located} over {variables:?}");
+    }
 }

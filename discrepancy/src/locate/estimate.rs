@@ -346,7 +346,7 @@ fn is_informative(solution: &Solution, number: usize) -> bool {
 }
 
 /// The variables of a window, in the order of [`VARIABLES`].
-pub(super) fn variables(
+pub(crate) fn variables(
     gridded: &GriddedRecord,
     axis: usize,
     from: usize,
@@ -365,7 +365,7 @@ pub(super) fn variables(
     let forces: Vec<f64> =
         gridded.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][1]).collect();
     let force = if forces.is_empty() { 0.0 } else { forces.iter().sum::<f64>() / forces.len() as f64 };
-    let end = &gridded.points[from + WINDOW][axis];
+    let end = &gridded.points[(from + WINDOW).min(gridded.points.len() - 1)][axis];
     let slope =
         |chamber: usize| (end.pressures_pa[chamber] - points[0][axis].pressures_pa[chamber]) / (n * PERIOD_S);
     let dp = match balance {

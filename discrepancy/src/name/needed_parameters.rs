@@ -15,6 +15,43 @@ use crate::refit::{Refit, coordinate_columns, linearise, prior_precisions, rig_o
 /// Rise of the loss at which a parameter is kept: three and a half standard errors.
 const NEEDED: f64 = 12.0;
 
+/// Significance of a parameter that is off, in standard errors.
+const OFF_ERRORS: f64 = 4.0;
+/// Smallest relative deviation of such a parameter.
+const OFF_LEAST: f64 = 0.01;
+
+/// Multiple of the shift by the error of integration that such a parameter exceeds beside its standard errors.
+const OFF_SHIFTS: f64 = 3.0;
+
+/// Which parameters of a model are significantly off the rig file's values: beyond their standard errors, and beyond what the
+/// error of integration shifts them by.
+pub(crate) fn off(engine: &Engine<'_>, model: &Refit) -> [bool; COUNT] {
+    let errors = &model.errors[model.errors.len() - COUNT..];
+    let by = model.factors.map(|factor| (factor - 1.0).abs());
+    let off: [bool; COUNT] = std::array::from_fn(|at| by[at] > OFF_LEAST && by[at] > OFF_ERRORS * errors[at]);
+    if !off.contains(&true) {
+        return off;
+    }
+    let shifts = integration_shifts(engine, model).unwrap_or([0.0; COUNT]);
+    std::array::from_fn(|at| off[at] && by[at] > OFF_ERRORS * errors[at] + OFF_SHIFTS * shifts[at])
+}
+
+/// Size of the change of each parameter when the model is fitted to itself simulated with half the step. `None` where it cannot
+/// be linearised.
+fn integration_shifts(engine: &Engine<'_>, model: &Refit) -> Option<[f64; COUNT]> {
+    let rig = rig_of(engine.rig(), &model.placed, &model.factors)?;
+    let simulated = engine.simulate(&rig);
+    let mut columns = linearise(engine, model).columns;
+    columns.extend(coordinate_columns(engine, &model.factors, &model.placed, &simulated)?);
+    let difference = engine.difference(&engine.simulate_finely(&rig), &simulated);
+    let products = engine.products(&difference, &columns);
+    let all: Vec<usize> = (0..columns.len()).collect();
+    let precisions = prior_precisions(&model.placed);
+    let weights = products.weights(&engine.squares(&engine.residual(&simulated)));
+    let shifts = products.weighted_solution(&all, &weights, &precisions, &vec![0.0; all.len()])?;
+    Some(std::array::from_fn(|at| shifts[at].abs()))
+}
+
 /// The model refitted with the needed parameters only; with all parameters where the loss rises by more than the linearised
 /// estimate.
 pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {

@@ -5,7 +5,10 @@ use super::draw::{Plot, Sample, figure, range};
 use super::markup::{Cell, charts, heading, number, paragraph, table, words as text_cell};
 use super::words;
 use crate::outside::SHIFTS;
-use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Surface, Verdict, listed};
+use crate::report::{
+    Curve, Dependence, LocatedTerm, LocatedVariable, NamedEffect, Outside, Quantity, Report, Surface,
+    Verdict, listed,
+};
 use plant::effects::sheet;
 
 pub(super) fn title(report: &Report) -> &'static str {
@@ -49,6 +52,18 @@ pub(super) fn finding(report: &Report) -> String {
     }
     if let Some(outside) = &report.outside {
         text += &unknown(outside);
+    }
+    if let Some(nearest) = &report.nearest {
+        text += &heading("The nearest effect of the catalogue");
+        text += &effect(nearest);
+    }
+    if let Some(remaining) = &report.remaining {
+        text += &heading("What is left");
+        text += &paragraph(&format!(
+            "With it the model still disagrees in this balance: {}. It depends on:",
+            words::balance(&remaining.balance)
+        ));
+        text += &located_variables("Dependence of what is left", remaining);
     }
     text
 }
@@ -116,23 +131,33 @@ fn sentence(law: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
-fn unknown(outside: &Outside) -> String {
-    let mut text = paragraph(&format!(
-        "No effect of the catalogue explains it. It is in this balance: {}. It depends on:",
-        words::balance(&outside.balance)
-    ));
-    let rows = outside.variables.iter().map(|one| {
+/// The variables that the disagreement of a balance depends on, the strongest first.
+pub(super) fn located_variables(label: &str, term: &LocatedTerm) -> String {
+    let row = |one: &LocatedVariable| {
+        let evidence = one.log_evidence.map_or_else(|| words::NOTHING.to_owned(), words::short);
+        vec![text_cell(&one.variable), number(words::percent(one.share)), number(evidence)]
+    };
+    table(label, &["variable", "explains", "log evidence"], term.variables.iter().map(row))
+}
+
+/// The variables that an unknown input depends on, the strongest first.
+fn dependence(label: &str, variables: &[Dependence]) -> String {
+    let rows = variables.iter().map(|one| {
         // Smallest p value: no shifted series reached R2.
         let least = 1.0 / (SHIFTS + 1) as f64;
         let chance =
             if one.p_value <= least { format!("none of {SHIFTS}") } else { words::percent(one.p_value) };
         vec![text_cell(&one.variable), number(words::percent(one.r2.max(0.0))), number(chance)]
     });
-    text += &table(
-        "Dependence",
-        &["variable", "explains, on data it was not fitted on", "shuffled data reach that"],
-        rows,
-    );
+    table(label, &["variable", "explains, on data it was not fitted on", "shuffled data reach that"], rows)
+}
+
+fn unknown(outside: &Outside) -> String {
+    let mut text = paragraph(&format!(
+        "No effect of the catalogue explains it. It is in this balance: {}. It depends on:",
+        words::balance(&outside.balance)
+    ));
+    text += &dependence("Dependence", &outside.variables);
     if let Some(formula) = &outside.formula {
         text += &format!(
             "<p>A formula that fits: <code style=\"font-size:1.1rem\">{}</code></p>\n",

@@ -2,7 +2,7 @@
 
 use super::decimate::{COLUMNS, columns};
 use super::draw::{Bar, Plot, Sample, bars, figure, range};
-use super::finding::curve_figure;
+use super::finding::{curve_figure, located_variables};
 use super::markup::{Cell, charts, folded, heading, paragraph, table, words as text_cell};
 use super::words;
 use crate::locate::regime::REGIMES;
@@ -20,7 +20,10 @@ pub(super) fn location(report: &Report) -> String {
     figures.retain(|figure| !figure.is_empty());
     let series: Vec<String> =
         location.series.iter().enumerate().map(|(at, input)| over_time(at, input)).collect();
-    let text = charts(&figures) + &regimes(location) + &folded("Unknown inputs over time", &charts(&series));
+    let text = charts(&figures)
+        + &depends(location)
+        + &regimes(location)
+        + &folded("Unknown inputs over time", &charts(&series));
     if text.is_empty() {
         return text;
     }
@@ -28,6 +31,14 @@ pub(super) fn location(report: &Report) -> String {
         "An unknown input (a force, or air into a chamber) is added to each balance of the model wherever the record asks for \
          one. Where nothing is missing it is as large as its noise, 1.",
     ) + &text
+}
+
+/// What the balance that disagrees most depends on.
+fn depends(location: &Location) -> String {
+    let Some(term) = &location.dependence else { return String::new() };
+    heading("On what it depends")
+        + &paragraph(&format!("Of the balance that disagrees most: {}.", words::balance(&term.balance)))
+        + &located_variables("Dependence of the disagreement", term)
 }
 
 fn balances(location: &Location) -> String {

@@ -104,6 +104,8 @@ fn verification() -> Verification {
         whiteness: of(both(0.97, 0.05)),
         physical: Vec::new(),
         confirmed: true,
+        worse: false,
+        adequate: true,
     }
 }
 
@@ -122,6 +124,11 @@ fn curve(variable: &str, variable_unit: &str, unit: &str, term: impl Fn(f64) -> 
     }
 }
 
+fn term(balance: &str, variable: &str) -> LocatedTerm {
+    let variable = LocatedVariable { variable: variable.to_owned(), log_evidence: Some(214.0), share: 0.71 };
+    LocatedTerm { balance: balance.to_owned(), variables: vec![variable] }
+}
+
 fn location(size: f64) -> Location {
     let balances =
         [("drive.flow-a", 31.0), ("drive.flow-b", 24.0), ("drive.force", 1.2), ("drive.force-sensor", 0.98)];
@@ -135,6 +142,7 @@ fn location(size: f64) -> Location {
     let over = |size_of: f64, share: f64| 1.0 + size * (size_of - 1.0) * share;
     let time_s: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-2).collect();
     Location {
+        dependence: Some(term("drive.flow-a", "p_a")),
         sensor_ratio: Some("drive.force is 1.96e-3 m^2 times an offset of pressure sensor a".into()),
         balances: balances
             .map(|(balance, value)| BalanceBar {
@@ -216,6 +224,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             searched_share: 1.0,
         },
         misfit: misfit(),
+        adequate: Some(verdict != Verdict::OutsideCatalogue),
         verification: Some(verification()),
         candidates: candidates(size),
         not_excited: vec![
@@ -281,6 +290,8 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
                     .to_owned();
             let dependence =
                 |variable: &str, r2, p_value| Dependence { variable: variable.to_owned(), r2, p_value };
+            report.nearest = Some(NamedEffect { share_explained: 0.6, ..leakage() });
+            report.remaining = Some(term("drive.flow-b", "p_b"));
             report.outside = Some(Outside {
                 balance: "drive.force".to_owned(),
                 variables: vec![dependence("x", 0.913, 1.0 / 201.0), dependence("p_a-p_b", 0.08, 0.21)],
@@ -335,6 +346,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             ];
             report.candidates.clear();
             report.location = None;
+            report.adequate = None;
             report.misfit.clear();
             report.verification = None;
             report.detection_limits.clear();

@@ -84,6 +84,29 @@ fn the_verdict_stands_first_with_names_numbers_and_errors() {
 }
 
 #[test]
+fn a_held_out_record_that_gets_worse_and_a_model_that_leaves_more_stand_in_the_headline() {
+    let headline = |report: &Report| {
+        let made = page(report, &Pictures::default());
+        let heading = parsed(&made).descendants().find(|node| node.has_tag_name("h1")).map(|node| node.id());
+        assert!(heading.is_some());
+        text(&made)
+    };
+    let (mut report, _) = sample(Verdict::Named);
+    report.adequate = Some(false);
+    assert!(headline(&report).starts_with("Part of what the simulation lacks"));
+    let verification = report.verification.as_mut().unwrap();
+    verification.confirmed = false;
+    assert!(headline(&report).starts_with("The held-out record does not confirm what was found"));
+    report.verification.as_mut().unwrap().worse = true;
+    let signal = report.misfit.values_mut().next().unwrap();
+    signal.after = 1.17 * signal.before;
+    let seen = headline(&report);
+    assert!(seen.starts_with("What was found makes the held-out record worse"), "{seen}");
+    assert!(seen.contains("gets worse with it: ") && seen.contains(" by 17 %"), "{seen}");
+    assert!(!seen.contains("of the gap to the noise is closed"), "{seen}");
+}
+
+#[test]
 fn what_is_ambiguous_stands_together_with_the_experiment_that_tells() {
     let seen = text(&made(Verdict::Ambiguous));
     for part in [
@@ -117,6 +140,9 @@ fn what_is_outside_the_catalogue_has_its_curve_formula_and_significance() {
         "none of 200",
         "91 %",
         "is added to the model as a table",
+        "resembles piston-leakage at the drive axis",
+        "it explains 60 % of the disagreement",
+        "it depends on p_b",
     ] {
         assert!(seen.contains(part), "{part}");
     }

@@ -2,16 +2,35 @@
 
 use super::words;
 use crate::report::{NamedEffect, Report, Verdict, listed};
+use crate::verify::WORSE;
 use pagekit::page::escaped;
 
-pub(super) fn title(verdict: Verdict) -> &'static str {
-    match verdict {
+/// The headline.
+pub(super) fn title(report: &Report) -> &'static str {
+    doubt(report).unwrap_or(match report.verdict {
         Verdict::NothingMissing => "Nothing is missing",
         Verdict::ParametersOnly => "Numbers of the rig are off",
         Verdict::Named => "What the simulation lacks",
         Verdict::Ambiguous => "Several explanations fit alike",
         Verdict::OutsideCatalogue => "Something is missing that the catalogue does not have",
         Verdict::BadData => "A record cannot be used",
+    })
+}
+
+/// What a finding lacks: the support of the held-out record, or that nothing beside it is missing.
+fn doubt(report: &Report) -> Option<&'static str> {
+    if matches!(report.verdict, Verdict::NothingMissing | Verdict::BadData) {
+        return None;
+    }
+    match &report.verification {
+        Some(verification) if verification.worse => Some("What was found makes the held-out record worse"),
+        Some(verification) if !verification.confirmed => {
+            Some("The held-out record does not confirm what was found")
+        }
+        _ if report.verdict == Verdict::Named && report.adequate == Some(false) => {
+            Some("Part of what the simulation lacks")
+        }
+        _ => None,
     }
 }
 
@@ -23,11 +42,11 @@ pub(super) fn head(report: &Report) -> String {
         from += &format!(", verified on {}", verification.record);
     }
     // Green and whole for an answer, amber for an open question, dashed for no answer.
+    let open = ('?', "verdict", " style=\"border-color:var(--s4)\"");
     let (sign, class, style) = match report.verdict {
         Verdict::BadData => ('\u{2717}', "verdict no", ""),
-        Verdict::Ambiguous | Verdict::OutsideCatalogue => {
-            ('?', "verdict", " style=\"border-color:var(--s4)\"")
-        }
+        Verdict::Ambiguous | Verdict::OutsideCatalogue => open,
+        _ if doubt(report).is_some() => open,
         _ => ('\u{2713}', "verdict", ""),
     };
     let mut points: Vec<String> = report.named.iter().flat_map(named).collect();
@@ -42,6 +61,14 @@ pub(super) fn head(report: &Report) -> String {
             escaped(&before)
         )
     }));
+    points.extend(report.nearest.iter().map(|nearest| one(nearest, "<i>resembles</i> ")));
+    points.extend(report.remaining.iter().map(|remaining| {
+        format!(
+            "More is missing, in this balance: {}; it depends on {}",
+            escaped(&words::balance(&remaining.balance)),
+            escaped(remaining.strongest())
+        )
+    }));
     points.extend(misfit(report));
     if let Some(next) = &report.next {
         let what = next.experiment.as_ref().or(next.otherwise.as_ref());
@@ -52,7 +79,7 @@ pub(super) fn head(report: &Report) -> String {
     format!(
         "<header>\n<h1>{}</h1>\n<p class=\"soft\">{}</p>\n<div class=\"{class}\"{style} role=\"note\" aria-label=\"Verdict\">\n\
          <p>{sign} {}</p>\n{points}</div>\n</header>\n",
-        title(report.verdict),
+        title(report),
         escaped(&from),
         escaped(&report.summary)
     )
@@ -81,7 +108,23 @@ fn misfit(report: &Report) -> Option<String> {
     if matches!(report.verdict, Verdict::NothingMissing | Verdict::BadData) {
         return None;
     }
-    let record = escaped(&report.verification.as_ref()?.record);
+    let verification = report.verification.as_ref()?;
+    let record = escaped(&verification.record);
+    if verification.worse {
+        let signals: Vec<String> = report
+            .misfit
+            .iter()
+            .filter(|(_, misfit)| misfit.after > WORSE * misfit.before)
+            .map(|(signal, misfit)| {
+                format!("{} by {}", words::signal(signal), words::percent(misfit.after / misfit.before - 1.0))
+            })
+            .collect();
+        return Some(format!(
+            "On {record}, a held-out record, the simulation gets worse with it: {}. Do not use the extended model; look at the \
+             other candidates, or record more",
+            escaped(&listed(&signals))
+        ));
+    }
     let mut closed: Vec<f64> = report.misfit.values().filter_map(|misfit| misfit.closed).collect();
     closed.sort_by(f64::total_cmp);
     let (least, most) = (closed.first()?, closed.last()?);

@@ -14,6 +14,7 @@ use crate::report::{
     BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, InputFiles, Location, Misfit, NamedEffect,
     Next, Outside, Quantity, Report, Verdict, Verification, Where,
 };
+use crate::verify::WORSE;
 use crate::workflow::empty;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -382,6 +383,8 @@ impl Study {
             whiteness: BTreeMap::from([(signal, BeforeAfter { before: lag(before), after: lag(after) })]),
             physical: Vec::new(),
             confirmed: !self.found.taken.is_empty() && clustered_t(&differences) > 3.0,
+            worse: after_rms > WORSE * before_rms,
+            adequate: after_rms.powi(2) / trained <= folds[folds.len() - 1],
         });
     }
 }

@@ -2,22 +2,18 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{SelectionResult, same};
+use crate::name::{NotExplained, SelectionResult, off, same};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
     self, DetectionLimit, EffectPlace, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, Where,
+    strongest,
 };
 
-/// Significance of a reported parameter, in standard errors.
-const OFF_ERRORS: f64 = 4.0;
-/// Smallest relative deviation of a reported parameter.
-const OFF_LEAST: f64 = 0.01;
-
 pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report {
-    let named = named(found);
+    let mut named = named(found);
     let (parameters, insignificant) = parameters(engine, &found.reported);
-    let verdict = if found.inadequate {
+    let verdict = if found.not_explained.is_some() {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
         Verdict::Ambiguous
@@ -28,10 +24,19 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     } else {
         Verdict::NothingMissing
     };
-    let named = if verdict == Verdict::OutsideCatalogue { Vec::new() } else { named };
+    let nearest = if verdict == Verdict::OutsideCatalogue {
+        std::mem::take(&mut named)
+            .into_iter()
+            .next()
+            .map(|nearest| NamedEffect { alternatives: Vec::new(), ..nearest })
+    } else {
+        None
+    };
     let (not_excited, detection_limits) = limits(found);
     Report {
         named,
+        adequate: Some(!found.lacks_fit),
+        nearest,
         parameters,
         insignificant,
         candidates: candidates(found),
@@ -44,10 +49,10 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
 fn named(found: &SelectionResult) -> Vec<NamedEffect> {
     let mut at = 0;
     let mut all = Vec::new();
-    for ((placed, share), alternatives) in
-        found.reported.placed.iter().zip(&found.shares).zip(&found.alternatives)
-    {
-        let errors = &found.reported.errors[at..at + placed.coordinates.len()];
+    // What is not explained has no names, and the nearest effect.
+    let model = if found.not_explained.is_some() { &found.model } else { &found.reported };
+    for ((placed, share), alternatives) in model.placed.iter().zip(&found.shares).zip(&found.alternatives) {
+        let errors = &model.errors[at..at + placed.coordinates.len()];
         at += placed.coordinates.len();
         let alternatives = alternatives
             .iter()
@@ -96,11 +101,9 @@ fn named_effect(
 
 /// Parameters that are significantly off, and those that the model moved by less.
 fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantity>) {
-    let errors = &model.errors[model.errors.len() - COUNT..];
-    let by = |at: usize| (model.factors[at] - 1.0).abs();
-    let (off, insignificant): (Vec<usize>, Vec<usize>) = (0..COUNT)
-        .filter(|at| by(*at) > 0.0)
-        .partition(|at| by(*at) > OFF_LEAST && by(*at) > OFF_ERRORS * errors[*at]);
+    let is_off = off(engine, model);
+    let (off, insignificant): (Vec<usize>, Vec<usize>) =
+        (0..COUNT).filter(|at| model.factors[*at] != 1.0).partition(|at| is_off[*at]);
     let quantities = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, model)).collect();
     (quantities(off), quantities(insignificant))
 }
@@ -122,11 +125,9 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let share = alone.map(|fit| {
                 ((found.calibrated.fit.loss - fit.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
             });
-            let decision = if is_named && !found.inadequate {
-                "named"
-            } else if is_named {
-                "explains too little"
-            } else if is_alike && !found.inadequate {
+            let decision = if is_named {
+                found.not_explained.map_or("named", NotExplained::reason)
+            } else if is_alike && found.not_explained.is_none() {
                 "explains as much as what is named"
             } else if alone.is_some() {
                 "fitted, and others explain more"
@@ -188,33 +189,51 @@ pub(super) fn summary(report: &Report) -> String {
         report.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>().join(", ");
     let off =
         if parameters.is_empty() { String::new() } else { format!(" Off in the rig file: {parameters}.") };
+    let remaining = report.remaining.as_ref().map_or(String::new(), |remaining| {
+        format!(" {} depends on {}.", remaining.balance, remaining.strongest())
+    });
+    let more = match report.adequate {
+        Some(false) if remaining.is_empty() => " More is missing.".to_owned(),
+        Some(false) => format!(" More is missing:{remaining}"),
+        _ => String::new(),
+    };
     match report.verdict {
         Verdict::NothingMissing => {
             "Nothing is missing above the detection limits of these records.".to_owned()
         }
         Verdict::ParametersOnly => format!("No effect is missing.{off}"),
         Verdict::Named => {
-            format!("Missing: {}.{off}", report.named.iter().map(one).collect::<Vec<_>>().join(" and "))
+            format!("Missing: {}.{off}{more}", report.named.iter().map(one).collect::<Vec<_>>().join(" and "))
         }
         Verdict::Ambiguous => {
             let quantities = report.named.iter().map(|named| {
                 std::iter::once(named).chain(&named.alternatives).map(one).collect::<Vec<_>>().join(" or ")
             });
             format!(
-                "Missing, and not to be told apart by these records: {}.{off}",
+                "Missing, and not to be told apart by these records: {}.{off}{more}",
                 quantities.collect::<Vec<_>>().join("; and ")
             )
         }
-        Verdict::OutsideCatalogue => match &report.outside {
-            Some(outside) => {
-                let on = outside
-                    .variables
-                    .first()
-                    .map_or("nothing that was measured", |dependence| dependence.variable.as_str());
-                format!("Not in the catalogue: something in {} that depends on {on}.{off}", outside.balance)
+        Verdict::OutsideCatalogue => {
+            let nearest = report.nearest.as_ref().map_or(String::new(), |nearest| {
+                let rest =
+                    if remaining.is_empty() { String::new() } else { format!("; of the rest,{remaining}") };
+                let rest = if rest.is_empty() { ".".to_owned() } else { rest };
+                format!(
+                    " It resembles {}, whose law takes {:.0} %{rest}",
+                    one(nearest),
+                    1e2 * nearest.share_explained
+                )
+            });
+            match &report.outside {
+                Some(outside) => format!(
+                    "Not in the catalogue: something in {} that depends on {}.{nearest}{off}",
+                    outside.balance,
+                    strongest(outside.variables.first().map(|dependence| dependence.variable.as_str()))
+                ),
+                None => format!("Something is missing that the catalogue does not explain.{nearest}{off}"),
             }
-            None => format!("Something is missing that the catalogue does not explain.{off}"),
-        },
+        }
         Verdict::BadData => report.summary.clone(),
     }
 }

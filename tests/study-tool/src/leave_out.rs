@@ -11,7 +11,8 @@
 //! - *No wrong name*: there is a good report and nothing of the catalogue is named in it. A parameter of the baseline is no name.
 //! - The *balance* is right when it is one that `outside-expected.json` has for the effect, on the axis that the effect is at;
 //!   what acts on both axes may be seen on either.
-//! - The *variable* is right when one of the first two is expected.
+//! - The *variable* is right when one of the first two is expected. Both come from what the program reports as outside the
+//!   catalogue; where it reports another verdict, from what it locates under the rig file's own values.
 //! - The gap *still closes* for effects without memory: a term over what is measured can stand in for them. With memory are those
 //!   for which the plant keeps something from step to step (`plant/src/effects/memory.rs`).
 //!
@@ -101,24 +102,22 @@ pub fn judge(
     let hidden = draw.recipe.hidden.first();
     let expected = hidden.and_then(|hidden| expectations.get(hidden.name));
     let outside = report.and_then(|report| report.outside.as_ref());
-    let variables: Vec<String> = outside
-        .map_or(&[][..], |outside| &outside.variables)
-        .iter()
-        .map(|own| own.variable.clone())
-        .collect();
-    let balance_right = |place: Place| {
-        let (outside, expected) = (outside?, expected?);
-        Some(is_expected(&outside.balance, place, &expected.balances))
-    };
+    let located = report.and_then(|report| report.dependence.as_ref()).filter(|_| outside.is_none());
+    let balance =
+        outside.map(|outside| &outside.balance).or(located.map(|located| &located.balance)).cloned();
+    let of_outside = outside.iter().flat_map(|outside| &outside.variables).map(|own| own.variable.clone());
+    let of_located = located.iter().flat_map(|located| &located.variables).map(|own| own.variable.clone());
+    let variables: Vec<String> = of_outside.chain(of_located).collect();
+    let balance_right = |place: Place| Some(is_expected(balance.as_ref()?, place, &expected?.balances));
     let variable_right = expected
         .is_some_and(|own| variables.iter().take(FIRST).any(|reported| own.variables.contains(reported)));
     LeftOut {
         without: without.to_vec(),
         verdict: report.map_or("error", |report| verdict_name(report.verdict)),
         no_wrong_name: report.is_some_and(|report| report.named.is_empty()),
-        balance: outside.map(|outside| outside.balance.clone()),
         formula: outside.and_then(|outside| outside.formula.clone()),
         balance_right: hidden.and_then(|hidden| balance_right(hidden.place)).unwrap_or(false),
+        balance,
         variable_right,
         variables,
         with_memory: hidden.is_some_and(|hidden| WITH_MEMORY.contains(&hidden.name)),

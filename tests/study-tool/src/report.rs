@@ -22,6 +22,8 @@ pub struct Report {
     pub gap: BTreeMap<String, Gap>,
     /// What is missing that the catalogue does not have.
     pub outside: Option<Outside>,
+    /// What the rig file's own model lacks, whatever the verdict.
+    pub dependence: Option<LocatedTerm>,
     /// What the program says of its model on the held-out record.
     pub verification: Option<Verification>,
     pub next: Option<Next>,
@@ -80,6 +82,18 @@ pub struct Outside {
     pub formula: Option<String>,
 }
 
+/// A balance that disagrees, and what it depends on, the strongest first.
+#[derive(Debug, Clone, Deserialize)]
+pub struct LocatedTerm {
+    pub balance: String,
+    pub variables: Vec<LocatedVariable>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+pub struct LocatedVariable {
+    pub variable: String,
+}
+
 #[derive(Debug, Clone, Deserialize)]
 pub struct Dependence {
     /// Its name, as in `outside-expected.json`.
@@ -113,7 +127,14 @@ struct RawReport {
     gap: Option<BTreeMap<String, Gap>>,
     outside: Option<Outside>,
     verification: Option<Verification>,
+    #[serde(default)]
+    location: Option<Location>,
     next: Option<Next>,
+}
+
+#[derive(Default, Deserialize)]
+struct Location {
+    dependence: Option<LocatedTerm>,
 }
 
 #[derive(Deserialize)]
@@ -158,8 +179,9 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
         return Err("verdict ParametersOnly without a parameter".to_owned());
     }
     let gap = raw.gap.unwrap_or_default();
+    let dependence = raw.location.and_then(|location| location.dependence);
     let RawReport { verdict, parameters, outside, verification, next, .. } = raw;
-    Ok(Report { verdict, named, parameters, gap, outside, verification, next })
+    Ok(Report { verdict, named, parameters, gap, outside, dependence, verification, next })
 }
 
 fn known(raw: RawNamed) -> Result<Named, String> {

@@ -1,0 +1,339 @@
+//! The discrepancy term of a model: an unknown input that is a function of state and command, the same in all windows.
+//!
+//! ```text
+//!   e = J a + B Phi_g w + noise       J sensitivities of parameters and effects, a with their priors
+//!                                     B responses to unknown inputs by block, Phi_g hats over the variable of group g
+//!   w ~ N(0, s^2)                     size s on a grid; ln Z_g = -1/2 (L + n ln s^2 + ln |H|), best s
+//! ```
+//!
+//! A group is a balance and a variable. Its evidence is compared with that of the model without a term; parameters and effects
+//! are free with their priors in both, so that what they can do is no discrepancy. L is the loss of [`crate::fit`], H its
+//! Gauss-Newton Hessian with the priors.
+//!
+//! Source: discrepancy-notes.md, Second reading. Kennedy, O'Hagan 2001, J. R. Stat. Soc. B 63(3): discrepancy of a model; MacKay
+//! 1992, Neural Comput. 4(3): evidence of a size.
+
+use crate::engine::Engine;
+use crate::fit::Products;
+use crate::gridded_record::GriddedRecord;
+use crate::locate::estimate::variables;
+use crate::locate::{FORCE as FORCE_VARIABLE, VARIABLES};
+use crate::outside::CONSTANT;
+use crate::parameters::COUNT;
+use crate::refit::{
+    EffectEstimate, coordinate_columns, linearise_at, prior_deviations, prior_precisions, rig_of,
+};
+use crate::report::{LocatedTerm, LocatedVariable};
+use crate::windows::{BLOCK, BLOCKS, FORCE, InputProducts, UnknownKind};
+use nalgebra::DMatrix;
+use plant::Axis;
+use rayon::prelude::*;
+
+/// Knots of the hats of a variable, at quantiles of its values.
+const KNOTS: usize = 8;
+/// Sizes of a term, N and Nl/min.
+const SIZES: [f64; 8] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+/// Log evidence over the model without a term from which on there is one: that of some sixty groups by chance is below 3.
+const MIN_LOG_EVIDENCE: f64 = 8.0;
+/// Share of the best log evidence from which on a constant comes first, or second.
+const SIMPLER: f64 = 0.97;
+const MOSTLY_CONSTANT: f64 = 0.8;
+/// Products of the direction with another variable, by their places in [`VARIABLES`]: friction over x, and over p_a - p_b.
+const PRODUCTS: [[usize; 2]; 2] = [[0, 3], [6, 3]];
+
+/// Balances that a term may stand in. What acts on the valve or the supply stands in both chambers.
+const BALANCES: [&[UnknownKind]; 5] = [
+    &[UnknownKind::FlowA],
+    &[UnknownKind::FlowB],
+    &[UnknownKind::FlowA, UnknownKind::FlowB],
+    &[UnknownKind::Force],
+    &[UnknownKind::ForceSensor],
+];
+
+/// What a group's hats are over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Over {
+    Constant,
+    Variable(usize),
+    /// Hats over the first, times the second.
+    Product([usize; 2]),
+}
+
+impl Over {
+    fn all() -> impl Iterator<Item = Over> {
+        let single = (0..VARIABLES.len()).map(Over::Variable);
+        [Over::Constant].into_iter().chain(single).chain(PRODUCTS.map(Over::Product))
+    }
+
+    fn names(self) -> Vec<&'static str> {
+        match self {
+            Over::Constant => vec![CONSTANT],
+            Over::Variable(at) => vec![VARIABLES[at].name],
+            Over::Product(pair) => pair.map(|at| VARIABLES[at].name).to_vec(),
+        }
+    }
+}
+
+/// A balance of an axis with a variable, and what it gains.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    axis: usize,
+    /// One, or both chambers with hats of their own.
+    kinds: &'static [UnknownKind],
+    over: Over,
+    log_evidence: f64,
+    /// Fall of the loss at the best size.
+    loss_fall: f64,
+}
+
+/// The model that a term is sought beside.
+pub struct Beside<'a> {
+    pub placed: &'a [EffectEstimate],
+    /// Of the baseline parameters, in the order of [`crate::parameters::PARAMETERS`].
+    pub factors: [f64; COUNT],
+}
+
+/// The term of a model; `None` where none has [`MIN_LOG_EVIDENCE`].
+pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedTerm> {
+    let mut groups = Term::new(engine, beside)?.groups();
+    let best = *groups.first().filter(|best| best.log_evidence > MIN_LOG_EVIDENCE)?;
+    let constant = groups
+        .iter()
+        .position(|group| (group.axis, group.kinds, group.over) == (best.axis, best.kinds, Over::Constant));
+    // A law that is nearly or mostly its mean.
+    if let Some(at) = constant {
+        let ratio = groups[at].log_evidence / best.log_evidence;
+        let place = if ratio > SIMPLER { 0 } else { 1 };
+        if ratio > MOSTLY_CONSTANT {
+            let constant = groups.remove(at);
+            groups.insert(place.min(groups.len()), constant);
+        }
+    }
+    let total = groups.iter().map(|group| group.loss_fall).fold(best.loss_fall, f64::max).max(1e-9);
+    let mut variables: Vec<LocatedVariable> = Vec::new();
+    let of_balance = groups.iter().filter(|group| group.axis == best.axis && group.kinds == best.kinds);
+    for group in of_balance.filter(|group| group.log_evidence > 0.0) {
+        for name in group.over.names() {
+            if variables.iter().all(|known| known.variable != name) {
+                variables.push(LocatedVariable {
+                    variable: name.to_owned(),
+                    log_evidence: Some(group.log_evidence),
+                    share: (group.loss_fall / total).clamp(0.0, 1.0),
+                });
+            }
+        }
+    }
+    // Of both chambers the one that has more evidence alone.
+    let alone = groups.iter().find(|group| {
+        group.axis == best.axis && best.kinds.contains(&group.kinds[0]) && group.kinds.len() == 1
+    });
+    let kind = alone.map_or(best.kinds[0], |alone| alone.kinds[0]);
+    let balance = format!("{}.{}", Axis::ALL[best.axis].name(), kind.name());
+    Some(LocatedTerm { balance, variables })
+}
+
+/// Products of all windows.
+struct Term {
+    /// Of residual and nuisance columns, window by window.
+    nuisance: Products,
+    precisions: Vec<f64>,
+    offsets: Vec<f64>,
+    windows: Vec<InputProducts>,
+    measured: [bool; 2],
+    /// The variables of each axis, balance, window and block.
+    values: [[Vec<BlockValues>; 4]; 2],
+}
+
+impl Term {
+    fn new(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<Self> {
+        let rig = rig_of(engine.rig(), beside.placed, &beside.factors)?;
+        let simulated = engine.simulate(&rig);
+        let residual = engine.residual(&simulated);
+        let mut columns = linearise_at(engine, beside.placed, beside.factors).columns;
+        columns.extend(coordinate_columns(engine, &beside.factors, beside.placed, &simulated)?);
+        let all: Vec<&[f64]> = std::iter::once(&residual).chain(&columns).map(Vec::as_slice).collect();
+        let mut windows = Vec::new();
+        let mut places: Vec<(&GriddedRecord, usize)> = Vec::new();
+        let mut from = 0;
+        for part in engine.windows() {
+            let to = from + part.count() * engine.rows();
+            let columns: Vec<&[f64]> = all.iter().map(|column| &column[from..to]).collect();
+            windows.extend(part.input_products(&rig, &columns));
+            places.extend(part.starts().iter().map(|start| (part.record(), *start)));
+            from = to;
+        }
+        let mut values = [0, 1].map(|axis| [0, 1, 2, 3].map(|balance| values_of(&places, axis, balance)));
+        simulated_forces(engine, &simulated, &mut values);
+        Some(Term {
+            nuisance: engine.products(&residual, &columns),
+            precisions: prior_precisions(beside.placed),
+            offsets: prior_deviations(&beside.factors, beside.placed),
+            windows,
+            measured: places.first().map_or([false; 2], |(record, _)| record.measured),
+            values,
+        })
+    }
+
+    /// All groups, by evidence.
+    fn groups(&self) -> Vec<Group> {
+        let (loss, log_determinant) = self.fitted(&self.nuisance, &self.precisions);
+        let all: Vec<(usize, &'static [UnknownKind], Over)> = (0..2)
+            .filter(|axis| self.measured[*axis])
+            .flat_map(|axis| BALANCES.map(|kinds| (axis, kinds)))
+            .flat_map(|(axis, kinds)| Over::all().map(move |over| (axis, kinds, over)))
+            .collect();
+        let mut groups: Vec<Group> = all
+            .into_par_iter()
+            .filter_map(|(axis, kinds, over)| {
+                let products = self.with_terms(axis, kinds, over);
+                let count = products.columns() - self.precisions.len();
+                let evidence = |size: f64| {
+                    let precision = size.powi(-2);
+                    let precisions: Vec<f64> = self
+                        .precisions
+                        .iter()
+                        .copied()
+                        .chain(std::iter::repeat_n(precision, count))
+                        .collect();
+                    let (with, with_determinant) = self.fitted(&products, &precisions);
+                    let spread = -(count as f64) * precision.ln();
+                    let log_evidence = -0.5 * (with - loss + spread + with_determinant - log_determinant);
+                    Group { axis, kinds, over, log_evidence, loss_fall: loss - with }
+                };
+                SIZES
+                    .into_iter()
+                    .map(evidence)
+                    .max_by(|left, right| left.log_evidence.total_cmp(&right.log_evidence))
+            })
+            .collect();
+        groups.sort_by(|left, right| right.log_evidence.total_cmp(&left.log_evidence));
+        groups
+    }
+
+    /// The loss with priors at its minimum, and ln |H| there; infinite where H is singular.
+    fn fitted(&self, products: &Products, precisions: &[f64]) -> (f64, f64) {
+        let all: Vec<usize> = (0..precisions.len()).collect();
+        let mut offsets = self.offsets.clone();
+        offsets.resize(precisions.len(), 0.0);
+        let fit = products.fit_from(&all, precisions, &offsets);
+        let (matrix, _) = products.normal(&all, &fit.weights, precisions);
+        let log_determinant = matrix.cholesky().map_or(f64::INFINITY, |factor| {
+            2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>()
+        });
+        (fit.loss, log_determinant)
+    }
+
+    /// For each window a row for each block, a column for each hat.
+    fn features(&self, axis: usize, kind: UnknownKind, over: Over) -> Vec<DMatrix<f64>> {
+        let values = &self.values[axis][kind.place()];
+        let knots = match over {
+            Over::Constant => vec![0.0],
+            Over::Variable(at) | Over::Product([at, _]) => {
+                knots(values.iter().flatten().map(|values| values[at]).collect())
+            }
+        };
+        let row = |values: &[f64; VARIABLES.len()], hat: usize| match over {
+            Over::Constant => 1.0,
+            Over::Variable(at) => hat_at(&knots, hat, values[at]),
+            Over::Product([at, times]) => hat_at(&knots, hat, values[at]) * values[times],
+        };
+        values
+            .iter()
+            .map(|window| DMatrix::from_fn(BLOCKS, knots.len(), |block, hat| row(&window[block], hat)))
+            .collect()
+    }
+
+    /// The nuisance columns, then the hats of each balance.
+    fn with_terms(&self, axis: usize, kinds: &[UnknownKind], over: Over) -> Products {
+        let hats: Vec<Vec<DMatrix<f64>>> =
+            kinds.iter().map(|kind| self.features(axis, *kind, over)).collect();
+        let (mut scores, mut information) = (Vec::new(), Vec::new());
+        for (at, window) in self.windows.iter().enumerate() {
+            // The hats of all balances as a function of all inputs of the axis.
+            let columns = hats.iter().map(|hats| hats[at].ncols()).sum();
+            let mut inputs = DMatrix::zeros(window.gram[axis].nrows(), columns);
+            let mut from = 0;
+            for (kind, hats) in kinds.iter().zip(&hats) {
+                let hats = &hats[at];
+                inputs.view_mut((kind.place() * BLOCKS, from), hats.shape()).copy_from(hats);
+                from += hats.ncols();
+            }
+            let cross = &window.cross[axis] * &inputs;
+            scores.push(cross.row(0).iter().copied().collect::<Vec<f64>>());
+            let among = inputs.transpose() * &window.gram[axis] * &inputs;
+            information.push((cross.rows(1, cross.nrows() - 1).into_owned(), among));
+        }
+        self.nuisance.extended(&scores, &information)
+    }
+}
+
+/// The variables of a window's blocks.
+type BlockValues = Vec<[f64; VARIABLES.len()]>;
+
+fn values_of(places: &[(&GriddedRecord, usize)], axis: usize, balance: usize) -> Vec<BlockValues> {
+    let window = |(record, start): &(&GriddedRecord, usize)| {
+        (0..BLOCKS).map(|block| variables(record, axis, start + block * BLOCK, balance)).collect()
+    };
+    places.iter().map(window).collect()
+}
+
+/// Replaces the force readings by simulated ones: a term over the force would correlate with the noise of its own readings.
+fn simulated_forces(engine: &Engine<'_>, simulated: &[f64], values: &mut [[Vec<BlockValues>; 4]; 2]) {
+    let (rows, mut window) = (engine.rows(), 0);
+    for part in engine.windows() {
+        let width = part.outputs().len();
+        for (output, (axis, channel)) in part.outputs().iter().enumerate().filter(|(_, of)| of.1 == FORCE) {
+            let noise = part.record().noise[*axis][*channel];
+            for at in window..window + part.count() {
+                let readings: Vec<f64> =
+                    simulated[at * rows..][..rows].iter().skip(output).step_by(width).copied().collect();
+                for (block, readings) in readings.chunks_exact(BLOCK).enumerate() {
+                    let force_n = noise * readings.iter().sum::<f64>() / BLOCK as f64;
+                    values[*axis].iter_mut().for_each(|balance| balance[at][block][FORCE_VARIABLE] = force_n);
+                }
+            }
+        }
+        window += part.count();
+    }
+}
+
+/// Knots at distinct quantiles.
+fn knots(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let mut knots: Vec<f64> =
+        (0..KNOTS).map(|knot| values[knot * (values.len() - 1) / (KNOTS - 1)]).collect();
+    knots.dedup();
+    knots
+}
+
+/// The piecewise linear hat of a knot, constant beyond the ends.
+fn hat_at(knots: &[f64], hat: usize, value: f64) -> f64 {
+    let value = value.clamp(knots[0], knots[knots.len() - 1]);
+    let side = |neighbour: Option<&f64>| {
+        neighbour.map_or(0.0, |neighbour| ((value - neighbour) / (knots[hat] - neighbour)).clamp(0.0, 1.0))
+    };
+    if value == knots[hat] {
+        1.0
+    } else if value < knots[hat] {
+        side(hat.checked_sub(1).and_then(|before| knots.get(before)))
+    } else {
+        side(knots.get(hat + 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hats_sum_to_one_and_are_one_at_their_knot() {
+        let knots = knots((0..100).map(f64::from).collect());
+        assert_eq!(knots.len(), KNOTS);
+        for value in [-5.0, 0.0, 3.3, 50.0, 99.0, 120.0] {
+            let sum: f64 = (0..KNOTS).map(|hat| hat_at(&knots, hat, value)).sum();
+            assert!((sum - 1.0).abs() < 1e-12, "{value}: {sum}");
+        }
+        assert_eq!(hat_at(&knots, 2, knots[2]), 1.0);
+        assert_eq!(super::knots(vec![1.0; 50]), [1.0]);
+    }
+}

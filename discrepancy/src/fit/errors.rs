@@ -1,0 +1,100 @@
+//! Errors of coefficients, clustered by windows: sandwich covariance and jackknife.
+
+use super::{Fit, Products, solve};
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+impl Products {
+    /// Sandwich covariance of the coefficients, clustered by windows: A^-1 (sum_k w_k^2 s_k s_k') A^-1.
+    pub(crate) fn covariance(&self, chosen: &[usize], fit: &Fit, precisions: &[f64]) -> Option<DMatrix<f64>> {
+        let (matrix, _) = self.normal(chosen, &fit.weights, precisions);
+        let inverse = matrix.try_inverse()?;
+        let count = chosen.len();
+        let mut middle = DMatrix::zeros(count, count);
+        for (window, weight) in fit.weights.iter().enumerate() {
+            let score: Vec<f64> = chosen
+                .iter()
+                .map(|at| {
+                    let taken: f64 = chosen
+                        .iter()
+                        .zip(&fit.coefficients)
+                        .map(|(other, coefficient)| {
+                            coefficient * self.information[window][at * self.columns + other]
+                        })
+                        .sum();
+                    weight * (self.scores[window][*at] - taken)
+                })
+                .collect();
+            for row in 0..count {
+                for column in 0..count {
+                    middle[(row, column)] += score[row] * score[column];
+                }
+            }
+        }
+        // The prior counts as one more window.
+        for row in 0..count {
+            middle[(row, row)] += precisions[row];
+        }
+        Some(&inverse * middle * &inverse)
+    }
+
+    /// One-step delete-one-window jackknife errors with frozen window weights. Where few windows determine a coefficient,
+    /// residuals understate its error. A Student t factor widens each error to half of the half-width of a calibrated 95.4 %
+    /// interval: two of them cover as two of a normal distribution do, and one is no plain standard error. Source: Bell,
+    /// McCaffrey 2002, Survey Methodology 28(2): jackknife variance with Student's distribution and Satterthwaite degrees of
+    /// freedom.
+    pub(crate) fn jackknife(&self, chosen: &[usize], fit: &Fit, precisions: &[f64]) -> Option<Vec<f64>> {
+        let each: Vec<[usize; 1]> = (0..chosen.len()).map(|at| [at]).collect();
+        self.jackknife_of_sums(chosen, fit, precisions, &each)
+    }
+
+    /// The same for sums of coefficients, each given by places in `chosen`.
+    pub(crate) fn jackknife_of_sums<S: AsRef<[usize]>>(
+        &self,
+        chosen: &[usize],
+        fit: &Fit,
+        precisions: &[f64],
+        sums: &[S],
+    ) -> Option<Vec<f64>> {
+        let (matrix, _) = self.normal(chosen, &fit.weights, precisions);
+        let inverse = matrix.clone().try_inverse()?;
+        let count = chosen.len();
+        let windows = fit.weights.len() as f64;
+        let prior_part =
+            &inverse * DMatrix::from_diagonal(&DVector::from_column_slice(precisions)) * &inverse;
+        let mut changes = Vec::with_capacity(fit.weights.len());
+        for (window, weight) in fit.weights.iter().enumerate() {
+            let information = &self.information[window];
+            let part = DMatrix::from_fn(count, count, |row, column| {
+                weight * information[chosen[row] * self.columns + chosen[column]]
+            });
+            let score = DVector::from_fn(count, |row, _| {
+                let taken: f64 = chosen
+                    .iter()
+                    .zip(&fit.coefficients)
+                    .map(|(other, coefficient)| coefficient * information[chosen[row] * self.columns + other])
+                    .sum();
+                weight * (self.scores[window][chosen[row]] - taken)
+            });
+            changes.push(solve(&matrix - part, &score)?);
+        }
+        let error = |places: &[usize]| {
+            let change_of = |change: &DVector<f64>| places.iter().map(|at| change[*at]).sum::<f64>();
+            let squares = changes.iter().map(|change| change_of(change).powi(2));
+            let prior_part: f64 =
+                places.iter().flat_map(|row| places.iter().map(|at| prior_part[(*row, *at)])).sum();
+            let sum: f64 = squares.clone().sum();
+            // For normal changes the fourth moment is three times the squared variance.
+            let satterthwaite_dof =
+                3.0 * sum * sum / squares.map(|square| square * square).sum::<f64>().max(1e-300);
+            ((1.0 - 1.0 / windows) * sum * t_factor(satterthwaite_dof).powi(2) + prior_part.max(0.0)).sqrt()
+        };
+        Some(sums.iter().map(|places| error(places.as_ref())).collect())
+    }
+}
+
+/// Factor on a standard error of few degrees of freedom that gives two of them the coverage of two normal ones.
+fn t_factor(dof: f64) -> f64 {
+    let share = Normal::standard().cdf(2.0);
+    StudentsT::new(0.0, 1.0, dof.max(1.0)).map_or(1.0, |student| student.inverse_cdf(share) / 2.0)
+}

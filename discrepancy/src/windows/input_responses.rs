@@ -1,0 +1,197 @@
+//! Responses of a window's readings to unknown inputs of each of its blocks, as products with other columns.
+//!
+//! ```text
+//!   B_k = d readings / d input of (axis, input, block)          window k, whitened, start states projected out
+//!   kept: B_k' B_k and B_k' c for each column c                 any input that is a function of state and command is B_k Phi_k
+//! ```
+//!
+//! An unknown force acts as a hand force that the sensor does not read; an unknown flow is added to the stored air; an offset of
+//! the force sensor is added to its reading. Source: discrepancy-notes.md, Second reading (Kennedy, O'Hagan 2001).
+
+use super::whiten::SPIKE;
+use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, dot, project, set_state};
+use crate::locate::NORMAL_LITRES_PER_MINUTE;
+use crate::sensor_inverse::SensorInverse;
+use nalgebra::DMatrix;
+use plant::{Inputs, PERIOD_S, Plant, RigParameters};
+use rayon::prelude::*;
+
+/// Periods of a block; a window has [`BLOCKS`].
+pub(crate) const BLOCK: usize = 20;
+pub(crate) const BLOCKS: usize = WINDOW / BLOCK;
+/// Steps of finite differences: 1 Nl/min and 1 N, the units of the columns.
+const STEP: f64 = 1.0;
+
+/// What is unknown in a balance of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum UnknownKind {
+    FlowA,
+    FlowB,
+    Force,
+    ForceSensor,
+}
+
+impl UnknownKind {
+    pub(crate) const ALL: [UnknownKind; 4] =
+        [UnknownKind::FlowA, UnknownKind::FlowB, UnknownKind::Force, UnknownKind::ForceSensor];
+
+    /// Its place in [`UnknownKind::ALL`].
+    pub(crate) fn place(self) -> usize {
+        self as usize
+    }
+
+    /// As a part of [`crate::report::BalanceBar::balance`].
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            UnknownKind::FlowA => "flow-a",
+            UnknownKind::FlowB => "flow-b",
+            UnknownKind::Force => "force",
+            UnknownKind::ForceSensor => "force-sensor",
+        }
+    }
+}
+
+/// Products of a window: the inputs of an axis in the order of [`UnknownKind::ALL`], each with its blocks.
+#[derive(Clone, Debug)]
+pub(crate) struct InputProducts {
+    /// B'B for each measured axis, and 0 for the other.
+    pub(crate) gram: [DMatrix<f64>; 2],
+    /// B'c: a row for each column.
+    pub(crate) cross: [DMatrix<f64>; 2],
+}
+
+impl Windows<'_> {
+    /// The products of each judged window; `columns` are over all judged windows, as residuals are.
+    pub(crate) fn input_products(&self, rig: &RigParameters, columns: &[&[f64]]) -> Vec<InputProducts> {
+        let rows = self.rows();
+        self.plants_at_windows(rig)
+            .par_iter()
+            .enumerate()
+            .map(|(at, plant)| {
+                let mut products = InputProducts {
+                    gram: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
+                    cross: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
+                };
+                for axis in (0..2).filter(|axis| self.record.measured[*axis]) {
+                    let responses = self.responses(at, plant, axis);
+                    let count = responses.len();
+                    let mut gram = DMatrix::zeros(count, count);
+                    for left in 0..count {
+                        for right in 0..=left {
+                            let product = dot(&responses[left], &responses[right]);
+                            gram[(left, right)] = product;
+                            gram[(right, left)] = product;
+                        }
+                    }
+                    products.gram[axis] = gram;
+                    products.cross[axis] = DMatrix::from_fn(columns.len(), count, |column, response| {
+                        dot(&columns[column][at * rows..][..rows], &responses[response])
+                    });
+                }
+                products
+            })
+            .collect()
+    }
+
+    /// The plant at the start of each judged window, with what continues from window to window.
+    fn plants_at_windows(&self, rig: &RigParameters) -> Vec<Plant> {
+        let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
+        let inverse = SensorInverse::of(rig);
+        let mut plants = Vec::with_capacity(self.starts.len());
+        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
+            let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
+            set_state(&mut plant, self.record, &points);
+            if self.starts.get(plants.len()) == Some(&start) {
+                plants.push(plant.clone());
+            }
+            self.record.inputs[start..start + WINDOW].iter().for_each(|inputs| plant.step(inputs));
+        }
+        plants
+    }
+
+    /// The responses of window `at` to each input and block of an axis.
+    fn responses(&self, at: usize, plant: &Plant, axis: usize) -> Vec<Vec<f64>> {
+        let inputs = &self.record.inputs[self.starts[at]..][..WINDOW];
+        let width = self.outputs.len();
+        // The straight run, and the plant at the start of each block.
+        let mut straight = Vec::with_capacity(self.rows());
+        let mut plants = Vec::with_capacity(BLOCKS);
+        let mut plant = plant.clone();
+        for (period, inputs) in inputs.iter().enumerate() {
+            if period % BLOCK == 0 {
+                plants.push(plant.clone());
+            }
+            self.read(&plant, inputs, &mut straight);
+            plant.step(inputs);
+        }
+        let force_output = self.outputs.iter().position(|output| *output == (axis, FORCE));
+        let mut all = Vec::with_capacity(UnknownKind::ALL.len() * BLOCKS);
+        for kind in UnknownKind::ALL {
+            for (block, plant) in plants.iter().enumerate() {
+                let from = block * BLOCK * width;
+                let mut response = vec![0.0; self.rows()];
+                if kind == UnknownKind::ForceSensor {
+                    if let Some(output) = force_output {
+                        let reading = STEP / self.record.noise[axis][FORCE];
+                        (0..BLOCK).for_each(|period| response[from + period * width + output] = reading);
+                    }
+                } else {
+                    let changed = self.run_block(plant, &inputs[block * BLOCK..], axis, kind);
+                    for ((value, changed), straight) in
+                        response[from..].iter_mut().zip(changed).zip(&straight[from..])
+                    {
+                        *value = (changed - straight) / STEP;
+                    }
+                }
+                self.process(at, &mut response);
+                all.push(response);
+            }
+        }
+        all
+    }
+
+    /// Readings from a block on, with a unit of an input during the block.
+    fn run_block(&self, plant: &Plant, inputs: &[Inputs], axis: usize, kind: UnknownKind) -> Vec<f64> {
+        let mut plant = plant.clone();
+        let mut readings = Vec::with_capacity(inputs.len() * self.outputs.len());
+        for (period, inputs) in inputs.iter().enumerate() {
+            let acts = period < BLOCK;
+            let mut inputs = *inputs;
+            let pushed = acts && kind == UnknownKind::Force;
+            if pushed {
+                let hand = [&mut inputs.hand_force_carriage_n, &mut inputs.hand_force_load_n];
+                *hand.into_iter().nth(axis).expect("two axes") += if axis == 0 { STEP } else { -STEP };
+            }
+            let from = readings.len();
+            self.read(&plant, &inputs, &mut readings);
+            if pushed {
+                for (reading, output) in readings[from..].iter_mut().zip(&self.outputs) {
+                    if *output == (axis, FORCE) {
+                        *reading += STEP / self.record.noise[axis][FORCE];
+                    }
+                }
+            }
+            plant.step(&inputs);
+            if acts && kind != UnknownKind::Force {
+                let mut state = *plant.state();
+                let air_j = plant.rig().gas().normal_pressure_pa * PERIOD_S * STEP / NORMAL_LITRES_PER_MINUTE;
+                let axis_state = &mut state.axes[axis];
+                match kind {
+                    UnknownKind::FlowA => axis_state.stored_air_a_j += air_j,
+                    _ => axis_state.stored_air_b_j += air_j,
+                }
+                plant.go_on_in(&state).expect("a little more air is a state of the rig");
+            }
+        }
+        readings
+    }
+
+    /// Processes one window's column as residuals are.
+    fn process(&self, at: usize, column: &mut [f64]) {
+        let valid = &self.valid[at * self.rows()..][..self.rows()];
+        column.iter_mut().zip(valid).filter(|(_, valid)| !**valid).for_each(|(value, _)| *value = 0.0);
+        self.flatten(column, SPIKE);
+        self.whiten(at, column);
+        project(column, &self.bases[at]);
+    }
+}
