@@ -17,7 +17,7 @@ use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::locate::{UnknownSeries, locate};
-use crate::name::{SelectionResult, name, on_all};
+use crate::name::{SelectionResult, is_off, name, on_all};
 use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
@@ -195,8 +195,8 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
                     reported.added = true;
                     reported.tables = found.terms;
                     reported.share_explained = Some(found.share_explained);
-                    report.parameters = found.parameters;
-                    report.insignificant.clear();
+                    (report.parameters, report.insignificant) =
+                        found.parameters.into_iter().partition(is_off);
                 }
                 Err(why_not) => reported.why_not = Some(why_not),
             }
