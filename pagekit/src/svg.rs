@@ -243,6 +243,7 @@ mod tests {
     fn round_values_are_round() {
         let scale = Scale::linear((-3.0, 61.0), (0.0, 100.0));
         assert_eq!(scale.round_values(7.0), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
+        assert_eq!(scale.round_values(40.0)[..3], [-2.0, 0.0, 2.0]);
         assert_eq!(whole_decades(13.0, 99.0), (10.0, 100.0));
         assert_eq!(whole_decades(10.0, 10.0), (10.0, 100.0));
     }

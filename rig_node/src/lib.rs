@@ -199,3 +199,29 @@ impl<R: SimulatedRig> RigNode<R> {
         self.skipped
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::scene::Outcome;
+    use plant::{People, Plant, RigParameters, Scene, Sensors, Setup};
+
+    #[test]
+    fn a_tick_is_sent_when_it_is_due_and_once_after_a_miss() {
+        let rig = RigParameters::baseline();
+        let plant = Plant::new(&rig, &Setup::default()).unwrap();
+        let peopled = PeopledPlant::new(plant, Sensors::new(&rig, 1), People::new(&Scene::default()));
+        let mut node = RigNode::new(peopled, false);
+        for cycle in 0..25 {
+            for after_miss in [false, true] {
+                let readings = node.begin(cycle, &mut |_: Outcome| ());
+                let mut ticks = 0;
+                node.publish(cycle, after_miss, &readings, |frame| {
+                    ticks += usize::from(matches!(frame, Frame::Tick(_)));
+                });
+                let is_due = after_miss || periods::tick_is_due(cycle);
+                assert_eq!(ticks, usize::from(is_due), "cycle {cycle}, after a miss: {after_miss}");
+            }
+        }
+    }
+}

@@ -292,3 +292,22 @@ impl<'a> Section<'a> {
         Ok(Self { source: self.source, path, table, at: value.span().start, asked: Vec::new() })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_whole_number_has_no_fraction_and_no_sign() {
+        let source = Source::parse("a = 3\nb = 2.5\nc = -1", Path::new("file.toml")).expect("TOML");
+        let mut section = source.root();
+        let mut read =
+            |name| section.whole_or_default(&Parameter::new((name, ""), [-10.0, 10.0], 1.0, "count"));
+        assert_eq!(read("a"), Ok(3));
+        for (name, line) in [("b", 2), ("c", 3)] {
+            let message = read(name).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("file.toml:{line}: {name} = ")), "{message}");
+            assert!(message.contains("allowed is a whole number"), "{message}");
+        }
+    }
+}

@@ -153,6 +153,15 @@ mod tests {
     }
 
     #[test]
+    fn one_overshoot_is_aperiodic_still() {
+        // Beyond the band of 5 % between 60 and 140 ms, once.
+        let bump = |since: f64| if (0.06..0.14).contains(&since) { 0.2 } else { 0.0 };
+        let figures = figures(|since| 1.0 - (-since / 0.01_f64).exp() + bump(since), |_| 0.0);
+        assert_eq!(figures.get("force_aperiodic"), Some(1.0));
+        assert!(figures.get("force_overshoot_ratio").unwrap() > 0.1);
+    }
+
+    #[test]
     fn an_oscillation_is_not_aperiodic_and_a_force_that_stays_away_never_settles_there() {
         let ringing = figures(|since| 1.0 - (-since / 0.1_f64).exp() * (60.0 * since).cos(), |_| 0.0);
         assert_eq!(ringing.get("force_aperiodic"), Some(0.0));
