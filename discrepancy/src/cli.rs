@@ -62,8 +62,8 @@ pub struct ReadArguments {
     /// Mapping file of foreign CSV records.
     #[arg(long)]
     pub(crate) mapping: Option<PathBuf>,
-    /// Refuse records with columns that the measurement file does not know; with close, exit code 1 too unless the held-out
-    /// record confirms what was found.
+    /// Refuse records with columns that the measurement file does not know (a model of one balance reads its own alone); with
+    /// close, exit code 1 too unless the held-out record confirms what was found.
     #[arg(long)]
     pub(crate) strict: bool,
 }

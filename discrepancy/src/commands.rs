@@ -4,6 +4,8 @@
 //! the verdict `bad-data`, and the exit code for bad input. What was found is printed before it is written, so that a full disk
 //! takes the files alone.
 
+mod text;
+
 use crate::calibrate::calibrate;
 use crate::calibrate::finer::finer;
 use crate::cli::{
@@ -13,7 +15,7 @@ use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
 use crate::refit::Linearisation;
-use crate::report::{Misfit, NamedEffect, Quantity, Report, Verdict, Verification, decimals};
+use crate::report::{Misfit, Report, Verdict, Verification};
 use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
 use crate::{locate, page, single_equation, verify};
 use plant::effects::{SHEETS, sheet};
@@ -24,6 +26,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Instant;
+use text::{in_words, quantity_in_words, significant};
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
@@ -125,14 +128,26 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         out.write(name, experiment)?;
     }
     progress(&format!("report.json and report.html are in {}", out.path().display()));
-    if report.verdict == Verdict::BadData || not_judged.is_some() {
-        return Ok(Exit::BadInput);
+    Ok(match not_judged {
+        Some(_) => Exit::BadInput,
+        None => exit_of(report, records.read.strict),
+    })
+}
+
+/// The exit code of a judged report. A finding that the held-out record does not confirm is a broken bound for who asked to be
+/// strict.
+fn exit_of(report: &Report, strict: bool) -> Exit {
+    match report.verdict {
+        Verdict::BadData => Exit::BadInput,
+        _ if strict && unconfirmed(report).is_some() => Exit::BoundBroken,
+        _ => Exit::Good,
     }
-    // A finding that a held-out record makes worse, or does not confirm, is a broken bound for who asked to be strict.
-    let is_found = report.verdict != Verdict::NothingMissing;
-    let is_unconfirmed =
-        is_found && report.verification.as_ref().is_some_and(|verification| !verification.confirmed);
-    Ok(if records.read.strict && is_unconfirmed { Exit::BoundBroken } else { Exit::Good })
+}
+
+/// The verification that does not confirm what was found.
+fn unconfirmed(report: &Report) -> Option<&Verification> {
+    let verification = report.verification.as_ref().filter(|verification| !verification.confirmed);
+    verification.filter(|_| report.verdict != Verdict::NothingMissing)
 }
 
 fn one_balance_outcome(
@@ -154,7 +169,6 @@ fn one_balance_outcome(
 fn refuse_whole_rig_options(arguments: &NameArguments) -> Result<(), CommandError> {
     let given = [
         ("--mapping", arguments.records.read.mapping.is_some(), "mapping = \"…\" in the model file"),
-        ("--strict", arguments.records.read.strict, "it reads the columns under [channels] alone"),
         ("--without", !arguments.without.is_empty(), "[[terms]] and [selection] of the model file"),
     ];
     let Some((option, _, instead)) = given.iter().find(|(_, given, _)| *given) else { return Ok(()) };
@@ -424,53 +438,25 @@ pub fn end_when_asked() {
     });
 }
 
-/// The verdict and the names in a few lines.
-fn in_words(report: &Report) -> String {
-    let mut text = format!("{}\n", report.summary);
-    for named in &report.named {
-        let _ = writeln!(text, "  {}", effect_in_words(named));
-        for other in &named.alternatives {
-            let _ = writeln!(text, "    or {}", effect_in_words(other));
-        }
-    }
-    for quantity in &report.parameters {
-        let _ = writeln!(text, "  {}", quantity_in_words(quantity));
-    }
-    let unconfirmed = report.verification.as_ref().filter(|verification| !verification.confirmed);
-    if report.verdict != Verdict::NothingMissing
-        && let Some(verification) = unconfirmed
-    {
-        let how = if verification.worse { "gets worse with it" } else { "does not confirm it" };
-        let _ = writeln!(text, "  the held-out record {how}");
-    }
-    for (signal, misfit) in &report.misfit {
-        if let Some(closed) = misfit.closed {
-            let _ = writeln!(text, "  {signal}: {:.1} % of the gap to the noise closed", closed * 100.0);
-        }
-    }
-    text
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn effect_in_words(named: &NamedEffect) -> String {
-    let place = workflow::place_name(&named.place);
-    let numbers: Vec<String> = named.parameters.iter().map(quantity_in_words).collect();
-    format!("{} {place}: {}", named.effect, numbers.join(", "))
-}
-
-/// Four digits that count.
-fn significant(value: f64) -> String {
-    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
-    format!("{value:.digits$}", digits = (3.0 - magnitude).clamp(0.0, 12.0) as usize)
-}
-
-/// `leakage_nl_per_min = 2.513 +- 0.041 Nl/min`: rounded to the second digit of the standard error.
-fn quantity_in_words(quantity: &Quantity) -> String {
-    let value = match quantity.standard_error.filter(|error| *error > 0.0) {
-        Some(error) => {
-            let digits = decimals(error);
-            format!("{:.digits$} +- {error:.digits$}", quantity.value)
-        }
-        None => significant(quantity.value),
-    };
-    format!("{} = {value} {}", quantity.name, quantity.unit).trim_end().to_owned()
+    #[test]
+    fn only_who_is_strict_is_refused_a_finding_that_the_held_out_record_does_not_confirm() {
+        let report = |verdict, confirmed| Report {
+            verdict,
+            verification: Some(Verification { confirmed, ..Verification::default() }),
+            ..Report::default()
+        };
+        let unconfirmed = report(Verdict::Named, false);
+        assert_eq!(
+            [false, true].map(|strict| exit_of(&unconfirmed, strict)),
+            [Exit::Good, Exit::BoundBroken]
+        );
+        assert_eq!(exit_of(&report(Verdict::Named, true), true), Exit::Good);
+        // Nothing was found, so that there is nothing to confirm.
+        assert_eq!(exit_of(&report(Verdict::NothingMissing, false), true), Exit::Good);
+        assert_eq!(exit_of(&report(Verdict::BadData, false), true), Exit::BadInput);
+    }
 }

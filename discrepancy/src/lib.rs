@@ -19,6 +19,7 @@
 //! | [`name`](mod@name) | forward selection and backward elimination of effects |
 //! | [`extend`] | the extended rig file |
 //! | [`locate`] | unknown inputs of each balance |
+//! | `unknown_inputs` | a force on an axis, a flow into a chamber |
 //! | [`discrepancy_term`] | the discrepancy term of a model: its balance and variables, by evidence |
 //! | [`outside`] | terms outside the catalogue: dependence, curve, formula |
 //! | `tabulate` | such terms as tables of the rig file |
@@ -54,6 +55,7 @@ pub(crate) mod sensor_inverse;
 pub mod single_equation;
 pub(crate) mod stats;
 pub(crate) mod tabulate;
+pub(crate) mod unknown_inputs;
 pub(crate) mod verify;
 pub mod windows;
 pub mod workflow;

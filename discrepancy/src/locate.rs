@@ -46,10 +46,9 @@ pub(crate) const POSITION: usize = 0;
 pub(crate) const VELOCITY: usize = 1;
 pub(crate) const SPEED: usize = 2;
 pub(crate) const DIRECTION: usize = 3;
+pub(crate) const PRESSURE_DIFFERENCE: usize = 6;
 pub(crate) const FORCE: usize = 9;
 pub(crate) const TIME: usize = 10;
-/// From m^3/s to Nl/min.
-pub(crate) const NORMAL_LITRES_PER_MINUTE: f64 = 6e4;
 /// Most points of a series in the report.
 const SERIES: usize = 1500;
 
@@ -207,7 +206,8 @@ mod tests {
 
     #[test]
     fn named_places_are_those_of_the_table() {
-        let named = [POSITION, VELOCITY, SPEED, DIRECTION, FORCE, TIME].map(|place| VARIABLES[place].name);
-        assert_eq!(named, ["x", "v", "|v|", "sign(v)", "F", "t"]);
+        let places = [POSITION, VELOCITY, SPEED, DIRECTION, PRESSURE_DIFFERENCE, FORCE, TIME];
+        let named = places.map(|place| VARIABLES[place].name);
+        assert_eq!(named, ["x", "v", "|v|", "sign(v)", "p_a-p_b", "F", "t"]);
     }
 }

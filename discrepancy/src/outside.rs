@@ -105,17 +105,16 @@ impl BalanceTests<'_> {
             })
             .collect();
         let mean = self.sample.mean_over_error().abs();
-        let of_constant = located.map(|located| {
-            let first = located.variables.iter().take(LOCATED);
-            first.into_iter().position(|variable| variable.variable == CONSTANT)
+        let located_at = located.and_then(|located| {
+            located.variables.iter().take(LOCATED).position(|variable| variable.variable == CONSTANT)
         });
         let is_constant = mean > MIN_MEAN_Z && constant > explained * (1.0 - constant);
-        if of_constant.unwrap_or(None).is_some() || located.is_none() && is_constant {
+        if located_at.is_some() || located.is_none() && is_constant {
             // No permutation p value: a circular shift leaves the mean unchanged. The z test above decides, and the smallest p
             // value of the other variables stands for it.
             let p_value = 1.0 / (SHIFTS as f64 + 1.0);
             let by_share = usize::from(explained > R2_BEFORE_CONSTANT);
-            let place = of_constant.flatten().unwrap_or(by_share).min(variables.len());
+            let place = located_at.unwrap_or(by_share).min(variables.len());
             variables.insert(place, Dependence { variable: CONSTANT.to_owned(), r2: constant, p_value });
         }
         let formula =

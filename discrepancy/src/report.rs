@@ -318,7 +318,7 @@ pub struct Misfit {
 }
 
 /// Figures of both models on the held-out record.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Verification {
     pub record: String,
     /// Windowed chi2 per degree of freedom of the baseline.

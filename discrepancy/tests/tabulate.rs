@@ -29,6 +29,14 @@ fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
     let report = &outcome.report;
     assert_eq!(report.verdict, Verdict::OutsideCatalogue, "{}", report.summary);
     assert!(report.named.is_empty());
+    assert_eq!(report.adequate, Some(false));
+    let located = report.location.as_ref().and_then(|location| location.dependence.as_ref());
+    let located = located.expect("whatever the verdict");
+    assert_eq!((located.balance.as_str(), located.variables[0].variable.as_str()), ("drive.force", "x"));
+    let nearest =
+        &report.nearest.as_ref().expect("a friction that depends on the position is like it").effect;
+    assert!(report.summary.contains(&format!("It resembles {nearest} (drive), whose law takes")));
+    assert!(!outcome.extended.as_ref().expect("a usable record").contains(nearest));
     let outside = report.outside.as_ref().expect("of this verdict");
     assert!(outside.added && outside.why_not.is_none(), "{:?}", outside.why_not);
     assert_eq!(

@@ -22,8 +22,9 @@
 use super::noise_colour::ar1_coefficients;
 use super::regime::Regimes;
 use super::simulated::{Nudge, Pass, Readings};
-use super::{NORMAL_LITRES_PER_MINUTE, UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
+use super::{UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
 use crate::gridded_record::{CHANNELS, GriddedRecord};
+use crate::unknown_inputs::NORMAL_LITRES_PER_MINUTE;
 use nalgebra::{SMatrix, SVector};
 use plant::{Axis, PERIOD_S, RigParameters};
 

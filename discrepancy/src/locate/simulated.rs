@@ -10,6 +10,7 @@
 
 use super::WINDOW;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
+use crate::unknown_inputs::{add_air, pushed};
 use crate::windows::state_at;
 use plant::{Inputs, PERIOD_S, Plant, RigParameters, Setup};
 
@@ -79,22 +80,11 @@ impl<'a> Pass<'a> {
             let inputs = self.inputs(from + at, forces);
             // The sensor reads the contact force of the instant; the mean of both ends acts over the period.
             let contact_n = self.contact_n[from + at];
-            let instant = Inputs {
-                hand_force_carriage_n: contact_n + forces[0],
-                hand_force_load_n: -contact_n - forces[1],
-                ..inputs
-            };
-            *readings = plant.shown(&plant.truth(&instant));
+            *readings = plant.shown(&plant.truth(&touched(inputs, contact_n, forces)));
             readings.iter_mut().zip(forces).for_each(|(reading, force_n)| reading[1] += force_n);
             plant.step(&inputs);
             if flows {
-                let mut state = *plant.state();
-                for (axis_state, flow) in state.axes.iter_mut().zip(nudge.flows_m3_per_s) {
-                    let air_j = plant.rig().gas().normal_pressure_pa * PERIOD_S;
-                    axis_state.stored_air_a_j += air_j * flow[0];
-                    axis_state.stored_air_b_j += air_j * flow[1];
-                }
-                plant.go_on_in(&state).ok()?;
+                add_air(&mut plant, &nudge.flows_m3_per_s).ok()?;
             }
         }
         Some([0, 1].map(|axis| read.map(|readings| readings[axis])))
@@ -116,12 +106,14 @@ impl<'a> Pass<'a> {
     /// Inputs of a period: commands, contact force, and unknown forces along the extensions, N.
     fn inputs(&self, at: usize, forces_n: [f64; 2]) -> Inputs {
         let contact_n = 0.5 * (self.contact_n[at] + self.contact_n[(at + 1).min(self.contact_n.len() - 1)]);
-        Inputs {
-            valve: self.record.inputs[at].valve,
-            hand_force_carriage_n: contact_n + forces_n[0],
-            hand_force_load_n: -contact_n - forces_n[1],
-        }
+        touched(self.record.inputs[at], contact_n, forces_n)
     }
+}
+
+/// Inputs with a contact force and unknown forces along the extensions, N.
+fn touched(inputs: Inputs, contact_n: f64, forces_n: [f64; 2]) -> Inputs {
+    let contact = Inputs { hand_force_carriage_n: contact_n, hand_force_load_n: -contact_n, ..inputs };
+    pushed(contact, forces_n)
 }
 
 /// Contact force from the sensors: -F of the load, or that of the drive minus the inertia of the carriage.

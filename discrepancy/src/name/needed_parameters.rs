@@ -29,7 +29,7 @@ const OFF_SHIFTS: f64 = 3.0;
 pub(crate) fn off(engine: &Engine<'_>, model: &Refit) -> [bool; COUNT] {
     let errors = &model.errors[model.errors.len() - COUNT..];
     let by = model.factors.map(|factor| (factor - 1.0).abs());
-    let off: [bool; COUNT] = std::array::from_fn(|at| by[at] > OFF_LEAST && by[at] > OFF_ERRORS * errors[at]);
+    let off: [bool; COUNT] = std::array::from_fn(|at| is_significant(by[at], errors[at]));
     if !off.contains(&true) {
         return off;
     }
@@ -40,8 +40,12 @@ pub(crate) fn off(engine: &Engine<'_>, model: &Refit) -> [bool; COUNT] {
 /// Whether a parameter of the rig file is off by as much, the error of integration aside.
 pub(crate) fn is_off(quantity: &Quantity) -> bool {
     let (Some(before), Some(error)) = (quantity.before, quantity.standard_error) else { return false };
-    let by = (quantity.value - before).abs();
-    by > OFF_LEAST * before.abs() && by > OFF_ERRORS * error
+    is_significant(((quantity.value - before) / before).abs(), error / before.abs())
+}
+
+/// Whether a relative deviation with this standard error makes a parameter off.
+fn is_significant(by: f64, error: f64) -> bool {
+    by > OFF_LEAST && by > OFF_ERRORS * error
 }
 
 /// Size of the change of each parameter when the model is fitted to itself simulated with half the step. `None` where it cannot

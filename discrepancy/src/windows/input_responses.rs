@@ -10,10 +10,10 @@
 
 use super::whiten::SPIKE;
 use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, dot, project, set_state};
-use crate::locate::NORMAL_LITRES_PER_MINUTE;
 use crate::sensor_inverse::SensorInverse;
+use crate::unknown_inputs::{NORMAL_LITRES_PER_MINUTE, add_air, pushed};
 use nalgebra::DMatrix;
-use plant::{Inputs, PERIOD_S, Plant, RigParameters};
+use plant::{Inputs, Plant, RigParameters};
 use rayon::prelude::*;
 
 /// Periods of a block; a window has [`BLOCKS`].
@@ -61,8 +61,13 @@ pub(crate) struct InputProducts {
 }
 
 impl Windows<'_> {
-    /// The products of each judged window; `columns` are over all judged windows, as residuals are.
-    pub(crate) fn input_products(&self, rig: &RigParameters, columns: &[&[f64]]) -> Vec<InputProducts> {
+    /// The products of each judged window; `columns` are over all judged windows, as residuals are. `None` where an input brings
+    /// the rig into a state that it cannot be in.
+    pub(crate) fn input_products(
+        &self,
+        rig: &RigParameters,
+        columns: &[&[f64]],
+    ) -> Option<Vec<InputProducts>> {
         let rows = self.rows();
         self.plants_at_windows(rig)
             .par_iter()
@@ -73,7 +78,7 @@ impl Windows<'_> {
                     cross: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
                 };
                 for axis in (0..2).filter(|axis| self.record.measured[*axis]) {
-                    let responses = self.responses(at, plant, axis);
+                    let responses = self.responses(at, plant, axis)?;
                     let count = responses.len();
                     let mut gram = DMatrix::zeros(count, count);
                     for left in 0..count {
@@ -88,7 +93,7 @@ impl Windows<'_> {
                         dot(&columns[column][at * rows..][..rows], &responses[response])
                     });
                 }
-                products
+                Some(products)
             })
             .collect()
     }
@@ -110,7 +115,7 @@ impl Windows<'_> {
     }
 
     /// The responses of window `at` to each input and block of an axis.
-    fn responses(&self, at: usize, plant: &Plant, axis: usize) -> Vec<Vec<f64>> {
+    fn responses(&self, at: usize, plant: &Plant, axis: usize) -> Option<Vec<Vec<f64>>> {
         let inputs = &self.record.inputs[self.starts[at]..][..WINDOW];
         let width = self.outputs.len();
         // The straight run, and the plant at the start of each block.
@@ -136,7 +141,7 @@ impl Windows<'_> {
                         (0..BLOCK).for_each(|period| response[from + period * width + output] = reading);
                     }
                 } else {
-                    let changed = self.run_block(plant, &inputs[block * BLOCK..], axis, kind);
+                    let changed = self.run_block(plant, &inputs[block * BLOCK..], axis, kind)?;
                     for ((value, changed), straight) in
                         response[from..].iter_mut().zip(changed).zip(&straight[from..])
                     {
@@ -147,43 +152,44 @@ impl Windows<'_> {
                 all.push(response);
             }
         }
-        all
+        Some(all)
     }
 
     /// Readings from a block on, with a unit of an input during the block.
-    fn run_block(&self, plant: &Plant, inputs: &[Inputs], axis: usize, kind: UnknownKind) -> Vec<f64> {
+    fn run_block(
+        &self,
+        plant: &Plant,
+        inputs: &[Inputs],
+        axis: usize,
+        kind: UnknownKind,
+    ) -> Option<Vec<f64>> {
         let mut plant = plant.clone();
         let mut readings = Vec::with_capacity(inputs.len() * self.outputs.len());
+        let (mut forces_n, mut flows_m3_per_s) = ([0.0; 2], [[0.0; 2]; 2]);
+        match kind {
+            UnknownKind::Force => forces_n[axis] = STEP,
+            UnknownKind::FlowA => flows_m3_per_s[axis][0] = STEP / NORMAL_LITRES_PER_MINUTE,
+            UnknownKind::FlowB => flows_m3_per_s[axis][1] = STEP / NORMAL_LITRES_PER_MINUTE,
+            UnknownKind::ForceSensor => {}
+        }
         for (period, inputs) in inputs.iter().enumerate() {
             let acts = period < BLOCK;
-            let mut inputs = *inputs;
-            let pushed = acts && kind == UnknownKind::Force;
-            if pushed {
-                let hand = [&mut inputs.hand_force_carriage_n, &mut inputs.hand_force_load_n];
-                *hand.into_iter().nth(axis).expect("two axes") += if axis == 0 { STEP } else { -STEP };
-            }
+            let inputs = if acts { pushed(*inputs, forces_n) } else { *inputs };
             let from = readings.len();
             self.read(&plant, &inputs, &mut readings);
-            if pushed {
-                for (reading, output) in readings[from..].iter_mut().zip(&self.outputs) {
-                    if *output == (axis, FORCE) {
-                        *reading += STEP / self.record.noise[axis][FORCE];
+            if acts {
+                for (reading, (of, channel)) in readings[from..].iter_mut().zip(&self.outputs) {
+                    if *channel == FORCE {
+                        *reading += forces_n[*of] / self.record.noise[*of][FORCE];
                     }
                 }
             }
             plant.step(&inputs);
-            if acts && kind != UnknownKind::Force {
-                let mut state = *plant.state();
-                let air_j = plant.rig().gas().normal_pressure_pa * PERIOD_S * STEP / NORMAL_LITRES_PER_MINUTE;
-                let axis_state = &mut state.axes[axis];
-                match kind {
-                    UnknownKind::FlowA => axis_state.stored_air_a_j += air_j,
-                    _ => axis_state.stored_air_b_j += air_j,
-                }
-                plant.go_on_in(&state).expect("a little more air is a state of the rig");
+            if acts && matches!(kind, UnknownKind::FlowA | UnknownKind::FlowB) {
+                add_air(&mut plant, &flows_m3_per_s).ok()?;
             }
         }
-        readings
+        Some(readings)
     }
 
     /// Processes one window's column as residuals are.

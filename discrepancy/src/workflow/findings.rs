@@ -35,7 +35,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     let (not_excited, detection_limits) = limits(found);
     Report {
         named,
-        adequate: Some(!found.lacks_fit),
+        adequate: Some(!found.lacks_fit && found.not_explained.is_none()),
         nearest,
         parameters,
         insignificant,
@@ -216,11 +216,15 @@ pub(super) fn summary(report: &Report) -> String {
         }
         Verdict::OutsideCatalogue => {
             let nearest = report.nearest.as_ref().map_or(String::new(), |nearest| {
+                let decision = report
+                    .candidates
+                    .iter()
+                    .find(|candidate| candidate.effect == nearest.effect && candidate.place == nearest.place)
+                    .map_or("", |candidate| candidate.decision.as_str());
                 let rest =
-                    if remaining.is_empty() { String::new() } else { format!("; of the rest,{remaining}") };
-                let rest = if rest.is_empty() { ".".to_owned() } else { rest };
+                    if remaining.is_empty() { ".".to_owned() } else { format!("; of the rest,{remaining}") };
                 format!(
-                    " It resembles {}, whose law takes {:.0} %{rest}",
+                    " It resembles {}, whose law takes {:.0} % and {decision}{rest}",
                     one(nearest),
                     1e2 * nearest.share_explained
                 )
