@@ -65,16 +65,13 @@ pub fn simulate_proposed(
     (file, toml): (&str, &str),
 ) -> Result<Record, MakeError> {
     let nominal = rig.without_effects();
-    let program = |name: &str| {
-        std::fs::read_to_string(workspace().join(format!("controller/programs/{name}.toml"))).ok()
-    };
     let experiment = Inputs::of_texts(&nominal, (file, toml), program, &[])?.experiment;
     let driven = [experiment.drive.is_some(), experiment.load.is_some()];
     let set = unsettled(Axis::ALL.into_iter().filter(|axis| driven[axis.index()]));
     let set: Vec<&str> = set.iter().map(String::as_str).collect();
     let inputs = Inputs::of_texts(&nominal, (file, toml), program, &set)?;
     let scene = scene(toml, file, rig)?;
-    let moved = Recipe { both_axes: true, ..recipe.clone() };
+    let moved = Recipe { both_axes: true, unlinked: false, ..recipe.clone() };
     let made = Made::new(&moved, rig, &scene, STEPS_PER_MS)?;
     let mut rehearsal = Rehearsal::with_rig(made, controllers(&inputs)?);
     let recorded = Recipe { both_axes: recipe.both_axes || scene.linked, ..recipe.clone() };
@@ -172,12 +169,8 @@ fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("two folders below the checkout")
 }
 
-fn experiment_file(recipe: &Recipe) -> Result<PathBuf, MakeError> {
-    let axes = match (recipe.both_axes, recipe.axis) {
-        (true, _) => "linked",
-        (false, Axis::Drive) => "drive",
-        (false, Axis::Load) => "load",
-    };
+/// The file of an experiment of `axes`: drive, load, or linked.
+fn experiment_file(recipe: &Recipe, axes: &str) -> Result<PathBuf, MakeError> {
     let name = match recipe.experiment {
         Experiment::Train => "train",
         Experiment::HeldOut(0) => "point-to-point",
@@ -188,10 +181,13 @@ fn experiment_file(recipe: &Recipe) -> Result<PathBuf, MakeError> {
 }
 
 fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeError> {
-    let experiment = experiment_file(recipe)?;
-    let file = experiment.display().to_string();
     let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
     let set = unsettled(moved);
+    if recipe.both_axes && recipe.unlinked {
+        return read_apart(recipe, rig, &set);
+    }
+    let experiment = experiment_file(recipe, if recipe.both_axes { "linked" } else { recipe.axis.name() })?;
+    let file = experiment.display().to_string();
     let files = FileArguments {
         rig: workspace().join("plant/rig.toml"),
         experiment,
@@ -203,6 +199,29 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
     inputs.rig = rig.without_effects();
     let scene = scene(&inputs.experiment_toml, &file, rig)?;
     Ok((inputs, scene))
+}
+
+/// Each axis under its own experiment, at the same time.
+fn read_apart(recipe: &Recipe, rig: &RigParameters, set: &[String]) -> Result<(Inputs, Scene), MakeError> {
+    let [drive, load] = Axis::ALL.map(|axis| experiment_file(recipe, axis.name()));
+    let (drive, load) = (drive?, load?);
+    let [drive_toml, load_toml] = [&drive, &load].map(|file| {
+        std::fs::read_to_string(file)
+            .map_err(|error| MakeError::File { path: file.display().to_string(), error })
+    });
+    let load_toml = load_toml?;
+    let section = load_toml.find("[load]").expect("an experiment of the load has its section");
+    let toml = format!("{}\n{}", drive_toml?, &load_toml[section..]);
+    let file = drive.display().to_string();
+    let set: Vec<&str> = set.iter().map(String::as_str).collect();
+    let inputs = Inputs::of_texts(&rig.without_effects(), (&file, &toml), program, &set)?;
+    let scene = scene(&toml, &file, rig)?;
+    Ok((inputs, scene))
+}
+
+/// The text of a shipped program.
+fn program(name: &str) -> Option<String> {
+    std::fs::read_to_string(workspace().join(format!("controller/programs/{name}.toml"))).ok()
 }
 
 fn unsettled(axes: impl Iterator<Item = Axis>) -> Vec<String> {
@@ -238,7 +257,8 @@ impl Made {
         scene: &Scene,
         steps_per_ms: usize,
     ) -> Result<Self, MakeError> {
-        let numbers = Numbers::new(rig, scene.added_mass_kg, &recipe.wrong_parameters)?;
+        let background = recipe.background.as_ref();
+        let numbers = Numbers::new(rig, scene.added_mass_kg, &recipe.wrong_parameters, background)?;
         let stroke_m = numbers.stroke_m;
         let (mut made, laws) = hidden::rig(recipe, numbers, steps_per_ms)?;
         // Both axes may move without being linked.
@@ -246,7 +266,11 @@ impl Made {
         let mut axis = 0;
         let sensing = laws.map(|laws| {
             let streams = |channel| Stream::new(recipe.seed, (4 * axis + channel) as u64);
-            let noise = (recipe.noise, recipe.coloured_noise);
+            let noise = (
+                recipe.noise,
+                recipe.coloured_noise,
+                background.map(|background| background.slow_noise_ratio),
+            );
             let sensing = Sensing::new(laws, rig.sensors(), axis, made.step_s(), streams, noise);
             axis += 1;
             sensing

@@ -111,7 +111,7 @@ fn truth_csv(record: &Record) -> Vec<u8> {
 
 /// The recipe, complete: effects with their place and numbers as reports name them.
 fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
-    let hidden = recipe.hidden.iter().map(|hidden| {
+    let effect = |hidden: &super::Hidden| {
         let keys = hidden::sheet(hidden)?.keys.iter().zip(&hidden.numbers);
         let parameters: Vec<_> = keys
             .map(|(key, value)| json!({ "name": key.name, "value": value, "unit": key.unit.name() }))
@@ -121,7 +121,20 @@ fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
             "element": hidden.place.element.map(|element| element.name()),
         });
         Ok(json!({ "effect": hidden.name, "where": place, "parameters": parameters }))
+    };
+    let background = recipe.background.as_ref().map(|background| {
+        let effects = background.effects.iter().map(effect).collect::<Result<Vec<_>, MakeError>>()?;
+        Ok::<Value, MakeError>(json!({
+            "effects": effects,
+            "valve_point_factors": background.valve_point_factors,
+            "dead_volume_ratio": background.dead_volume_ratio,
+            "temperature_ratio": background.temperature_ratio,
+            "fading_ratio": background.fading_ratio,
+            "fading_below_m_per_s": background.fading_below_m_per_s,
+            "slow_noise_ratio": background.slow_noise_ratio,
+        }))
     });
+    let background = background.transpose()?;
     let experiment = match recipe.experiment {
         Experiment::Train => json!("train"),
         Experiment::HeldOut(number) => json!({ "held-out": number }),
@@ -136,12 +149,14 @@ fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
         "seed": recipe.seed,
         "axis": recipe.axis.name(),
         "both_axes": recipe.both_axes,
-        "hidden": hidden.collect::<Result<Vec<_>, MakeError>>()?,
+        "unlinked": recipe.unlinked,
+        "hidden": recipe.hidden.iter().map(effect).collect::<Result<Vec<_>, MakeError>>()?,
         "foreign_form": recipe.foreign_form,
         "wrong_parameters": wrong,
         "coloured_noise": recipe.coloured_noise,
         "jitter": recipe.jitter,
         "noise": recipe.noise,
+        "background": background,
         "experiment": experiment,
     }))
 }

@@ -43,7 +43,8 @@ pub(super) fn rig(
     }
     let mut supply = None;
     let (mut worn, mut hertz) = (false, false);
-    for hidden in &recipe.hidden {
+    let background = recipe.background.iter().flat_map(|background| &background.effects);
+    for hidden in recipe.hidden.iter().chain(background) {
         let n = si(hidden)?;
         check_place(recipe, hidden)?;
         match hidden.name {
@@ -68,7 +69,7 @@ pub(super) fn rig(
     let rig = Rig {
         axes,
         active: plant::Axis::ALL.map(|axis| recipe.both_axes || axis == recipe.axis),
-        coupling: recipe.both_axes.then_some(Coupling {
+        coupling: (recipe.both_axes && !recipe.unlinked).then_some(Coupling {
             gap_m: numbers.gap_m,
             stiffness_n_per_m: numbers.stiffness_n_per_m,
             damping_n_s_per_m: numbers.damping_n_s_per_m,
@@ -78,6 +79,7 @@ pub(super) fn rig(
         supply: supply.map(|droop| Node::supply(&numbers, droop, foreign)),
         late_s: [laws[0].late_s, laws[1].late_s],
         foreign,
+        first_order: recipe.background.is_some(),
         steps_per_ms,
     };
     Ok((rig, laws.map(|laws| laws.sensing)))
@@ -110,13 +112,13 @@ fn check_place(recipe: &Recipe, hidden: &Hidden) -> Result<(), MakeError> {
     let seen = match hidden.place.part {
         Part::Drive => recipe.both_axes || recipe.axis == plant::Axis::Drive,
         Part::Load => recipe.both_axes || recipe.axis == plant::Axis::Load,
-        Part::Linkage => recipe.both_axes,
+        Part::Linkage => recipe.both_axes && !recipe.unlinked,
         Part::Supply => true,
     };
     if !seen {
         let linkage = kind == PlaceKind::Linkage;
         return refuse(if linkage {
-            "the linkage is seen with both_axes alone"
+            "the linkage is seen with both_axes alone, and linked"
         } else {
             "this axis is not recorded; choose the other one, or both_axes"
         });

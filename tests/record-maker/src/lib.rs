@@ -14,6 +14,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `numbers.rs` | true numbers of the rig, some off by a few per cent |
+//! | `background.rs` | errors of the whole model, each small |
 //! | `hidden.rs` | from a recipe's effects to laws |
 //! | `valve.rs`, `port.rs`, `axis.rs`, `motion.rs`, `coupling.rs` | the laws, both forms of each |
 //! | `rig.rs` | steps, stick and slip, delays |
@@ -25,6 +26,7 @@
 //! Source: rig-model.md, effects.md; discrepancy-notes.md, Blind protocol.
 
 mod axis;
+mod background;
 mod closed_loop;
 pub mod comparison;
 mod coupling;
@@ -40,6 +42,7 @@ mod sensing;
 mod tests;
 mod valve;
 
+pub use background::Background;
 pub use closed_loop::{replay, simulate, simulate_proposed};
 pub use files::{make, write, write_measurement};
 pub use numbers::PARAMETERS;
@@ -60,6 +63,8 @@ pub struct Recipe {
     pub axis: Axis,
     /// Both axes, linked: the drive positioned, the load pressing.
     pub both_axes: bool,
+    /// With `both_axes`: the rods are apart, and both axes positioned.
+    pub unlinked: bool,
     pub hidden: Vec<Hidden>,
     /// Whether they have another functional form than the catalogue's.
     pub foreign_form: bool,
@@ -71,6 +76,8 @@ pub struct Recipe {
     pub jitter: bool,
     /// Rms of the noise in units of the rig file's; rounding stays.
     pub noise: f64,
+    /// Errors of the whole model beside what is hidden.
+    pub background: Option<Background>,
     pub experiment: Experiment,
 }
 
@@ -81,12 +88,14 @@ impl Default for Recipe {
             seed: 1,
             axis: Axis::Drive,
             both_axes: false,
+            unlinked: false,
             hidden: Vec::new(),
             foreign_form: false,
             wrong_parameters: Vec::new(),
             coloured_noise: false,
             jitter: false,
             noise: 1.0,
+            background: None,
             experiment: Experiment::Train,
         }
     }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 const USAGE: &str =
-    "record-maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes]
+    "record-maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes [--unlinked]]
     [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form] [--wrong parameter:NAME=FACTOR]...
     [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1]
 record-maker list
@@ -157,6 +157,7 @@ fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error
             "--seed" => recipe.seed = value()?.parse()?,
             "--axis" => recipe.axis = if value()? == "load" { Axis::Load } else { Axis::Drive },
             "--both-axes" => recipe.both_axes = true,
+            "--unlinked" => recipe.unlinked = true,
             "--foreign-form" => recipe.foreign_form = true,
             "--coloured-noise" => recipe.coloured_noise = true,
             "--jitter" => recipe.jitter = true,

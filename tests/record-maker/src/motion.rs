@@ -43,6 +43,7 @@ pub(super) struct Motion {
     /// +1 for the drive; -1 for the load, whose rod extends to -x.
     pub(super) to_rig: f64,
     micro_damping_n_s_per_m: f64,
+    fading_friction: Option<[f64; 2]>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -83,6 +84,7 @@ impl Motion {
             stroke_m: numbers.stroke_m,
             to_rig: [1.0, -1.0][axis],
             micro_damping_n_s_per_m: damping,
+            fading_friction: numbers.fading_friction,
         }
     }
 
@@ -151,6 +153,10 @@ impl Motion {
             let power = libm::pow(share, exponent);
             let falls = if laws.foreign { 1.0 / (1.0 + power) } else { libm::exp(-power) };
             level += (self.break_away_n - self.sliding_n) * falls;
+        }
+        if let Some([share, velocity]) = self.fading_friction {
+            let along = speed / velocity;
+            level *= 1.0 - share / (1.0 + along * along);
         }
         level.max(0.0)
     }

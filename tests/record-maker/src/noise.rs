@@ -6,6 +6,8 @@
 //!
 //! Source: Blackman, Vigna, "Scrambled linear pseudorandom number generators", ACM Trans. Math. Softw. 47(4), 2021.
 
+use super::background::SLOW_NOISE_SAMPLES;
+
 #[derive(Debug, Clone)]
 pub(super) struct Stream {
     state: [u64; 4],
@@ -58,7 +60,7 @@ impl Stream {
     }
 }
 
-/// Noise of one sensor: white, or with a correlation time of 5 ms at the same rms.
+/// Noise of one sensor: white, or with a correlation time of 5 ms at the same rms; a share of its variance may be slow.
 #[derive(Debug, Clone)]
 pub(super) struct Noise {
     stream: Stream,
@@ -66,16 +68,25 @@ pub(super) struct Noise {
     /// What of a sample is left in the next one.
     kept: f64,
     last: f64,
+    slow: Option<Slow>,
+}
+
+/// A part of the noise with a correlation of [`SLOW_NOISE_SAMPLES`].
+#[derive(Debug, Clone)]
+struct Slow {
+    share: f64,
+    last: f64,
 }
 
 /// Correlation time of coloured noise, in samples of 1 ms.
 const CORRELATION_SAMPLES: f64 = 5.0;
 
 impl Noise {
-    pub(super) fn new(stream: Stream, rms: f64, coloured: bool) -> Self {
+    pub(super) fn new(stream: Stream, rms: f64, coloured: bool, slow: Option<f64>) -> Self {
         let kept = if coloured { libm::exp(-1.0 / CORRELATION_SAMPLES) } else { 0.0 };
-        let mut noise = Noise { stream, rms, kept, last: 0.0 };
+        let mut noise = Noise { stream, rms, kept, last: 0.0, slow: None };
         noise.last = noise.stream.normal();
+        noise.slow = slow.map(|share| Slow { share, last: noise.stream.normal() });
         noise
     }
 
@@ -83,7 +94,10 @@ impl Noise {
     pub(super) fn sample(&mut self) -> f64 {
         let fresh = self.stream.normal();
         self.last = self.kept * self.last + (1.0 - self.kept * self.kept).sqrt() * fresh;
-        self.rms * self.last
+        let Some(slow) = &mut self.slow else { return self.rms * self.last };
+        let kept = libm::exp(-1.0 / SLOW_NOISE_SAMPLES);
+        slow.last = kept * slow.last + (1.0 - kept * kept).sqrt() * self.stream.normal();
+        self.rms * ((1.0 - slow.share).sqrt() * self.last + slow.share.sqrt() * slow.last)
     }
 }
 
@@ -92,7 +106,7 @@ mod tests {
     use super::*;
 
     fn draws(coloured: bool) -> Vec<f64> {
-        let mut noise = Noise::new(Stream::new(3, 1), 2.0, coloured);
+        let mut noise = Noise::new(Stream::new(3, 1), 2.0, coloured, None);
         (0..200_000).map(|_| noise.sample()).collect()
     }
 

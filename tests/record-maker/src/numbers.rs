@@ -2,7 +2,7 @@
 //!
 //! The controllers and whoever reads the record keep the file's numbers; `parameter:` names are those of effects.md.
 
-use super::MakeError;
+use super::{Background, MakeError};
 use plant::RigParameters;
 use plant::parameters::VALVE_POINTS;
 
@@ -52,14 +52,17 @@ pub(super) struct Numbers {
     pub(super) stiffness_n_per_m: f64,
     pub(super) damping_n_s_per_m: f64,
     pub(super) start_b_pa: f64,
+    /// Share of the sliding friction that is missing near rest, and the speed over which it comes, m/s.
+    pub(super) fading_friction: Option<[f64; 2]>,
 }
 
 impl Numbers {
-    /// The numbers of a rig file with weights on the carriage, `wrong` factors applied.
+    /// The numbers of a rig file with weights on the carriage, `wrong` factors and the background applied.
     pub(super) fn new(
         rig: &RigParameters,
         added_mass_kg: f64,
         wrong: &[(String, f64)],
+        background: Option<&Background>,
     ) -> Result<Self, MakeError> {
         let (valve, mass, friction) = (rig.valve(), rig.mass(), rig.friction());
         let conductance = |kv: &[f64; VALVE_POINTS]| kv.map(|kv| kv * CONDUCTANCE_PER_KV);
@@ -87,7 +90,12 @@ impl Numbers {
             stiffness_n_per_m: rig.linkage().stiffness_n_per_m,
             damping_n_s_per_m: rig.linkage().damping_n_s_per_m,
             start_b_pa: rig.start().rod_side_pressure_pa,
+            fading_friction: background
+                .map(|background| [background.fading_ratio, background.fading_below_m_per_s]),
         };
+        if let Some(background) = background {
+            numbers.change(background);
+        }
         for (name, factor) in wrong {
             numbers.scale(name, *factor)?;
         }
@@ -96,6 +104,16 @@ impl Numbers {
         // A piston at rest holds at least what holds it while it slides.
         numbers.break_away_n = numbers.break_away_n.max(numbers.sliding_n);
         Ok(numbers)
+    }
+
+    fn change(&mut self, background: &Background) {
+        let edges = [&mut self.supply_edge_m3_per_s_pa, &mut self.exhaust_edge_m3_per_s_pa];
+        for (edge, factors) in edges.into_iter().zip(&background.valve_point_factors) {
+            edge.iter_mut().zip(factors).for_each(|(conductance, factor)| *conductance *= factor);
+        }
+        self.dead_volume_m3 *= background.dead_volume_ratio;
+        // A normal flow brings p_N T / T_0 of energy.
+        self.normal_pa *= background.temperature_ratio;
     }
 
     fn scale(&mut self, name: &str, factor: f64) -> Result<(), MakeError> {

@@ -36,6 +36,8 @@ pub(super) struct Rig {
     /// Command dead time of each axis, s.
     pub(super) late_s: [f64; 2],
     pub(super) foreign: bool,
+    /// Steps by Euler's method in place of the midpoint's.
+    pub(super) first_order: bool,
     pub(super) steps_per_ms: usize,
 }
 
@@ -302,7 +304,8 @@ impl Rig {
         let lines = [0, 1].map(|i| self.leaving(state, i, &y[i], supply_pa));
         let mut direction = state.direction;
         let at = Instant { y: &y, bristles, supply_pa, rest_s };
-        let middle = self.evaluate(&at, &mut direction, targets, lines, false);
+        let middle =
+            if self.first_order { *first } else { self.evaluate(&at, &mut direction, targets, lines, false) };
         for i in 0..2 {
             if !self.active[i] {
                 continue;

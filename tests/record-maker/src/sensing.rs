@@ -60,7 +60,7 @@ impl Sensing {
         axis: usize,
         step_s: f64,
         streams: impl Fn(usize) -> Stream,
-        (noise, coloured): (f64, bool),
+        (noise, coloured, slow): (f64, bool, Option<f64>),
     ) -> Self {
         let lag = |time_s: f64| {
             (time_s > 0.0).then(|| Lag { time_s, kept: libm::exp(-step_s / time_s), shown: 0.0 })
@@ -91,7 +91,7 @@ impl Sensing {
             ring: vec![[0.0; CHANNELS]; (REACH_MS * per_ms).next_power_of_two()],
             steps: 0,
             noise: std::array::from_fn(|channel| {
-                Noise::new(streams(channel), noise * rms[channel], coloured)
+                Noise::new(streams(channel), noise * rms[channel], coloured, slow)
             }),
         }
     }

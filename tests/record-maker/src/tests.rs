@@ -274,3 +274,82 @@ fn null_records_lie_within_a_fifth_of_the_noise_of_the_plant() {
         }
     }
 }
+
+fn background() -> Background {
+    let small = hidden(plant::effects::sheet("line-delay").expect("known"), |drawn| 0.5 * drawn[0]);
+    Background {
+        effects: vec![small],
+        valve_point_factors: [[1.01; 6], [0.99; 6]],
+        dead_volume_ratio: 1.02,
+        temperature_ratio: 0.995,
+        fading_ratio: 0.05,
+        fading_below_m_per_s: 2e-3,
+        slow_noise_ratio: 0.2,
+    }
+}
+
+#[test]
+fn a_background_moves_all_readings_a_little_and_hides_nothing() {
+    let valves = commands(1500);
+    let null = replay(&Recipe::default(), &rig(), &valves).unwrap();
+    let with = Recipe { background: Some(background()), ..Recipe::default() };
+    let record = replay(&with, &rig(), &valves).unwrap();
+    for signal in 0..4 {
+        let differs = null.rows.iter().zip(&record.rows);
+        let squares: f64 = differs
+            .map(|(one, other)| (one.without_noise[0][signal] - other.without_noise[0][signal]).powi(2))
+            .sum();
+        // Of position, force and pressures, over their ranges.
+        let rms = (squares / null.rows.len() as f64).sqrt() / [0.5, 500.0, 6e5, 6e5][signal];
+        assert!((1e-6..0.05).contains(&rms), "{signal}: {rms}");
+    }
+    assert_eq!(measurement_csv(&record), measurement_csv(&replay(&with, &rig(), &valves).unwrap()));
+}
+
+#[test]
+fn each_part_of_a_background_changes_the_record() {
+    let valves = commands(600);
+    let none = Background {
+        effects: Vec::new(),
+        valve_point_factors: [[1.0; 6]; 2],
+        dead_volume_ratio: 1.0,
+        temperature_ratio: 1.0,
+        fading_ratio: 0.0,
+        fading_below_m_per_s: 2e-3,
+        slow_noise_ratio: 0.0,
+    };
+    let bytes = |background: &Background| {
+        let recipe = Recipe { background: Some(background.clone()), ..Recipe::default() };
+        measurement_csv(&replay(&recipe, &rig(), &valves).unwrap())
+    };
+    let all = background();
+    let parts = [
+        Background { effects: all.effects.clone(), ..none.clone() },
+        Background { valve_point_factors: all.valve_point_factors, ..none.clone() },
+        Background { dead_volume_ratio: all.dead_volume_ratio, ..none.clone() },
+        Background { temperature_ratio: all.temperature_ratio, ..none.clone() },
+        Background { fading_ratio: all.fading_ratio, ..none.clone() },
+        Background { slow_noise_ratio: all.slow_noise_ratio, ..none.clone() },
+    ];
+    for part in parts {
+        assert!(bytes(&part) != bytes(&none), "{part:?}");
+    }
+}
+
+#[test]
+fn rods_that_are_apart_do_not_touch_and_both_axes_move() {
+    let recipe = Recipe { both_axes: true, unlinked: true, ..Recipe::default() };
+    let record = run(&recipe, &rig(), [3000, STEPS_PER_MS]).unwrap();
+    assert!(!record.linked && record.rows.iter().all(|row| row.contact_force_n == 0.0));
+    for axis in 0..2 {
+        let extensions = record.rows.iter().map(|row| row.axes[axis].extension_m);
+        let [least, most] =
+            extensions.fold([f64::MAX, f64::MIN], |[least, most], x| [least.min(x), most.max(x)]);
+        assert!(most - least > 0.05, "axis {axis}: {least} to {most}");
+    }
+    let refused = Recipe {
+        hidden: vec![hidden(plant::effects::sheet("coupling-backlash").unwrap(), |drawn| drawn[0])],
+        ..recipe
+    };
+    assert!(matches!(run(&refused, &rig(), [10, STEPS_PER_MS]), Err(MakeError::Place { .. })));
+}

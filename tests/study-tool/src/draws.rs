@@ -12,7 +12,12 @@
 //!   above them.
 //! - A case of wrong parameters alone has one that is off by 3 to 15 % and none of the other difficulties in the baseline.
 //!
-//! Source: issue 5 and effects.md, Blind protocol of discrepancy-notes.md.
+//! - A study of both worlds ([`worlds`]) records both axes, and its draws take turns in the world where the catalogue's laws
+//!   are exact and the one where everything is a little wrong, in the catalogue's form and in another.
+//!
+//! Source: issue 5 and effects.md, Blind protocol of discrepancy-notes.md; issue 32.
+
+mod worlds;
 
 use crate::limits::Scale;
 use plant::Axis;
@@ -40,6 +45,9 @@ pub struct Shape {
     /// What the amplitudes of the drawn range are divided by, counted from the baseline; absent in a file when it is 1.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub weaker_factor: f64,
+    /// Exact and background world in turn, both axes recorded; absent in a file when the world is exact alone.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub worlds: bool,
 }
 
 fn one() -> f64 {
@@ -61,6 +69,7 @@ impl Shape {
         triples: 0,
         noise_factor: 1.0,
         weaker_factor: 1.0,
+        worlds: false,
     };
     pub(crate) const SMALL: Shape =
         Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, ..Shape::NO_DRAW };
@@ -76,6 +85,7 @@ impl Default for Shape {
             triples: 20,
             noise_factor: 1.0,
             weaker_factor: 1.0,
+            worlds: false,
         }
     }
 }
@@ -115,14 +125,21 @@ impl Draw {
 /// All draws of a study, in the order of their numbers.
 pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
     let mut drawn: Vec<(Kind, Recipe)> = Vec::new();
+    let in_world = |recipe, seed, stream, repetition| {
+        if shape.worlds { worlds::turn(recipe, seed, stream, repetition) } else { recipe }
+    };
     for (place, sheet) in SHEETS.iter().enumerate() {
         for repetition in 0..shape.each {
-            drawn.push((Kind::Single, Generator::new(seed, place as u64, repetition).single(sheet)));
+            let single = Generator::new(seed, place as u64, repetition).single(sheet);
+            drawn.push((Kind::Single, in_world(single, seed, place as u64, repetition)));
         }
     }
     let more = |kind, stream, count, make: &dyn Fn(Generator) -> Recipe| {
         (0..count)
-            .map(move |repetition| (kind, make(Generator::new(seed, stream, repetition))))
+            .map(move |repetition| {
+                let recipe = make(Generator::new(seed, stream, repetition));
+                (kind, in_world(recipe, seed, stream, repetition))
+            })
             .collect::<Vec<_>>()
     };
     drawn.extend(more(Kind::Null, 1000, shape.nulls, &Generator::null));
@@ -258,6 +275,8 @@ impl Generator {
             coloured_noise: coloured,
             jitter: coloured,
             noise: 1.0,
+            background: None,
+            unlinked: false,
             experiment: Experiment::Train,
         }
     }

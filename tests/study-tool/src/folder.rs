@@ -136,9 +136,10 @@ fn name(number: usize) -> String {
 
 /// A draw as `draws.json` and `score.json` hold it.
 pub fn draw_as_json(draw: &Draw) -> Value {
-    let Recipe { seed, axis, both_axes, hidden, foreign_form, wrong_parameters, .. } = &draw.recipe;
+    let Recipe { seed, axis, both_axes, hidden, foreign_form, wrong_parameters, background, .. } =
+        &draw.recipe;
     let wrong = |(name, factor): &(String, f64)| json!({"name": name, "factor": factor});
-    json!({
+    let mut draw_json = json!({
         "number": draw.number,
         "kind": draw.kind,
         "seed": seed,
@@ -150,7 +151,23 @@ pub fn draw_as_json(draw: &Draw) -> Value {
         "coloured_noise": draw.recipe.coloured_noise,
         "jitter": draw.recipe.jitter,
         "noise_factor": draw.recipe.noise,
-    })
+    });
+    // What older studies did not have stands where it is something.
+    if draw.recipe.unlinked {
+        draw_json["unlinked"] = json!(true);
+    }
+    if let Some(background) = background {
+        draw_json["background"] = json!({
+            "effects": background.effects.iter().map(hidden_as_json).collect::<Vec<_>>(),
+            "valve_point_factors": background.valve_point_factors,
+            "dead_volume_ratio": background.dead_volume_ratio,
+            "temperature_ratio": background.temperature_ratio,
+            "fading_ratio": background.fading_ratio,
+            "fading_below_m_per_s": background.fading_below_m_per_s,
+            "slow_noise_ratio": background.slow_noise_ratio,
+        });
+    }
+    draw_json
 }
 
 fn hidden_as_json(hidden: &Hidden) -> Value {

@@ -298,6 +298,11 @@ const DIMENSIONLESS: &[&str] = &[
     "strength",              // of a signature, over what an ideal observer needs
     "noise_factor",          // on the noise of the sensors
     "weaker_factor",         // on amplitudes
+    "valve_point_factors",   // on K_V
+    "dead_volume_ratio",     // true over nominal
+    "temperature_ratio",     // the same
+    "fading_ratio",          // share of a friction
+    "slow_noise_ratio",      // share of a variance
     "over_limit",            // amplitudes over their limits
     "limit_value",           // of an effect, whose unit is a field beside it
     "error_value",           // of a fitted number, whose unit is a field beside it

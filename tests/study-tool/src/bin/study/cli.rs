@@ -86,13 +86,24 @@ pub(crate) struct PlanArguments {
     /// Divides all amplitudes, counted from the baseline: 100 brings most near their limits.
     #[arg(long, default_value_t = 1.0)]
     weaker: f64,
+    /// Exact and background world in turn, both axes recorded.
+    #[arg(long)]
+    worlds: bool,
 }
 
 impl PlanArguments {
     pub(crate) fn plan(&self) -> Plan {
-        let Self { each, nulls, parameters, pairs, triples, noise, weaker, .. } = *self;
-        let shape =
-            Shape { each, nulls, parameters, pairs, triples, noise_factor: noise, weaker_factor: weaker };
+        let Self { each, nulls, parameters, pairs, triples, noise, weaker, worlds, .. } = *self;
+        let shape = Shape {
+            each,
+            nulls,
+            parameters,
+            pairs,
+            triples,
+            noise_factor: noise,
+            weaker_factor: weaker,
+            worlds,
+        };
         Plan::new(self.seed, shape)
     }
 }
