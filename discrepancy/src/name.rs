@@ -14,6 +14,7 @@
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
 mod elimination;
+mod explanations;
 mod gauss_newton;
 mod needed_parameters;
 mod null_distribution;
@@ -28,12 +29,13 @@ use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, 
 use crate::screen::{Columns, Screened};
 pub(crate) use elimination::same;
 use elimination::{alternatives, eliminate_backward, shares, swap};
+use explanations::rank_by_evidence;
 use gauss_newton::{backtrack, fit_selected};
 use needed_parameters::with_needed;
 pub(crate) use needed_parameters::{is_off, off};
 use null_distribution::NullDistribution;
 use rayon::prelude::*;
-use round::{Contenders, Round};
+use round::Round;
 use start_states::{RefitWithInitialStates, refit_with_starts};
 
 /// Maximum number of effects.
@@ -58,7 +60,7 @@ const MIN_LOSS_SHARE_FIRST: f64 = 0.1;
 /// Share of the remaining loss that each further effect must remove.
 const MIN_LOSS_SHARE_FURTHER: f64 = 0.3;
 /// Smallest amplitude, as a share of the smallest change that occurs.
-const MIN_AMPLITUDE_RATIO: f64 = 0.6;
+const MIN_AMPLITUDE_RATIO: f64 = 0.85;
 /// Share of the loss after calibration that an explanation may leave.
 const MOST_LOSS_LEFT: f64 = 0.3;
 /// Fall of the loss per degree of freedom that makes a model adequate whatever it leaves (1.8: chi2 to a sixth). A law of a
@@ -153,22 +155,33 @@ pub fn name(
     let mut fitted = Vec::new();
     // For each accepted effect the fits of its round, best first.
     let mut rounds: Vec<Vec<Refit>> = Vec::new();
+    let mut accepted_by_evidence = false;
+    let dof = engine.scaled_dof().iter().sum::<f64>();
+    let most_loss_per_dof = if engine.is_linked() { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF };
     for number in 0..MAX_EFFECTS {
         let here = restarted.as_ref().unwrap_or(engine);
         let screening =
             if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, &model) };
-        let Some(contenders) = Contenders::of(screening, here, &columns, &model, threshold) else { break };
-        progress(&format!("fitting {} candidates, round {}", contenders.count(), number + 1));
         let at_model = if number == 0 { linearisation.clone() } else { linearise(here, &model) };
-        let Some(mut round) = Round::fitted(here, &at_model, &model, &contenders, progress) else { break };
-        fitted.extend(round.fits.iter().cloned());
-        round.keep_large();
+        let selected = Round::selected(here, &at_model, &columns, &model, screening, threshold, progress);
+        fitted.extend(selected.tried);
+        let Some(mut round) = selected.round else { break };
+        let inexact = round.fits.first().is_some_and(|best| best.loss > most_loss_per_dof * dof);
+        if inexact {
+            progress("comparing explanations");
+            let enough = rank_by_evidence(here, &at_model, &model, &mut round.fits);
+            match enough {
+                Some(true) if number == 0 => accepted_by_evidence = true,
+                Some(false) if accepted_by_evidence => break,
+                _ => {}
+            }
+        }
         let best_restarted = round.take_engine();
         let there = best_restarted.as_ref().unwrap_or(here);
         let Some(best) = round.fits.first_mut() else { break };
         // The null distribution is drawn from the residual of the best model, since explained signal is not noise. No threshold
         // applies here: an effect that turns out unnecessary is eliminated at the end.
-        if !gains_enough(&model, best) {
+        if !accepted_by_evidence && !gains_enough(&model, best) {
             break;
         }
         best.factors = backtrack(there, best);
@@ -181,28 +194,39 @@ pub fn name(
         restarted = best_restarted.or(restarted);
     }
     let here = restarted.as_ref().unwrap_or(engine);
-    eliminate_backward(here, &calibrated, &columns, &mut model, &mut rounds);
+    let first = rounds.first().and_then(|round| round.first()).cloned();
+    if !accepted_by_evidence {
+        eliminate_backward(here, &calibrated, &columns, &mut model, &mut rounds);
+    }
     let null = NullDistribution::new(here, &columns, &linearise(here, &model), &model);
     threshold = null.threshold();
     let limits = limits_of(&null, &columns, threshold);
-    let dof = here.scaled_dof().iter().sum::<f64>();
     let loss_per_dof = model.loss / dof;
-    let most_loss_per_dof = if engine.is_linked() { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF };
     let fall_per_dof = (calibrated.fit.loss - model.loss) / dof;
     let lacks_fit = loss_per_dof > most_loss_per_dof;
-    let explains_too_little =
-        lacks_fit && model.loss > MOST_LOSS_LEFT * calibrated.fit.loss && fall_per_dof < ENOUGH_FALL_PER_DOF;
+    let explains_too_little = !accepted_by_evidence
+        && lacks_fit
+        && model.loss > MOST_LOSS_LEFT * calibrated.fit.loss
+        && fall_per_dof < ENOUGH_FALL_PER_DOF;
     let far_ahead =
         explains_too_little && is_far_ahead(&screened, null_loss, calibrated.fit.loss, rounds.first());
     if far_ahead {
         model = rounds[0][0].clone();
         rounds.truncate(1);
     }
+    if explains_too_little
+        && model.placed.is_empty()
+        && let Some(first) = first
+    {
+        // It comes nearest to what is outside the catalogue.
+        rounds = vec![vec![first.clone()]];
+        model = first;
+    }
     let explained = with_needed(here, &model);
     let parameters_off = off(here, &explained).into_iter().filter(|off| *off).count();
     let not_explained = if explains_too_little && !far_ahead {
         Some(NotExplained::TooLittle)
-    } else if !model.placed.is_empty() && parameters_off > MAX_PARAMETERS_OFF {
+    } else if !accepted_by_evidence && !model.placed.is_empty() && parameters_off > MAX_PARAMETERS_OFF {
         Some(NotExplained::TooManyParametersOff)
     } else {
         None
@@ -280,11 +304,17 @@ fn is_far_ahead(
 
 /// Whether one of an effect's amplitudes is above the floor.
 pub(crate) fn is_large(placed: &EffectEstimate) -> bool {
+    amplitude_ratio(placed) >= 1.0
+}
+
+/// The largest of an effect's amplitudes over its floor.
+fn amplitude_ratio(placed: &EffectEstimate) -> f64 {
     let candidate = &placed.candidate;
     let keys = if DEFINED_BY_FIRST.contains(&candidate.sheet.name) { 1 } else { placed.coordinates.len() };
     (0..keys)
         .filter(|key| !candidate.is_shape(*key))
-        .any(|key| placed.coordinates[key].abs() >= least_coordinate(candidate, key))
+        .map(|key| placed.coordinates[key].abs() / least_coordinate(candidate, key))
+        .fold(0.0, f64::max)
 }
 
 /// Amplitude floor of a key, as a coordinate.

@@ -10,7 +10,8 @@ use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
 use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_starts};
 use super::{
-    EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, is_large, relinearise,
+    EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, is_large,
+    relinearise,
 };
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Linearisation, Refit, loss_at, refit_steps};
@@ -21,6 +22,12 @@ use rayon::prelude::*;
 const CONTENDERS: usize = 6;
 /// Smallest screened gain of a refitted candidate, as a share of the best.
 const CONTENDER_SHARE: f64 = 0.35;
+/// The same where a model leaves more than noise: what is missing beside the effect ranks first there.
+const CONTENDER_SHARE_INEXACT: f64 = 0.15;
+/// Smallest screened amplitude of a refitted candidate, as a share of its floor.
+const MIN_SCREENED_RATIO: f64 = 0.5;
+/// Maximum number of selections of candidates in a round.
+const MAX_SELECTIONS: usize = 3;
 /// Smallest screened gain of a further effect, as a share of the last round's threshold.
 const SEARCHED_SHARE: f64 = 0.5;
 /// Share of the predicted gain that the simulator may lack before other starting amplitudes are tried.
@@ -34,7 +41,7 @@ const CLOSE: f64 = 0.02;
 /// The backlash of the linkage. Screening underrates it, since the start states were estimated without it.
 const BACKLASH: &str = "coupling-backlash";
 
-pub(super) struct Contenders {
+struct Contenders {
     null_loss: f64,
     best: Vec<Screened>,
     /// The backlash of linked rods, whatever its screened gain.
@@ -46,7 +53,7 @@ impl Contenders {
     ///
     /// The last round's threshold came from a residual with unexplained signal: it decides when to stop searching, not what to
     /// reject.
-    pub(super) fn of(
+    fn of(
         (null_loss, screened): (f64, Vec<Screened>),
         engine: &Engine<'_>,
         columns: &Columns,
@@ -56,6 +63,9 @@ impl Contenders {
         let taken = |screened: &Screened| model.placed.iter().any(|placed| same(placed, &screened.start));
         let mut best: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
         best.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        // What is clearly below the floor cannot be named, and does not take the place of what can.
+        let can_be_named = |screened: &Screened| amplitude_ratio(&screened.start) > MIN_SCREENED_RATIO;
+        best.retain(can_be_named);
         let most = null_loss - best.first()?.loss;
         if most < MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold) {
             return None;
@@ -63,13 +73,18 @@ impl Contenders {
         let is_backlash = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
         let backlash = if engine.is_linked() { best.iter().find(is_backlash).cloned() } else { None };
         best.truncate(CONTENDERS);
-        best.retain(|screened| null_loss - screened.loss > CONTENDER_SHARE * most);
+        let lacks_fit = null_loss > LACK_OF_FIT_PER_DOF * engine.scaled_dof().iter().sum::<f64>();
+        let share = if lacks_fit { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
+        best.retain(|screened| null_loss - screened.loss > share * most);
         Some(Self { null_loss, best, backlash })
     }
+}
 
-    pub(super) fn count(&self) -> usize {
-        self.best.len()
-    }
+/// All fits of a round, and what is left of them.
+pub(super) struct Selected<'a> {
+    pub(super) tried: Vec<Refit>,
+    /// `None` where none gains enough, or all are below the amplitude floor.
+    pub(super) round: Option<Round<'a>>,
 }
 
 /// Models with one more effect.
@@ -80,8 +95,42 @@ pub(super) struct Round<'a> {
 }
 
 impl<'a> Round<'a> {
+    /// The round of the candidates with the largest gains. Where all that were fitted turn out below the amplitude floor, the
+    /// next ones are tried.
+    pub(super) fn selected(
+        engine: &Engine<'a>,
+        linearisation: &Linearisation,
+        columns: &Columns,
+        model: &Refit,
+        (null_loss, mut screened): (f64, Vec<Screened>),
+        threshold: f64,
+        progress: &mut dyn FnMut(&str),
+    ) -> Selected<'a> {
+        let mut tried: Vec<Refit> = Vec::new();
+        for _ in 0..MAX_SELECTIONS {
+            let screening = (null_loss, screened.clone());
+            let Some(contenders) = Contenders::of(screening, engine, columns, model, threshold) else {
+                break;
+            };
+            let number = model.placed.len() + 1;
+            progress(&format!("fitting {} candidates, round {number}", contenders.best.len()));
+            let round = Round::fitted(engine, linearisation, model, &contenders, progress);
+            let Some(mut round) = round else { break };
+            let before = tried.len();
+            tried.extend(round.fits.iter().cloned());
+            round.fits.retain(|fit| fit.placed.last().is_some_and(is_large));
+            if !round.fits.is_empty() {
+                return Selected { tried, round: Some(round) };
+            }
+            let small = tried[before..].iter().filter_map(|fit| fit.placed.last());
+            let small: Vec<EffectEstimate> = small.cloned().collect();
+            screened.retain(|screened| !small.iter().any(|placed| same(placed, &screened.start)));
+        }
+        Selected { tried, round: None }
+    }
+
     /// Fits the model with each contender; `linearisation` holds the parameter sensitivities. `None` where no fit is possible.
-    pub(super) fn fitted(
+    fn fitted(
         engine: &Engine<'a>,
         linearisation: &Linearisation,
         model: &Refit,
@@ -161,11 +210,6 @@ impl<'a> Round<'a> {
             self.fits.push(restarted.fit.clone());
             self.restarted.push(restarted);
         }
-    }
-
-    /// Drops fits below the amplitude floor, however well they fit.
-    pub(super) fn keep_large(&mut self) {
-        self.fits.retain(|fit| fit.placed.last().is_some_and(is_large));
     }
 
     /// The engine with the start states of the best model, where they were re-estimated.
