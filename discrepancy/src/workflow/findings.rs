@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{NotExplained, SelectionResult, off, same};
+use crate::name::{NotExplained, SelectionResult, is_large, off, same};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
@@ -129,6 +129,8 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
                 found.not_explained.map_or("named", NotExplained::reason)
             } else if is_alike && found.not_explained.is_none() {
                 "explains as much as what is named"
+            } else if alone.is_some_and(|fit| !is_large(&fit.placed[0])) {
+                "fitted, and below the smallest amplitude that is named"
             } else if alone.is_some() {
                 "fitted, and others explain more"
             } else if found.fitted.iter().any(|fit| is_last(&fit)) {
