@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Where everything is a little wrong, the effect with the least loss is the one that absorbs most of that. An effect is worth
-//! what it adds to what terms over state and command do in any case: a law that is nearly right leaves little to them, an impostor
-//! adds little that they do not do as well.
+//! what it adds to what terms over state and command do in any case: a law that is nearly right leaves little to them, an
+//! impostor adds little that they do not do as well.
 //!
 //! Source: discrepancy-notes.md, Second reading. Kennedy, O'Hagan 2001, J. R. Stat. Soc. B 63(3): discrepancy of a model.
 
