@@ -10,6 +10,7 @@
 
 use super::Hidden;
 use plant::parameters::VALVE_POINTS;
+use serde_json::{Value, json};
 
 /// Nobody is asked to name any of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +29,22 @@ pub struct Background {
     pub fading_below_m_per_s: f64,
     /// Share of the noise's variance with a correlation of [`SLOW_NOISE_SAMPLES`].
     pub slow_noise_ratio: f64,
+}
+
+impl Background {
+    /// As `truth.json` and `draws.json` hold it; each writes effects its own way.
+    #[must_use]
+    pub fn as_json(&self, effects: Vec<Value>) -> Value {
+        json!({
+            "effects": effects,
+            "valve_point_factors": self.valve_point_factors,
+            "dead_volume_ratio": self.dead_volume_ratio,
+            "temperature_ratio": self.temperature_ratio,
+            "fading_ratio": self.fading_ratio,
+            "fading_below_m_per_s": self.fading_below_m_per_s,
+            "slow_noise_ratio": self.slow_noise_ratio,
+        })
+    }
 }
 
 /// Correlation time of the slow noise, in samples of 1 ms.

@@ -124,15 +124,7 @@ fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
     };
     let background = recipe.background.as_ref().map(|background| {
         let effects = background.effects.iter().map(effect).collect::<Result<Vec<_>, MakeError>>()?;
-        Ok::<Value, MakeError>(json!({
-            "effects": effects,
-            "valve_point_factors": background.valve_point_factors,
-            "dead_volume_ratio": background.dead_volume_ratio,
-            "temperature_ratio": background.temperature_ratio,
-            "fading_ratio": background.fading_ratio,
-            "fading_below_m_per_s": background.fading_below_m_per_s,
-            "slow_noise_ratio": background.slow_noise_ratio,
-        }))
+        Ok::<Value, MakeError>(background.as_json(effects))
     });
     let background = background.transpose()?;
     let experiment = match recipe.experiment {

@@ -157,15 +157,8 @@ pub fn draw_as_json(draw: &Draw) -> Value {
         draw_json["unlinked"] = json!(true);
     }
     if let Some(background) = background {
-        draw_json["background"] = json!({
-            "effects": background.effects.iter().map(hidden_as_json).collect::<Vec<_>>(),
-            "valve_point_factors": background.valve_point_factors,
-            "dead_volume_ratio": background.dead_volume_ratio,
-            "temperature_ratio": background.temperature_ratio,
-            "fading_ratio": background.fading_ratio,
-            "fading_below_m_per_s": background.fading_below_m_per_s,
-            "slow_noise_ratio": background.slow_noise_ratio,
-        });
+        let effects = background.effects.iter().map(hidden_as_json).collect();
+        draw_json["background"] = background.as_json(effects);
     }
     draw_json
 }
