@@ -12,7 +12,7 @@ struct motion_point {
     bool moves;
 };
 
-/* The Bestehorn sinoid from one place to another, now_ms after its start; at its end place after duration_ms. */
+/* The Bestehorn sinoid from one place to another, now_ms after its start; at its end place after duration_ms, 4095 at most. */
 struct motion_point motion_bestehorn(float from_m, float to_m, uint32_t now_ms, uint32_t duration_ms);
 
 /* Memory of the control law. */
