@@ -15,7 +15,7 @@ uv_version=0.13.9
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_valgrind && install_python && install_dask && install_browser && install_machines
+    install_strace && install_valgrind && install_python && install_dask && install_hil && install_arm && install_browser && install_machines
 }
 
 apt_updated=no
@@ -139,6 +139,44 @@ install_mdf4() { install_requirements mdf4 "$(dirname "${BASH_SOURCE[0]}")/../di
 
 # The client of a Dask cluster, which scripts/campaign hands parts out with.
 install_dask() { install_requirements dask "$(dirname "${BASH_SOURCE[0]}")/../campaign/dask/requirements.txt"; }
+
+# airbench-hil from python/, with labwired, and python-can's own tests, which only its source distribution holds.
+install_hil() {
+    local python stamp="$tools/hil/installed"
+    python="$(dirname "${BASH_SOURCE[0]}")/../python"
+    cat "$python/pyproject.toml" "$python/requirements.txt" | cmp -s - "$stamp" && return
+    make_venv hil --requirement "$python/requirements.txt" --editable "$python[mcu]" && install_python_can_tests "$python" &&
+        cat "$python/pyproject.toml" "$python/requirements.txt" >"$stamp"
+}
+
+install_python_can_tests() {
+    local version
+    version=$(sed -n 's/^python-can==//p' "$1/requirements.txt")
+    rm -rf "$tools/python-can" && mkdir -p "$tools/python-can" &&
+        "$tools/uv/bin/python" -m pip download --quiet --disable-pip-version-check --no-deps --no-binary python-can \
+            --dest "$tools/python-can" "python-can==$version" &&
+        tar -xz -C "$tools/python-can" --strip-components 1 --wildcards -f "$tools/python-can"/python_can-*.tar.gz '*/test'
+}
+
+# The compiler of tests/firmware/stm32f103 and its C library. Unpacked for root too, and for one processor: 80 MB in the place of 800.
+install_arm() {
+    local package arm="$tools/arm" program
+    if command -v arm-none-eabi-gcc >/dev/null && [ -d /usr/lib/picolibc/arm-none-eabi ]; then return 0; fi
+    if [ -x "$tools/bin/arm-none-eabi-gcc" ] && [ -f "$arm/complete" ]; then return 0; fi
+    rm -rf "$arm" && mkdir -p "$arm/packages" "$tools/bin" || return 1
+    if [ "$(id -u)" = 0 ] && [ $apt_updated = no ]; then apt-get update -q >/dev/null && apt_updated=yes; fi
+    (cd "$arm/packages" && apt-get download -q gcc-arm-none-eabi binutils-arm-none-eabi picolibc-arm-none-eabi >/dev/null 2>&1) ||
+        return 1
+    for package in "$arm"/packages/*.deb; do
+        # A pattern that this package has nothing of is no failure.
+        dpkg-deb --fsys-tarfile "$package" | tar -x -C "$arm" --no-anchored --wildcards --exclude '*lto-dump' \
+            'usr/bin/arm-none-eabi-*' 'arm-none-eabi/[0-9]*/cc1' collect2 liblto_plugin.so '[0-9]*/include' include-fixed v7-m \
+            'usr/lib/arm-none-eabi' 'picolibc/arm-none-eabi/include' 2>/dev/null || true
+    done
+    rm -rf "$arm/packages"
+    for program in "$arm"/usr/bin/arm-none-eabi-*; do ln -sf "$program" "$tools/bin/"; done
+    "$tools/bin/arm-none-eabi-gcc" --version >/dev/null && touch "$arm/complete"
+}
 
 # MkDocs, which scripts/book builds the book with.
 install_book() { install_requirements book "$(dirname "${BASH_SOURCE[0]}")/../docs/book/requirements.txt"; }

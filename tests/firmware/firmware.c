@@ -57,7 +57,8 @@ static struct {
     uint32_t cycle; /* of the newest sensors, by the tick and the counters since */
     bool cycle_known;
     bool answer_waits; /* sensors came before the first tick */
-    bool lockstep;     /* time is simulated: it passes with the rig's ticks */
+    bool own_time;     /* the board's milliseconds are the rig's, even where that simulates time */
+    bool lockstep;     /* the rig simulates time: for who has no such clock it passes with the rig's ticks */
     bool stopped;      /* the rig's emergency stop */
     bool tell_status;
     uint32_t silent_ms;
@@ -107,14 +108,13 @@ bool firmware_transmit(struct port_frame *frame)
     return true;
 }
 
-/* CRC-8 SAE J1850. */
+/* CRC-8 SAE J1850, four bits at a time: entry i is what i << 4 leaves of the polynomial 0x1D. */
 static uint8_t crc8(uint8_t crc, uint8_t byte)
 {
+    static const uint8_t LEFT[16] = {0x00, 0x1D, 0x3A, 0x27, 0x74, 0x69, 0x4E, 0x53, 0xE8, 0xF5, 0xD2, 0xCF, 0x9C, 0x81, 0xA6, 0xBB};
     crc ^= byte;
-    for (int bit = 0; bit < 8; bit++) {
-        crc = (uint8_t)((crc & 0x80U) != 0U ? (crc << 1) ^ 0x1D : crc << 1);
-    }
-    return crc;
+    crc = (uint8_t)((crc << 4) ^ LEFT[crc >> 4]);
+    return (uint8_t)((crc << 4) ^ LEFT[crc >> 4]);
 }
 
 static void send_command(float opening)
@@ -219,11 +219,16 @@ static void answer(void)
 {
     advance();
     const float opening = motion_step(&fw.control, fw.set_point, fw.position_m);
-    if (fw.tell_status || fw.cycle % STATUS_EVERY_CYCLES == 0U) {
+    const bool status_is_due = fw.tell_status || fw.cycle % STATUS_EVERY_CYCLES == 0U;
+    /* The rig waits for the command, so it goes first. Who takes part in lockstep by its echo sends it last: there it says that this
+     * cycle is answered, and what follows belongs to the next one. */
+    if (status_is_due && !fw.own_time) {
         send_status();
     }
-    /* Last: in lockstep the command says that this cycle is answered, and what follows belongs to the next one. */
     send_command(moves_the_valve() ? opening : 0.0F);
+    if (status_is_due && fw.own_time) {
+        send_status();
+    }
 }
 
 static void take_sensors(const struct port_frame *frame)
@@ -266,7 +271,7 @@ static void take_tick(const struct port_frame *frame)
         return;
     }
     const uint32_t since_ms = fw.cycle_known ? tick.cycle - fw.cycle : 0U;
-    fw.lockstep = tick.lockstep != 0U;
+    fw.lockstep = tick.lockstep != 0U && !fw.own_time;
     fw.cycle = tick.cycle;
     fw.cycle_known = true;
     if (fw.answer_waits) {
@@ -323,9 +328,10 @@ static void take_run_control(const struct port_frame *frame)
     }
 }
 
-void firmware_init(void)
+void firmware_init(bool own_time)
 {
     memset(&fw, 0, sizeof fw);
+    fw.own_time = own_time;
 }
 
 void firmware_receive(const struct port_frame *frame)

@@ -4,8 +4,8 @@
 
 #include "port.h"
 
-/* Begins anew, as after power-on. */
-void firmware_init(void);
+/* Begins anew, as after power-on; own_time says whether the board's milliseconds are the rig's (port_millis_are_the_rigs). */
+void firmware_init(bool own_time);
 
 /* Takes a frame from the bus; sensors are answered by a command. */
 void firmware_receive(const struct port_frame *frame);

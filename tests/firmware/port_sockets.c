@@ -58,6 +58,11 @@ uint32_t port_millis(void)
     return (uint32_t)now.tv_sec * 1000U + (uint32_t)(now.tv_nsec / 1000000);
 }
 
+bool port_millis_are_the_rigs(void)
+{
+    return false;
+}
+
 void port_wait(void)
 {
     struct pollfd readable = {.fd = bus_socket, .events = POLLIN, .revents = 0};

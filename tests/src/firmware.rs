@@ -3,7 +3,7 @@
 //! It keeps no table of its own: what it does is read off the bus, and its set-point is computed a second time here.
 
 use crate::binaries::workspace;
-use crate::foreign_python::python;
+use crate::foreign_python::{python, tools_path};
 use protocol::can::CanFrame;
 use protocol::frames::{ECHO_RANGE, Frame, MainChainState};
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,7 +22,6 @@ const MOVE_CYCLES: u64 = 3000;
 const REST_CYCLES: u64 = 1000;
 /// How often it moves out and back; the first time with the chamber pressures of the start.
 const REPETITIONS: u64 = 2;
-const EXPERIMENT_CYCLES: u64 = REPETITIONS * 2 * (MOVE_CYCLES + REST_CYCLES);
 /// The last part of a rest, over which the static error is averaged (bus.md, A run's folder).
 const STATIC_CYCLES: u64 = 200;
 /// Cycles without an answer, in real time, by which a machine that stands still holds the loop up; and how many cycles after it
@@ -30,11 +29,14 @@ const STATIC_CYCLES: u64 = 200;
 const HELD_UP_CYCLES: u64 = 20;
 const RECOVERY_CYCLES: u64 = 500;
 
-/// Builds it into `folder`, as its Makefile does for a customer, warnings being errors; gives the folder.
+/// Builds it into `folder`, as its Makefile does for a customer, warnings being errors. `options` are those of make,
+/// such as the target `elf`. Gives the folder.
 pub fn build(folder: &Path, options: &[&str]) -> PathBuf {
     let mut make = Command::new("make");
     make.arg("-C").arg(workspace().join("tests/firmware")).args(options);
-    make.arg(format!("BUILD={}", folder.display())).arg(format!("PYTHON={}", python().display()));
+    make.env("PATH", tools_path())
+        .arg(format!("BUILD={}", folder.display()))
+        .arg(format!("PYTHON={}", python().display()));
     let built = make.output().expect("make is installed");
     assert!(
         built.status.success(),
@@ -60,14 +62,20 @@ pub struct Positioned {
     pub left_out: usize,
 }
 
-/// Reads off the frames of a run how it positioned. What a machine that stood still did to the loop is left out, and reported.
+/// Reads off the frames of a whole run how it positioned. What a machine that stood still did to the loop is left out, and reported.
 pub fn positioned(frames: &[CanFrame]) -> Positioned {
+    positioned_in(frames, REPETITIONS)
+}
+
+/// The same of a run that ended after so many repetitions.
+pub fn positioned_in(frames: &[CanFrame], repetitions: u64) -> Positioned {
+    let experiment_cycles = repetitions * 2 * (MOVE_CYCLES + REST_CYCLES);
     let mut counted = Counted::default();
     frames.iter().filter_map(|frame| Frame::decode(frame).ok()).for_each(|frame| counted.take(&frame));
     let began = counted.began.expect("it told that its experiment began");
     let mut done = Positioned::default();
     let mut rests: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-    for (cycle, position_m) in counted.positions_m.range(began..began + EXPERIMENT_CYCLES) {
+    for (cycle, position_m) in counted.positions_m.range(began..began + experiment_cycles) {
         let (set_point_m, part, within) = set_point(cycle - began);
         let error_m = (set_point_m - position_m).abs();
         let held_up = counted.held_up.range(cycle.saturating_sub(RECOVERY_CYCLES)..=*cycle);
@@ -82,10 +90,10 @@ pub fn positioned(frames: &[CanFrame]) -> Positioned {
             rests.entry(part).or_default().push(error_m);
         }
     }
-    assert_eq!(rests.len() as u64, 2 * REPETITIONS, "all rests are there");
+    assert_eq!(rests.len() as u64, 2 * repetitions, "all rests are there");
     let means = rests.values().map(|errors_m| errors_m.iter().sum::<f64>() / errors_m.len() as f64);
     done.position_error_static_m = means.fold(0.0, f64::max);
-    for (cycle, told_m) in counted.set_points_m.range(began + 1..began + EXPERIMENT_CYCLES) {
+    for (cycle, told_m) in counted.set_points_m.range(began + 1..began + experiment_cycles) {
         done.set_point_error_m = done.set_point_error_m.max((set_point(cycle - began).0 - told_m).abs());
         done.set_points += 1;
     }

@@ -2,7 +2,7 @@
 
 use crate::binaries::workspace;
 use crate::process::Running;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -25,7 +25,25 @@ pub fn of(environment: &str) -> PathBuf {
 
 /// Runs a script of `tests/python` and gives what it printed.
 pub fn run_script(name: &str, arguments: &[impl AsRef<OsStr>]) -> String {
+    run(&python(), name, arguments)
+}
+
+/// The same with the packages of another environment.
+pub fn run_script_of(environment: &str, name: &str, arguments: &[impl AsRef<OsStr>]) -> String {
+    run(&of(environment), name, arguments)
+}
+
+fn run(python: &Path, name: &str, arguments: &[impl AsRef<OsStr>]) -> String {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python").join(name);
-    let mut command = Command::new(python());
+    let mut command = Command::new(python);
+    command.env("PYTHONPATH", workspace().join("python")).env("PATH", tools_path());
     Running::start(name, command.arg(script).args(arguments)).wait().expect_code(0).stdout
+}
+
+/// The search path of programs with what `scripts/test` unpacks first, for tests that are started without it.
+pub fn tools_path() -> OsString {
+    let mut path = workspace().join("target/tools/bin").into_os_string();
+    path.push(":");
+    path.push(std::env::var_os("PATH").unwrap_or_default());
+    path
 }

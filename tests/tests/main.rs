@@ -32,6 +32,7 @@ mod faults_signals;
 mod faults_table;
 mod find_effect;
 mod firmware;
+mod firmware_elf;
 mod fmu;
 mod gateway;
 mod gateway_hostile;

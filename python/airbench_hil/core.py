@@ -1,0 +1,122 @@
+"""A microcontroller in the emulator labwired, with its CAN controller at a wire of 1 Mbit/s and its time in the caller's hands."""
+
+import tempfile
+from importlib import resources
+from pathlib import Path
+
+import labwired
+
+from airbench_hil import peer
+
+CYCLE_NS = 1_000_000
+_BITRATE = 1_000_000
+_NS_A_BIT = 1_000_000_000 // _BITRATE
+_STACK_PATTERN = 0xA5A5A5A5
+_RF0R, _FIFO_MASK, _FIFO_DEPTH = 0x0C, 3, 3
+
+CHIPS = {"stm32f103": {"bus": "bxcan1", "can_base": 0x40006400}}
+
+
+class CoreStopped(Exception):
+    """The emulator cannot go on: an instruction or an access that the chip does not have."""
+
+
+def wire_ns(raw_id, length):
+    """Time of a frame on the wire up to the next one, ns, without stuff bits: 47 bits beside the data, 67 with 29-bit identifiers."""
+    data = 0 if raw_id & peer.REMOTE else 8 * min(length, 8)
+    return ((67 if raw_id & peer.EXTENDED else 47) + data) * _NS_A_BIT
+
+
+def system_file(chip, folder):
+    """Writes what labwired wants to know of a chip into the folder, and gives the path of the file that it reads first."""
+    text = resources.files("airbench_hil").joinpath(f"chips/{chip}.yaml").read_text()
+    Path(folder, "chip.yaml").write_text(text)
+    system = Path(folder, "system.yaml")
+    system.write_text("name: airbench\nchip: chip.yaml\nexternal_devices: []\nboard_io: []\n")
+    return system
+
+
+class Core:
+    """One ELF on one chip, from reset on."""
+
+    def __init__(self, elf, chip):
+        """Raises ValueError for an unknown chip, OSError or ValueError for an ELF that cannot be loaded."""
+        if chip not in CHIPS:
+            raise ValueError(f"chip '{chip}' is unknown; there is: {', '.join(sorted(CHIPS))}")
+        self.bus, self._can = CHIPS[chip]["bus"], CHIPS[chip]["can_base"]
+        with tempfile.TemporaryDirectory(prefix="airbench-mcu-") as folder:
+            self.sim = labwired.Sim(str(elf), system=str(system_file(chip, folder)))
+        self.not_taken = self.lost_at_fifo = self.refused = 0
+        self.why_refused = ""
+
+    @property
+    def cycles(self):
+        """Clocks since reset."""
+        return self.sim.cycles
+
+    def run_ns(self, duration_ns):
+        """Runs for that time of its own. Raises CoreStopped."""
+        if duration_ns == 0:
+            return
+        stop = self.sim.run_for(f"{duration_ns}ns")
+        if stop.kind != "reached":
+            raise CoreStopped(f"{stop.kind} at {self.sim.cycles} clocks, pc {stop.pc}")
+
+    def hear(self, frame):
+        """A frame that comes to its end on the wire. What the chip does not take is counted."""
+        if frame.raw_id & peer.ERROR:
+            return
+        if self.sim.read_u32(self._can + _RF0R) & _FIFO_MASK == _FIFO_DEPTH:
+            # The real one overwrites the newest, or drops the frame, and sets FOVR: one frame is lost either way.
+            self.lost_at_fifo += 1
+            return
+        try:
+            self.sim.inject_can(
+                self.bus,
+                frame.raw_id & (0x1FFFFFFF if frame.raw_id & peer.EXTENDED else 0x7FF),
+                frame.data,
+                extended=bool(frame.raw_id & peer.EXTENDED),
+                remote=bool(frame.raw_id & peer.REMOTE),
+            )
+        except ValueError as refused:
+            if "filter" in str(refused):
+                self.not_taken += 1
+            else:
+                self.refused += 1
+                self.why_refused = str(refused)
+
+    def said(self):
+        """Frames that it has sent since the last call, in its order: (raw_id, data, clocks since reset)."""
+        return [
+            (payload["id"] | payload["extended"] * peer.EXTENDED | payload["remote"] * peer.REMOTE, payload["data"], each["cycle"])
+            for each in self.sim.frames()
+            if (payload := each["payload"])["direction"] == "tx"
+        ]
+
+    def millisecond(self, frames):
+        """Runs 1 ms in which these frames come, one after the other as on a wire; gives what it sent.
+
+        Raises CoreStopped.
+        """
+        now_ns = ends_ns = 0
+        for frame in frames:
+            # What exceeds the millisecond of a wire comes at its end, and is the firmware's affair in the next one.
+            ends_ns = min(ends_ns + wire_ns(frame.raw_id, frame.length), CYCLE_NS)
+            self.run_ns(ends_ns - now_ns)
+            now_ns = ends_ns
+            self.hear(frame)
+        self.run_ns(CYCLE_NS - now_ns)
+        return self.said()
+
+    def stack(self):
+        """Bytes of the stack that were used, and its size; None when the ELF has none between `stack_begin` and `stack_end`."""
+        try:
+            begin, end = self.sim.symbol("stack_begin"), self.sim.symbol("stack_end")
+        except (KeyError, ValueError):
+            return None
+        if begin is None or end is None:
+            return None
+        free = 0
+        while begin + free < end and self.sim.read_u32(begin + free) == _STACK_PATTERN:
+            free += 4
+        return end - begin - free, end - begin

@@ -1,0 +1,261 @@
+//! The firmware as the ELF of an STM32F103, in an emulator of that chip and in lockstep with the rig: `scripts/mcu`.
+//!
+//! The emulator counts one clock for each instruction; what a real core takes is counted apart, in `tests/python/cortex_m3_cycles.py`.
+
+use protocol::frames::{
+    EmergencyStop, EmergencyStopReason, Frame, MainChainState, RunControl, RunControlCommand, ValveCommand,
+};
+use runlog::candump::read_line;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use system_tests::binaries::{Program, workspace};
+use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned_in};
+use system_tests::foreign_python::run_script_of;
+use system_tests::launch::Pace;
+use system_tests::process::Running;
+use system_tests::records::{bus_log, count, count_of_id, json};
+use system_tests::scene::Scene;
+
+/// The approach, 1 s, settling, 2 s, and the first of two repetitions, 8 s: the shortest run with all bounds in it.
+const ONE_REPETITION_S: f64 = 11.01;
+/// Clocks of a millisecond at 8 MHz.
+const CLOCKS: u64 = 8000;
+
+fn built() -> &'static Path {
+    static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let made = || {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        build(folder.path(), &["elf"]);
+        folder
+    };
+    BUILT.get_or_init(made).path()
+}
+
+fn elf() -> PathBuf {
+    built().join("firmware-stm32f103.elf")
+}
+
+/// `scripts/mcu` with the ELF; its report lies in the scene as `mcu.json`.
+fn mcu(scene: &Scene) -> Running {
+    let mut command = Command::new(workspace().join("scripts/mcu"));
+    command.arg("--elf").arg(elf()).arg("--bus").arg(scene.url());
+    Running::start("mcu", command.arg("--report").arg(scene.path("mcu.json")))
+}
+
+fn scene(more: &str) -> Scene {
+    Scene::new(&format!("title = \"elf\"\n[rig]\ncarriage_position_m = 0.15\n{more}"))
+}
+
+#[test]
+fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
+    let run = || {
+        let scene = scene("");
+        let options = format!("--members 1 --seconds {ONE_REPETITION_S}");
+        let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
+        let mcu = mcu(&scene);
+        let _ = emulator.wait().expect_code(0);
+        let _ = mcu.wait().expect_code(0);
+        scene
+    };
+    let [one, other] = std::thread::scope(|threads| {
+        let runs = [threads.spawn(run), threads.spawn(run)];
+        runs.map(|run| run.join().expect("it runs"))
+    });
+    for file in ["emulator/bus.log", "emulator/measurement.csv"] {
+        assert!(one.same(&one.path(file), &other.path(file)), "{file} differs in a second run");
+    }
+    let summary = json(&one.path("emulator/summary.json"));
+    let cycles = count(&summary, "/cycles");
+    assert_eq!((count(&summary, "/frames_malformed"), count(&summary, "/stale_commands")), (0, 0));
+    assert_eq!(count(&summary, "/drive_commands/accepted"), cycles);
+    for what in ["lost", "late", "duplicate", "breaks", "refused_stale"] {
+        assert_eq!(count(&summary, &format!("/drive_commands/{what}")), 0, "{what}");
+    }
+    let done = positioned_in(&bus_log(&one.path("emulator/bus.log")), 1);
+    eprintln!("{done:?}");
+    assert_eq!((done.cycles, done.left_out), (8_000, 0));
+    assert!(done.set_points > 790 && done.set_point_error_m < 2e-5, "{done:?}");
+    assert!(done.position_error_dynamic_m < DYNAMIC_M, "{done:?}");
+    assert!(done.position_error_static_m < STATIC_M, "{done:?}");
+    assert!(done.position_error_dynamic_m > 5e-4, "a real loop has errors: {done:?}");
+
+    // The core's time is the bus's: 10 ms before the first cycle and one for each.
+    let report = json(&one.path("mcu.json"));
+    eprintln!("{report}");
+    assert_eq!(count(&report, "/cycles"), cycles);
+    assert_eq!(count(&report, "/core_clocks"), (10 + cycles) * CLOCKS);
+    assert_eq!((count(&report, "/frames_lost_at_fifo"), count(&report, "/frames_refused")), (0, 0));
+    assert_eq!(count(&report, "/frames_from_core"), count(&summary, "/frames_received"));
+    let (used, stack) = (count(&report, "/stack_used_bytes"), count(&report, "/stack_bytes"));
+    assert!(used > 64 && used <= stack / 2, "{used} bytes of {stack} used");
+}
+
+const NOISE: std::ops::Range<u64> = 200..300;
+const LOSS: std::ops::Range<u64> = 403..503;
+const RELEASED: u64 = 700;
+const STARTED: u64 = 900;
+const STOPPED: u64 = 1400;
+const END: u64 = 1700;
+
+/// The frames of the run by their stamps, which are simulated time; those that no receiver knows left out.
+fn by_cycle(scene: &Scene) -> Vec<(u64, Frame)> {
+    let path = scene.path("emulator/bus.log");
+    let text = std::fs::read_to_string(&path).expect("bus.log");
+    let records = text.lines().map(|line| read_line(line).unwrap_or_else(|| panic!("{line}")));
+    records
+        .filter_map(|record| Some((record.stamp_ns / 1_000_000, Frame::decode(&record.frame).ok()?)))
+        .collect()
+}
+
+/// Faults and events in simulated time, and what the ELF is seen to do then.
+#[test]
+fn noise_does_not_move_it_and_sensor_loss_and_the_emergency_stop_shut_its_valve_in_time() {
+    let stop = format!("event = [{{ at_s = {}, do = \"emergency-stop\" }}]\n", STOPPED as f64 * 1e-3);
+    let scene = scene(&stop);
+    // A node that babbles at the highest priority while sensors are cut short; later no sensors for 100 ms.
+    let fault = |what: &str, during: &std::ops::Range<u64>| {
+        let (from_s, for_s) = (during.start as f64 * 1e-3, (during.end - during.start) as f64 * 1e-3);
+        format!("[[fault]]\n{what}\nfrom_s = {from_s}\nfor_s = {for_s}\n")
+    };
+    let faults = [
+        "seed = 5\n".into(),
+        fault("name = \"babbling-node\"\nid = 16\nframes_per_ms = 3", &NOISE),
+        fault("name = \"wrong-length\"\nat = \"bus.DriveSensors\"\nprobability = 0.3", &NOISE),
+        fault("name = \"bus-loss\"\nat = \"bus.DriveSensors\"", &LOSS),
+    ];
+    let script = scene.write("faults.toml", &faults.concat());
+    let options = format!("--members 2 --seconds {} --faults {}", END as f64 * 1e-3, script.display());
+    let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
+    let mcu = mcu(&scene);
+    let release = EmergencyStop { reason: EmergencyStopReason::Operator, release: true };
+    let start = RunControl { command: RunControlCommand::Start, experiment: 8 };
+    scene.peer().be_console(|cycle| match u64::from(cycle) {
+        RELEASED => Some(Frame::ConsoleEmergencyStop(release)),
+        STARTED => Some(Frame::RunControl(start)),
+        _ => None,
+    });
+    let _ = emulator.wait().expect_code(0);
+    let _ = mcu.wait().expect_code(0);
+
+    let frames = by_cycle(&scene);
+    let commands: BTreeMap<u64, ValveCommand> = frames
+        .iter()
+        .filter_map(|(cycle, frame)| match frame {
+            Frame::DriveValveCommand(command) => Some((*cycle, *command)),
+            _ => None,
+        })
+        .collect();
+    let open = |cycles: std::ops::Range<u64>| {
+        commands.range(cycles).filter(|(_, command)| command.enable || command.opening != 0.0).count() as u64
+    };
+    let silent =
+        |cycles: std::ops::Range<u64>| cycles.filter(|cycle| !commands.contains_key(cycle)).count() as u64;
+    let mut states: Vec<(u64, MainChainState)> = frames
+        .iter()
+        .filter_map(|(cycle, frame)| match frame {
+            Frame::DriveChainStatus(status) => Some((*cycle, status.main_chain)),
+            _ => None,
+        })
+        .collect();
+    states.dedup_by_key(|(_, state)| *state);
+    let tripped: Vec<u64> = frames
+        .iter()
+        .filter(|(_, frame)| matches!(frame, Frame::DriveEmergencyStop(stop) if !stop.release))
+        .map(|(cycle, _)| *cycle)
+        .collect();
+    let summary = json(&scene.path("emulator/summary.json"));
+    let report = json(&scene.path("mcu.json"));
+    eprintln!("{states:?}\n{tripped:?}\n{}\n{report}", summary["bus_host"]["faults"]);
+
+    use MainChainState::{Aborted, Fault, InitialPositioning};
+    let [
+        (0, InitialPositioning),
+        (fault, Fault),
+        (released, Aborted),
+        (started, InitialPositioning),
+        (stopped, Aborted),
+    ] = states[..]
+    else {
+        panic!("other states: {states:?}");
+    };
+    // The noise: sensors that are whole are answered, the others are not, and nothing else comes of it.
+    let cut = count_of_id(&summary["bus_host"]["faults"]["wrong-length"], "120");
+    assert!((10..60).contains(&cut), "{cut} sensors cut short");
+    assert_eq!((silent(0..NOISE.start), silent(NOISE), silent(NOISE.end..LOSS.start)), (0, cut, 0));
+    assert_eq!(open(1..LOSS.start), LOSS.start - 1 - cut, "it went on moving");
+    assert!(count(&report, "/frames_filtered") >= 300, "the babble ends at its filters: {report}");
+    assert_eq!((count(&report, "/frames_lost_at_fifo"), count(&report, "/frames_refused")), (0, 0));
+    // 50 of its own milliseconds after the last sensors it trips the emergency stop; its timer runs at some phase of the cycle.
+    let last = LOSS.start - 1;
+    assert!((last + 49..=last + 50).contains(&fault), "fault in cycle {fault}");
+    assert_eq!(tripped, [fault, fault + 100, fault + 200], "and repeats it until it is released");
+    assert_eq!(
+        (silent(LOSS), silent(LOSS.end..END)),
+        (LOSS.end - LOSS.start, 0),
+        "it answers again with sensors"
+    );
+    // What is said in a cycle acts in the next one.
+    assert_eq!((released, started), (RELEASED + 1, STARTED + 1));
+    assert_eq!(open(LOSS.start..started), 0, "the valve stays shut until it is started again");
+    assert!(open(started + 1..STOPPED) > 300, "then it moves");
+    // The rig's stop reaches it in the cycle in which it is tripped.
+    assert!((STOPPED..=STOPPED + 1).contains(&stopped), "stopped in cycle {stopped}");
+    assert_eq!(open(stopped + 1..END), 0, "and its valve stays shut");
+}
+
+#[test]
+fn the_check_of_controllers_passes_it() {
+    let scene = scene("");
+    let mut check = Program::Bench.command();
+    check.args(["check-controller", "--pace", "lockstep", "--seconds", "1", "--junit"]);
+    check.arg(scene.path("result.xml")).arg("--").arg(workspace().join("scripts/mcu"));
+    check.arg("--elf").arg(elf()).args(["--bus", "{bus}"]);
+    let ended = Running::start("check", &mut check).wait().expect_code(0);
+    let passed = |name: &str| {
+        let line = ended.stdout.lines().find(|line| line.contains(name));
+        assert!(line.is_some_and(|line| line.contains("passed")), "{name}: {}", ended.stdout);
+    };
+    ["regular", "noise", "emergency-stop", "sensor-loss"].iter().for_each(|session| passed(session));
+    eprintln!("{}", ended.stdout);
+}
+
+#[test]
+fn a_millisecond_of_it_fits_into_that_of_a_real_cortex_m3() {
+    let counted = run_script_of("hil", "cortex_m3_cycles.py", &[built().join("firmware-count.elf")]);
+    eprintln!("{counted}");
+    let counted: serde_json::Value = serde_json::from_str(&counted).expect("JSON");
+    let clocks = |kind: &str| count(&counted[kind], "/clocks");
+    // The accesses to the CAN controller, and the timer's interrupt: 200 clocks at most (docs/elf.md).
+    assert!(clocks("with status") + 200 < CLOCKS, "{counted}");
+    // The sensors' frame and the command's own are on the wire for 111 and 95 us of the same millisecond.
+    assert!(clocks("without") + (111 + 95) * CLOCKS / 1000 < CLOCKS, "{counted}");
+}
+
+#[test]
+fn it_has_no_heap_and_the_build_tells_its_sizes() {
+    let tool = |name: &str, option: &str, file: &Path| {
+        let arm = workspace().join("target/tools/bin").join(format!("arm-none-eabi-{name}"));
+        let program =
+            if arm.exists() { arm.into_os_string() } else { format!("arm-none-eabi-{name}").into() };
+        let output = Command::new(program).arg(option).arg(file).output().expect("the tool starts");
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let symbols = tool("nm", "-A", &elf());
+    assert!(symbols.contains("firmware_receive") && symbols.contains("__aeabi_fmul"), "{symbols}");
+    for name in ["malloc", "_sbrk", "sbrk", "__heap_start", "printf"] {
+        assert!(!symbols.split_whitespace().any(|word| word == name), "{name} is linked");
+    }
+    // 64 KiB of flash and 20 KiB of RAM are the chip's; what the build reports is far from both.
+    let sizes = std::fs::read_to_string(built().join("firmware-stm32f103.elf.sizes")).expect("sizes");
+    let bytes = |section: &str| -> u64 {
+        let line = sizes.lines().find(|line| line.split_whitespace().next() == Some(section));
+        let number = line.and_then(|line| line.split_whitespace().nth(1)).and_then(|word| word.parse().ok());
+        number.unwrap_or_else(|| panic!("{section} is not in\n{sizes}"))
+    };
+    eprintln!("{sizes}");
+    assert!((4_000..16_000).contains(&bytes(".text")), "{sizes}");
+    assert!(bytes(".data") + bytes(".bss") < 1_000 && bytes(".stack") == 2_048, "{sizes}");
+}
