@@ -23,7 +23,7 @@ from pyxcp.daq_stim import DaqList, DaqOnlinePolicy
 from pyxcp.master import Master
 from pyxcp.types import XcpResponseError
 
-import airbench_can
+from airbench_hil import can_bus
 
 SECRET = bytes.fromhex("000102030405060708090a0b0c0d0e0f")
 IDENTIFIERS = {"drive": (0x1E0, 0x1E1), "load": (0x1E2, 0x1E3)}
@@ -67,7 +67,7 @@ class Client:
         self.axis, self.folder = axis, Path(folder)
         self.file = self.folder / f"controller-{axis}.a2l"
         self.a2l = A2l(self.file)
-        self.bus = airbench_can.AirbenchBus(bus, member=member)
+        self.bus = can_bus.AirbenchBus(bus, member=member)
         self.master = None
         self.rows = None
         self.secret = SECRET
@@ -268,7 +268,7 @@ def daq(client, names, rows):
     client.open([daq_list(client, names)])
     client.rows.setup()
     client.rows.start()
-    while len(client.rows.rows) < rows and not client.bus.closed:
+    while len(client.rows.rows) < rows and client.master.transport.listener.is_alive():
         time.sleep(0.01)
     client.rows.stop()
     return {"headers": [header[0] for header in client.rows.daq_lists[0].headers], "rows": client.rows.rows}

@@ -94,7 +94,7 @@ impl Foreign {
         let scripts = workspace().join("tests/python");
         let seen = scene.path(&format!("seen-{axis}.json"));
         let mut command = Command::new(python());
-        command.env("PYTHONPATH", &scripts).arg(scripts.join("xcp_client.py"));
+        command.env("PYTHONPATH", workspace().join("python")).arg(scripts.join("xcp_client.py"));
         command.arg(scenario).arg(scene.socket()).arg(scene.path(folder)).arg(axis).arg(&seen);
         if member {
             command.arg(format!("client-{axis}"));

@@ -48,6 +48,7 @@ mod modelled_wire;
 mod noise;
 mod own_algorithm;
 mod partner_faults;
+mod python_can;
 mod report_files;
 mod sealed;
 mod sensor_loss;
