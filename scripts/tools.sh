@@ -15,7 +15,7 @@ uv_version=0.13.9
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_valgrind && install_python && install_dask && install_hil && install_arm && install_browser && install_machines
+    install_strace && install_valgrind && install_python && install_dask && install_hil && install_arm && install_gdb && install_browser && install_machines
 }
 
 apt_updated=no
@@ -176,6 +176,19 @@ install_arm() {
     rm -rf "$arm/packages"
     for program in "$arm"/usr/bin/arm-none-eabi-*; do ln -sf "$program" "$tools/bin/"; done
     "$tools/bin/arm-none-eabi-gcc" --version >/dev/null && touch "$arm/complete"
+}
+
+# The debugger of tests/firmware's ELF.
+install_gdb() {
+    if command -v gdb-multiarch >/dev/null || [ -x "$tools/bin/gdb-multiarch" ]; then return 0; fi
+    # shellcheck disable=SC2046 # a list of names
+    need_packages gdb-multiarch $([ "$(id -u)" = 0 ] || { echo gdb && libraries_of gdb-multiarch; }) || return 1
+    [ "$(id -u)" = 0 ] && return
+    mkdir -p "$tools/bin"
+    # An unpacked debugger has to be told where its files are.
+    printf '#!/bin/sh\nLD_LIBRARY_PATH=%s exec %s/debian/usr/bin/gdb-multiarch --data-directory=%s/debian/usr/share/gdb "$@"\n' \
+        "$tools/debian/usr/lib/$(uname -m)-linux-gnu" "$tools" "$tools" >"$tools/bin/gdb-multiarch"
+    chmod +x "$tools/bin/gdb-multiarch"
 }
 
 # MkDocs, which scripts/book builds the book with.

@@ -89,6 +89,9 @@ pub struct RunArguments {
     /// Lockstep: how long to wait for the members to join, in s.
     #[arg(long, default_value = "30", value_parser = seconds)]
     pub join_timeout: f64,
+    /// Lockstep: how long a member may take for a cycle, in s of wall time; more for a debugger.
+    #[arg(long, default_value = "5", value_parser = seconds)]
+    pub lockstep_timeout: f64,
     /// Seed of the sensors' noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,

@@ -98,6 +98,8 @@ pub struct Limits {
     pub bus_grace: Duration,
     /// Lockstep: how long to wait for the members to join.
     pub join: Duration,
+    /// Lockstep: how long a member may take for a cycle.
+    pub cycle: Duration,
 }
 
 /// A rig on its bus, and what may end its run.

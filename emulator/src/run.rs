@@ -221,6 +221,7 @@ impl RigWork<'_> {
             cycles: arguments.seconds.map(|seconds| (seconds * 1000.0).round() as u64),
             bus_grace: Duration::from_secs_f64(arguments.bus_grace),
             join: Duration::from_secs_f64(arguments.join_timeout),
+            cycle: Duration::from_secs_f64(arguments.lockstep_timeout),
         };
         let context = RunContext { node: &mut node, bus, limits: &limits, shared };
         let paced = match arguments.pace {
@@ -270,6 +271,7 @@ fn open_bus(arguments: &RunArguments, clock: StampClock) -> Result<OpenedBus, Ru
     match Host::bind(path, *wire, barrier) {
         Ok(host) if lockstep => {
             let orders = Some(host.wire_orders());
+            let host = host.with_barrier_timeout(Duration::from_secs_f64(arguments.lockstep_timeout));
             Ok(OpenedBus { bus: Box::new(HostedRig::new(host, clock)), host: None, orders })
         }
         Ok(host) => {

@@ -14,7 +14,7 @@ _NS_A_BIT = 1_000_000_000 // _BITRATE
 _STACK_PATTERN = 0xA5A5A5A5
 _RF0R, _FIFO_MASK, _FIFO_DEPTH = 0x0C, 3, 3
 
-CHIPS = {"stm32f103": {"bus": "bxcan1", "can_base": 0x40006400}}
+CHIPS = {"stm32f103": {"bus": "bxcan1", "can_base": 0x40006400, "hz": 8_000_000}}
 
 
 class CoreStopped(Exception):
@@ -43,11 +43,14 @@ class Core:
         """Raises ValueError for an unknown chip, OSError or ValueError for an ELF that cannot be loaded."""
         if chip not in CHIPS:
             raise ValueError(f"chip '{chip}' is unknown; there is: {', '.join(sorted(CHIPS))}")
-        self.bus, self._can = CHIPS[chip]["bus"], CHIPS[chip]["can_base"]
+        self.chip, self.bus, self._can = chip, CHIPS[chip]["bus"], CHIPS[chip]["can_base"]
         with tempfile.TemporaryDirectory(prefix="airbench-mcu-") as folder:
             self.sim = labwired.Sim(str(elf), system=str(system_file(chip, folder)))
         self.not_taken = self.lost_at_fifo = self.refused = 0
         self.why_refused = ""
+
+    def close(self):
+        """Nothing runs that had to be ended."""
 
     @property
     def cycles(self):
@@ -117,6 +120,10 @@ class Core:
         if begin is None or end is None:
             return None
         free = 0
-        while begin + free < end and self.sim.read_u32(begin + free) == _STACK_PATTERN:
+        while begin + free < end and self.word(begin + free) == _STACK_PATTERN:
             free += 4
         return end - begin - free, end - begin
+
+    def word(self, address):
+        """Four bytes of its memory."""
+        return self.sim.read_u32(address)

@@ -29,6 +29,7 @@ def _arguments(words):
     parser.add_argument(
         "--boot-ms", type=int, default=10, metavar="N", help="how long it has been on when the rig begins (default: %(default)s)"
     )
+    parser.add_argument("--gdb", type=int, metavar="PORT", help="wait for GDB on 127.0.0.1:PORT, at reset; 0 takes any port and prints it")
     parser.add_argument("--report", metavar="FILE", help="write what is printed at the end as JSON")
     return parser.parse_args(words)
 
@@ -62,7 +63,10 @@ def _lockstep(core, bus, boot_ms, sums):
         before = core.cycles
         heard = [frame for frame in frames if not frame.raw_id & peer.ERROR]
         for raw_id, data, clock in core.millisecond(heard):
-            bus.send(raw_id, bytes(data))
+            try:
+                bus.send(raw_id, bytes(data))
+            except peer.BusError:
+                return  # the bus ended while the core ran
             sums["said"] += 1
             sums["latest_us"] = max(sums["latest_us"], round((clock - before) * 1000 / clocks_a_ms))
         sums["heard"] += len(heard)
@@ -84,18 +88,26 @@ def main(words=None):
         path = peer.path_of(asked.bus)
         if asked.chip not in CHIPS:
             raise ValueError(f"--chip {asked.chip}: there is {', '.join(sorted(CHIPS))}")
-        core = Core(asked.elf, asked.chip)
+        if asked.gdb is None:
+            core = Core(asked.elf, asked.chip)
+        else:
+            from airbench_hil.debug import DebugCore
+
+            core = DebugCore(asked.elf, asked.chip, asked.gdb)
     except (OSError, ValueError, RuntimeError) as wrong:
         return _fail(BAD_INPUT, f"{asked.elf}: {wrong}" if isinstance(wrong, OSError) else wrong)
+    except KeyboardInterrupt:
+        return INTERRUPTED
     began, sums = time.monotonic(), {"cycles": 0, "heard": 0, "said": 0, "latest_us": 0}
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    code = 0
+    code, joined = 0, False
     try:
         for _ in range(asked.boot_ms):
             core.run_ns(1_000_000)
         core.said()
         bus = peer.Peer(path)
         bus.join(asked.name)
+        joined = True
         _lockstep(core, bus, asked.boot_ms, sums)
     except KeyboardInterrupt:
         code = INTERRUPTED
@@ -107,6 +119,10 @@ def main(words=None):
         code = _fail(BUS_FAILED, f"the core stopped: {stopped}")
     except peer.LockstepTimeout as late:
         code = _fail(LOCKSTEP_TIMEOUT, f"lockstep time-out: {late} was not done")
+    finally:
+        core.close()
+    if not joined:
+        return code
     report = _report(core, sums, began)
     print("\n".join(f"  {key:<22} {value}" for key, value in report.items()))
     if asked.report:

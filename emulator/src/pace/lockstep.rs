@@ -2,7 +2,6 @@
 
 use super::{End, RunContext, RunOutcome};
 use protocol::bus::control::{Kind, Role};
-use protocol::bus::host::BARRIER_TIMEOUT;
 use protocol::bus::{BusError, Received};
 use protocol::can::CanFrame;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -23,7 +22,7 @@ pub fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Result<RunO
     let mut members_seen = false;
     let end = loop {
         let cycle = cycles;
-        let patience = if cycle == 0 { context.limits.join } else { BARRIER_TIMEOUT * 2 };
+        let patience = if cycle == 0 { context.limits.join } else { context.limits.cycle * 2 };
         let members = match wait_for_go(&mut context, &mut posted, cycle, patience) {
             Ok(members) => members,
             Err(end) => break end,

@@ -35,7 +35,7 @@ use std::time::{Duration, Instant};
 
 pub use super::host_report::{FramesById, HostReport, PeerReport};
 
-/// Wall time after which the barrier is broken by a member that is not done (bus.md, Lockstep).
+/// Wall time after which the barrier is broken by a member that is not done (bus.md, Lockstep), if nothing else is asked for.
 pub const BARRIER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Queue of a peer in bytes of the kernel's accounting, some 750 for each frame: about half a second of the whole bus.
@@ -90,6 +90,7 @@ pub struct Host {
     wire_events: Vec<WireEvent>,
     barrier: Option<Barrier>,
     waiting_since: Instant,
+    barrier_timeout: Duration,
     inbox: Inbox,
     for_rig: Option<VecDeque<ForRig>>,
     report: HostReport,
@@ -141,12 +142,21 @@ impl Host {
             wire_events: Vec::new(),
             barrier: barrier.map(Barrier::new),
             waiting_since: Instant::now(),
+            barrier_timeout: BARRIER_TIMEOUT,
             inbox: Inbox::new(),
             for_rig: None,
             report: HostReport::default(),
             gone: Vec::new(),
             closing: false,
         })
+    }
+
+    /// Gives members of the barrier this much wall time for a cycle instead of [`BARRIER_TIMEOUT`]: a core at a breakpoint
+    /// takes as long as the person in front of it.
+    #[must_use]
+    pub fn with_barrier_timeout(mut self, timeout: Duration) -> Self {
+        self.barrier_timeout = timeout;
+        self
     }
 
     /// Serves the bus until `stop` is set, and tells what it counted.
@@ -387,7 +397,7 @@ impl Host {
             self.waiting_since = Instant::now();
         }
         let Some(barrier) = &self.barrier else { return };
-        let Some(name) = barrier.waits_for().filter(|_| self.waiting_since.elapsed() > BARRIER_TIMEOUT)
+        let Some(name) = barrier.waits_for().filter(|_| self.waiting_since.elapsed() > self.barrier_timeout)
         else {
             return;
         };
