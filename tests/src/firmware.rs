@@ -29,8 +29,8 @@ const STATIC_CYCLES: u64 = 200;
 const HELD_UP_CYCLES: u64 = 20;
 const RECOVERY_CYCLES: u64 = 500;
 
-/// Builds it into `folder`, as its Makefile does for a customer, warnings being errors. `options` are those of make,
-/// such as the target `elf`. Gives the folder.
+/// Builds it into `folder`, as its Makefile does for a customer, warnings being errors; gives the folder. `options` are those of
+/// make, such as the target `elf`.
 pub fn build(folder: &Path, options: &[&str]) -> PathBuf {
     let mut make = Command::new("make");
     make.arg("-C").arg(workspace().join("tests/firmware")).args(options);
@@ -62,7 +62,8 @@ pub struct Positioned {
     pub left_out: usize,
 }
 
-/// Reads off the frames of a whole run how it positioned. What a machine that stood still did to the loop is left out, and reported.
+/// Reads off the frames of a whole run how it positioned. What a machine that stood still did to the loop is left out, and
+/// reported.
 pub fn positioned(frames: &[CanFrame]) -> Positioned {
     positioned_in(frames, REPETITIONS)
 }

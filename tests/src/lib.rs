@@ -14,7 +14,7 @@
 //!   onlooker  a viewer of the telemetry, and the live page as programs see it
 //!   discrepancy  the workflow as a program
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
-//!   firmware  a controller in C, and how well it positions
+//!   firmware  a controller in C, for Linux and as an ELF, and how well it positions
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
 //!   noise ── a node that babbles, and whether it was ever obeyed

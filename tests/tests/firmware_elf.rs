@@ -1,6 +1,7 @@
 //! The firmware as the ELF of an STM32F103, in an emulator of that chip and in lockstep with the rig: `scripts/mcu`.
 //!
-//! The emulator counts one clock for each instruction; what a real core takes is counted apart, in `tests/python/cortex_m3_cycles.py`.
+//! The emulator counts one clock for each instruction; what a real core takes is counted apart, in
+//! `tests/python/cortex_m3_cycles.py`.
 
 use protocol::frames::{
     EmergencyStop, EmergencyStopReason, Frame, MainChainState, RunControl, RunControlCommand, ValveCommand,
@@ -10,9 +11,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::binaries::{Program, workspace};
+use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned_in};
-use system_tests::foreign_python::run_script_of;
+use system_tests::foreign_python::{run_script_of, tools_path};
 use system_tests::launch::Pace;
 use system_tests::process::Running;
 use system_tests::records::{bus_log, count, count_of_id, json};
@@ -39,9 +40,14 @@ fn elf() -> PathBuf {
 
 /// `scripts/mcu` with the ELF; its report lies in the scene as `mcu.json`.
 fn mcu(scene: &Scene) -> Running {
+    Running::start("mcu", &mut mcu_command(scene))
+}
+
+fn mcu_command(scene: &Scene) -> Command {
     let mut command = Command::new(workspace().join("scripts/mcu"));
     command.arg("--elf").arg(elf()).arg("--bus").arg(scene.url());
-    Running::start("mcu", command.arg("--report").arg(scene.path("mcu.json")))
+    command.arg("--report").arg(scene.path("mcu.json"));
+    command
 }
 
 fn scene(more: &str) -> Scene {
@@ -219,6 +225,87 @@ fn the_check_of_controllers_passes_it() {
     };
     ["regular", "noise", "emergency-stop", "sensor-loss"].iter().for_each(|session| passed(session));
     eprintln!("{}", ended.stdout);
+}
+
+#[test]
+fn gdb_stops_the_core_while_the_rig_waits_and_the_run_is_the_same_to_the_byte() {
+    let run = |gdb: bool| {
+        let scene = scene("");
+        let options = "--members 1 --seconds 0.3 --lockstep-timeout 300";
+        let emulator = scene.emulator(Pace::Lockstep).with(options).start();
+        let mut command = mcu_command(&scene);
+        let mut mcu = Running::start("mcu", if gdb { command.args(["--gdb", "0"]) } else { &mut command });
+        if gdb {
+            mcu.wait_for("halted at reset");
+            let said = mcu.stderr();
+            let port = said.rsplit_once("target remote :").expect("a port").1;
+            let port = port.trim_end().trim_end_matches('\'');
+            // Longer than the 5 s that a member has otherwise.
+            let commands = [
+                &format!("target remote :{port}"),
+                "break motion_step if fw.cycle == 123",
+                "continue",
+                "backtrace",
+                "print fw.cycle",
+                "print milliseconds",
+                "finish",
+                "stepi",
+                "shell sleep 6",
+                "detach",
+            ];
+            let mut debugger = Command::new("gdb-multiarch");
+            debugger.env("PATH", tools_path()).args(["-nx", "-batch"]).arg(elf());
+            debugger.args(commands.iter().flat_map(|command| ["-ex", command]));
+            let ended = Running::start("gdb", &mut debugger).wait().expect_code(0);
+            // It has been on for 10 ms before the first cycle.
+            ended.expect_printed(&[
+                "motion_step (control=",
+                "take_sensors",
+                "$1 = 123",
+                "$2 = 133",
+                "Value returned is",
+            ]);
+        }
+        let _ = emulator.wait().expect_code(0);
+        let _ = mcu.wait().expect_code(0);
+        scene
+    };
+    let [plain, debugged] = [run(false), run(true)];
+    for file in ["emulator/bus.log", "emulator/measurement.csv"] {
+        assert!(plain.same(&plain.path(file), &debugged.path(file)), "{file} differs under the debugger");
+    }
+}
+
+#[test]
+fn what_is_no_elf_of_the_chip_and_no_bus_is_refused_in_words() {
+    let scene = scene("");
+    let host = executable(Program::Bench, Build::Shipped);
+    let cases = [
+        (["--elf", "/nowhere.elf"], "/nowhere.elf: No such file"),
+        (["--elf", host.to_str().expect("text")], "ELF"),
+        (["--chip", "stm32f999"], "there is stm32f103"),
+        (["--bus", "can://vcan0"], "unix:///PATH is expected"),
+        (["--boot-ms", "0"], "--boot-ms: at least 1"),
+    ];
+    for (arguments, words) in cases {
+        let mut command = mcu_command(&scene);
+        let _ = Running::start("mcu", command.args(arguments)).wait().expect_code(2).expect_said(&[words]);
+    }
+}
+
+#[test]
+fn the_emulator_of_the_chip_differs_from_it_where_the_page_says() {
+    let said = run_script_of("hil", "labwired_cases.py", &[elf()]);
+    let cases: BTreeMap<String, serde_json::Value> = serde_json::from_str(&said).expect("JSON");
+    let page = std::fs::read_to_string(workspace().join("docs/elf.md")).expect("docs/elf.md");
+    assert_eq!(cases.len(), 6, "{said}");
+    for (case, seen) in cases {
+        assert_ne!(seen["chip"], seen["labwired"], "{case}: mended; the port need not go round any more");
+        // Each row of the page begins with the manual's paragraph.
+        let paragraph =
+            case.rsplit_once('(').and_then(|(_, rest)| rest.split([',', ')']).next()).expect("one");
+        assert!(page.contains(paragraph), "{paragraph} is not in docs/elf.md");
+    }
 }
 
 #[test]

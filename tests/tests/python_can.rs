@@ -1,4 +1,5 @@
-//! python-can on the embedded bus: its own back-to-back tests, ours of `python/tests`, and the example of a job for a hosted runner.
+//! python-can on the embedded bus: its own back-to-back tests, ours of `python/tests`, and the example of a job for a hosted
+//! runner.
 
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
