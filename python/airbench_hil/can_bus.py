@@ -52,7 +52,11 @@ class AirbenchBus(can.BusABC):
             # Nobody hears what he sends himself; a second connection does.
             self._sender = peer.Peer(path, connect_timeout) if receive_own_messages and not member else self._peer
             if member:
-                self._peer.join(member)
+                try:
+                    self._peer.join(member)
+                except ValueError:
+                    self._peer.close()
+                    raise
         except (peer.BusError, ValueError) as error:
             raise can.CanInitializationError(str(error)) from error
         self.channel_info = f"airbench {path}"
