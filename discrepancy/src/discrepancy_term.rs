@@ -24,7 +24,7 @@ use crate::refit::{
     EffectEstimate, coordinate_columns, linearise_at, prior_deviations, prior_precisions, rig_of,
 };
 use crate::report::{LocatedTerm, LocatedVariable};
-use crate::windows::{BLOCK, BLOCKS, FORCE, InputResponses, UnknownKind, first_block};
+use crate::windows::{BLOCK, BLOCKS, FORCE, InputProducts, UnknownKind};
 use nalgebra::DMatrix;
 use plant::Axis;
 use rayon::prelude::*;
@@ -33,12 +33,6 @@ use rayon::prelude::*;
 const KNOTS: usize = 8;
 /// Sizes of a term, N and Nl/min.
 const SIZES: [f64; 8] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
-/// The same of several terms at once.
-const JOINT_SIZES: [f64; 5] = [0.05, 0.4, 3.0, 20.0, 100.0];
-/// A size at which a term is none.
-const NO_SIZE: f64 = 1e-4;
-/// Sweeps over the sizes of all terms.
-const SWEEPS: usize = 2;
 /// Log evidence over the model without a term from which on there is one. It is not calibrated: of six null records of seed 12
 /// that are true to the rig file one had 39 and one 11 (its largest of some hundred groups).
 const MIN_LOG_EVIDENCE: f64 = 8.0;
@@ -81,19 +75,13 @@ impl Over {
     }
 }
 
-/// A balance of an axis with a variable.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
+/// A balance of an axis with a variable, and what it gains.
+#[derive(Clone, Copy, Debug)]
+struct Group {
     axis: usize,
     /// One, or both chambers with hats of their own.
     kinds: &'static [UnknownKind],
     over: Over,
-}
-
-/// A place, and what a term there gains.
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    place: Place,
     log_evidence: f64,
     /// Fall of the loss at the best size.
     loss_fall: f64,
@@ -106,28 +94,13 @@ pub struct Beside<'a> {
     pub factors: [f64; COUNT],
 }
 
-/// ln Z of a model, up to what all models of the records have in common; minus infinity where the fit is singular.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Evidence {
-    pub(crate) alone: f64,
-    pub(crate) with_terms: f64,
-}
-
-impl Evidence {
-    /// What the terms add.
-    pub(crate) fn left_to_terms(self) -> f64 {
-        self.with_terms - self.alone
-    }
-}
-
 /// The term of a model; `None` where none has [`MIN_LOG_EVIDENCE`].
 pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedTerm> {
-    let responses = engine.input_responses(&rig_of(engine.rig(), beside.placed, &beside.factors)?)?;
-    let columns = linearise_at(engine, beside.placed, beside.factors).columns;
-    let mut groups = Term::new(engine, beside, &columns, &responses)?.groups();
+    let mut groups = Term::new(engine, beside)?.groups();
     let best = *groups.first().filter(|best| best.log_evidence > MIN_LOG_EVIDENCE)?;
-    let constant =
-        groups.iter().position(|group| group.place == Place { over: Over::Constant, ..best.place });
+    let constant = groups
+        .iter()
+        .position(|group| (group.axis, group.kinds, group.over) == (best.axis, best.kinds, Over::Constant));
     // A law that is nearly or mostly its mean.
     if let Some(at) = constant {
         let ratio = groups[at].log_evidence / best.log_evidence;
@@ -138,10 +111,9 @@ pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedT
     }
     let total = groups.iter().map(|group| group.loss_fall).fold(best.loss_fall, f64::max).max(1e-9);
     let mut variables: Vec<LocatedVariable> = Vec::new();
-    let of_balance =
-        groups.iter().filter(|group| group.place == Place { over: group.place.over, ..best.place });
+    let of_balance = groups.iter().filter(|group| group.axis == best.axis && group.kinds == best.kinds);
     for group in of_balance.filter(|group| group.log_evidence > 0.0) {
-        for name in group.place.over.names() {
+        for name in group.over.names() {
             if variables.iter().all(|known| known.variable != name) {
                 variables.push(LocatedVariable {
                     variable: name.to_owned(),
@@ -152,9 +124,8 @@ pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedT
         }
     }
     // Of both chambers the one that has more evidence alone.
-    let best = best.place;
-    let alone = groups.iter().map(|group| group.place).find(|place| {
-        place.axis == best.axis && best.kinds.contains(&place.kinds[0]) && place.kinds.len() == 1
+    let alone = groups.iter().find(|group| {
+        group.axis == best.axis && best.kinds.contains(&group.kinds[0]) && group.kinds.len() == 1
     });
     let kind = alone.map_or(best.kinds[0], |alone| alone.kinds[0]);
     let balance = format!("{}.{}", Axis::ALL[best.axis].name(), kind.name());
@@ -162,42 +133,34 @@ pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedT
 }
 
 /// Products of all windows.
-pub(crate) struct Term<'a> {
+struct Term {
     /// Of residual and nuisance columns, window by window.
     nuisance: Products,
     precisions: Vec<f64>,
     offsets: Vec<f64>,
-    responses: &'a [InputResponses],
-    /// B'c of each window: a row for the residual, and for each nuisance column.
-    cross: Vec<DMatrix<f64>>,
+    windows: Vec<InputProducts>,
     measured: [bool; 2],
     /// The variables of each axis, balance, window and block.
     values: [[Vec<BlockValues>; 4]; 2],
 }
 
-impl<'a> Term<'a> {
-    /// Of a model; `columns` are sensitivities to the parameters, at this model or near it.
-    pub(crate) fn new(
-        engine: &Engine<'_>,
-        beside: &Beside<'_>,
-        columns: &[Vec<f64>],
-        responses: &'a [InputResponses],
-    ) -> Option<Self> {
+impl Term {
+    fn new(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<Self> {
         let rig = rig_of(engine.rig(), beside.placed, &beside.factors)?;
         let simulated = engine.simulate(&rig);
         let residual = engine.residual(&simulated);
-        let mut columns = columns.to_vec();
+        let mut columns = linearise_at(engine, beside.placed, beside.factors).columns;
         columns.extend(coordinate_columns(engine, &beside.factors, beside.placed, &simulated)?);
         let all: Vec<&[f64]> = std::iter::once(&residual).chain(&columns).map(Vec::as_slice).collect();
-        let rows = engine.rows();
-        let of_window = |window: usize| {
-            let columns: Vec<&[f64]> = all.iter().map(|column| &column[window * rows..][..rows]).collect();
-            responses[window].cross(&columns)
-        };
-        let cross = (0..responses.len()).into_par_iter().map(of_window).collect();
+        let mut windows = Vec::new();
         let mut places: Vec<(&GriddedRecord, usize)> = Vec::new();
+        let mut from = 0;
         for part in engine.windows() {
+            let to = from + part.count() * engine.rows();
+            let columns: Vec<&[f64]> = all.iter().map(|column| &column[from..to]).collect();
+            windows.extend(part.input_products(&rig, &columns)?);
             places.extend(part.starts().iter().map(|start| (part.record(), *start)));
+            from = to;
         }
         let mut values =
             [0, 1].map(|axis| UnknownKind::ALL.map(|kind| values_of(&places, axis, kind.place())));
@@ -206,8 +169,7 @@ impl<'a> Term<'a> {
             nuisance: engine.products(&residual, &columns),
             precisions: prior_precisions(beside.placed),
             offsets: prior_deviations(&beside.factors, beside.placed),
-            responses,
-            cross,
+            windows,
             measured: places.first().map_or([false; 2], |(record, _)| record.measured),
             values,
         })
@@ -216,16 +178,16 @@ impl<'a> Term<'a> {
     /// All groups, by evidence.
     fn groups(&self) -> Vec<Group> {
         let (loss, log_determinant) = self.fitted(&self.nuisance, &self.precisions);
-        let all: Vec<Place> = (0..2)
+        let all: Vec<(usize, &'static [UnknownKind], Over)> = (0..2)
             .filter(|axis| self.measured[*axis])
             .flat_map(|axis| BALANCES.map(|kinds| (axis, kinds)))
-            .flat_map(|(axis, kinds)| Over::all().map(move |over| Place { axis, kinds, over }))
+            .flat_map(|(axis, kinds)| Over::all().map(move |over| (axis, kinds, over)))
             .collect();
         let mut groups: Vec<Group> = all
             .into_par_iter()
-            .filter_map(|place| {
+            .filter_map(|(axis, kinds, over)| {
                 // A singular fit has no evidence.
-                let products = self.with_terms(&[place]);
+                let products = self.with_terms(axis, kinds, over);
                 let count = products.columns() - self.precisions.len();
                 let evidence = |size: f64| {
                     let precision = size.powi(-2);
@@ -238,7 +200,7 @@ impl<'a> Term<'a> {
                     let (with, with_determinant) = self.fitted(&products, &precisions);
                     let spread = -(count as f64) * precision.ln();
                     let log_evidence = -0.5 * (with - loss + spread + with_determinant - log_determinant);
-                    Group { place, log_evidence, loss_fall: loss - with }
+                    Group { axis, kinds, over, log_evidence, loss_fall: loss - with }
                 };
                 SIZES
                     .into_iter()
@@ -265,7 +227,7 @@ impl<'a> Term<'a> {
     }
 
     /// For each window a row for each block, a column for each hat.
-    fn features(&self, Place { axis, over, .. }: Place, kind: UnknownKind) -> Vec<DMatrix<f64>> {
+    fn features(&self, axis: usize, kind: UnknownKind, over: Over) -> Vec<DMatrix<f64>> {
         let values = &self.values[axis][kind.place()];
         let knots = match over {
             Over::Constant => vec![0.0],
@@ -284,100 +246,24 @@ impl<'a> Term<'a> {
             .collect()
     }
 
-    /// For each balance the place with most evidence alone, where that is enough for a term.
-    pub(crate) fn places(&self) -> Vec<Place> {
-        let mut places: Vec<Place> = Vec::new();
-        for group in self.groups().into_iter().filter(|group| group.log_evidence > MIN_LOG_EVIDENCE) {
-            let place = group.place;
-            if place.kinds.len() == 1
-                && places.iter().all(|other| (other.axis, other.kinds) != (place.axis, place.kinds))
-            {
-                places.push(place);
-            }
-        }
-        places
-    }
-
-    /// The evidence of the model alone, and with terms at these places, each of its best size or none.
-    pub(crate) fn evidence(&self, places: &[Place]) -> Evidence {
-        let (loss, log_determinant) = self.fitted(&self.nuisance, &self.precisions);
-        let prior: f64 = self.precisions.iter().map(|precision| precision.ln()).sum();
-        let alone = -0.5 * (loss + log_determinant - prior);
-        if places.is_empty() {
-            return Evidence { alone, with_terms: alone };
-        }
-        let products = self.with_terms(places);
-        let counts: Vec<usize> = places.iter().map(|place| self.hats(*place)).collect();
-        let log_evidence = |sizes: &[Option<f64>]| {
-            let of = counts.iter().zip(sizes);
-            let terms =
-                of.flat_map(|(count, size)| std::iter::repeat_n(size.unwrap_or(NO_SIZE).powi(-2), *count));
-            let precisions: Vec<f64> = self.precisions.iter().copied().chain(terms).collect();
-            let (loss, log_determinant) = self.fitted(&products, &precisions);
-            let prior: f64 = precisions.iter().map(|precision| precision.ln()).sum();
-            -0.5 * (loss + log_determinant - prior)
-        };
-        let mut sizes: Vec<Option<f64>> = vec![None; places.len()];
-        let mut best = log_evidence(&sizes);
-        for _ in 0..SWEEPS {
-            for at in 0..places.len() {
-                let tried = JOINT_SIZES.into_iter().map(Some).chain([None]).filter(|size| *size != sizes[at]);
-                let tried: Vec<Option<f64>> = tried.collect();
-                let found = tried
-                    .into_par_iter()
-                    .map(|size| {
-                        let mut with = sizes.clone();
-                        with[at] = size;
-                        (log_evidence(&with), size)
-                    })
-                    .collect::<Vec<_>>();
-                for (evidence, size) in found {
-                    if evidence > best {
-                        (best, sizes[at]) = (evidence, size);
-                    }
-                }
-            }
-        }
-        Evidence { alone, with_terms: best }
-    }
-
-    /// Hats of a place.
-    fn hats(&self, place: Place) -> usize {
-        place.kinds.iter().map(|kind| self.features(place, *kind).first().map_or(0, DMatrix::ncols)).sum()
-    }
-
-    /// The nuisance columns, then the hats of each place and balance.
-    fn with_terms(&self, places: &[Place]) -> Products {
-        let hats: Vec<(usize, Vec<DMatrix<f64>>)> = places
-            .iter()
-            .flat_map(|place| {
-                let of_kind =
-                    |kind: &UnknownKind| (first_block(place.axis, *kind), self.features(*place, *kind));
-                place.kinds.iter().map(of_kind)
-            })
-            .collect();
+    /// The nuisance columns, then the hats of each balance.
+    fn with_terms(&self, axis: usize, kinds: &[UnknownKind], over: Over) -> Products {
+        let hats: Vec<Vec<DMatrix<f64>>> =
+            kinds.iter().map(|kind| self.features(axis, *kind, over)).collect();
         let (mut scores, mut information) = (Vec::new(), Vec::new());
-        for (at, (responses, known)) in self.responses.iter().zip(&self.cross).enumerate() {
-            let columns = hats.iter().map(|(_, hats)| hats[at].ncols()).sum();
-            let mut cross = DMatrix::zeros(known.nrows(), columns);
-            let mut among = DMatrix::zeros(columns, columns);
+        for (at, window) in self.windows.iter().enumerate() {
+            // The hats of all balances as a function of all inputs of the axis.
+            let columns = hats.iter().map(|hats| hats[at].ncols()).sum();
+            let mut inputs = DMatrix::zeros(window.gram[axis].nrows(), columns);
             let mut from = 0;
-            for (first, own) in &hats {
-                let own = &own[at];
-                let shape = (cross.nrows(), own.ncols());
-                cross.view_mut((0, from), shape).copy_from(&(known.columns(*first, BLOCKS) * own));
-                let mut other_from = 0;
-                for (other_first, other) in &hats {
-                    let other = &other[at];
-                    let products = own.transpose()
-                        * responses.gram.view((*first, *other_first), (BLOCKS, BLOCKS))
-                        * other;
-                    among.view_mut((from, other_from), products.shape()).copy_from(&products);
-                    other_from += other.ncols();
-                }
-                from += own.ncols();
+            for (kind, hats) in kinds.iter().zip(&hats) {
+                let hats = &hats[at];
+                inputs.view_mut((kind.place() * BLOCKS, from), hats.shape()).copy_from(hats);
+                from += hats.ncols();
             }
+            let cross = &window.cross[axis] * &inputs;
             scores.push(cross.row(0).iter().copied().collect::<Vec<f64>>());
+            let among = inputs.transpose() * &window.gram[axis] * &inputs;
             information.push((cross.rows(1, cross.nrows() - 1).into_owned(), among));
         }
         self.nuisance.extended(&scores, &information)

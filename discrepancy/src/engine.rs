@@ -13,7 +13,7 @@ use crate::fit::Products;
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
 use crate::stats::order_statistic;
-use crate::windows::{InputResponses, ReferenceRun, VariableRanges, Windows, dot};
+use crate::windows::{ReferenceRun, VariableRanges, Windows, dot};
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -164,15 +164,6 @@ impl<'a> Engine<'a> {
             column
         };
         up.par_iter().zip(down).map(difference).collect()
-    }
-
-    /// Responses of each window to unknown inputs, all records: [`Windows::input_responses`].
-    pub(crate) fn input_responses(&self, rig: &RigParameters) -> Option<Vec<InputResponses>> {
-        let mut all = Vec::with_capacity(self.scaled_dof.len());
-        for windows in &self.windows {
-            all.extend(windows.input_responses(rig)?);
-        }
-        Some(all)
     }
 
     /// Whitened residual of a simulation.

@@ -39,6 +39,8 @@ pub struct Report {
     pub inputs: InputFiles,
     /// Missing effects, the best first.
     pub named: Vec<NamedEffect>,
+    /// Effects below the smallest amplitude that is named, the best first; the extended rig file has them.
+    pub small: Vec<NamedEffect>,
     /// Baseline parameters that were significantly off.
     pub parameters: Vec<Quantity>,
     /// Parameters that the model moved by an insignificant amount; the extended rig file has them.
@@ -139,6 +141,9 @@ pub struct NamedEffect {
     pub parameters: Vec<Quantity>,
     /// Share of the excess of the training records that it removes.
     pub share_explained: f64,
+    /// Coefficient of variation of its amplitude between windows; null where none was computed.
+    #[serde(default)]
+    pub amplitude_variation: Option<f64>,
     /// Effects that explain these records as well.
     pub alternatives: Vec<NamedEffect>,
 }

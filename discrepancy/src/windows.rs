@@ -23,7 +23,7 @@ mod whiten;
 
 use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::sensor_inverse::SensorInverse;
-pub(crate) use input_responses::{BLOCK, BLOCKS, InputResponses, UnknownKind, first_block};
+pub(crate) use input_responses::{BLOCK, BLOCKS, InputProducts, UnknownKind};
 use plant::{Batch, Inputs, Plant, RigParameters};
 pub use reference_run::{ReferenceRun, VariableRanges};
 use starts::START_PASSES;

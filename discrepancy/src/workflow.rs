@@ -327,7 +327,7 @@ fn is_copy(one: &Path, other: &Path) -> bool {
 /// # Errors
 /// [`ExtendError`] when it names what a rig cannot have.
 pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, ExtendError> {
-    let additions: Vec<Addition> = reported.named.iter().map(addition).collect();
+    let additions: Vec<Addition> = reported.named.iter().chain(&reported.small).map(addition).collect();
     let changed = [&reported.parameters[..], &reported.insignificant].concat();
     let mass_axis = mass_axis(reported.measured());
     let text =

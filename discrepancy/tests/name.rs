@@ -3,7 +3,7 @@
 use crate::record::{gridded, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
-use discrepancy::name::{SelectionResult, name};
+use discrepancy::name::{SelectionResult, is_large, name};
 use discrepancy::parameters::{COUNT, with_factors};
 use plant::RigParameters;
 
@@ -99,6 +99,25 @@ fn two_hidden_effects_are_both_named() {
     let mut named = names(&found(&hidden, &[]));
     named.sort();
     assert_eq!(named, ["inclination drive", "valve-dead-zone drive"]);
+}
+
+#[test]
+fn what_is_missing_is_named_beside_what_is_too_small_for_a_name() {
+    let hidden = hiding(&[
+        ("heat-exchange", "drive", &[("coefficient_w_per_m2_k", 385.0)]),
+        ("piston-leakage", "drive", &[("leakage_nl_per_min", 3.2)]),
+    ]);
+    let found = found(&hidden, &[]);
+    let (large, small): (Vec<_>, Vec<_>) = found.reported.placed.iter().partition(|placed| is_large(placed));
+    assert_eq!(
+        large.iter().map(|placed| placed.candidate.name()).collect::<Vec<_>>(),
+        ["piston-leakage drive"]
+    );
+    assert_eq!(
+        small.iter().map(|placed| placed.candidate.name()).collect::<Vec<_>>(),
+        ["heat-exchange drive"]
+    );
+    assert_eq!(found.not_explained, None);
 }
 
 #[test]

@@ -14,6 +14,9 @@ pub(super) fn in_words(report: &Report) -> String {
             let _ = writeln!(text, "    or {}", effect_in_words(other));
         }
     }
+    for small in &report.small {
+        let _ = writeln!(text, "  smaller: {}", effect_in_words(small));
+    }
     for quantity in &report.parameters {
         let _ = writeln!(text, "  {}", quantity_in_words(quantity));
     }

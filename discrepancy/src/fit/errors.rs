@@ -38,6 +38,40 @@ impl Products {
         Some(&inverse * middle * &inverse)
     }
 
+    /// For one column, with all others projected out: the change of its coefficient that each window asks for, and its
+    /// information there. `None` where the others are singular.
+    pub(crate) fn window_changes(
+        &self,
+        column: usize,
+        weights: &[f64],
+        precisions: &[f64],
+    ) -> Option<Vec<(f64, f64)>> {
+        let others: Vec<usize> = (0..self.columns).filter(|at| *at != column).collect();
+        let ridges: Vec<f64> = others.iter().map(|at| precisions[*at]).collect();
+        let (matrix, _) = self.normal(&others, weights, &ridges);
+        let cross = DVector::from_fn(others.len(), |row, _| {
+            let of = |(weight, products): (&f64, &Vec<f64>)| {
+                weight * products[others[row] * self.columns + column]
+            };
+            weights.iter().zip(&self.information).map(of).sum()
+        });
+        let taken = solve(matrix, &cross)?;
+        let mut projection = vec![0.0; self.columns];
+        projection[column] = 1.0;
+        others.iter().zip(taken.iter()).for_each(|(at, share)| projection[*at] = -share);
+        let window = |((weight, scores), products): ((&f64, &Vec<f64>), &Vec<f64>)| {
+            let score: f64 = projection.iter().zip(scores).map(|(share, score)| share * score).sum();
+            let row = |at: usize| {
+                let row = &products[at * self.columns..][..self.columns];
+                projection[at]
+                    * projection.iter().zip(row).map(|(share, product)| share * product).sum::<f64>()
+            };
+            let information: f64 = (0..self.columns).map(row).sum::<f64>().max(1e-12);
+            (score / information, weight * information)
+        };
+        Some(weights.iter().zip(&self.scores).zip(&self.information).map(window).collect())
+    }
+
     /// One-step delete-one-window jackknife errors with frozen window weights. Where few windows determine a coefficient,
     /// residuals understate its error. A Student t factor widens each error to half of the half-width of a calibrated 95.4 %
     /// interval: two of them cover as two of a normal distribution do, and one is no plain standard error. Source: Bell,

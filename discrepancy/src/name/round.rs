@@ -10,7 +10,7 @@ use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
 use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_starts};
 use super::{
-    EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, is_large,
+    EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, lacks_fit,
     relinearise,
 };
 use crate::engine::Engine;
@@ -20,14 +20,17 @@ use rayon::prelude::*;
 
 /// Maximum number of candidates refitted in the simulator in each round.
 const CONTENDERS: usize = 6;
+/// The same from the third round on, whose fits take longest.
+const CONTENDERS_LATE: usize = 3;
 /// Smallest screened gain of a refitted candidate, as a share of the best.
 const CONTENDER_SHARE: f64 = 0.35;
 /// The same where a model leaves more than noise: what is missing beside the effect ranks first there.
 const CONTENDER_SHARE_INEXACT: f64 = 0.15;
 /// Smallest screened amplitude of a refitted candidate, as a share of its floor.
 const MIN_SCREENED_RATIO: f64 = 0.5;
-/// Maximum number of selections of candidates in a round.
-const MAX_SELECTIONS: usize = 3;
+/// Maximum number of refitted candidates below [`MIN_SCREENED_RATIO`], and their smallest screened gain as a share of the best.
+const SMALL_CONTENDERS: usize = 2;
+const SMALL_CONTENDER_SHARE: f64 = 0.6;
 /// Smallest screened gain of a further effect, as a share of the last round's threshold.
 const SEARCHED_SHARE: f64 = 0.5;
 /// Share of the predicted gain that the simulator may lack before other starting amplitudes are tried.
@@ -49,7 +52,8 @@ struct Contenders {
 }
 
 impl Contenders {
-    /// Selects the candidates outside the model with the largest gains; `None` where none gains enough.
+    /// Selects the candidates outside the model with the largest gains, in descending order: those that may be large enough to be
+    /// named, and smaller ones.
     ///
     /// The last round's threshold came from a residual with unexplained signal: it decides when to stop searching, not what to
     /// reject.
@@ -59,32 +63,39 @@ impl Contenders {
         columns: &Columns,
         model: &Refit,
         threshold: f64,
-    ) -> Option<Self> {
+    ) -> [Option<Self>; 2] {
         let taken = |screened: &Screened| model.placed.iter().any(|placed| same(placed, &screened.start));
-        let mut best: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
-        best.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        // What is clearly below the floor cannot be named, and does not take the place of what can.
-        let can_be_named = |screened: &Screened| amplitude_ratio(&screened.start) > MIN_SCREENED_RATIO;
-        best.retain(can_be_named);
-        let most = null_loss - best.first()?.loss;
-        if most < MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold) {
-            return None;
-        }
+        let mut all: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
+        all.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        let (large, small): (Vec<Screened>, Vec<Screened>) =
+            all.into_iter().partition(|screened| amplitude_ratio(&screened.start) > MIN_SCREENED_RATIO);
+        let gain = |screened: &Screened| null_loss - screened.loss;
+        let enough = |screened: &[Screened]| {
+            screened
+                .first()
+                .is_some_and(|best| gain(best) > MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold))
+        };
         let is_backlash = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
-        let backlash = if engine.is_linked() { best.iter().find(is_backlash).cloned() } else { None };
-        best.truncate(CONTENDERS);
-        let lacks_fit = null_loss > LACK_OF_FIT_PER_DOF * engine.scaled_dof().iter().sum::<f64>();
-        let share = if lacks_fit { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
-        best.retain(|screened| null_loss - screened.loss > share * most);
-        Some(Self { null_loss, best, backlash })
+        let backlash = if engine.is_linked() { large.iter().find(is_backlash).cloned() } else { None };
+        let share = if lacks_fit(engine, null_loss) { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
+        let most = [&large, &small].map(|all| all.first().map_or(0.0, gain));
+        let count = if model.placed.len() < 2 { CONTENDERS } else { CONTENDERS_LATE };
+        let best = |mut all: Vec<Screened>, count: usize, least: f64| {
+            all.retain(|screened| gain(screened) > least);
+            all.truncate(count);
+            all
+        };
+        [
+            enough(&large).then(|| Self { null_loss, best: best(large, count, share * most[0]), backlash }),
+            enough(&small)
+                .then(|| Self {
+                    null_loss,
+                    best: best(small, SMALL_CONTENDERS, SMALL_CONTENDER_SHARE * most[0].max(most[1])),
+                    backlash: None,
+                })
+                .filter(|small| !small.best.is_empty()),
+        ]
     }
-}
-
-/// All fits of a round, and what is left of them.
-pub(super) struct Selected<'a> {
-    pub(super) tried: Vec<Refit>,
-    /// `None` where none gains enough, or all are below the amplitude floor.
-    pub(super) round: Option<Round<'a>>,
 }
 
 /// Models with one more effect.
@@ -95,38 +106,39 @@ pub(super) struct Round<'a> {
 }
 
 impl<'a> Round<'a> {
-    /// The round of the candidates with the largest gains. Where all that were fitted turn out below the amplitude floor, the
-    /// next ones are tried.
+    /// The round of the candidates with the largest gains; `None` where none gains enough. Candidates below the amplitude floor
+    /// take part where the others leave more than noise: a real machine differs from its rig file by many of them.
     pub(super) fn selected(
         engine: &Engine<'a>,
         linearisation: &Linearisation,
         columns: &Columns,
         model: &Refit,
-        (null_loss, mut screened): (f64, Vec<Screened>),
+        screening: (f64, Vec<Screened>),
         threshold: f64,
         progress: &mut dyn FnMut(&str),
-    ) -> Selected<'a> {
-        let mut tried: Vec<Refit> = Vec::new();
-        for _ in 0..MAX_SELECTIONS {
-            let screening = (null_loss, screened.clone());
-            let Some(contenders) = Contenders::of(screening, engine, columns, model, threshold) else {
-                break;
-            };
+    ) -> Option<Self> {
+        let [large, small] = Contenders::of(screening, engine, columns, model, threshold);
+        let mut fitted = |contenders: &Contenders| {
             let number = model.placed.len() + 1;
             progress(&format!("fitting {} candidates, round {number}", contenders.best.len()));
-            let round = Round::fitted(engine, linearisation, model, &contenders, progress);
-            let Some(mut round) = round else { break };
-            let before = tried.len();
-            tried.extend(round.fits.iter().cloned());
-            round.fits.retain(|fit| fit.placed.last().is_some_and(is_large));
-            if !round.fits.is_empty() {
-                return Selected { tried, round: Some(round) };
+            Round::fitted(engine, linearisation, model, contenders, progress)
+        };
+        let mut round = large.and_then(|contenders| fitted(&contenders));
+        let best_loss =
+            round.as_ref().and_then(|round| round.fits.first()).map_or(model.loss, |best| best.loss);
+        if lacks_fit(engine, model.loss.min(best_loss))
+            && let Some(small) = small.and_then(|contenders| fitted(&contenders))
+        {
+            match &mut round {
+                Some(round) => {
+                    round.fits.extend(small.fits);
+                    round.restarted.extend(small.restarted);
+                    sort(&mut round.fits);
+                }
+                none => *none = Some(small),
             }
-            let small = tried[before..].iter().filter_map(|fit| fit.placed.last());
-            let small: Vec<EffectEstimate> = small.cloned().collect();
-            screened.retain(|screened| !small.iter().any(|placed| same(placed, &screened.start)));
         }
-        Selected { tried, round: None }
+        round
     }
 
     /// Fits the model with each contender; `linearisation` holds the parameter sensitivities. `None` where no fit is possible.

@@ -34,6 +34,26 @@ pub(super) fn finding(report: &Report) -> String {
     for named in &report.named {
         text += &effect(named);
     }
+    if !report.small.is_empty() {
+        text += &heading("Smaller effects");
+        text += &paragraph(
+            "Below the smallest amplitude that is named. They are part of the model, and the extended rig file has them: a real \
+             machine differs from its rig file by many of these.",
+        );
+        let row = |small: &NamedEffect| {
+            vec![
+                Cell::About(
+                    small.effect.clone(),
+                    sheet(&small.effect).map_or("", |sheet| sheet.law).to_owned(),
+                ),
+                text_cell(words::place(&small.effect, &small.place)),
+                text_cell(words::numbers(small)),
+                number(words::percent(small.share_explained)),
+            ]
+        };
+        let heads = ["effect", "where", "numbers", "explains"];
+        text += &table("Smaller effects", &heads, report.small.iter().map(row));
+    }
     if !report.parameters.is_empty() {
         if !report.named.is_empty() {
             text += &heading("Numbers of the rig file that are off");
@@ -80,6 +100,13 @@ fn effect(named: &NamedEffect) -> String {
         ));
     }
     text += &numbers(named);
+    if let Some(variation) = named.amplitude_variation {
+        text += &paragraph(&format!(
+            "Stretches of the records differ by {} in the amplitude that they ask for, noise aside; a wrong law needs another \
+             amplitude in each.",
+            words::percent(variation)
+        ));
+    }
     if !named.alternatives.is_empty() {
         text += &paragraph("These records do not distinguish it from:");
         let row = |other: &NamedEffect| {

@@ -24,7 +24,14 @@ fn quantity(name: &str, value: f64, standard_error: f64, unit: &str, before: Opt
 }
 
 fn named(effect: &str, place: Where, parameters: Vec<Quantity>, share_explained: f64) -> NamedEffect {
-    NamedEffect { effect: effect.to_owned(), place, parameters, share_explained, alternatives: Vec::new() }
+    NamedEffect {
+        effect: effect.to_owned(),
+        place,
+        parameters,
+        share_explained,
+        amplitude_variation: None,
+        alternatives: Vec::new(),
+    }
 }
 
 /// Numbers that look like noise and are the same in each run.
@@ -266,6 +273,9 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
         Verdict::Named => {
             report.summary = "Air leaks past the drive's piston: 2.51 Nl/min from 6 to 1 bar.".to_owned();
             report.named = vec![leakage()];
+            let offset = vec![quantity("offset_percent", 0.21, 0.02, "%", None)];
+            let offset = named("valve-offset", at("load", None), offset, 0.012);
+            report.small = vec![NamedEffect { amplitude_variation: Some(0.04), ..offset }];
         }
         Verdict::Ambiguous => {
             report.summary =

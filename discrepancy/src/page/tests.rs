@@ -102,6 +102,15 @@ fn a_held_out_record_that_gets_worse_and_a_model_that_leaves_more_stand_in_the_h
 }
 
 #[test]
+fn small_effects_stand_apart_from_what_is_missing() {
+    let seen = text(&made(Verdict::Named));
+    let named = seen.find("piston-leakage at the drive axis: leakage").expect("what is missing");
+    let small = seen.find("smaller: valve-offset at the load axis: offset 0.21").expect("what is small");
+    assert!(named < small, "{seen}");
+    assert!(seen.contains("the extended rig file has them"), "{seen}");
+}
+
+#[test]
 fn what_is_ambiguous_stands_together_with_the_experiment_that_tells() {
     let seen = text(&made(Verdict::Ambiguous));
     for part in [
@@ -170,6 +179,7 @@ fn text_of_the_report_cannot_become_markup_and_strange_numbers_draw_nothing_stra
         place: at("\"", Some("<")),
         parameters: Vec::new(),
         share_explained: f64::NAN,
+        amplitude_variation: Some(f64::NAN),
         alternatives: Vec::new(),
     });
     let misfit = Misfit { before: f64::NAN, after: f64::INFINITY, floor: 0.0, closed: Some(f64::NAN) };

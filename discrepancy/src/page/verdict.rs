@@ -50,6 +50,7 @@ pub(super) fn head(report: &Report) -> String {
         _ => ('\u{2713}', "verdict", ""),
     };
     let mut points: Vec<String> = report.named.iter().flat_map(named).collect();
+    points.extend(report.small.iter().map(|small| one(small, "<i>smaller:</i> ")));
     points.extend(report.parameters.iter().map(|quantity| {
         let before = quantity.before.map_or(String::new(), |before| {
             format!(", the rig file says {}", words::with_unit(&words::short(before), &quantity.unit))

@@ -29,7 +29,14 @@ fn drive() -> Where {
 /// An effect of a balance, without alternatives.
 fn named_effect(effect: &str, parameters: Vec<Quantity>, share_explained: f64) -> NamedEffect {
     let (effect, place) = (effect.to_owned(), place(effect));
-    NamedEffect { effect, place, parameters, share_explained, alternatives: Vec::new() }
+    NamedEffect {
+        effect,
+        place,
+        parameters,
+        share_explained,
+        amplitude_variation: None,
+        alternatives: Vec::new(),
+    }
 }
 
 /// Where an effect of a balance is: a chamber's is chamber a's.

@@ -1,4 +1,4 @@
-//! Responses of a window's readings to unknown inputs of each of its blocks.
+//! Responses of a window's readings to unknown inputs of each of its blocks, as products with other columns.
 //!
 //! ```text
 //!   B_k = d readings / d input of (axis, input, block)          window k, whitened, start states projected out
@@ -9,7 +9,7 @@
 //! the force sensor is added to its reading. Source: discrepancy-notes.md, Second reading (Kennedy, O'Hagan 2001).
 
 use super::whiten::SPIKE;
-use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, project, set_state};
+use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, dot, project, set_state};
 use crate::sensor_inverse::SensorInverse;
 use crate::unknown_inputs::{NORMAL_LITRES_PER_MINUTE, add_air, pushed};
 use nalgebra::DMatrix;
@@ -51,50 +51,49 @@ impl UnknownKind {
     }
 }
 
-/// Responses of a window to the inputs of both axes in the order of [`UnknownKind::ALL`], each with its blocks; those of an axis
-/// that is not measured are 0.
+/// Products of a window: the inputs of an axis in the order of [`UnknownKind::ALL`], each with its blocks.
 #[derive(Clone, Debug)]
-pub(crate) struct InputResponses {
-    /// A column for each input.
-    responses: DMatrix<f64>,
-    /// B'B.
-    pub(crate) gram: DMatrix<f64>,
-}
-
-impl InputResponses {
-    /// B'c: a row for each of the window's columns.
-    pub(crate) fn cross(&self, columns: &[&[f64]]) -> DMatrix<f64> {
-        let rows = self.responses.nrows();
-        let columns = DMatrix::from_fn(columns.len(), rows, |column, row| columns[column][row]);
-        columns * &self.responses
-    }
-}
-
-/// Inputs of both axes.
-pub(crate) const INPUTS: usize = 2 * UnknownKind::ALL.len() * BLOCKS;
-
-/// The first block of an input of an axis.
-pub(crate) fn first_block(axis: usize, kind: UnknownKind) -> usize {
-    (axis * UnknownKind::ALL.len() + kind.place()) * BLOCKS
+pub(crate) struct InputProducts {
+    /// B'B for each measured axis, and 0 for the other.
+    pub(crate) gram: [DMatrix<f64>; 2],
+    /// B'c: a row for each column.
+    pub(crate) cross: [DMatrix<f64>; 2],
 }
 
 impl Windows<'_> {
-    /// The responses of each judged window. `None` where an input brings the rig into a state that it cannot be in.
-    pub(crate) fn input_responses(&self, rig: &RigParameters) -> Option<Vec<InputResponses>> {
+    /// The products of each judged window; `columns` are over all judged windows, as residuals are. `None` where an input brings
+    /// the rig into a state that it cannot be in.
+    pub(crate) fn input_products(
+        &self,
+        rig: &RigParameters,
+        columns: &[&[f64]],
+    ) -> Option<Vec<InputProducts>> {
+        let rows = self.rows();
         self.plants_at_windows(rig)
             .par_iter()
             .enumerate()
             .map(|(at, plant)| {
-                let mut responses = DMatrix::zeros(self.rows(), INPUTS);
+                let mut products = InputProducts {
+                    gram: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
+                    cross: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
+                };
                 for axis in (0..2).filter(|axis| self.record.measured[*axis]) {
-                    let first = first_block(axis, UnknownKind::ALL[0]);
-                    for (input, response) in self.responses(at, plant, axis)?.iter().enumerate() {
-                        responses.column_mut(first + input).copy_from_slice(response);
+                    let responses = self.responses(at, plant, axis)?;
+                    let count = responses.len();
+                    let mut gram = DMatrix::zeros(count, count);
+                    for left in 0..count {
+                        for right in 0..=left {
+                            let product = dot(&responses[left], &responses[right]);
+                            gram[(left, right)] = product;
+                            gram[(right, left)] = product;
+                        }
                     }
+                    products.gram[axis] = gram;
+                    products.cross[axis] = DMatrix::from_fn(columns.len(), count, |column, response| {
+                        dot(&columns[column][at * rows..][..rows], &responses[response])
+                    });
                 }
-                // Across axes too: whitening mixes what a common jitter of the sampling moves.
-                let gram = responses.transpose() * &responses;
-                Some(InputResponses { responses, gram })
+                Some(products)
             })
             .collect()
     }

@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{NotExplained, SelectionResult, is_large, off, same};
+use crate::name::{SelectionResult, is_large, off, same};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
@@ -11,7 +11,7 @@ use crate::report::{
 };
 
 pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report {
-    let mut named = named(found);
+    let (mut named, mut small) = effects(found);
     let (parameters, insignificant) = parameters(engine, &found.reported);
     let verdict = if found.not_explained.is_some() {
         Verdict::OutsideCatalogue
@@ -32,9 +32,13 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     } else {
         None
     };
+    if verdict == Verdict::OutsideCatalogue {
+        small.clear();
+    }
     let (not_excited, detection_limits) = limits(found);
     Report {
         named,
+        small,
         adequate: Some(!found.lacks_fit && found.not_explained.is_none()),
         nearest,
         parameters,
@@ -46,9 +50,10 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     }
 }
 
-fn named(found: &SelectionResult) -> Vec<NamedEffect> {
-    let mut at = 0;
-    let mut all = Vec::new();
+/// The effects of the model: those that are named, and smaller ones.
+fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
+    let (mut at, mut index) = (0, 0);
+    let (mut named, mut small) = (Vec::new(), Vec::new());
     // What is not explained has no names, and the nearest effect.
     let model = if found.not_explained.is_some() { &found.model } else { &found.reported };
     for ((placed, share), alternatives) in model.placed.iter().zip(&found.shares).zip(&found.alternatives) {
@@ -62,10 +67,20 @@ fn named(found: &SelectionResult) -> Vec<NamedEffect> {
                 Some(named_effect(placed, &other.fit.errors[from..], other.share, Vec::new()))
             })
             .collect();
-        all.push(named_effect(placed, errors, *share, alternatives));
+        let amplitude_variation = found.amplitude_variation.get(index).copied();
+        index += 1;
+        let effect =
+            NamedEffect { amplitude_variation, ..named_effect(placed, errors, *share, alternatives) };
+        if is_large(placed) || found.not_explained.is_some() {
+            named.push(effect)
+        } else {
+            small.push(effect)
+        }
     }
-    all.sort_by(|left, right| right.share_explained.total_cmp(&left.share_explained));
-    all
+    for all in [&mut named, &mut small] {
+        all.sort_by(|left, right| right.share_explained.total_cmp(&left.share_explained));
+    }
+    (named, small)
 }
 
 fn named_effect(
@@ -95,6 +110,7 @@ fn named_effect(
         place: Where::from(candidate.place),
         parameters,
         share_explained: share,
+        amplitude_variation: None,
         alternatives,
     }
 }
@@ -119,14 +135,20 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let is_it = |other: &EffectEstimate| same(other, placed);
             let is_last = |fit: &&Refit| fit.placed.last().is_some_and(is_it);
             let alone = found.fitted.iter().filter(|fit| fit.placed.len() == 1).find(is_last);
-            let is_named = found.model.placed.iter().any(is_it);
+            let of_model = found.model.placed.iter().find(|other| is_it(other));
             let is_alike = found.alternatives.iter().flatten().any(|alternative| is_last(&&alternative.fit));
             let shown = alone.map_or(placed, |fit| &fit.placed[0]);
             let share = alone.map(|fit| {
                 ((found.calibrated.fit.loss - fit.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
             });
-            let decision = if is_named {
-                found.not_explained.map_or("named", NotExplained::reason)
+            let decision = if let Some(reason) = of_model.and(found.not_explained) {
+                reason.reason()
+            } else if let Some(placed) = of_model {
+                if is_large(placed) {
+                    "named"
+                } else {
+                    "part of the model, and below the smallest amplitude that is named"
+                }
             } else if is_alike && found.not_explained.is_none() {
                 "explains as much as what is named"
             } else if alone.is_some_and(|fit| !is_large(&fit.placed[0])) {
@@ -191,6 +213,10 @@ pub(super) fn summary(report: &Report) -> String {
         report.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>().join(", ");
     let off =
         if parameters.is_empty() { String::new() } else { format!(" Off in the rig file: {parameters}.") };
+    let small = match &report.small[..] {
+        [] => String::new(),
+        all => format!(" Smaller: {}.", all.iter().map(one).collect::<Vec<_>>().join(", ")),
+    };
     let remaining = report.remaining.as_ref().map_or(String::new(), |remaining| {
         format!(" {} depends on {}.", remaining.balance, remaining.strongest())
     });
@@ -200,19 +226,23 @@ pub(super) fn summary(report: &Report) -> String {
         _ => String::new(),
     };
     match report.verdict {
-        Verdict::NothingMissing => {
+        Verdict::NothingMissing if report.small.is_empty() => {
             "Nothing is missing above the detection limits of these records.".to_owned()
         }
-        Verdict::ParametersOnly => format!("No effect is missing.{off}"),
+        Verdict::NothingMissing | Verdict::ParametersOnly if !report.small.is_empty() => {
+            format!("No effect is missing that is large enough to be named.{small}{off}")
+        }
+        Verdict::NothingMissing | Verdict::ParametersOnly => format!("No effect is missing.{off}"),
         Verdict::Named => {
-            format!("Missing: {}.{off}{more}", report.named.iter().map(one).collect::<Vec<_>>().join(" and "))
+            let named = report.named.iter().map(one).collect::<Vec<_>>().join(" and ");
+            format!("Missing: {named}.{small}{off}{more}")
         }
         Verdict::Ambiguous => {
             let quantities = report.named.iter().map(|named| {
                 std::iter::once(named).chain(&named.alternatives).map(one).collect::<Vec<_>>().join(" or ")
             });
             format!(
-                "Missing, and not to be told apart by these records: {}.{off}{more}",
+                "Missing, and not to be told apart by these records: {}.{small}{off}{more}",
                 quantities.collect::<Vec<_>>().join("; and ")
             )
         }

@@ -8,6 +8,9 @@ use plant::Axis;
 pub struct Reported {
     /// Effects, the best first.
     pub named: Vec<NamedEffect>,
+    /// Effects below the smallest amplitude that is named.
+    #[serde(default)]
+    pub small: Vec<NamedEffect>,
     /// Parameters that were off.
     pub parameters: Vec<Quantity>,
     /// Parameters that the model moved by less.
@@ -23,6 +26,7 @@ impl From<&Report> for Reported {
     fn from(report: &Report) -> Self {
         Reported {
             named: report.named.clone(),
+            small: report.small.clone(),
             parameters: report.parameters.clone(),
             insignificant: report.insignificant.clone(),
             inputs: report.inputs.clone(),
