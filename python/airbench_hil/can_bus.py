@@ -60,7 +60,9 @@ class AirbenchBus(can.BusABC):
         except (peer.BusError, ValueError) as error:
             raise can.CanInitializationError(str(error)) from error
         self.channel_info = f"airbench {path}"
+        # What was sent and has not come back: the host does not say whose a frame is.
         self._own = collections.deque() if receive_own_messages else None
+        self._own_lock, self._sending = threading.Lock(), threading.Lock()
         self._member, self._now_s = member, 0.0
         self._pending = collections.deque()
         self._let_in = None
@@ -106,14 +108,14 @@ class AirbenchBus(can.BusABC):
             while first or until is None or time.monotonic() < until:
                 first = False
                 left = None if until is None else max(0.0, until - time.monotonic())
-                frame = self._pending.popleft() if self._pending else self._next(left)
+                frame, own = self._pending.popleft() if self._pending else self._next(left)
                 self._last_read = time.monotonic()
                 if frame is not None and self._wanted(frame.raw_id):
-                    return self._message(frame), True
+                    return self._message(frame, own), True
         return None, True
 
     def _next(self, timeout_s):
-        """The next frame, None when none comes; a cycle that is over is said to be done."""
+        """The next frame and whether it is an own one; None when none comes. A cycle that is over is said to be done."""
         if self._gone:
             raise can.CanOperationError(self._gone)
         try:
@@ -121,14 +123,30 @@ class AirbenchBus(can.BusABC):
             if isinstance(packet, peer.Go):
                 self._now_s = (packet.cycle + 1) * _CYCLE_S
                 self._peer.done(packet.cycle)
-                return None
+                return None, False
         except peer.BusError as error:
             self._gone = str(error)
             raise can.CanOperationError(self._gone) from error
         except peer.LockstepTimeout as error:
             self._gone = f"lockstep time-out: {error} was not done"
             raise can.CanOperationError(self._gone) from error
-        return packet._replace(stamp_s=self._now_s) if packet is not None and self._member else packet
+        if packet is None:
+            return None, False
+        if self._member:
+            return packet._replace(stamp_s=self._now_s), False
+        if self._sender is not self._peer:
+            self._sender.forget()
+        return packet, self._is_own(packet)
+
+    def _is_own(self, frame):
+        sent = (frame.raw_id, frame.length, frame.data)
+        with self._own_lock:
+            if not self._own or sent not in self._own:
+                return False
+            # They come in the order in which they were sent; the host has dropped those before it.
+            while self._own.popleft() != sent:
+                pass
+        return True
 
     def _keep_alive(self):
         """Reads up to the end of a cycle whenever nobody has read for a while."""
@@ -138,16 +156,13 @@ class AirbenchBus(can.BusABC):
                 if time.monotonic() - self._last_read < _PATIENCE_S:
                     continue
                 try:
-                    while (frame := self._next(0.0)) is not None:
-                        self._pending.append(frame)
+                    while (came := self._next(0.0))[0] is not None:
+                        self._pending.append(came)
                 except can.CanOperationError:
                     return
                 self._last_read = time.monotonic()
 
-    def _message(self, frame):
-        own = bool(self._own) and self._own[0] == (frame.raw_id, frame.length, frame.data)
-        if own:
-            self._own.popleft()
+    def _message(self, frame, own):
         remote = bool(frame.raw_id & peer.REMOTE)
         extended = bool(frame.raw_id & peer.EXTENDED)
         return can.Message(
@@ -172,18 +187,23 @@ class AirbenchBus(can.BusABC):
         raw_id = msg.arbitration_id
         raw_id |= msg.is_extended_id * peer.EXTENDED | msg.is_remote_frame * peer.REMOTE | msg.is_error_frame * peer.ERROR
         data = b"" if msg.is_remote_frame else bytes(msg.data)
-        if self._own is not None:
-            # Before it goes: the one who reads may be faster.
-            self._own.append((raw_id, msg.dlc, data.ljust(min(msg.dlc, 8), b"\0")))
-        try:
-            self._sender.send(raw_id, data, msg.dlc, timeout)
-        except (peer.BusError, TimeoutError) as error:
-            if self._own is not None:
-                self._own.pop()
-            raise can.CanOperationError(str(error)) from error
-        if self._own is not None and self._member:
-            # In the barrier a second connection would be a second controller.
-            self._pending.append(peer.Frame(raw_id, self._own[-1][2], msg.dlc, self._now_s))
+        own = peer.Frame(raw_id, data.ljust(min(msg.dlc, 8), b"\0"), msg.dlc, self._now_s)
+        comes_back = self._own is not None and not self._member
+        with self._sending:
+            if comes_back:
+                # Before it goes: the one who reads may be faster.
+                with self._own_lock:
+                    self._own.append((own.raw_id, own.length, own.data))
+            try:
+                self._sender.send(raw_id, data, msg.dlc, timeout)
+            except (peer.BusError, TimeoutError) as error:
+                if comes_back:
+                    with self._own_lock:
+                        self._own.pop()
+                raise can.CanOperationError(str(error)) from error
+            if self._own is not None and self._member:
+                # In the barrier a second connection would be a second controller.
+                self._pending.append((own, True))
 
     def shutdown(self):
         """Leaves the bus; to do so twice does nothing."""

@@ -109,6 +109,14 @@ class Peer:
         """Leaves the bus."""
         self.socket.close()
 
+    def forget(self):
+        """Drops what waits, for a connection that only sends: the host would count it as lost."""
+        try:
+            while self.socket.recv(_ROOM, socket.MSG_DONTWAIT):
+                pass
+        except OSError:
+            pass  # nothing waits; whether the host is gone the next to send or receive learns
+
     def send(self, raw_id, data, length=None, timeout_s=None):
         """Sends a frame; waits for room in the host's queue for `timeout_s`, without end if None. Raises BusError, TimeoutError."""
         self._send(_FRAME.pack(raw_id, len(data) if length is None else length, bytes(data)), timeout_s)

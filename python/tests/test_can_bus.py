@@ -63,6 +63,25 @@ def test_own_frames_come_back_in_their_place_and_are_marked(bus_path, pair):
     assert one.recv(0.05) is None
 
 
+def test_own_frames_are_told_apart_though_filters_or_the_host_keep_some_of_them_back(bus_path, pair):
+    one, _ = pair
+    filters = [{"can_id": 0x200, "can_mask": 0x7FF, "extended": False}]
+    with can.Bus(interface="airbench", channel=bus_path, receive_own_messages=True, can_filters=filters) as own:
+        for identifier in (0x201, 0x200, 0x201):
+            own.send(message(identifier))
+        assert not own.recv(60).is_rx
+        # More than the host keeps for one peer, then one that is kept again.
+        own.set_filters(None)
+        for n in range(10_000):
+            own.send(message(0x202, n.to_bytes(4, "big")))
+        while (got := own.recv(1)) is not None:
+            assert not got.is_rx
+        own.send(message(0x203))
+        assert not own.recv(60).is_rx
+        one.send(message(0x203))
+        assert own.recv(60).is_rx
+
+
 def test_all_kinds_of_frames_survive(pair):
     one, other = pair
     kinds = [
