@@ -210,6 +210,8 @@ class AirbenchBus(can.BusABC):
         if self._is_shutdown:
             return
         super().shutdown()
+        # Whoever waits for a frame without end has the lock until then.
+        self._peer.hang_up()
         with self._lock:
             self._peer.close()
             self._sender.close()

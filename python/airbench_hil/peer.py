@@ -105,6 +105,13 @@ class Peer:
         """The descriptor, readable when a packet waits or the host is gone."""
         return self.socket.fileno()
 
+    def hang_up(self):
+        """Ends the connection: whoever waits in `receive`, in another thread too, gets BusError."""
+        try:
+            self.socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass  # it has ended already
+
     def close(self):
         """Leaves the bus."""
         self.socket.close()

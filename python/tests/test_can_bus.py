@@ -2,6 +2,7 @@
 
 import asyncio
 import select
+import threading
 import time
 
 import can
@@ -80,6 +81,25 @@ def test_own_frames_are_told_apart_though_filters_or_the_host_keep_some_of_them_
         assert not own.recv(60).is_rx
         one.send(message(0x203))
         assert own.recv(60).is_rx
+
+
+def test_a_shutdown_does_not_wait_for_one_who_waits_without_end(bus_path):
+    bus = can.Bus(interface="airbench", channel=bus_path)
+    ended = []
+
+    def wait():
+        with pytest.raises(can.CanOperationError, match="closed|gone"):
+            bus.recv()
+        ended.append(True)
+
+    reader = threading.Thread(target=wait, daemon=True)
+    reader.start()
+    time.sleep(0.1)
+    closer = threading.Thread(target=bus.shutdown, daemon=True)
+    closer.start()
+    closer.join(60)
+    reader.join(60)
+    assert not closer.is_alive() and ended
 
 
 def test_all_kinds_of_frames_survive(pair):
