@@ -167,7 +167,7 @@ def test_the_default_bus_is_found_when_it_is_there(tmp_path, monkeypatch):
         end_host(host)
 
 
-def test_a_sender_at_full_speed_loses_nothing_without_a_count(bus_path, pair):
+def test_what_is_sent_at_full_speed_arrives_in_order(pair):
     one, other = pair
     sent = 5000
     for n in range(sent):
