@@ -19,7 +19,7 @@ def _arguments(words):
         prog="scripts/mcu",
         description="Runs the ELF of a microcontroller in labwired as a controller in lockstep with the rig: 1 ms of the core for each "
         "cycle of the bus. The emulator gets --pace lockstep --members 1. Ends with the bus.",
-        epilog="Exit codes: 0 the bus has ended; 2 usage or bad input; 3 no bus, or the core stopped; 4 lockstep time-out; "
+        epilog="Exit codes: 0 the bus has ended; 2 usage or bad input; 3 no bus or no cycle on it, or the core stopped; 4 lockstep time-out; "
         "130 interrupted.",
     )
     parser.add_argument("--elf", required=True, metavar="FILE", help="the program, as it would be flashed")
@@ -109,6 +109,8 @@ def main(words=None):
         bus.join(asked.name)
         joined = True
         _lockstep(core, bus, asked.boot_ms, sums)
+        if sums["cycles"] == 0:
+            code = _fail(BUS_FAILED, f"the bus at {path} ended before its first cycle; is it --pace lockstep, and the name taken?")
     except KeyboardInterrupt:
         code = INTERRUPTED
     except ValueError as wrong:

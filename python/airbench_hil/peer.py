@@ -23,6 +23,7 @@ _CONTROL = struct.Struct("<4sBBxxI20s")
 _MAGIC = b"ABLS"
 _JOIN_AS_MEMBER, _DONE, _GO, _TIMED_OUT = 2, 3, 4, 5
 _ROOM = 64
+_TOO_MANY = 10_000  # frames: a wire carries 21 in a cycle of 1 ms
 _SO_TIMESTAMPNS = getattr(socket, "SO_TIMESTAMPNS", 35)
 _TIMESPEC = struct.Struct("@qq")
 
@@ -189,10 +190,13 @@ def _stamp_s(ancillary):
 def cycles(peer):
     """Takes part in the barrier: yields (cycle, frames) and says done when asked for the next. Ends when the host is gone.
 
-    A peer that has joined and is not done within 5 s of wall time ends the run of all. Raises LockstepTimeout.
+    A peer that has joined and is not done within 5 s of wall time ends the run of all. Raises LockstepTimeout, and BusError for a
+    bus without a barrier, where frames come and no cycle ends.
     """
     frames = []
     while True:
+        if len(frames) > _TOO_MANY:
+            raise BusError(f"{len(frames)} frames and no end of a cycle: the bus at {peer.path} has no lockstep barrier")
         try:
             packet = peer.receive()
             if isinstance(packet, Frame):
