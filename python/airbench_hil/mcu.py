@@ -14,13 +14,13 @@ from airbench_hil import peer
 BAD_INPUT, BUS_FAILED, LOCKSTEP_TIMEOUT, INTERRUPTED = 2, 3, 4, 130
 
 
-def _arguments(words):
+def _arguments(words, prog):
     parser = argparse.ArgumentParser(
-        prog="scripts/mcu",
+        prog=prog,
         description="Runs the ELF of a microcontroller in labwired as a controller in lockstep with the rig: 1 ms of the core for each "
         "cycle of the bus. The emulator gets --pace lockstep --members 1. Ends with the bus.",
-        epilog="Exit codes: 0 the bus has ended; 2 usage or bad input; 3 no bus or no cycle on it, or the core stopped; 4 lockstep time-out; "
-        "130 interrupted.",
+        epilog="Exit codes: 0 the bus has ended; 2 usage or bad input; 3 no bus or no cycle on it, or the core stopped; "
+        "4 lockstep time-out; 130 interrupted.",
     )
     parser.add_argument("--elf", required=True, metavar="FILE", help="the program, as it would be flashed")
     parser.add_argument("--chip", default="stm32f103", help="the microcontroller (default: %(default)s)")
@@ -75,9 +75,9 @@ def _lockstep(core, bus, boot_ms, sums):
             raise RuntimeError(f"cycle {cycle}: the core is at {core.cycles} clocks: its time is not the bus's")
 
 
-def main(words=None):
+def main(words=None, prog="scripts/mcu"):
     """The program; gives its exit code."""
-    asked = _arguments(words)
+    asked = _arguments(words, prog)
     try:
         from airbench_hil.core import CHIPS, Core, CoreStopped
     except ImportError as missing:
@@ -86,6 +86,7 @@ def main(words=None):
         return _fail(BAD_INPUT, "--boot-ms: at least 1, since a CAN controller has to be started")
     try:
         path = peer.path_of(asked.bus)
+        peer.check_name(asked.name)
         if asked.chip not in CHIPS:
             raise ValueError(f"--chip {asked.chip}: there is {', '.join(sorted(CHIPS))}")
         if asked.gdb is None:
@@ -113,11 +114,9 @@ def main(words=None):
             code = _fail(BUS_FAILED, f"the bus at {path} ended before its first cycle; is it --pace lockstep, and the name taken?")
     except KeyboardInterrupt:
         code = INTERRUPTED
-    except ValueError as wrong:
-        return _fail(BAD_INPUT, f"--name: {wrong}")
     except peer.BusError as gone:
         code = _fail(BUS_FAILED, gone)
-    except CoreStopped as stopped:
+    except (CoreStopped, RuntimeError) as stopped:  # labwired raises the second where an access leads nowhere
         code = _fail(BUS_FAILED, f"the core stopped: {stopped}")
     except peer.LockstepTimeout as late:
         code = _fail(LOCKSTEP_TIMEOUT, f"lockstep time-out: {late} was not done")
@@ -139,8 +138,8 @@ def main(words=None):
 
 def entry():
     """The program as it is installed."""
-    sys.exit(main())
+    sys.exit(main(prog="airbench-mcu"))
 
 
 if __name__ == "__main__":
-    entry()
+    sys.exit(main())

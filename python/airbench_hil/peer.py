@@ -72,6 +72,14 @@ def path_of(url):
     return path
 
 
+def check_name(name):
+    """A member's name as the bus carries it. Raises ValueError unless it has 1 to 20 bytes."""
+    encoded = name.encode()
+    if not 0 < len(encoded) <= LONGEST_NAME:
+        raise ValueError(f"name '{name}': 1 to {LONGEST_NAME} bytes")
+    return encoded
+
+
 class Peer:
     """A node of the bus. What it sends, it does not hear; all others do."""
 
@@ -130,11 +138,8 @@ class Peer:
         self._send(_FRAME.pack(raw_id, len(data) if length is None else length, bytes(data)), timeout_s)
 
     def join(self, name):
-        """Joins the lockstep barrier as a controller of that name, of at most 20 bytes."""
-        encoded = name.encode()
-        if not 0 < len(encoded) <= LONGEST_NAME:
-            raise ValueError(f"name '{name}': 1 to {LONGEST_NAME} bytes")
-        self._send(_CONTROL.pack(_MAGIC, _JOIN_AS_MEMBER, 0, 0, encoded))
+        """Joins the lockstep barrier as a controller of that name. Raises ValueError as `check_name` does."""
+        self._send(_CONTROL.pack(_MAGIC, _JOIN_AS_MEMBER, 0, 0, check_name(name)))
 
     def done(self, cycle):
         """Says that all frames of the cycle are sent."""
