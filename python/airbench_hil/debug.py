@@ -136,12 +136,12 @@ class GdbServer:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         listener.close()
         self._bytes, self._breakpoints = b"", set()
-        self._halted, self._step, self._passing = True, False, None
+        self._halted, self._step = True, False
 
     def look(self):
         """Whether the debugger has interrupted the core meanwhile."""
         if self._socket and not self._halted and select.select([self._socket], [], [], 0)[0]:
-            got = self._socket.recv(4096)
+            got = self._more()
             if not got:
                 self._leave()
             elif b"\x03" in got:
@@ -152,16 +152,14 @@ class GdbServer:
         """Called before an instruction; returns when it may go, and says whether the next one has to be asked for."""
         if self._socket is None:
             return False
-        if self._step and self._passing is None or pc in self._breakpoints and pc != self._passing:
+        if not self._halted and (self._step or pc in self._breakpoints):
             self._halted, self._step = True, False
             self._reply("S05")
         if self._halted:
             self._serve()
             # The instruction where it stood goes without asking again.
-            self._passing = pc
             return True
-        self._passing = None
-        return self._step or bool(self._breakpoints)
+        return bool(self._breakpoints)
 
     def _serve(self):
         while self._socket and self._halted:
@@ -178,19 +176,27 @@ class GdbServer:
             begin, end = self._bytes.find(b"$"), self._bytes.find(b"#")
             if 0 <= begin < end and len(self._bytes) >= end + 3:
                 packet, self._bytes = self._bytes[begin + 1 : end], self._bytes[end + 3 :]
-                self._socket.sendall(b"+")
+                self._write(b"+")
                 return packet.decode("latin-1")
-            try:
-                got = self._socket.recv(4096)
-            except OSError:
-                got = b""
+            got = self._more()
             if not got:
                 return None
             self._bytes += got
 
-    def _reply(self, text):
+    def _more(self):
+        """What the debugger has sent; nothing when it is gone, killed too."""
         try:
-            self._socket.sendall(f"${text}#{sum(text.encode()) & 0xFF:02x}".encode())
+            return self._socket.recv(4096)
+        except OSError:
+            return b""
+
+    def _reply(self, text):
+        self._write(f"${text}#{sum(text.encode()) & 0xFF:02x}".encode())
+
+    def _write(self, packet):
+        try:
+            if self._socket:
+                self._socket.sendall(packet)
         except OSError:
             self._leave()
 
@@ -204,7 +210,7 @@ class GdbServer:
                 part = _TARGET[offset : offset + length]
                 return ("m" if offset + length < len(_TARGET) else "l") + part
             if kind in "cs":
-                self._halted, self._step, self._passing = False, kind == "s", None
+                self._halted, self._step = False, kind == "s"
                 return None
             if kind in "Dk":
                 self._reply("OK")
