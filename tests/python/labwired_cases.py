@@ -12,8 +12,9 @@ import sys
 from airbench_hil.core import Core
 
 CAN = 0x40006400
-TSR, RF0R, RF1R, IER, BTR, FMR, FFA1R, MAILBOX = 0x08, 0x0C, 0x10, 0x14, 0x1C, 0x200, 0x214, 0x180
-NVIC_ENABLE, NVIC_PENDING, NVIC_ACTIVE, CPUID = 0xE000E100, 0xE000E200, 0xE000E300, 0xE000ED00
+MCR, TSR, RF0R, RF1R, IER, BTR, FMR, FFA1R, MAILBOX = 0x00, 0x08, 0x0C, 0x10, 0x14, 0x1C, 0x200, 0x214, 0x180
+LOOP_BACK = 1 << 30
+NVIC_ENABLE, NVIC_PENDING, CPUID = 0xE000E100, 0xE000E200, 0xE000ED00
 RX0 = 1 << 20
 SENSORS = 0x120
 
@@ -43,7 +44,11 @@ def cases(elf):
     seen = {}
 
     case = Case(elf)
+    case.write(MCR, case.read(MCR) | 1)
+    case.core.run_ns(1_000_000)
     case.write(BTR, (1 - 1) << 20 | (6 - 1) << 16)
+    case.write(MCR, case.read(MCR) & ~1)
+    case.core.run_ns(1_000_000)
     case.request(0)
     case.core.run_ns(1_000_000)
     seen["a segment of one quantum after the sample point sends (RM0008 24.7.7, TS2 = 0)"] = (1, len(case.core.said()))
@@ -51,14 +56,12 @@ def cases(elf):
     case = Case(elf)
     case.write(IER, 1 << 1)
     case.core.sim.write_u32(NVIC_ENABLE, RX0)
-    before = case.core.sim.read_u32(case.core.sim.symbol("milliseconds"))
     case.core.sim.inject_can("bxcan1", SENSORS, bytes(8))
     pending = case.core.sim.read_u32(NVIC_PENDING) & RX0
     case.core.run_ns(5_000_000)
-    # The vector of that interrupt is `stopped`, in which only the timer still counts: an answered frame says that it never came.
-    answered = case.read(RF0R) & 3 == 0
-    seen["the interrupt of FIFO 0 comes (RM0008 24.8, FMPIE0)"] = (True, bool(pending) or not answered)
-    assert case.core.sim.read_u32(case.core.sim.symbol("milliseconds")) == before + 5
+    # The vector of that interrupt is `stopped`, where nobody empties the FIFO.
+    emptied = case.read(RF0R) & 3 == 0
+    seen["the interrupt of FIFO 0 comes (RM0008 24.8, FMPIE0)"] = (True, bool(pending) or not emptied)
 
     case = Case(elf)
     case.write(FMR, case.read(FMR) | 1)
@@ -80,6 +83,11 @@ def cases(elf):
     case.core.run_ns(1_000_000)
     case.write(TSR, 1 << 0)
     seen["a cleared RQCP0 clears TXOK0 (RM0008 24.9.2)"] = (0, case.read(TSR) >> 1 & 1)
+
+    case = Case(elf)
+    case.write(BTR, case.read(BTR) | LOOP_BACK)
+    loops_back = case.read(BTR) & LOOP_BACK != 0
+    seen["bit timing and loop-back change outside initialisation (RM0008 24.9.2, CAN_BTR)"] = (False, loops_back)
 
     case = Case(elf)
     seen["the part number of CPUID is that of a Cortex-M3 (DDI 0337)"] = ("0xc23", hex(case.core.sim.read_u32(CPUID) >> 4 & 0xFFF))
