@@ -7,7 +7,7 @@
  * Within the rest zone of a set-point that rests, the valve stays shut as soon as the rod stands: the air is trapped and friction
  * holds it. Numbers of the rig: plant/rig.toml. The law is the paper's (Neugebauer et al. 2011, section 4).
  *
- * Written for a Cortex-M3, where float32 takes 40 clocks for a product, 160 for a quotient (docs/elf.md).
+ * Written for a core without floating point, where a quotient costs as much as four products (docs/elf.md).
  */
 #include "motion.h"
 
