@@ -15,7 +15,8 @@ uv_version=0.13.9
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_valgrind && install_python && install_dask && install_hil && install_arm && install_gdb && install_browser && install_machines
+    install_strace && install_valgrind && install_python && install_dask && install_hil && install_arm && install_gdb &&
+        install_browser && install_machines
 }
 
 apt_updated=no
@@ -158,8 +159,8 @@ install_python_can_tests() {
         tar -xz -C "$tools/python-can" --strip-components 1 --wildcards -f "$tools/python-can"/python_can-*.tar.gz '*/test'
 }
 
-# The compiler of tests/firmware/stm32f103 and its C library: 85 MB to download, 8 s. Unpacked for root too, and for one processor:
-# 82 MB on the disk in the place of 800.
+# The compiler of tests/firmware/stm32f103 and its C library: 85 MB to download, 8 s. Unpacked for root too, and for one
+# processor: 82 MB on the disk in the place of 800.
 install_arm() {
     local package arm="$tools/arm" program
     if command -v arm-none-eabi-gcc >/dev/null && [ -d /usr/lib/picolibc/arm-none-eabi ]; then return 0; fi

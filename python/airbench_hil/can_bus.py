@@ -4,9 +4,9 @@
 
 Without a channel it is the default bus of this user. Frames carry the kernel's stamps of their arrival.
 
-With `member` the bus joins the lockstep barrier under that name: simulated time waits until it has read what came, so that it loses
-nothing however slow it is; stamps are simulated time from 0, in seconds. A member that is silent for 5 s ends the run, so one that does
-not read for a second (it starts, or is between two sessions) has what came put by, one cycle a second.
+With `member` the bus joins the lockstep barrier under that name: simulated time waits until it has read what came, so that it
+loses nothing however slow it is; stamps are simulated time from 0, in seconds. A member that is silent for 5 s ends the run, so
+one that does not read for a second (it starts, or is between two sessions) has what came put by, one cycle a second.
 """
 
 import collections

@@ -1,4 +1,4 @@
-"""A microcontroller in the emulator labwired, with its CAN controller at a wire of 1 Mbit/s and its time in the caller's hands."""
+"""A microcontroller in the emulator labwired: its CAN controller at a wire of 1 Mbit/s, its time in the caller's hands."""
 
 import tempfile
 from importlib import resources
@@ -22,7 +22,7 @@ class CoreStopped(Exception):
 
 
 def wire_ns(raw_id, length):
-    """Time of a frame on the wire up to the next one, ns, without stuff bits: 47 bits beside the data, 67 with 29-bit identifiers."""
+    """Time of a frame on the wire up to the next one, ns, without stuff bits: data and 47 bits, 67 with 29-bit identifiers."""
     data = 0 if raw_id & peer.REMOTE else 8 * min(length, 8)
     return ((67 if raw_id & peer.EXTENDED else 47) + data) * _NS_A_BIT
 
@@ -90,8 +90,9 @@ class Core:
 
     def said(self):
         """Frames that it has sent since the last call, in its order: (raw_id, data, clocks since reset)."""
+        flags = {"extended": peer.EXTENDED, "remote": peer.REMOTE}
         return [
-            (payload["id"] | payload["extended"] * peer.EXTENDED | payload["remote"] * peer.REMOTE, payload["data"], each["cycle"])
+            (payload["id"] | sum(payload[name] * flag for name, flag in flags.items()), payload["data"], each["cycle"])
             for each in self.sim.frames()
             if (payload := each["payload"])["direction"] == "tx"
         ]

@@ -70,7 +70,8 @@ class DebugCore(core.Core):
                     self._take(mailbox)
 
     def _take(self, mailbox):
-        identifier, length, low, high = struct.unpack("<4I", bytes(self.machine.read_memory(self._can + _MAILBOX + 16 * mailbox, 16)))
+        registers = self.machine.read_memory(self._can + _MAILBOX + 16 * mailbox, 16)
+        identifier, length, low, high = struct.unpack("<4I", bytes(registers))
         raw_id = identifier >> 3 | peer.EXTENDED if identifier & 4 else identifier >> 21
         data = struct.pack("<2I", low, high)[: min(length & 15, 8)]
         self._sent.append((raw_id | (peer.REMOTE if identifier & 2 else 0), list(data), self._clocks))

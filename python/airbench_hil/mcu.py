@@ -1,5 +1,5 @@
-"""Runs the ELF of a microcontroller as a member of the lockstep barrier: in cycle k it gets the frames of k, runs 1 ms, and what it
-sends in that time acts in k + 1. Its time is the bus's time.
+"""Runs the ELF of a microcontroller as a member of the lockstep barrier: in cycle k it gets the frames of k, runs 1 ms, and what
+it sends in that time acts in k + 1. Its time is the bus's time.
 """
 
 import argparse
@@ -17,8 +17,8 @@ BAD_INPUT, BUS_FAILED, LOCKSTEP_TIMEOUT, INTERRUPTED = 2, 3, 4, 130
 def _arguments(words, prog):
     parser = argparse.ArgumentParser(
         prog=prog,
-        description="Runs the ELF of a microcontroller in labwired as a controller in lockstep with the rig: 1 ms of the core for each "
-        "cycle of the bus. The emulator gets --pace lockstep --members 1. Ends with the bus.",
+        description="Runs the ELF of a microcontroller in labwired as a controller in lockstep with the rig: 1 ms of the core "
+        "for each cycle of the bus. The emulator gets --pace lockstep --members 1. Ends with the bus.",
         epilog="Exit codes: 0 the bus has ended; 2 usage or bad input; 3 no bus or no cycle on it, or the core stopped; "
         "4 lockstep time-out; 130 interrupted.",
     )
@@ -29,7 +29,9 @@ def _arguments(words, prog):
     parser.add_argument(
         "--boot-ms", type=int, default=10, metavar="N", help="how long it has been on when the rig begins (default: %(default)s)"
     )
-    parser.add_argument("--gdb", type=int, metavar="PORT", help="wait for GDB on 127.0.0.1:PORT, at reset; 0 takes any port and prints it")
+    parser.add_argument(
+        "--gdb", type=int, metavar="PORT", help="wait for GDB on 127.0.0.1:PORT, at reset; 0 takes any port and prints it"
+    )
     parser.add_argument("--report", metavar="FILE", help="write what is printed at the end as JSON")
     return parser.parse_args(words)
 
@@ -111,7 +113,7 @@ def main(words=None, prog="scripts/mcu"):
         joined = True
         _lockstep(core, bus, asked.boot_ms, sums)
         if sums["cycles"] == 0:
-            code = _fail(BUS_FAILED, f"the bus at {path} ended before its first cycle; is it --pace lockstep, and the name taken?")
+            code = _fail(BUS_FAILED, f"{path} ended before its first cycle; is it --pace lockstep, and the name taken?")
     except KeyboardInterrupt:
         code = INTERRUPTED
     except peer.BusError as gone:

@@ -134,7 +134,7 @@ class Peer:
             pass  # nothing waits; whether the host is gone the next to send or receive learns
 
     def send(self, raw_id, data, length=None, timeout_s=None):
-        """Sends a frame; waits for room in the host's queue for `timeout_s`, without end if None. Raises BusError, TimeoutError."""
+        """Sends a frame; waits for room in the host's queue for `timeout_s`, None: without end. Raises BusError, TimeoutError."""
         self._send(_FRAME.pack(raw_id, len(data) if length is None else length, bytes(data)), timeout_s)
 
     def join(self, name):
@@ -156,7 +156,7 @@ class Peer:
             raise BusError(f"the bus at {self.path} is gone: {error}") from error
 
     def receive(self, timeout_s=None):
-        """The next Frame or Go; None when none comes within `timeout_s`. Raises BusError when the host is gone, LockstepTimeout."""
+        """The next Frame or Go; None when none comes in `timeout_s`. Raises BusError when the host is gone, LockstepTimeout."""
         until = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             left = None if until is None else max(0.0, until - time.monotonic())

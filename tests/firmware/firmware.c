@@ -111,7 +111,8 @@ bool firmware_transmit(struct port_frame *frame)
 /* CRC-8 SAE J1850, four bits at a time: entry i is what i << 4 leaves of the polynomial 0x1D. */
 static uint8_t crc8(uint8_t crc, uint8_t byte)
 {
-    static const uint8_t LEFT[16] = {0x00, 0x1D, 0x3A, 0x27, 0x74, 0x69, 0x4E, 0x53, 0xE8, 0xF5, 0xD2, 0xCF, 0x9C, 0x81, 0xA6, 0xBB};
+    static const uint8_t LEFT[16] = {0x00, 0x1D, 0x3A, 0x27, 0x74, 0x69, 0x4E, 0x53,
+                                     0xE8, 0xF5, 0xD2, 0xCF, 0x9C, 0x81, 0xA6, 0xBB};
     crc ^= byte;
     crc = (uint8_t)((crc << 4) ^ LEFT[crc >> 4]);
     return (uint8_t)((crc << 4) ^ LEFT[crc >> 4]);
@@ -220,8 +221,8 @@ static void answer(void)
     advance();
     const float opening = motion_step(&fw.control, fw.set_point, fw.position_m);
     const bool status_is_due = fw.tell_status || fw.cycle % STATUS_EVERY_CYCLES == 0U;
-    /* The rig waits for the command, so it goes first. Who takes part in lockstep by its echo sends it last: there it says that this
-     * cycle is answered, and what follows belongs to the next one. */
+    /* The rig waits for the command, so it goes first. Who takes part in lockstep by its echo sends it last: there it says that
+     * this cycle is answered, and what follows belongs to the next one. */
     if (status_is_due && !fw.own_time) {
         send_status();
     }

@@ -36,7 +36,7 @@ static const struct {
     PIECE(0.8F, 0.52F, 1.0F, 0.58F),
 };
 
-/* An angle in 2^20ths of a turn: whole numbers find the quadrant where a processor without floating point would look for it long. */
+/* An angle in 2^20ths of a turn: its quadrant is found in whole numbers, without floating point. */
 #define TURN_BITS 20U
 #define QUADRANT_BITS (TURN_BITS - 2U)
 #define TURN (1U << TURN_BITS)

@@ -27,8 +27,8 @@ bool port_send(const struct port_frame *frame);
 /* Milliseconds since some moment, modulo 2^32. */
 uint32_t port_millis(void);
 
-/* Whether these pass as the rig's time does, even where that is simulated: true on a board, whose timer is that of its core and is
- * simulated with it; false for a process on a host, whose clock goes on by itself. */
+/* Whether these pass as the rig's time does, even where that is simulated: true on a board, whose timer is that of its core and
+ * is simulated with it; false for a process on a host, whose clock goes on by itself. */
 bool port_millis_are_the_rigs(void);
 
 /* Sleeps until a frame or the next millisecond comes, as a processor waits for its next interrupt. */

@@ -2,12 +2,12 @@
 
     cortex_m3_cycles.py COUNT_ELF [ARM_PREFIX]
 
-COUNT_ELF is firmware-count.elf, whose CAN controller lies in the RAM: this script plays it. An emulator executes each instruction
-(labwired counts one clock for any), the Cortex-M3 Technical Reference Manual (ARM DDI 0337I, table 3-1) says what it takes. Where that
-gives a range, its upper end is taken: 3 clocks to fill the pipeline after a branch, 12 for a division, 5 and 7 for 64-bit products;
-no load is taken for pipelined. The flash has no wait states up to 24 MHz (PM0075). Of each kind of millisecond the result says the
-instructions and the clocks of a real one; accesses to the CAN controller on its slower bus are not in it, some 4 clocks for each of
-about 20. The result is a JSON object.
+COUNT_ELF is firmware-count.elf, whose CAN controller lies in the RAM: this script plays it. An emulator executes each
+instruction (labwired counts one clock for any), the Cortex-M3 Technical Reference Manual (ARM DDI 0337I, table 3-1) says what it
+takes. Where that gives a range, its upper end is taken: 3 clocks to fill the pipeline after a branch, 12 for a division, 5 and 7
+for 64-bit products; no load is taken for pipelined. The flash has no wait states up to 24 MHz (PM0075). Of each kind of
+millisecond the result says the instructions and the clocks of a real one; accesses to the CAN controller on its slower bus are
+not in it, some 4 clocks for each of about 20. The result is a JSON object.
 """
 
 import json
@@ -60,7 +60,8 @@ class Board:
     """The count ELF, stepped by instructions."""
 
     def __init__(self, elf, prefix):
-        listing = subprocess.run([f"{prefix}objdump", "-d", "--no-show-raw-insn", elf], check=True, capture_output=True, text=True)
+        disassemble = [f"{prefix}objdump", "-d", "--no-show-raw-insn", elf]
+        listing = subprocess.run(disassemble, check=True, capture_output=True, text=True)
         self.code, function = {}, None
         for line in listing.stdout.splitlines():
             if head := re.match(r"[0-9a-f]+ <(.*)>:", line):
@@ -114,7 +115,8 @@ def sensors(cycle, position):
 
 def operations(calls):
     """Calls of the float32 routines of libgcc, by operation."""
-    names = {"add": ("__aeabi_fadd", "__aeabi_fsub", "__addsf3", "__subsf3"), "multiply": ("__aeabi_fmul",), "divide": ("__aeabi_fdiv",)}
+    names = {"add": ("__aeabi_fadd", "__aeabi_fsub", "__addsf3", "__subsf3")}
+    names |= {"multiply": ("__aeabi_fmul",), "divide": ("__aeabi_fdiv",)}
     names["compare"] = ("__aeabi_fcmplt", "__aeabi_fcmpgt", "__aeabi_fcmple", "__aeabi_fcmpge", "__aeabi_fcmpeq")
     names["convert"] = ("__aeabi_i2f", "__aeabi_ui2f", "__aeabi_f2iz", "__aeabi_f2uiz", "__aeabi_f2ulz", "__aeabi_ul2f")
     return {what: sum(calls.get(name, 0) for name in routines) for what, routines in names.items()}

@@ -2,8 +2,8 @@
 
     labwired_cases.py ELF
 
-The ELF is the firmware's, which has started clock, filters and CAN; from then on the registers are poked from outside. The result is
-a JSON object: for each case what the chip would show, and what labwired shows.
+The ELF is the firmware's, which has started clock, filters and CAN; from then on the registers are poked from outside. The
+result is a JSON object: for each case what the chip would show, and what labwired shows.
 """
 
 import json
@@ -90,7 +90,8 @@ def cases(elf):
     seen["bit timing and loop-back change outside initialisation (RM0008 24.9.2, CAN_BTR)"] = (False, loops_back)
 
     case = Case(elf)
-    seen["the part number of CPUID is that of a Cortex-M3 (DDI 0337)"] = ("0xc23", hex(case.core.sim.read_u32(CPUID) >> 4 & 0xFFF))
+    part = hex(case.core.sim.read_u32(CPUID) >> 4 & 0xFFF)
+    seen["the part number of CPUID is that of a Cortex-M3 (DDI 0337)"] = ("0xc23", part)
     return seen
 
 

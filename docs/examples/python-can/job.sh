@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What the job does, and what a person does to repeat it: the rig in real time on a bus of its own, and tests of CAN software at it.
-# No root, no CAN in the kernel.
+# What the job does, and what a person does to repeat it: the rig in real time on a bus of its own, and tests of CAN software
+# at it. No root, no CAN in the kernel.
 #
 #   job.sh AIRBENCH     a clone of airbench; its programs are built, unless AIRBENCH_BIN_DIR names a folder with them.
 #                       PYTHON: a python that has airbench-hil and pytest; without, a virtual environment is made in ./venv

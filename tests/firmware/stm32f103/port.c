@@ -1,8 +1,8 @@
 /* The port for an STM32F103: bxCAN at 1 Mbit/s, SysTick each millisecond, both from a crystal of 8 MHz without the PLL.
  *
  * 8 MHz are enough (docs/elf.md has the cycles), need no wait states of the flash, and divide into 8 quanta a bit, sampled at
- * 75 %: at 87.5 %, with one quantum after the sample, an emulator takes the timing for invalid and sends nothing. The RC oscillator
- * would do as well but for its tolerance of 1 %, which CAN at this rate does not allow.
+ * 75 %: at 87.5 %, with one quantum after the sample, an emulator takes the timing for invalid and sends nothing. The RC
+ * oscillator would do as well but for its tolerance of 1 %, which CAN at this rate does not allow.
  *
  * CAN on PA11 and PA12. Frames wait in FIFO 0, which holds three: the filters let in only what the firmware takes. It is polled
  * while the core has nothing else to do: the interrupt of the FIFO is not needed for that, and one emulator does not have it.
