@@ -87,6 +87,7 @@ class DebugCore(core.Core):
             return
         if self._read(_MSR) & _INITIALISING:
             self.refused += 1
+            self.why_refused = "it is in initialisation"
             return
         timing = self._read(_BTR)
         self._write(_BTR, timing | _LOOP_BACK)

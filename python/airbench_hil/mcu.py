@@ -128,6 +128,8 @@ def main(words=None, prog="scripts/mcu"):
         return code
     report = _report(core, sums, began)
     print("\n".join(f"  {key:<22} {value}" for key, value in report.items()))
+    if core.refused:
+        print(f"mcu: the CAN controller refused {core.refused} frames, the last: {core.why_refused}", file=sys.stderr)
     if asked.report:
         try:
             with open(asked.report, "w", encoding="utf-8") as file:

@@ -1,7 +1,8 @@
-"""An embedded bus without a rig for each module, hosted by `emulator bus` from AIRBENCH_BIN_DIR or target/release."""
+"""An embedded bus without a rig for each module, hosted by `emulator bus` from AIRBENCH_BIN_DIR or target/release; an ELF."""
 
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -16,9 +17,14 @@ sys.path.insert(0, str(PYTHON_CAN))
 sys.modules.pop("test", None)
 
 
+def emulator():
+    """The program."""
+    return Path(os.environ.get("AIRBENCH_BIN_DIR", ROOT / "target/release"), "emulator")
+
+
 def start_host(path):
     """Starts a host; it is there when this returns."""
-    program = Path(os.environ.get("AIRBENCH_BIN_DIR", ROOT / "target/release"), "emulator")
+    program = emulator()
     host = subprocess.Popen([program, "bus", "--bus", f"unix://{path}"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     until = time.monotonic() + 60
     while not Path(path).exists():
@@ -40,3 +46,14 @@ def bus_path(tmp_path_factory):
     host = start_host(path)
     yield str(path)
     end_host(host)
+
+
+@pytest.fixture
+def elf(tmp_path):
+    """A program for the chip: two vectors, 64 times `nop`, and a branch back to the first. It never touches CAN."""
+    flash, stack, first = 0x08000000, 0x20005000, 0x08000008
+    code = struct.pack("<II", stack, first | 1) + b"\x00\xbf" * 64 + struct.pack("<H", 0xE000 | -66 & 0x7FF)
+    header = struct.pack("<16s2H5I6H", b"\x7fELF\x01\x01\x01", 2, 40, 1, first | 1, 52, 0, 0x05000000, 52, 32, 1, 40, 0, 0)
+    segment = struct.pack("<8I", 1, 84, flash, flash, len(code), len(code), 5, 4)
+    (tmp_path / "nops.elf").write_bytes(header + segment + code)
+    return tmp_path / "nops.elf"

@@ -6,21 +6,9 @@ import struct
 import threading
 import time
 
-import pytest
-
 from airbench_hil import debug
 
-FLASH, STACK, FIRST = 0x08000000, 0x20005000, 0x08000008
-
-
-@pytest.fixture
-def elf(tmp_path):
-    """Two vectors, 64 times `nop`, and a branch back to the first."""
-    code = struct.pack("<II", STACK, FIRST | 1) + b"\x00\xbf" * 64 + struct.pack("<H", 0xE000 | -66 & 0x7FF)
-    header = struct.pack("<16s2H5I6H", b"\x7fELF\x01\x01\x01", 2, 40, 1, FIRST | 1, 52, 0, 0x05000000, 52, 32, 1, 40, 0, 0)
-    segment = struct.pack("<8I", 1, 84, FLASH, FLASH, len(code), len(code), 5, 4)
-    (tmp_path / "nops.elf").write_bytes(header + segment + code)
-    return tmp_path / "nops.elf"
+FIRST = 0x08000008  # of the nops
 
 
 class Debugger:
