@@ -11,6 +11,7 @@
 //! | [`spread`] | how much the figures of repetitions spread |
 //! | [`probe`] | gaps that a spinning thread sees: did the machine stand still, or did another thread run |
 //! | [`ping_pong`] | round trips of 16 bytes between two processes, as a reference |
+//! | [`can`] | any SocketCAN program on an embedded bus |
 //! | [`conformance`] | whether a foreign controller keeps the contract of the bus |
 //! | [`gateway`] | a door to a bus for clients of the socketcand protocol |
 //! | [`soak`] | emulator and controllers over hours, every frame accounted for |
@@ -20,6 +21,7 @@
 //! | [`export_fmu`] | the plant as an FMU |
 //! | [`cli`] | the command line |
 
+pub mod can;
 pub mod cli;
 pub mod compare;
 pub mod conformance;

@@ -8,7 +8,7 @@ use bench::replay::ReplayError;
 use bench::runs::{self, Run, RunsError};
 use bench::soak::SoakError;
 use bench::soak::processes::become_child;
-use bench::{compare, export, export_fmu, picture, probe, replay, soak, spread};
+use bench::{can, compare, export, export_fmu, picture, probe, replay, soak, spread};
 use clap::Parser;
 use figures::{SummaryError, join, table, thresholds};
 use latency::ReportError;
@@ -45,6 +45,7 @@ fn main() -> ExitCode {
             return reported(conformance::run(&arguments), ConformanceError::exit);
         }
         Command::Gateway(arguments) => return reported(gateway::run(&arguments), GatewayError::exit),
+        Command::Can(arguments) => return can::run(&arguments),
         Command::Watch(arguments) => return reported(live::run(&arguments), LiveError::exit),
         Command::Soak(arguments) => return reported(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
         Command::SoakChild(arguments) => {

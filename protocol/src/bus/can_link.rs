@@ -1,14 +1,14 @@
 //! Link to a SocketCAN interface, hardware and vcan alike.
 
+#![allow(unsafe_code)] // the ioctl SIOCGIFFLAGS, nothing else
+
 use super::socket_peer::Link;
 use socketcan::{CanSocket, Socket, SocketOptions};
 use std::io;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 
 /// Receive buffer asked for, in bytes: 2 000 frames of some 900 bytes with the kernel's bookkeeping.
 const RECEIVE_BUFFER_BYTES: usize = 2 << 20;
-/// `IFF_UP` of `<net/if.h>`.
-const INTERFACE_UP: u32 = 1;
 
 /// A SocketCAN interface by name.
 pub(super) struct CanLink {
@@ -20,12 +20,21 @@ impl CanLink {
         Self { interface: interface.into() }
     }
 
-    /// A socket on an interface that is down opens without a word and then drops everything, so ask first.
-    fn check_up(&self) -> io::Result<()> {
-        let flags = std::fs::read_to_string(format!("/sys/class/net/{}/flags", self.interface))
-            .map_err(|_| io::Error::new(io::ErrorKind::NotFound, "no such network interface"))?;
-        let flags = u32::from_str_radix(flags.trim().trim_start_matches("0x"), 16).unwrap_or(INTERFACE_UP);
-        if flags & INTERFACE_UP == 0 {
+    /// A socket on an interface that is down opens without a word and then drops everything, so ask first. Asked of the socket and
+    /// not of /sys, where an interface of another network namespace, or of `bench can`, does not stand.
+    fn check_up(&self, socket: BorrowedFd<'_>) -> io::Result<()> {
+        // SAFETY: a plain C structure for which all zeros is a valid value.
+        let mut request: libc::ifreq = unsafe { std::mem::zeroed() };
+        for (to, from) in request.ifr_name.iter_mut().zip(self.interface.bytes()) {
+            *to = from as libc::c_char;
+        }
+        // SAFETY: the kernel reads the name, which ends with a zero, and writes the flags.
+        if unsafe { libc::ioctl(socket.as_raw_fd(), libc::SIOCGIFFLAGS as _, &raw mut request) } != 0 {
+            return Err(io::Error::last_os_error());
+        }
+        // SAFETY: the kernel has written this member.
+        let flags = unsafe { request.ifr_ifru.ifru_flags };
+        if i32::from(flags) & libc::IFF_UP == 0 {
             return Err(io::Error::new(io::ErrorKind::NetworkDown, "the interface is down"));
         }
         Ok(())
@@ -38,8 +47,11 @@ impl Link for CanLink {
     const REMEDY: &'static str = "make it with 'ip link add dev vcan0 type vcan' and 'ip link set vcan0 up', or use --bus unix:///PATH";
 
     fn connect(&self) -> io::Result<OwnedFd> {
-        self.check_up()?;
-        let socket = CanSocket::open(&self.interface)?;
+        let socket = CanSocket::open(&self.interface).map_err(|error| match error.raw_os_error() {
+            Some(libc::ENODEV) => io::Error::new(io::ErrorKind::NotFound, "no such network interface"),
+            _ => error,
+        })?;
+        self.check_up(socket.as_fd())?;
         socket.set_nonblocking(true)?;
         socket.set_error_filter_accept_all()?;
         // The crate gives up its descriptor as a raw number only; a duplicate is the same socket, and safe.

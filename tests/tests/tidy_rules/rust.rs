@@ -24,7 +24,7 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 23] = [
+const ROOMS: [&str; 24] = [
     "settings",
     "protocol",
     "realtime",
@@ -43,6 +43,7 @@ const ROOMS: [&str; 23] = [
     "figures",
     "latency",
     "live",
+    "socketcan-guest",
     "bench",
     "records",
     "discrepancy",
@@ -84,6 +85,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("figures", &["runlog", "pagekit"]),
     ("latency", &["protocol", "realtime", "runlog", "pagekit", "figures"]),
     ("live", &["protocol", "realtime", "runlog", "pagekit", "latency"]),
+    ("socketcan_guest", &["protocol"]),
     ("records", &["protocol", "runlog", "plant"]),
     (
         "discrepancy",

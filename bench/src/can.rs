@@ -1,0 +1,170 @@
+//! `bench can`: runs any SocketCAN program on embedded buses, on a machine whose kernel may have no CAN.
+//!
+//! How its system calls are answered is the crate `socketcan-guest`; here are the command line, the bus of a pair of programs that
+//! have no rig, and the exit code, which is the program's own.
+
+pub mod cli;
+
+use crate::warn;
+use cli::{CanArguments, InterfaceArgument};
+use protocol::bus::host::Host;
+use protocol::bus::{BusError, BusUrl};
+use protocol::exit::Exit;
+use realtime::Interrupt;
+use socketcan_guest::{GuestError, Named};
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// The interface of `--bus`.
+const FIRST_INTERFACE: &str = "vcan0";
+/// How often the end is looked for while a bus is hosted.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// Why a program could not be run.
+#[derive(Debug, thiserror::Error)]
+pub enum CanError {
+    /// A bus that the kernel has itself.
+    #[error("{0}: 'bench can' opens embedded buses, unix:///PATH; a program reaches {0} without it")]
+    Kernels(BusUrl),
+    /// Two interfaces of one name.
+    #[error("interface {0} is given twice")]
+    Twice(String),
+    /// Neither a program nor a bus to open.
+    #[error("no command: bench can -- COMMAND ARGUMENT…, or bench can --pair to open a bus alone")]
+    NoCommand,
+    /// The bus of a pair.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The program.
+    #[error(transparent)]
+    Guest(#[from] GuestError),
+    /// The system gave no signal handler, or the host ended.
+    #[error(transparent)]
+    System(#[from] io::Error),
+}
+
+impl CanError {
+    /// The code of the table that all programs share.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Bus(_) | Self::Guest(GuestError::NoHost { .. }) => Exit::BusFailed,
+            _ => Exit::BadInput,
+        }
+    }
+}
+
+/// Runs what the arguments say; the exit code is the program's.
+#[must_use]
+pub fn run(arguments: &CanArguments) -> ExitCode {
+    match try_to_run(arguments) {
+        Ok(code) => ExitCode::from(u8::try_from(code).unwrap_or(u8::MAX)),
+        Err(error) => {
+            warn(&error.to_string());
+            error.exit().into()
+        }
+    }
+}
+
+fn try_to_run(arguments: &CanArguments) -> Result<i32, CanError> {
+    let named = interfaces(arguments)?;
+    if !arguments.pair {
+        if arguments.command.is_empty() {
+            return Err(CanError::NoCommand);
+        }
+        return run_program(arguments, &named);
+    }
+    let BusUrl::Unix { path, wire } = &arguments.bus else {
+        return Err(CanError::Kernels(arguments.bus.clone()));
+    };
+    let host = Host::bind(path, *wire, None)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopped = Arc::clone(&stop);
+    let serving = std::thread::spawn(move || host.serve(&stopped));
+    let ran = if arguments.command.is_empty() {
+        wait_for_the_end(&arguments.bus)
+    } else {
+        run_program(arguments, &named)
+    };
+    stop.store(true, Ordering::Relaxed);
+    let report = serving.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+    if arguments.command.is_empty() {
+        let dropped: u64 = report.peers.iter().map(|peer| peer.dropped_at_queue.total()).sum();
+        warn(&format!("the bus carried {} frames; {dropped} did not fit the queue of a peer", report.frames));
+    }
+    ran
+}
+
+fn run_program(arguments: &CanArguments, named: &[Named]) -> Result<i32, CanError> {
+    let patience = Duration::from_secs(arguments.wait_s.into());
+    let code = socketcan_guest::run(named, &arguments.command, patience)?;
+    Ok(code.unwrap_or(Exit::Interrupted as i32))
+}
+
+fn wait_for_the_end(bus: &BusUrl) -> Result<i32, CanError> {
+    let interrupt = Interrupt::watch()?;
+    warn(&format!("hosting {bus}; Ctrl-C ends it"));
+    while !interrupt.came() {
+        std::thread::sleep(LOOK_EVERY);
+    }
+    Ok(Exit::Interrupted as i32)
+}
+
+/// The interfaces in their order: those that are named, or the one of `--bus`.
+fn interfaces(arguments: &CanArguments) -> Result<Vec<Named>, CanError> {
+    let first = InterfaceArgument { name: FIRST_INTERFACE.into(), bus: arguments.bus.clone() };
+    let asked =
+        if arguments.interfaces.is_empty() { std::slice::from_ref(&first) } else { &arguments.interfaces };
+    let mut named: Vec<Named> = Vec::new();
+    for InterfaceArgument { name, bus } in asked {
+        let path: PathBuf = match bus {
+            BusUrl::Unix { path, .. } => path.clone(),
+            BusUrl::Can { .. } => return Err(CanError::Kernels(bus.clone())),
+        };
+        if named.iter().any(|other| other.name == *name) {
+            return Err(CanError::Twice(name.clone()));
+        }
+        named.push(Named { name: name.clone(), path });
+    }
+    Ok(named)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::{Cli, Command};
+    use clap::Parser;
+
+    fn arguments(line: &str) -> CanArguments {
+        match Cli::parse_from(line.split(' ')).command {
+            Command::Can(arguments) => *arguments,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_first_interface_is_vcan0_unless_others_are_named() {
+        let one = interfaces(&arguments("bench can --bus unix:///a -- x")).unwrap();
+        assert_eq!(one, [Named { name: "vcan0".into(), path: "/a".into() }]);
+        let two = "bench can --interface can0=unix:///a --interface can1=unix:///b -- x";
+        let two: Vec<_> = interfaces(&arguments(two)).unwrap().into_iter().map(|named| named.name).collect();
+        assert_eq!(two, ["can0", "can1"]);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_a_word_on_what_can() {
+        for (line, hint) in [
+            ("bench can --bus can://vcan0 -- x", "unix:///PATH"),
+            ("bench can --interface a=unix:///a --interface a=unix:///b -- x", "twice"),
+        ] {
+            let refused = interfaces(&arguments(line)).unwrap_err();
+            assert!(refused.to_string().contains(hint), "{line}: {refused}");
+            assert_eq!(refused.exit(), Exit::BadInput);
+        }
+        assert!(matches!(try_to_run(&arguments("bench can")), Err(CanError::NoCommand)));
+    }
+}

@@ -1,0 +1,166 @@
+//! The broadcast manager, `CAN_BCM`: a socket that sends cyclically and reports changes and time-outs, on the guest's behalf.
+//!
+//! ```text
+//!   guest ── TX_SETUP, TX_SEND, TX_DELETE, TX_READ ──► jobs that send (transmit.rs)  ── frames ──► the interface
+//!         ── RX_SETUP, RX_DELETE, RX_READ ───────────► jobs that watch (watch.rs)    ◄── frames ── the interface
+//!         ◄── TX_EXPIRED, TX_STATUS, RX_CHANGED, RX_TIMEOUT, RX_STATUS ── both
+//! ```
+//!
+//! It knows no socket and no clock: commands, frames and the time come in, [`Action`]s go out. It differs from the kernel's in one
+//! thing: the next cycle is counted from when the last was due, not from when it was sent, so that a cyclic frame does not drift.
+//!
+//! Source: Linux 6.1 `net/can/bcm.c`, `include/uapi/linux/can/bcm.h`.
+
+mod message;
+mod transmit;
+mod watch;
+
+use crate::bus_peer::FrameBytes;
+use message::{Head, opcode};
+use rustix::io::Errno;
+use std::time::Instant;
+use transmit::Transmission;
+use watch::Watch;
+
+/// `MAX_NFRAMES`.
+const MOST_FRAMES: u32 = 256;
+
+/// What the manager wants done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Action {
+    /// A frame goes to the interface of this index, and to the guests on it.
+    Send(u32, FrameBytes),
+    /// A message goes to the guest; the index is that of the interface that it tells of.
+    Tell(u32, Vec<u8>),
+}
+
+/// The jobs of one socket.
+#[derive(Debug, Default)]
+pub(crate) struct BroadcastManager {
+    transmissions: Vec<Transmission>,
+    watches: Vec<Watch>,
+}
+
+impl BroadcastManager {
+    /// Carries out a command for the interface of this index, 0 for any; gives the bytes that it took.
+    ///
+    /// # Errors
+    /// What the kernel says: `EINVAL` for malformed commands and unknown jobs, `EFAULT` for fewer frames than announced, `E2BIG`
+    /// for more frames than the job has room for, `ENODEV` to send on no interface.
+    pub(crate) fn command(
+        &mut self,
+        bytes: &[u8],
+        interface: u32,
+        now: Instant,
+        actions: &mut Vec<Action>,
+    ) -> Result<usize, Errno> {
+        let (head, frames) = Head::read(bytes)?;
+        match head.opcode {
+            opcode::TX_SETUP => self.set_up_transmission(&head, frames, interface, now, actions),
+            opcode::RX_SETUP => self.set_up_watch(&head, frames, interface, now, actions),
+            opcode::TX_DELETE => delete(&mut self.transmissions, |job| job.is(&head, interface)),
+            opcode::RX_DELETE => delete(&mut self.watches, |job| job.is(&head, interface)),
+            opcode::TX_READ => {
+                let job =
+                    self.transmissions.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
+                actions.push(Action::Tell(interface, job.status()));
+                Ok(message::HEAD_BYTES)
+            }
+            opcode::RX_READ => {
+                let job = self.watches.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
+                actions.push(Action::Tell(interface, job.status()));
+                Ok(message::HEAD_BYTES)
+            }
+            opcode::TX_SEND => {
+                if head.frame_count != 1 || frames.len() != 1 {
+                    return Err(Errno::INVAL);
+                }
+                if interface == 0 {
+                    return Err(Errno::NODEV);
+                }
+                actions.push(Action::Send(interface, frames[0]));
+                Ok(bytes.len())
+            }
+            _ => Err(Errno::INVAL),
+        }
+    }
+
+    fn set_up_transmission(
+        &mut self,
+        head: &Head,
+        frames: Vec<FrameBytes>,
+        interface: u32,
+        now: Instant,
+        actions: &mut Vec<Action>,
+    ) -> Result<usize, Errno> {
+        if interface == 0 {
+            return Err(Errno::NODEV);
+        }
+        if head.frame_count < 1 || head.frame_count > MOST_FRAMES {
+            return Err(Errno::INVAL);
+        }
+        let frames = head.announced(frames)?;
+        match self.transmissions.iter_mut().find(|job| job.is(head, interface)) {
+            Some(job) => job.set_up(head, &frames, now, actions),
+            None => {
+                let mut job = Transmission::new(head, interface, &frames)?;
+                let taken = job.set_up(head, &frames, now, actions)?;
+                self.transmissions.push(job);
+                Ok(taken)
+            }
+        }
+    }
+
+    fn set_up_watch(
+        &mut self,
+        head: &Head,
+        frames: Vec<FrameBytes>,
+        interface: u32,
+        now: Instant,
+        actions: &mut Vec<Action>,
+    ) -> Result<usize, Errno> {
+        let head = watch::normal(head)?;
+        let frames = head.announced(frames)?;
+        match self.watches.iter_mut().find(|job| job.is(&head, interface)) {
+            Some(job) => job.set_up(&head, &frames, now, actions),
+            None => {
+                let mut job = Watch::new(&head, interface, &frames);
+                let taken = job.set_up(&head, &frames, now, actions)?;
+                self.watches.push(job);
+                Ok(taken)
+            }
+        }
+    }
+
+    /// Processes a frame that came on an interface.
+    pub(crate) fn take_frame(
+        &mut self,
+        interface: u32,
+        frame: &FrameBytes,
+        now: Instant,
+        actions: &mut Vec<Action>,
+    ) {
+        self.watches.iter_mut().for_each(|job| job.take_frame(interface, frame, now, actions));
+    }
+
+    /// When the next job has something to do.
+    pub(crate) fn due(&self) -> Option<Instant> {
+        let sending = self.transmissions.iter().filter_map(Transmission::due);
+        sending.chain(self.watches.iter().filter_map(Watch::due)).min()
+    }
+
+    /// Does what is due.
+    pub(crate) fn advance(&mut self, now: Instant, actions: &mut Vec<Action>) {
+        self.transmissions.iter_mut().for_each(|job| job.advance(now, actions));
+        self.watches.iter_mut().for_each(|job| job.advance(now, actions));
+    }
+}
+
+fn delete<J>(jobs: &mut Vec<J>, is_meant: impl Fn(&J) -> bool) -> Result<usize, Errno> {
+    let place = jobs.iter().position(is_meant).ok_or(Errno::INVAL)?;
+    jobs.remove(place);
+    Ok(message::HEAD_BYTES)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,175 @@
+//! Starts a program under the filter and serves it until it ends.
+//!
+//! A thread of this process takes the filter upon itself, and starts the program, which inherits it; the thread then ends. What the
+//! thread itself does while it starts the program is answered like a guest's calls. So no code runs between `fork` and `exec`,
+//! and the listener needs no way from one process to the other.
+
+use crate::interface::{Interface, free_indices};
+use crate::supervisor::{MOST_INTERFACES, Supervisor};
+use crate::{GuestError, Named, filter};
+use rustix::process::{Pid, PidfdFlags, Resource, Signal, getrlimit, kill_process, pidfd_open, setrlimit};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
+use std::ffi::OsString;
+use std::io;
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Child, Command, ExitStatus};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How often a bus is looked for before the program starts.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// Code of a program that a signal ended, above the signal's number, as shells have it.
+const SIGNALLED: i32 = 128;
+
+/// Signals that a person sends to this process and means for the program.
+struct Signals {
+    /// Of the keyboard: the program has had it too.
+    interrupted: Arc<AtomicBool>,
+    terminated: Arc<AtomicBool>,
+}
+
+impl Signals {
+    fn catch() -> io::Result<Self> {
+        let signals = Self { interrupted: Arc::default(), terminated: Arc::default() };
+        flag::register(SIGINT, Arc::clone(&signals.interrupted))?;
+        flag::register(SIGTERM, Arc::clone(&signals.terminated))?;
+        flag::register(SIGHUP, Arc::clone(&signals.terminated))?;
+        Ok(signals)
+    }
+
+    fn is_over(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed) || self.terminated.load(Ordering::Relaxed)
+    }
+}
+
+/// What the starting thread reports.
+enum Started {
+    /// The filter is in place; here its calls arrive.
+    Listening(OwnedFd),
+    /// The program runs, or could not be started.
+    Program(io::Result<Child>),
+}
+
+/// Runs `command` so that its CAN sockets meet `interfaces`, each an embedded bus; waits for buses that have no host yet for so long.
+/// Gives the program's exit code, 128 and the signal's number if a signal ended it; `None` when a person ended the waiting.
+///
+/// # Errors
+/// [`GuestError`].
+pub fn run(
+    interfaces: &[Named],
+    command: &[OsString],
+    patience: Duration,
+) -> Result<Option<i32>, GuestError> {
+    if interfaces.len() > MOST_INTERFACES {
+        return Err(GuestError::TooMany(MOST_INTERFACES));
+    }
+    let signals = Signals::catch().map_err(GuestError::System)?;
+    let named = interfaces.iter().zip(free_indices());
+    let mut interfaces: Vec<_> =
+        named.map(|(named, index)| Interface::new(&named.name, &named.path, index)).collect();
+    if !wait_for_hosts(&mut interfaces, patience, &signals)? {
+        return Ok(None);
+    }
+    let (report, reports) = channel();
+    let command = command.to_vec();
+    let starter = thread::spawn(move || start(&command, &report)).thread().clone();
+    let listener = match reports.recv() {
+        Ok(Started::Listening(listener)) => listener,
+        Ok(Started::Program(Err(error))) => return Err(GuestError::Filter(error)),
+        Ok(Started::Program(Ok(_))) | Err(_) => {
+            unreachable!("the filter comes first, and {starter:?} reports")
+        }
+    };
+    let mut supervisor = Supervisor::new(listener, interfaces).map_err(GuestError::System)?;
+    let mut child = serve_the_start(&mut supervisor, &reports)?;
+    raise_limit_of_files();
+    let status = serve(&mut supervisor, &mut child, &signals).map_err(GuestError::System)?;
+    supervisor.account();
+    Ok(Some(status.code().unwrap_or_else(|| SIGNALLED + status.signal().unwrap_or(0))))
+}
+
+/// True when all buses have a host; false when a person ended the waiting.
+fn wait_for_hosts(
+    interfaces: &mut [Interface],
+    patience: Duration,
+    signals: &Signals,
+) -> Result<bool, GuestError> {
+    let until = Instant::now() + patience;
+    let mut told = false;
+    loop {
+        for interface in &mut *interfaces {
+            interface.bus.look_for_host();
+        }
+        let Some(missing) = interfaces.iter().find(|interface| interface.bus.socket().is_none()) else {
+            return Ok(true);
+        };
+        let path = missing.bus.path().display().to_string();
+        if Instant::now() >= until {
+            return Err(GuestError::NoHost { name: missing.name.clone(), path });
+        }
+        if signals.is_over() {
+            return Ok(false);
+        }
+        if !std::mem::replace(&mut told, true) {
+            eprintln!("bench can: {} has no host yet at unix://{path}; waiting for it", missing.name);
+        }
+        thread::sleep(LOOK_EVERY);
+    }
+}
+
+/// In a thread of its own, which the filter holds from then on.
+fn start(command: &[OsString], report: &Sender<Started>) {
+    // Whoever waits for the reports is there until the last one.
+    let _ = match filter::install() {
+        Ok(listener) => {
+            let _ = report.send(Started::Listening(listener));
+            report.send(Started::Program(Command::new(&command[0]).args(&command[1..]).spawn()))
+        }
+        Err(error) => report.send(Started::Program(Err(error))),
+    };
+}
+
+/// Answers the starting thread until the program runs.
+fn serve_the_start(supervisor: &mut Supervisor, reports: &Receiver<Started>) -> Result<Child, GuestError> {
+    loop {
+        supervisor.turn_for(LOOK_EVERY).map_err(GuestError::System)?;
+        match reports.try_recv() {
+            Ok(Started::Program(Ok(child))) => return Ok(child),
+            Ok(Started::Program(Err(error))) => return Err(GuestError::Command(error)),
+            Ok(Started::Listening(_)) => {}
+            Err(TryRecvError::Empty) => {}
+            Err(TryRecvError::Disconnected) => {
+                return Err(GuestError::Command(io::Error::other("the thread that starts it has ended")));
+            }
+        }
+    }
+}
+
+/// Each socket of a guest costs a descriptor here. The program has been started with the limit as it was.
+fn raise_limit_of_files() {
+    let mut limit = getrlimit(Resource::Nofile);
+    limit.current = limit.maximum;
+    // Without it, `socket` fails earlier.
+    let _ = setrlimit(Resource::Nofile, limit);
+}
+
+fn serve(supervisor: &mut Supervisor, child: &mut Child, signals: &Signals) -> io::Result<ExitStatus> {
+    let pid = Pid::from_child(child);
+    let end = pidfd_open(pid, PidfdFlags::empty())?;
+    supervisor.watch_child(end.as_fd())?;
+    loop {
+        if supervisor.turn()? {
+            return child.wait();
+        }
+        if signals.terminated.swap(false, Ordering::Relaxed) {
+            // It may have ended meanwhile.
+            let _ = kill_process(pid, Signal::TERM);
+        }
+    }
+}

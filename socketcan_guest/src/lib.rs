@@ -1,0 +1,99 @@
+//! SocketCAN for unmodified programs on a machine without CAN in the kernel: their CAN sockets meet embedded buses.
+//!
+//! ```text
+//!   program, its threads and children                this process
+//!   socket, bind, ioctl, recvmsg … ── seccomp ─────► supervisor ── answers, as net/can of the kernel would
+//!   read, write, poll, select, epoll ─ natively ─► a pair of Unix sockets ─► supervisor ◄─► embedded bus (protocol::bus::host)
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | `launch` | the program's start and end |
+//! | `filter` | which system calls are answered here |
+//! | `notification` | a call that waits, and its answer |
+//! | `caller` | the calling thread's memory and descriptors |
+//! | `supervisor` | the loop over calls, sockets and buses |
+//! | `interface`, `bus_peer` | an interface as guests see it, and the bus behind it |
+//! | `socket` | a guest's socket: its queue, and what is known of each frame in it |
+//! | `raw` | filters and options of `CAN_RAW` |
+//! | `bcm` | `CAN_BCM`: cyclic sending, changes, time-outs |
+//! | `names`, `options`, `ioctl`, `receive`, `send` | the answers, by system call |
+//! | `abi` | numbers and layouts |
+//!
+//! Preloading a library would be simpler, and would not reach a statically linked program or one of Go; a kernel module needs a
+//! kernel that loads it. What is served, what is not, and the cost: `docs/socketcan-without-kernel.md`.
+
+mod abi;
+mod bcm;
+mod bus_peer;
+mod caller;
+mod filter;
+mod interface;
+mod ioctl;
+mod launch;
+mod names;
+mod notification;
+mod options;
+mod raw;
+mod receive;
+mod send;
+mod socket;
+mod supervisor;
+
+pub use launch::run;
+use std::io;
+use std::path::PathBuf;
+
+/// An interface for the programs: its name, and the socket of the embedded bus that it stands for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Named {
+    /// 1 to 15 bytes.
+    pub name: String,
+    /// Path of the bus's socket.
+    pub path: PathBuf,
+}
+
+/// Why a program cannot be run so.
+#[derive(Debug, thiserror::Error)]
+pub enum GuestError {
+    /// More interfaces than there is room for.
+    #[error("at most {0} interfaces")]
+    TooMany(usize),
+    /// Nobody hosts the bus.
+    #[error(
+        "{name}: no host at unix://{path}; start 'emulator run' or 'emulator bus' on it, or let --pair open a bus of its own"
+    )]
+    NoHost {
+        /// The interface.
+        name: String,
+        /// Where its bus was looked for.
+        path: String,
+    },
+    /// The kernel or a container refuses the filter.
+    #[error("{}", refused(.0))]
+    Filter(io::Error),
+    /// The program cannot be started.
+    #[error("cannot start the command: {0}")]
+    Command(io::Error),
+    /// The system is out of something.
+    #[error("{0}")]
+    System(io::Error),
+}
+
+/// What to do when the filter is refused.
+fn refused(error: &io::Error) -> String {
+    let advice = match error.raw_os_error() {
+        Some(libc::EBUSY) => {
+            "it runs below another program with a seccomp listener; 'bench can' does not nest"
+        }
+        Some(libc::EPERM | libc::EACCES) => {
+            "a container or sandbox forbids seccomp(2): allow it, as docker run --security-opt seccomp=unconfined does"
+        }
+        Some(libc::ENOSYS | libc::EINVAL) => {
+            "this kernel has no seccomp user notification with injected descriptors: Linux 5.14 or later is needed, built with \
+             CONFIG_SECCOMP_FILTER, and not emulated, as gVisor is"
+        }
+        _ => "see seccomp(2)",
+    };
+    format!("the system calls of a program cannot be answered here: {error}; {advice}")
+}

@@ -1,0 +1,157 @@
+//! `socket`, `bind`, `connect`, `getsockname`, and the calls that CAN sockets do not have.
+//!
+//! Source: Linux 6.1 `net/can/af_can.c` (`can_create`), `net/can/raw.c` (`raw_bind`, `raw_getname`, `raw_ops`), `net/can/bcm.c`
+//! (`bcm_connect`, `bcm_ops`).
+
+use crate::abi::{self, CAN_BCM, CAN_PROTOCOLS, CAN_RAW};
+use crate::bcm::BroadcastManager;
+use crate::caller::Caller;
+use crate::notification::{Answer, Notification};
+use crate::raw::RawOptions;
+use crate::socket::{self, Kind};
+use crate::supervisor::{Supervisor, inode_of};
+use rustix::io::Errno;
+use std::io;
+use std::os::fd::AsFd;
+
+/// Names of the protocols that are not served.
+const OTHERS: [(i32, &str); 5] =
+    [(3, "CAN_TP16"), (4, "CAN_TP20"), (5, "CAN_MCNET"), (6, "CAN_ISOTP"), (7, "CAN_J1939")];
+
+impl Supervisor {
+    /// `socket(AF_CAN, type, protocol)`.
+    pub(crate) fn make_socket(&mut self, notification: &Notification) -> Answer {
+        let (kind_and_flags, protocol) = (notification.int(1), notification.int(2));
+        let flags = libc::SOCK_CLOEXEC | libc::SOCK_NONBLOCK;
+        let kind = kind_and_flags & 0xF;
+        if kind_and_flags & !(flags | 0xF) != 0 || !(0..CAN_PROTOCOLS).contains(&protocol) {
+            return Errno::INVAL.into();
+        }
+        let (wanted, made) = match protocol {
+            CAN_RAW => (libc::SOCK_RAW, Kind::Raw(RawOptions::default())),
+            CAN_BCM => (libc::SOCK_DGRAM, Kind::Bcm(Box::<BroadcastManager>::default())),
+            other => {
+                if let Some((_, name)) = OTHERS.iter().find(|(number, _)| *number == other) {
+                    self.tell(&format!("socket: {name} is not served; the call fails with EPROTONOSUPPORT"));
+                }
+                return Errno::PROTONOSUPPORT.into();
+            }
+        };
+        if kind != wanted {
+            return Errno::PROTOTYPE.into();
+        }
+        match self.inject_socket(notification, made, kind_and_flags, protocol) {
+            Ok(()) => Answer::Deferred,
+            Err(error) => Errno::from_io_error(&error).unwrap_or(Errno::NOMEM).into(),
+        }
+    }
+
+    fn inject_socket(
+        &mut self,
+        notification: &Notification,
+        kind: Kind,
+        flags: i32,
+        protocol: i32,
+    ) -> io::Result<()> {
+        let non_blocking = flags & libc::SOCK_NONBLOCK != 0;
+        let (made, theirs) = socket::make(kind, non_blocking, self.message_bytes)?;
+        let inode = inode_of(theirs.as_fd()).ok_or_else(|| io::Error::from(io::ErrorKind::OutOfMemory))?;
+        self.add_socket(inode, made, protocol)?;
+        // The guest may use it as soon as it has it, so it is known before.
+        let injected = self.listener.inject(notification.id, theirs.as_fd(), flags & libc::SOCK_CLOEXEC != 0);
+        if injected.is_err() {
+            self.remove_socket(inode);
+        }
+        injected
+    }
+
+    /// `bind`: to an interface, or with index 0 to any.
+    pub(crate) fn bind(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let interface = match self.read_interface(notification) {
+            Ok(interface) => interface,
+            Err(error) => return error.into(),
+        };
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+        if socket.raw().is_none() {
+            return Errno::OPNOTSUPP.into();
+        }
+        if socket.interface == Some(interface) {
+            return Answer::Value(0);
+        }
+        let is_down = match self.interfaces.iter().find(|known| known.index == interface) {
+            Some(known) => !known.is_up,
+            None if interface == 0 => false,
+            None => return Errno::NODEV.into(),
+        };
+        socket.interface = Some(interface);
+        if is_down {
+            self.tell_error(inode, interface, Errno::NETDOWN);
+        }
+        Answer::Value(0)
+    }
+
+    /// `connect`, which binds a broadcast manager and no raw socket.
+    pub(crate) fn connect(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let interface = self.read_interface(notification);
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+        if socket.raw().is_some() {
+            return Errno::OPNOTSUPP.into();
+        }
+        let interface = match interface {
+            Ok(interface) => interface,
+            Err(error) => return error.into(),
+        };
+        if socket.interface.is_some() {
+            return Errno::ISCONN.into();
+        }
+        if interface != 0 && !self.interfaces.iter().any(|known| known.index == interface) {
+            return Errno::NODEV.into();
+        }
+        socket.interface = Some(interface);
+        Answer::Value(0)
+    }
+
+    /// The interface in the address of `bind(fd, address, length)`.
+    fn read_interface(&self, notification: &Notification) -> Result<u32, Errno> {
+        if notification.int(2) < abi::ADDRESS_BYTES as i32 {
+            return Err(Errno::INVAL);
+        }
+        let address: [u8; abi::ADDRESS_BYTES] =
+            Caller::new(notification.thread).read_array(notification.arguments[1])?;
+        if !self.listener.is_alive(notification.id) {
+            return Err(Errno::INTR);
+        }
+        abi::interface_of(&address).ok_or(Errno::INVAL)
+    }
+
+    /// `getsockname(fd, address, length)`.
+    pub(crate) fn own_name(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let Some(socket) = self.sockets.get(&inode) else { return Answer::Continue };
+        if socket.raw().is_none() {
+            return Errno::OPNOTSUPP.into();
+        }
+        let address = abi::address(socket.interface.unwrap_or(0));
+        let [_, at, length_at, ..] = notification.arguments;
+        let caller = Caller::new(notification.thread);
+        let written = caller.read_array(length_at).map(i32::from_ne_bytes).and_then(|room| {
+            let room = usize::try_from(room).map_err(|_| Errno::INVAL)?;
+            if !self.listener.is_alive(notification.id) {
+                return Err(Errno::INTR);
+            }
+            caller.write(at, &address[..address.len().min(room)])?;
+            caller.write(length_at, &(address.len() as i32).to_ne_bytes())
+        });
+        written.map_or_else(Answer::Error, |()| Answer::Value(0))
+    }
+
+    /// Calls of sockets that have connections.
+    pub(crate) fn not_of_can(&mut self, notification: &Notification) -> Answer {
+        match self.guest_socket(notification) {
+            Some(_) => Errno::OPNOTSUPP.into(),
+            None => Answer::Continue,
+        }
+    }
+}

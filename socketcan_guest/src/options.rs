@@ -1,0 +1,105 @@
+//! `setsockopt` and `getsockopt`: those of `CAN_RAW`, and those of all sockets that a Unix socket answers differently.
+
+use crate::abi::SOL_CAN_RAW;
+use crate::caller::Caller;
+use crate::notification::{Answer, Notification};
+use crate::raw::RawOptions;
+use crate::socket::Kind;
+use crate::supervisor::Supervisor;
+use rustix::io::Errno;
+
+impl Supervisor {
+    /// `setsockopt(fd, level, option, value, length)`.
+    pub(crate) fn set_option(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let (level, option) = (notification.int(1), notification.int(2));
+        let value = match self.read_value(notification) {
+            Ok(value) => value,
+            Err(error) => return error.into(),
+        };
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+        if level == libc::SOL_SOCKET {
+            let number = value.get(..4).map(|four| u32::from_ne_bytes(four.try_into().expect("four bytes")));
+            match (option, number) {
+                (libc::SO_RCVBUF | libc::SO_RCVBUFFORCE, Some(bytes)) => {
+                    socket.resize_queue(bytes as usize);
+                    // The guest's own end remembers it, for `getsockopt`.
+                    return Answer::Continue;
+                }
+                (libc::SO_RXQ_OVFL, Some(wanted)) => {
+                    socket.tells_dropped = wanted != 0;
+                    return Answer::Value(0);
+                }
+                // Raw CAN sockets are bound by `bind`; the kernel accepts the option and it has no effect.
+                (libc::SO_BINDTODEVICE, _) => {
+                    let end = value.iter().position(|byte| *byte == 0).unwrap_or(value.len());
+                    let is_ours = self.interfaces.iter().any(|known| known.name.as_bytes() == &value[..end]);
+                    return if is_ours { Answer::Value(0) } else { Answer::Continue };
+                }
+                _ => return Answer::Continue,
+            }
+        }
+        let Kind::Raw(raw) = &mut socket.kind else { return Errno::OPNOTSUPP.into() };
+        if level != SOL_CAN_RAW {
+            return Errno::INVAL.into();
+        }
+        raw.set(option, &value).map_or_else(Answer::Error, |()| Answer::Value(0))
+    }
+
+    /// The value of `setsockopt`, as long as any may be; a longer one is refused by its length.
+    fn read_value(&self, notification: &Notification) -> Result<Vec<u8>, Errno> {
+        let length = usize::try_from(notification.int(4)).map_err(|_| Errno::INVAL)?;
+        let mut value = vec![0; length.min(RawOptions::LONGEST_VALUE + 1)];
+        Caller::new(notification.thread).read(notification.arguments[3], &mut value)?;
+        if self.listener.is_alive(notification.id) { Ok(value) } else { Err(Errno::INTR) }
+    }
+
+    /// `getsockopt(fd, level, option, value, length)`.
+    pub(crate) fn get_option(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let Some(socket) = self.sockets.get(&inode) else { return Answer::Continue };
+        let (level, option) = (notification.int(1), notification.int(2));
+        let is_raw = socket.raw().is_some();
+        let number = |number: i32| Ok((number.to_ne_bytes().to_vec(), true));
+        let value = match (level, option) {
+            (libc::SOL_SOCKET, libc::SO_TYPE) => {
+                number(if is_raw { libc::SOCK_RAW } else { libc::SOCK_DGRAM })
+            }
+            (libc::SOL_SOCKET, libc::SO_DOMAIN) => number(crate::abi::AF_CAN),
+            (libc::SOL_SOCKET, libc::SO_PROTOCOL) => {
+                number(if is_raw { crate::abi::CAN_RAW } else { crate::abi::CAN_BCM })
+            }
+            (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => number(socket.tells_dropped.into()),
+            (libc::SOL_SOCKET, _) => return Answer::Continue,
+            _ => match &socket.kind {
+                Kind::Bcm(_) => Err(Errno::OPNOTSUPP),
+                Kind::Raw(_) if level != SOL_CAN_RAW => Err(Errno::INVAL),
+                Kind::Raw(raw) => raw.get(option),
+            },
+        };
+        let written =
+            value.and_then(|(value, may_be_cut)| self.write_value(notification, &value, may_be_cut));
+        written.map_or_else(Answer::Error, |()| Answer::Value(0))
+    }
+
+    /// Writes a value and its length.
+    ///
+    /// # Errors
+    /// `ERANGE` with the length that is needed, for a value that may not be cut.
+    fn write_value(&self, notification: &Notification, value: &[u8], may_be_cut: bool) -> Result<(), Errno> {
+        let caller = Caller::new(notification.thread);
+        let [_, _, _, value_at, length_at, _] = notification.arguments;
+        let room = i32::from_ne_bytes(caller.read_array(length_at)?);
+        let room = usize::try_from(room).map_err(|_| Errno::INVAL)?;
+        if !self.listener.is_alive(notification.id) {
+            return Err(Errno::INTR);
+        }
+        if room < value.len() && !may_be_cut {
+            caller.write(length_at, &(value.len() as i32).to_ne_bytes())?;
+            return Err(Errno::RANGE);
+        }
+        let value = &value[..value.len().min(room)];
+        caller.write(length_at, &(value.len() as i32).to_ne_bytes())?;
+        caller.write(value_at, value)
+    }
+}

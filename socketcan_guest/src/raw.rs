@@ -1,0 +1,193 @@
+//! What a `CAN_RAW` socket was told: filters and options, and which frames pass.
+//!
+//! ```text
+//!   error frame    passes where (class & mask) != 0: of CAN_RAW_ERR_FILTER, or of a filter whose mask has the error flag
+//!   any other      passes a filter where (id & mask) == (filter & mask), or != with CAN_INV_FILTER
+//!                  passes the list where one filter lets it pass; with CAN_RAW_JOIN_FILTERS where all do
+//! ```
+//!
+//! Source: Linux 6.1 `net/can/raw.c` (`raw_rcv`, `raw_setsockopt`, `raw_getsockopt`), `net/can/af_can.c` (`find_rcv_list`,
+//! `can_rcv_filter`).
+
+use crate::abi::{ERROR_FLAG, ERROR_MASK, EXTENDED_FLAG, INVERTED_FLAG, REMOTE_FLAG, STANDARD_MASK, u32_at};
+use rustix::io::Errno;
+
+/// Options of `SOL_CAN_RAW`.
+const FILTER: i32 = 1;
+const ERROR_FILTER: i32 = 2;
+const LOOPBACK: i32 = 3;
+const RECEIVE_OWN: i32 = 4;
+const FD_FRAMES: i32 = 5;
+const JOIN_FILTERS: i32 = 6;
+
+/// `sizeof(struct can_filter)`.
+const FILTER_BYTES: usize = 8;
+/// `CAN_RAW_FILTER_MAX`.
+const MOST_FILTERS: usize = 512;
+
+/// A filter as the guest gave it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Filter {
+    id: u32,
+    mask: u32,
+}
+
+impl Filter {
+    fn is_passed_by(self, id: u32) -> bool {
+        let mut mask = self.mask;
+        if mask & ERROR_FLAG != 0 {
+            return id & ERROR_FLAG != 0 && id & mask & ERROR_MASK != 0;
+        }
+        if id & ERROR_FLAG != 0 {
+            return false;
+        }
+        // A filter for 11-bit identifiers only.
+        if mask & EXTENDED_FLAG != 0 && self.id & EXTENDED_FLAG == 0 {
+            mask &= STANDARD_MASK | EXTENDED_FLAG | REMOTE_FLAG;
+        }
+        let is_inverted = self.id & INVERTED_FLAG != 0;
+        (id & mask == self.id & !INVERTED_FLAG & mask) != is_inverted
+    }
+}
+
+/// Options of a socket.
+#[derive(Clone, Debug)]
+pub(crate) struct RawOptions {
+    filters: Vec<Filter>,
+    error_mask: u32,
+    /// Numbers as they were set; any but 0 switches on.
+    loopback: i32,
+    receive_own: i32,
+    fd_frames: i32,
+    join_filters: i32,
+}
+
+impl Default for RawOptions {
+    fn default() -> Self {
+        let filters = vec![Filter { id: 0, mask: 0 }];
+        Self { filters, error_mask: 0, loopback: 1, receive_own: 0, fd_frames: 0, join_filters: 0 }
+    }
+}
+
+impl RawOptions {
+    /// Whether the other guests on the interface get what this socket sends.
+    pub(crate) fn loops_back(&self) -> bool {
+        self.loopback != 0
+    }
+
+    /// Whether it gets what it sends.
+    pub(crate) fn receives_own(&self) -> bool {
+        self.receive_own != 0
+    }
+
+    /// Whether a frame of this identifier, flags included, passes.
+    pub(crate) fn passes(&self, id: u32) -> bool {
+        let passed = self.filters.iter().filter(|filter| filter.is_passed_by(id)).count();
+        let by_error_filter = id & ERROR_FLAG != 0 && id & self.error_mask != 0;
+        let count = passed + usize::from(by_error_filter);
+        // The kernel counts the matches of an entry of its lists, whichever option made it.
+        if self.join_filters != 0 && self.filters.len() > 1 { count >= self.filters.len() } else { count > 0 }
+    }
+
+    /// `setsockopt`.
+    ///
+    /// # Errors
+    /// `EINVAL` for a wrong length, `ENOPROTOOPT` for an option that a classic interface's kernel does not know.
+    pub(crate) fn set(&mut self, option: i32, value: &[u8]) -> Result<(), Errno> {
+        if option == FILTER {
+            if !value.len().is_multiple_of(FILTER_BYTES) || value.len() > MOST_FILTERS * FILTER_BYTES {
+                return Err(Errno::INVAL);
+            }
+            let filter = |bytes: &[u8]| Filter { id: u32_at(bytes, 0), mask: u32_at(bytes, 4) };
+            self.filters = value.chunks_exact(FILTER_BYTES).map(filter).collect();
+            return Ok(());
+        }
+        if !(ERROR_FILTER..=JOIN_FILTERS).contains(&option) {
+            return Err(Errno::NOPROTOOPT);
+        }
+        let number = u32::from_ne_bytes(value.try_into().map_err(|_| Errno::INVAL)?);
+        match option {
+            ERROR_FILTER => self.error_mask = number & ERROR_MASK,
+            LOOPBACK => self.loopback = number as i32,
+            RECEIVE_OWN => self.receive_own = number as i32,
+            FD_FRAMES => self.fd_frames = number as i32,
+            _ => self.join_filters = number as i32,
+        }
+        Ok(())
+    }
+
+    /// `getsockopt`: the whole value, and whether it may be cut to the room that there is.
+    ///
+    /// # Errors
+    /// `ENOPROTOOPT`.
+    pub(crate) fn get(&self, option: i32) -> Result<(Vec<u8>, bool), Errno> {
+        let number = match option {
+            FILTER => {
+                let bytes = |filter: &Filter| [filter.id.to_ne_bytes(), filter.mask.to_ne_bytes()].concat();
+                return Ok((self.filters.iter().flat_map(bytes).collect(), false));
+            }
+            ERROR_FILTER => self.error_mask,
+            LOOPBACK => self.loopback as u32,
+            RECEIVE_OWN => self.receive_own as u32,
+            FD_FRAMES => self.fd_frames as u32,
+            JOIN_FILTERS => self.join_filters as u32,
+            _ => return Err(Errno::NOPROTOOPT),
+        };
+        Ok((number.to_ne_bytes().to_vec(), true))
+    }
+
+    /// Longest value that `setsockopt` may read.
+    pub(crate) const LONGEST_VALUE: usize = MOST_FILTERS * FILTER_BYTES;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_filters(filters: &[(u32, u32)]) -> RawOptions {
+        let mut options = RawOptions::default();
+        let bytes: Vec<u8> =
+            filters.iter().flat_map(|(id, mask)| [id.to_ne_bytes(), mask.to_ne_bytes()].concat()).collect();
+        options.set(FILTER, &bytes).unwrap();
+        options
+    }
+
+    #[test]
+    fn masks_inverted_filters_and_an_empty_list() {
+        assert!(RawOptions::default().passes(0x123));
+        assert!(!with_filters(&[]).passes(0x123));
+        let one = with_filters(&[(0x120, 0x7F0)]);
+        assert!(one.passes(0x12F) && one.passes(0x8000_0125) && !one.passes(0x130));
+        let standard_only = with_filters(&[(0x120, 0x8000_07FF)]);
+        assert!(standard_only.passes(0x120) && !standard_only.passes(0x8000_0120));
+        let inverted = with_filters(&[(INVERTED_FLAG | 0x120, 0x7FF)]);
+        assert!(!inverted.passes(0x120) && inverted.passes(0x121));
+    }
+
+    #[test]
+    fn joined_filters_must_all_pass() {
+        let list = [(INVERTED_FLAG | 0x120, 0x7FF), (INVERTED_FLAG | 0x121, 0x7FF)];
+        let mut options = with_filters(&list);
+        assert!(options.passes(0x120) && options.passes(0x121), "the other one lets it pass");
+        options.set(JOIN_FILTERS, &1_u32.to_ne_bytes()).unwrap();
+        assert!(!options.passes(0x120) && !options.passes(0x121) && options.passes(0x122));
+    }
+
+    #[test]
+    fn error_frames_pass_the_error_filter_alone() {
+        let mut options = RawOptions::default();
+        assert!(!options.passes(ERROR_FLAG | 0x40));
+        options.set(ERROR_FILTER, &0x40_u32.to_ne_bytes()).unwrap();
+        assert!(options.passes(ERROR_FLAG | 0x40) && !options.passes(ERROR_FLAG | 0x80));
+        assert!(with_filters(&[(0, ERROR_FLAG | 0x40)]).passes(ERROR_FLAG | 0x40));
+    }
+
+    #[test]
+    fn wrong_lengths_and_unknown_options_are_refused_as_the_kernel_does() {
+        let mut options = RawOptions::default();
+        assert_eq!(options.set(FILTER, &[0; 7]), Err(Errno::INVAL));
+        assert_eq!(options.set(LOOPBACK, &[1]), Err(Errno::INVAL));
+        assert_eq!(options.set(7, &1_u32.to_ne_bytes()), Err(Errno::NOPROTOOPT));
+        assert_eq!(options.get(7), Err(Errno::NOPROTOOPT));
+    }
+}

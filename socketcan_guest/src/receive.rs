@@ -1,0 +1,338 @@
+//! `recvmsg`, `recvmmsg` and `recvfrom` with an address: what a guest reads together with what the kernel would tell of it.
+//!
+//! The message is taken from the guest's own end by a copy of its descriptor, so that the order with what it reads natively is kept,
+//! and written into its memory with the address of the interface, the flags, the control messages of the kernel (time stamps) and
+//! the count of lost frames. A call that would block is kept and tried again when something was delivered; a message whose
+//! call a signal ended meanwhile goes to the next one.
+
+#![allow(unsafe_code)] // recvmsg, nothing else
+
+use crate::abi::{self, u32_at, u64_at};
+use crate::caller::Caller;
+use crate::notification::{Answer, Notification};
+use crate::socket::{GuestSocket, Note};
+use crate::supervisor::Supervisor;
+use rustix::fs::{OFlags, fcntl_getfl};
+use rustix::io::Errno;
+use rustix::net::sockopt::{Timeout, socket_timeout};
+use std::io;
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
+use std::time::Instant;
+
+/// `sizeof(struct msghdr)` and `sizeof(struct mmsghdr)`, and where the second has the length.
+const HEADER_BYTES: usize = 56;
+const LONG_HEADER_BYTES: u64 = 64;
+/// Longest message that a guest's queue holds: one of the broadcast manager.
+const LONGEST_MESSAGE: usize = 8192;
+/// Room for the kernel's control messages.
+const CONTROL_WORDS: usize = 32;
+/// `sizeof(struct cmsghdr)`.
+const CONTROL_HEADER_BYTES: usize = 16;
+/// Parts of a buffer that are looked at, and messages of one call: the kernel's own limits.
+const MOST_PARTS: u64 = 1024;
+
+/// A message that was taken from a guest's queue.
+#[derive(Clone, Debug)]
+pub(crate) struct Message {
+    bytes: Vec<u8>,
+    /// Control messages of the kernel: time stamps.
+    control: Vec<u8>,
+    note: Note,
+}
+
+/// A call that waits for a message.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WaitingCall {
+    pub(crate) notification: Notification,
+    /// When its socket's time-out ends it.
+    pub(crate) deadline: Option<Instant>,
+}
+
+/// The parts of a guest's `struct msghdr`.
+pub(crate) struct Header {
+    pub(crate) name: u64,
+    pub(crate) name_bytes: i32,
+    parts: Vec<(u64, usize)>,
+    control: u64,
+    control_bytes: usize,
+}
+
+impl Header {
+    /// Reads one at an address.
+    ///
+    /// # Errors
+    /// `EFAULT`, or `EMSGSIZE` for too many parts.
+    pub(crate) fn read(caller: Caller, address: u64) -> Result<Self, Errno> {
+        let header: [u8; HEADER_BYTES] = caller.read_array(address)?;
+        let count = u64_at(&header, 24);
+        if count > MOST_PARTS {
+            return Err(Errno::MSGSIZE);
+        }
+        let mut bytes = vec![0; count as usize * 16];
+        caller.read(u64_at(&header, 16), &mut bytes)?;
+        let part = |part: &[u8]| (u64_at(part, 0), u64_at(part, 8) as usize);
+        Ok(Self {
+            name: u64_at(&header, 0),
+            name_bytes: u32_at(&header, 8) as i32,
+            parts: bytes.chunks_exact(16).map(part).collect(),
+            control: u64_at(&header, 32),
+            control_bytes: u64_at(&header, 40) as usize,
+        })
+    }
+
+    /// What the parts hold together, up to a length that no message has.
+    ///
+    /// # Errors
+    /// `EFAULT`.
+    pub(crate) fn gather(&self, caller: Caller) -> Result<Vec<u8>, Errno> {
+        let mut bytes = Vec::new();
+        for (address, length) in &self.parts {
+            let more = (*length).min(LONGEST_MESSAGE - bytes.len());
+            let from = bytes.len();
+            bytes.resize(from + more, 0);
+            caller.read(*address, &mut bytes[from..])?;
+        }
+        Ok(bytes)
+    }
+
+    fn scatter(&self, caller: Caller, mut bytes: &[u8]) -> Result<(), Errno> {
+        for (address, length) in &self.parts {
+            let (here, rest) = bytes.split_at(bytes.len().min(*length));
+            caller.write(*address, here)?;
+            bytes = rest;
+        }
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        self.parts.iter().fold(0, |sum, (_, length)| sum.saturating_add(*length))
+    }
+}
+
+impl Supervisor {
+    /// A call that receives from a guest's socket, if the descriptor is one.
+    pub(crate) fn receive(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, end)) = self.guest_socket(notification) else { return Answer::Continue };
+        match self.try_to_receive(notification, inode, end.as_fd()) {
+            Answer::Error(Errno::AGAIN) if may_wait(notification, end.as_fd()) => {
+                let timeout = socket_timeout(&end, Timeout::Recv).ok().flatten();
+                let deadline = timeout.map(|timeout| Instant::now() + timeout);
+                let waiting = WaitingCall { notification: *notification, deadline };
+                self.sockets.get_mut(&inode).expect("it is there").waiting.push_back(waiting);
+                self.waiting_calls += 1;
+                Answer::Deferred
+            }
+            answer => answer,
+        }
+    }
+
+    /// Calls that wait for a message of this socket are tried again, in their order.
+    pub(crate) fn serve_waiting(&mut self, inode: u64) {
+        while let Some(call) = self.sockets.get_mut(&inode).and_then(|socket| socket.waiting.pop_front()) {
+            self.waiting_calls -= 1;
+            // One that a signal ended comes again by itself.
+            if !self.listener.is_alive(call.notification.id) {
+                continue;
+            }
+            // The number may stand for something else by now, as after a close by another thread.
+            let answer = match self.guest_socket(&call.notification) {
+                Some((found, end)) if found == inode => {
+                    self.try_to_receive(&call.notification, inode, end.as_fd())
+                }
+                _ => Answer::Error(Errno::BADF),
+            };
+            if answer == Answer::Error(Errno::AGAIN) {
+                self.sockets.get_mut(&inode).expect("it is there").waiting.push_front(call);
+                self.waiting_calls += 1;
+                return;
+            }
+            self.listener.answer(call.notification.id, answer);
+        }
+    }
+
+    /// Answers the call when there is a message; `EAGAIN` when there is none.
+    fn try_to_receive(&mut self, notification: &Notification, inode: u64, end: BorrowedFd<'_>) -> Answer {
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+        let flags = notification.int(if notification.call == libc::SYS_recvmmsg {
+            3
+        } else {
+            flags_at(notification)
+        });
+        if flags & libc::MSG_ERRQUEUE != 0 {
+            return Errno::AGAIN.into();
+        }
+        if !self.listener.is_alive(notification.id) {
+            return Errno::INTR.into();
+        }
+        let caller = Caller::new(notification.thread);
+        let mut taken = Vec::new();
+        let answer = match notification.call {
+            libc::SYS_recvmmsg => receive_many(socket, caller, notification, end, flags, &mut taken),
+            libc::SYS_recvmsg => {
+                receive_one(socket, caller, notification.arguments[1], end, flags, &mut taken)
+            }
+            _ => receive_from(socket, caller, notification, end, flags, &mut taken),
+        };
+        let answer = answer.map_or_else(Answer::Error, |value| Answer::Value(value as i64));
+        if answer != Answer::Error(Errno::AGAIN) {
+            let answered = self.listener.answer(notification.id, answer);
+            if !answered && flags & libc::MSG_PEEK == 0 {
+                taken.into_iter().rev().for_each(|message| socket.returned.push_front(message));
+            }
+            return Answer::Deferred;
+        }
+        answer
+    }
+}
+
+fn flags_at(notification: &Notification) -> usize {
+    if notification.call == libc::SYS_recvmsg { 2 } else { 3 }
+}
+
+fn may_wait(notification: &Notification, end: BorrowedFd<'_>) -> bool {
+    let flags = notification.int(flags_at(notification));
+    flags & (libc::MSG_DONTWAIT | libc::MSG_ERRQUEUE) == 0
+        && fcntl_getfl(end).is_ok_and(|flags| !flags.contains(OFlags::NONBLOCK))
+}
+
+/// `recvfrom(fd, buffer, length, flags, address, address length)`.
+fn receive_from(
+    socket: &mut GuestSocket,
+    caller: Caller,
+    notification: &Notification,
+    end: BorrowedFd<'_>,
+    flags: i32,
+    taken: &mut Vec<Message>,
+) -> Result<usize, Errno> {
+    let [_, buffer, length, _, name, name_length] = notification.arguments;
+    let room = i32::from_ne_bytes(caller.read_array(name_length)?);
+    if room < 0 {
+        return Err(Errno::INVAL);
+    }
+    let message = take(socket, end, flags)?;
+    let bytes = &message.bytes[..message.bytes.len().min(length as usize)];
+    caller.write(buffer, bytes)?;
+    let address = abi::address(message.note.interface);
+    caller.write(name, &address[..address.len().min(room as usize)])?;
+    caller.write(name_length, &(address.len() as i32).to_ne_bytes())?;
+    let length = bytes.len();
+    taken.push(message);
+    Ok(length)
+}
+
+/// One message into the `struct msghdr` at an address.
+fn receive_one(
+    socket: &mut GuestSocket,
+    caller: Caller,
+    header_at: u64,
+    end: BorrowedFd<'_>,
+    flags: i32,
+    taken: &mut Vec<Message>,
+) -> Result<usize, Errno> {
+    let header = Header::read(caller, header_at)?;
+    let message = take(socket, end, flags)?;
+    let length = message.bytes.len().min(header.room());
+    header.scatter(caller, &message.bytes[..length])?;
+    let mut told = message.note.flags as i32 | flags & libc::MSG_CMSG_CLOEXEC;
+    if length < message.bytes.len() {
+        told |= libc::MSG_TRUNC;
+    }
+    if header.name != 0 {
+        let address = abi::address(message.note.interface);
+        let room = usize::try_from(header.name_bytes).map_err(|_| Errno::INVAL)?;
+        caller.write(header.name, &address[..address.len().min(room)])?;
+        caller.write(header_at + 8, &(address.len() as u32).to_ne_bytes())?;
+    }
+    let mut control = message.control.clone();
+    if socket.tells_dropped && message.note.dropped != 0 {
+        control.extend(overflow_message(message.note.dropped));
+    }
+    if control.len() > header.control_bytes {
+        control.truncate(header.control_bytes);
+        told |= libc::MSG_CTRUNC;
+    }
+    caller.write(header.control, &control)?;
+    caller.write(header_at + 40, &(control.len() as u64).to_ne_bytes())?;
+    caller.write(header_at + 48, &told.to_ne_bytes())?;
+    taken.push(message);
+    Ok(length)
+}
+
+/// As many messages as are there into the `struct mmsghdr`s at an address; gives their number. It does not wait for more of them
+/// when it has one, as if `MSG_WAITFORONE` was given.
+fn receive_many(
+    socket: &mut GuestSocket,
+    caller: Caller,
+    notification: &Notification,
+    end: BorrowedFd<'_>,
+    flags: i32,
+    taken: &mut Vec<Message>,
+) -> Result<usize, Errno> {
+    let [_, headers, count, ..] = notification.arguments;
+    let mut received = 0;
+    for number in 0..count.min(MOST_PARTS) {
+        let header_at = headers + number * LONG_HEADER_BYTES;
+        match receive_one(socket, caller, header_at, end, flags, taken) {
+            Ok(length) => {
+                caller.write(header_at + HEADER_BYTES as u64, &(length as u32).to_ne_bytes())?;
+                received += 1;
+            }
+            Err(error) if received == 0 => return Err(error),
+            Err(_) => break,
+        }
+    }
+    Ok(received)
+}
+
+/// `SO_RXQ_OVFL` as the kernel writes it.
+fn overflow_message(dropped: u32) -> Vec<u8> {
+    let mut message = Vec::with_capacity(24);
+    message.extend((CONTROL_HEADER_BYTES + 4).to_ne_bytes());
+    message.extend(libc::SOL_SOCKET.to_ne_bytes());
+    message.extend(libc::SO_RXQ_OVFL.to_ne_bytes());
+    message.extend(dropped.to_ne_bytes());
+    message.extend([0; 4]); // the next would be aligned
+    message
+}
+
+/// The next message of a guest's queue, without waiting.
+fn take(socket: &mut GuestSocket, end: BorrowedFd<'_>, flags: i32) -> Result<Message, Errno> {
+    let peeks = flags & libc::MSG_PEEK != 0;
+    let returned = if peeks { socket.returned.front().cloned() } else { socket.returned.pop_front() };
+    if let Some(message) = returned {
+        return Ok(message);
+    }
+    let note = socket.next_note();
+    let (bytes, control) = take_bytes(end, flags & libc::MSG_PEEK)?;
+    if bytes.is_empty() {
+        if peeks {
+            // An error is told once.
+            let _ = take_bytes(end, 0);
+        }
+        return Err(note.and_then(|note| note.error).unwrap_or(Errno::NETDOWN));
+    }
+    let unknown =
+        Note { interface: socket.interface.unwrap_or(0), flags: 0, dropped: 0, stamp_ns: 0, error: None };
+    Ok(Message { bytes, control, note: note.unwrap_or(unknown) })
+}
+
+/// A message and the kernel's control messages with it.
+fn take_bytes(end: BorrowedFd<'_>, peek: i32) -> Result<(Vec<u8>, Vec<u8>), Errno> {
+    let mut bytes = vec![0_u8; LONGEST_MESSAGE];
+    let mut control = [0_u64; CONTROL_WORDS];
+    let mut part = libc::iovec { iov_base: bytes.as_mut_ptr().cast(), iov_len: bytes.len() };
+    // SAFETY: a plain C structure for which all zeros is a valid value.
+    let mut header: libc::msghdr = unsafe { std::mem::zeroed() };
+    header.msg_iov = &raw mut part;
+    header.msg_iovlen = 1;
+    header.msg_control = control.as_mut_ptr().cast();
+    header.msg_controllen = size_of_val(&control);
+    // SAFETY: the header points to a part and a control buffer that outlive the call and have the sizes given.
+    let received = unsafe { libc::recvmsg(end.as_raw_fd(), &raw mut header, libc::MSG_DONTWAIT | peek) };
+    let Ok(received) = usize::try_from(received) else {
+        return Err(Errno::from_io_error(&io::Error::last_os_error()).unwrap_or(Errno::IO));
+    };
+    bytes.truncate(received);
+    let words = control.iter().flat_map(|word| word.to_ne_bytes());
+    Ok((bytes, words.take(header.msg_controllen).collect()))
+}

@@ -1,0 +1,280 @@
+//! What a guest sends: natively, or by a call that has an address or a length that no frame has.
+//!
+//! A frame goes to the bus, and then, unless the socket said otherwise, to every other guest's socket on the interface. What a
+//! guest has written natively has been accepted already; if the kernel would have refused it, that is told on standard error.
+
+use crate::abi::{self, MOST_DATA, identifier};
+use crate::bcm::Action;
+use crate::bus_peer::{FrameBytes, Sent};
+use crate::caller::Caller;
+use crate::notification::{Answer, Notification};
+use crate::receive::Header;
+use crate::socket::{Kind, Note};
+use crate::supervisor::{Supervisor, wall_clock_ns};
+use rustix::io::Errno;
+use rustix::net::{RecvFlags, recv};
+use std::os::fd::AsFd;
+use std::time::Instant;
+
+/// Messages that are taken from a guest before the next one has its turn.
+const BATCH: usize = 16;
+/// Longest message of the broadcast manager, and one byte more.
+const ROOM: usize = 8192;
+
+/// Which of the frames that pass an interface is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum From {
+    /// One of the bus.
+    Bus,
+    /// One of a guest's socket.
+    Guest(u64),
+}
+
+impl Supervisor {
+    /// `write` of a length that is no frame's. The kernel looks at the interface before the length.
+    pub(crate) fn write(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let [_, buffer, length, ..] = notification.arguments;
+        self.send_bytes_at(notification, inode, buffer, length as usize, None)
+    }
+
+    /// `sendto(fd, buffer, length, flags, address, address length)`.
+    pub(crate) fn send_to(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let [_, buffer, length, _, name, name_length] = notification.arguments;
+        let name = (name != 0).then_some((name, name_length as i32));
+        self.send_bytes_at(notification, inode, buffer, length as usize, name)
+    }
+
+    fn send_bytes_at(
+        &mut self,
+        notification: &Notification,
+        inode: u64,
+        buffer: u64,
+        length: usize,
+        name: Option<(u64, i32)>,
+    ) -> Answer {
+        let caller = Caller::new(notification.thread);
+        let mut bytes = vec![0; length.min(ROOM)];
+        let sent = caller
+            .read(buffer, &mut bytes)
+            .and_then(|()| read_name(caller, name))
+            .and_then(|name| self.check_alive(notification).map(|()| name))
+            .and_then(|name| self.send(inode, name.as_deref(), &bytes));
+        sent.map_or_else(Answer::Error, |()| Answer::Value(bytes.len() as i64))
+    }
+
+    /// `sendmsg` and `sendmmsg`.
+    pub(crate) fn send_message(&mut self, notification: &Notification) -> Answer {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let caller = Caller::new(notification.thread);
+        let at = notification.arguments[1];
+        if notification.call == libc::SYS_sendmsg {
+            let sent = self.send_one(notification, inode, caller, at);
+            return sent.map_or_else(Answer::Error, |length| Answer::Value(length as i64));
+        }
+        let mut count = 0;
+        for number in 0..notification.arguments[2].min(1024) {
+            let at = at + number * 64;
+            let sent = self
+                .send_one(notification, inode, caller, at)
+                .and_then(|length| caller.write(at + 56, &(length as u32).to_ne_bytes()));
+            match sent {
+                Ok(()) => count += 1,
+                Err(error) if count == 0 => return Answer::Error(error),
+                Err(_) => break,
+            }
+        }
+        Answer::Value(count)
+    }
+
+    fn send_one(
+        &mut self,
+        notification: &Notification,
+        inode: u64,
+        caller: Caller,
+        at: u64,
+    ) -> Result<usize, Errno> {
+        let header = Header::read(caller, at)?;
+        let bytes = header.gather(caller)?;
+        let name = read_name(caller, (header.name != 0).then_some((header.name, header.name_bytes)))?;
+        self.check_alive(notification)?;
+        self.send(inode, name.as_deref(), &bytes)?;
+        Ok(bytes.len())
+    }
+
+    /// Sends for a guest; `name` is the address that it gave.
+    fn send(&mut self, inode: u64, name: Option<&[u8]>, bytes: &[u8]) -> Result<(), Errno> {
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Err(Errno::BADF) };
+        let bound = socket.interface;
+        match &mut socket.kind {
+            Kind::Raw(_) => {
+                let interface = match name {
+                    Some(name) => abi::interface_of(name).ok_or(Errno::INVAL)?,
+                    None => bound.unwrap_or(0),
+                };
+                self.send_frame(inode, interface, bytes)
+            }
+            Kind::Bcm(manager) => {
+                let bound = bound.ok_or(Errno::NOTCONN)?;
+                let interface = match name {
+                    Some(name) if bound == 0 => abi::interface_of(name).ok_or(Errno::INVAL)?,
+                    _ => bound,
+                };
+                if interface != 0 && !self.interfaces.iter().any(|known| known.index == interface) {
+                    return Err(Errno::NODEV);
+                }
+                let mut actions = Vec::new();
+                manager.command(bytes, interface, Instant::now(), &mut actions)?;
+                self.carry_out(inode, actions);
+                Ok(())
+            }
+        }
+    }
+
+    /// Sends a frame of a guest on an interface.
+    ///
+    /// # Errors
+    /// `ENXIO` without an interface, `EINVAL` for what is no classic frame, `ENETDOWN` without a bus, `ENOBUFS` when the bus takes
+    /// no more for now.
+    fn send_frame(&mut self, inode: u64, interface: u32, bytes: &[u8]) -> Result<(), Errno> {
+        let known = self.interfaces.iter_mut().find(|known| known.index == interface);
+        let interface = known.ok_or(Errno::NXIO)?;
+        let frame: &FrameBytes = bytes.try_into().map_err(|_| Errno::INVAL)?;
+        if frame[4] > MOST_DATA {
+            return Err(Errno::INVAL);
+        }
+        match interface.bus.send(frame) {
+            Sent::Taken => {}
+            Sent::Full => return Err(Errno::NOBUFS),
+            Sent::Down => return Err(Errno::NETDOWN),
+        }
+        let index = interface.index;
+        self.sent += 1;
+        let loops_back =
+            self.sockets.get(&inode).is_none_or(|socket| socket.raw().is_none_or(|raw| raw.loops_back()));
+        if loops_back {
+            self.spread(index, frame, From::Guest(inode));
+        }
+        Ok(())
+    }
+
+    /// Gives a frame to every guest's socket on the interface whose filters it passes.
+    pub(crate) fn spread(&mut self, interface: u32, frame: &FrameBytes, from: From) {
+        let (id, stamp_ns, now) = (identifier(frame), wall_clock_ns(), Instant::now());
+        let mut wanted = Vec::new();
+        for (inode, socket) in self.sockets.iter_mut().filter(|(_, socket)| socket.listens_on(interface)) {
+            let is_own = from == From::Guest(*inode);
+            let mut actions = Vec::new();
+            match &mut socket.kind {
+                Kind::Raw(raw) => {
+                    if !raw.passes(id) || is_own && !raw.receives_own() {
+                        continue;
+                    }
+                    let local = if from == From::Bus { 0 } else { libc::MSG_DONTROUTE };
+                    let flags = (local | if is_own { libc::MSG_CONFIRM } else { 0 }) as u32;
+                    socket.deliver(frame, Note { interface, flags, dropped: 0, stamp_ns, error: None });
+                }
+                Kind::Bcm(manager) => manager.take_frame(interface, frame, now, &mut actions),
+            }
+            if !actions.is_empty() || !socket.waiting.is_empty() {
+                wanted.push((*inode, actions));
+            }
+        }
+        for (inode, actions) in wanted {
+            self.carry_out(inode, actions);
+            self.serve_waiting(inode);
+        }
+    }
+
+    /// Does what a broadcast manager wants.
+    pub(crate) fn carry_out(&mut self, inode: u64, actions: Vec<Action>) {
+        for action in actions {
+            match action {
+                // As the kernel's: what the interface does not take is lost.
+                Action::Send(interface, frame) => {
+                    let _ = self.send_frame(inode, interface, &frame);
+                }
+                Action::Tell(interface, message) => {
+                    let stamp_ns = wall_clock_ns();
+                    if let Some(socket) = self.sockets.get_mut(&inode) {
+                        socket.deliver(
+                            &message,
+                            Note { interface, flags: 0, dropped: 0, stamp_ns, error: None },
+                        );
+                    }
+                    self.serve_waiting(inode);
+                }
+            }
+        }
+    }
+
+    /// Takes what a guest has written natively, a few messages, so that others have their turn. A frame for which the bus has no
+    /// room is held, and with it the guest, whose queue to us fills.
+    pub(crate) fn take_from(&mut self, inode: u64) {
+        for _ in 0..BATCH {
+            let Some(socket) = self.sockets.get(&inode).filter(|socket| socket.held.is_none()) else {
+                return;
+            };
+            let mut bytes = [0_u8; ROOM];
+            match recv(socket.as_fd(), &mut bytes, RecvFlags::DONTWAIT) {
+                // A guest that closes it with frames unread is told of first, and once.
+                Err(Errno::INTR | Errno::CONNRESET) => {}
+                Err(Errno::AGAIN) => return,
+                Ok((_, 0)) | Err(_) => return self.remove_socket(inode),
+                Ok((_, length)) => self.send_native(inode, &bytes[..length]),
+            }
+        }
+    }
+
+    fn send_native(&mut self, inode: u64, bytes: &[u8]) {
+        match self.send(inode, None, bytes) {
+            Err(Errno::NOBUFS) => {
+                let socket = self.sockets.get_mut(&inode).expect("it has sent");
+                let interface = socket.interface.unwrap_or(0);
+                socket.held = bytes.try_into().ok();
+                self.watch_socket(inode, false);
+                let known = self.interfaces.iter().position(|known| known.index == interface);
+                let place = known.expect("its bus has no room");
+                self.interfaces[place].waiting.push(inode);
+                self.watch_bus(place);
+            }
+            Err(error) => {
+                self.refused_late += 1;
+                self.tell(&format!(
+                    "a write of {} bytes was accepted and dropped; the kernel answers {error:?}",
+                    bytes.len()
+                ));
+            }
+            Ok(()) => {}
+        }
+    }
+
+    /// The bus has room again: what was held goes on.
+    pub(crate) fn release_held(&mut self, place: usize) {
+        for inode in std::mem::take(&mut self.interfaces[place].waiting) {
+            let held = self.sockets.get_mut(&inode).and_then(|socket| socket.held.take());
+            if let Some(frame) = held {
+                self.send_native(inode, &frame);
+                if self.sockets.get(&inode).is_some_and(|socket| socket.held.is_none()) {
+                    self.watch_socket(inode, true);
+                }
+            }
+        }
+        self.watch_bus(place);
+    }
+
+    fn check_alive(&self, notification: &Notification) -> Result<(), Errno> {
+        if self.listener.is_alive(notification.id) { Ok(()) } else { Err(Errno::INTR) }
+    }
+}
+
+/// The address that a call has, as bytes.
+fn read_name(caller: Caller, name: Option<(u64, i32)>) -> Result<Option<Vec<u8>>, Errno> {
+    let Some((address, length)) = name else { return Ok(None) };
+    // As long as `struct sockaddr_storage` at most.
+    let length = usize::try_from(length).ok().filter(|length| *length <= 128).ok_or(Errno::INVAL)?;
+    let mut bytes = vec![0; length];
+    caller.read(address, &mut bytes)?;
+    Ok(Some(bytes))
+}

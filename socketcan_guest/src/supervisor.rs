@@ -1,0 +1,367 @@
+//! The loop: answers the guests' calls, and carries frames between their sockets and the buses. One thread, one epoll.
+//!
+//! Nothing in it waits for a guest: what a guest's queue does not take is dropped and counted there, a call that would block is
+//! kept, and a guest that writes faster than its bus takes is held back by its own queue. Each turn takes a few messages of each
+//! source.
+
+use crate::abi::CAN_BCM;
+use crate::caller::Caller;
+use crate::interface::Interface;
+use crate::notification::{Answer, Listener, Notification};
+use crate::receive::WaitingCall;
+use crate::send::From;
+use crate::socket::{GuestSocket, Kind, Note};
+use rustix::event::{Timespec, epoll};
+use rustix::io::Errno;
+use rustix::time::{ClockId, clock_gettime};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::mem::MaybeUninit;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::time::{Duration, Instant};
+
+/// Calls that are answered in one turn, and frames that are taken from a bus.
+const A_TURN: usize = 32;
+/// Sources of events that are looked at in one turn; epoll brings the others in the next.
+const EVENTS_A_TURN: usize = 64;
+/// Longest sleep: a bus that has gone is looked for, and calls that died while they waited are forgotten.
+const LONGEST_SLEEP: Duration = Duration::from_millis(100);
+/// Different texts that are told; a guest must not be able to fill a disk.
+const MOST_TEXTS: usize = 200;
+
+const LISTENER: u64 = u64::MAX;
+const CHILD: u64 = u64::MAX - 1;
+/// The bus of the interface in the first place; the others are below it.
+const FIRST_BUS: u64 = u64::MAX - 16;
+/// Interfaces that there may be.
+pub(crate) const MOST_INTERFACES: usize = 64;
+
+/// What there is to answer with.
+pub(crate) struct Supervisor {
+    pub(crate) listener: Listener,
+    epoll: OwnedFd,
+    pub(crate) interfaces: Vec<Interface>,
+    /// Guests' sockets by the inode of the guest's end.
+    pub(crate) sockets: BTreeMap<u64, GuestSocket>,
+    /// Those that are broadcast managers.
+    pub(crate) managers: BTreeSet<u64>,
+    /// Calls that wait for a message, of all sockets.
+    pub(crate) waiting_calls: usize,
+    pub(crate) message_bytes: usize,
+    /// Frames of guests that a bus took.
+    pub(crate) sent: u64,
+    /// Messages that were accepted natively and that the kernel would have refused.
+    pub(crate) refused_late: u64,
+    told: BTreeSet<String>,
+    last_look: Instant,
+}
+
+impl Supervisor {
+    pub(crate) fn new(listener: OwnedFd, interfaces: Vec<Interface>) -> io::Result<Self> {
+        let epoll = epoll::create(epoll::CreateFlags::CLOEXEC)?;
+        epoll::add(&epoll, &listener, epoll::EventData::new_u64(LISTENER), epoll::EventFlags::IN)?;
+        let mut supervisor = Self {
+            listener: Listener::new(listener),
+            epoll,
+            interfaces,
+            sockets: BTreeMap::new(),
+            managers: BTreeSet::new(),
+            waiting_calls: 0,
+            message_bytes: crate::socket::bytes_accounted_to_a_message()?,
+            sent: 0,
+            refused_late: 0,
+            told: BTreeSet::new(),
+            last_look: Instant::now(),
+        };
+        for place in 0..supervisor.interfaces.len() {
+            if supervisor.interfaces[place].bus.socket().is_some() {
+                supervisor.bus_came(place);
+            }
+        }
+        Ok(supervisor)
+    }
+
+    /// Wakes the loop when this process has ended.
+    pub(crate) fn watch_child(&self, child: BorrowedFd<'_>) -> io::Result<()> {
+        let data = epoll::EventData::new_u64(CHILD);
+        Ok(epoll::add(&self.epoll, child, data, epoll::EventFlags::IN)?)
+    }
+
+    /// Waits for something to do, and does it. True when the child has ended.
+    ///
+    /// # Errors
+    /// What epoll says when the system is out of memory.
+    pub(crate) fn turn(&mut self) -> io::Result<bool> {
+        self.turn_for(LONGEST_SLEEP)
+    }
+
+    /// The same, and sleeps no longer than so.
+    pub(crate) fn turn_for(&mut self, longest: Duration) -> io::Result<bool> {
+        let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
+        let patience = self.patience().min(longest);
+        let patience = Timespec { tv_sec: 0, tv_nsec: patience.subsec_nanos().into() };
+        let events: Vec<(u64, epoll::EventFlags)> = match epoll::wait(&self.epoll, &mut room, Some(&patience))
+        {
+            Ok((events, _)) => events.iter().map(|event| (event.data.u64(), event.flags)).collect(),
+            Err(Errno::INTR) => Vec::new(),
+            Err(error) => return Err(error.into()),
+        };
+        let mut has_ended = false;
+        for (source, flags) in events {
+            match source {
+                LISTENER => self.answer_some(),
+                CHILD => has_ended = true,
+                bus if bus > FIRST_BUS - MOST_INTERFACES as u64 => {
+                    let place = (FIRST_BUS - bus) as usize;
+                    if flags.contains(epoll::EventFlags::OUT) {
+                        self.release_held(place);
+                    }
+                    self.take_from_bus(place);
+                }
+                inode => self.take_from(inode),
+            }
+        }
+        self.advance_managers();
+        self.look_around();
+        Ok(has_ended)
+    }
+
+    fn patience(&self) -> Duration {
+        let now = Instant::now();
+        let managers = self.managers.iter().filter_map(|inode| match &self.sockets.get(inode)?.kind {
+            Kind::Bcm(manager) => manager.due(),
+            Kind::Raw(_) => None,
+        });
+        let mut due = managers.min();
+        if self.waiting_calls > 0 {
+            let calls = self.sockets.values().flat_map(|socket| &socket.waiting);
+            due = calls.filter_map(|call| call.deadline).chain(due).min();
+        }
+        due.map_or(LONGEST_SLEEP, |due| due.saturating_duration_since(now).min(LONGEST_SLEEP))
+    }
+
+    fn answer_some(&mut self) {
+        for _ in 0..A_TURN {
+            let Some(notification) = self.listener.next() else { return };
+            let answer = self.answer_to(&notification);
+            self.listener.answer(notification.id, answer);
+        }
+    }
+
+    fn answer_to(&mut self, notification: &Notification) -> Answer {
+        match notification.call {
+            libc::SYS_socket => self.make_socket(notification),
+            libc::SYS_bind => self.bind(notification),
+            libc::SYS_connect => self.connect(notification),
+            libc::SYS_getsockname => self.own_name(notification),
+            libc::SYS_listen
+            | libc::SYS_accept
+            | libc::SYS_accept4
+            | libc::SYS_shutdown
+            | libc::SYS_getpeername => self.not_of_can(notification),
+            libc::SYS_ioctl => self.ioctl(notification),
+            libc::SYS_setsockopt => self.set_option(notification),
+            libc::SYS_getsockopt => self.get_option(notification),
+            libc::SYS_recvmsg | libc::SYS_recvmmsg | libc::SYS_recvfrom => self.receive(notification),
+            libc::SYS_sendmsg | libc::SYS_sendmmsg => self.send_message(notification),
+            libc::SYS_sendto => self.send_to(notification),
+            libc::SYS_write => self.write(notification),
+            _ => Answer::Continue,
+        }
+    }
+
+    /// The guest's socket that a call's first argument stands for, and a copy of the descriptor; `None` when it is none of ours.
+    pub(crate) fn guest_socket(&mut self, notification: &Notification) -> Option<(u64, OwnedFd)> {
+        // Without a socket there is nothing to look for, and most programs make most of these calls on other descriptors.
+        if self.sockets.is_empty() {
+            return None;
+        }
+        match Caller::new(notification.thread).descriptor(notification.int(0)) {
+            Ok(copy) => {
+                let inode = inode_of(copy.as_fd())?;
+                self.sockets.contains_key(&inode).then_some((inode, copy))
+            }
+            // None of that number, or the caller has gone: the kernel says so.
+            Err(Errno::BADF | Errno::SRCH) => None,
+            Err(error) => {
+                self.tell(&format!(
+                    "process {}: its descriptors cannot be looked at ({error:?}), so its CAN sockets do not work: it is a \
+                     program that may be executed but not read, or a container allows no pidfd_getfd (docker run \
+                     --cap-add SYS_PTRACE, or --security-opt seccomp=unconfined)",
+                    notification.thread
+                ));
+                None
+            }
+        }
+    }
+
+    /// Takes a new socket into the loop.
+    pub(crate) fn add_socket(&mut self, inode: u64, socket: GuestSocket, protocol: i32) -> io::Result<()> {
+        epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(inode), epoll::EventFlags::IN)?;
+        if protocol == CAN_BCM {
+            self.managers.insert(inode);
+        }
+        self.sockets.insert(inode, socket);
+        Ok(())
+    }
+
+    /// The guests have closed it: what it was, its cyclic frames included, is over.
+    pub(crate) fn remove_socket(&mut self, inode: u64) {
+        // Closing the descriptor takes it out of the epoll set.
+        if let Some(socket) = self.sockets.remove(&inode) {
+            self.waiting_calls -= socket.waiting.len();
+            for call in socket.waiting {
+                self.listener.answer(call.notification.id, Answer::Error(Errno::BADF));
+            }
+        }
+        self.managers.remove(&inode);
+    }
+
+    /// Whether what the guest writes is taken from now on.
+    pub(crate) fn watch_socket(&self, inode: u64, takes: bool) {
+        let Some(socket) = self.sockets.get(&inode) else { return };
+        // Out of the set while its frame is held: epoll would tell of its end again and again, and the frame goes first.
+        let _ = if takes {
+            epoll::add(&self.epoll, socket, epoll::EventData::new_u64(inode), epoll::EventFlags::IN)
+        } else {
+            epoll::delete(&self.epoll, socket)
+        };
+    }
+
+    /// Waits for room at a bus while a guest's frame waits for it.
+    pub(crate) fn watch_bus(&self, place: usize) {
+        let interface = &self.interfaces[place];
+        let mut flags = epoll::EventFlags::IN;
+        flags.set(epoll::EventFlags::OUT, !interface.waiting.is_empty());
+        if let Some(socket) = interface.bus.socket() {
+            let data = epoll::EventData::new_u64(FIRST_BUS - place as u64);
+            let _ = epoll::modify(&self.epoll, socket, data, flags);
+        }
+    }
+
+    fn take_from_bus(&mut self, place: usize) {
+        for _ in 0..A_TURN {
+            let interface = &mut self.interfaces[place];
+            let index = interface.index;
+            match interface.bus.receive() {
+                Some(frame) => self.spread(index, &frame, From::Bus),
+                None => break,
+            }
+        }
+        if self.interfaces[place].bus.socket().is_none() {
+            self.bus_went(place);
+        }
+    }
+
+    fn bus_came(&mut self, place: usize) {
+        let interface = &mut self.interfaces[place];
+        interface.is_up = true;
+        if let Some(socket) = interface.bus.socket() {
+            let data = epoll::EventData::new_u64(FIRST_BUS - place as u64);
+            // Without memory for it the interface is up and silent.
+            let _ = epoll::add(&self.epoll, socket, data, epoll::EventFlags::IN);
+        }
+    }
+
+    /// The interface goes down: sockets that are bound to it are told, those of any interface are not, as the kernel does.
+    fn bus_went(&mut self, place: usize) {
+        let interface = &mut self.interfaces[place];
+        if !std::mem::replace(&mut interface.is_up, false) {
+            return;
+        }
+        let (index, name) = (interface.index, interface.name.clone());
+        eprintln!("bench can: {name} is down: its bus has gone; looking for it");
+        self.release_held(place);
+        let bound: Vec<u64> = self
+            .sockets
+            .iter()
+            .filter(|(_, socket)| socket.interface == Some(index))
+            .map(|(inode, _)| *inode)
+            .collect();
+        for inode in bound {
+            self.tell_error(inode, index, Errno::NETDOWN);
+        }
+    }
+
+    /// Lets the next call that receives fail with this error; natively it reads a message of length 0.
+    pub(crate) fn tell_error(&mut self, inode: u64, interface: u32, error: Errno) {
+        let note = Note { interface, flags: 0, dropped: 0, stamp_ns: wall_clock_ns(), error: Some(error) };
+        if let Some(socket) = self.sockets.get_mut(&inode).filter(|socket| socket.raw().is_some()) {
+            socket.deliver(&[], note);
+        }
+        self.serve_waiting(inode);
+    }
+
+    fn advance_managers(&mut self) {
+        let now = Instant::now();
+        for inode in self.managers.iter().copied().collect::<Vec<_>>() {
+            let mut actions = Vec::new();
+            if let Some(Kind::Bcm(manager)) = self.sockets.get_mut(&inode).map(|socket| &mut socket.kind) {
+                manager.advance(now, &mut actions);
+            }
+            self.carry_out(inode, actions);
+        }
+    }
+
+    /// Looks for buses that are not there, and for waiting calls that are over or have died.
+    fn look_around(&mut self) {
+        let now = Instant::now();
+        if self.waiting_calls > 0 {
+            self.end_waiting(|listener, call| {
+                let is_over = call.deadline.is_some_and(|deadline| deadline <= now);
+                is_over && listener.answer(call.notification.id, Answer::Error(Errno::AGAIN))
+            });
+        }
+        if now - self.last_look < LONGEST_SLEEP {
+            return;
+        }
+        self.last_look = now;
+        for place in 0..self.interfaces.len() {
+            if self.interfaces[place].bus.look_for_host() {
+                eprintln!("bench can: {} is up", self.interfaces[place].name);
+                self.bus_came(place);
+            }
+        }
+        if self.waiting_calls > 0 {
+            self.end_waiting(|listener, call| !listener.is_alive(call.notification.id));
+        }
+    }
+
+    /// Forgets the waiting calls that are over.
+    fn end_waiting(&mut self, is_over: impl Fn(&Listener, &WaitingCall) -> bool) {
+        let mut left = 0;
+        for socket in self.sockets.values_mut() {
+            socket.waiting.retain(|call| !is_over(&self.listener, call));
+            left += socket.waiting.len();
+        }
+        self.waiting_calls = left;
+    }
+
+    /// What is to be said at the end: nothing when all went as the kernel's interface would.
+    pub(crate) fn account(&self) {
+        if self.refused_late > 0 {
+            eprintln!(
+                "bench can: {} messages of the program were accepted and dropped; {} frames reached a bus",
+                self.refused_late, self.sent
+            );
+        }
+    }
+
+    /// Tells something on standard error, each text once.
+    pub(crate) fn tell(&mut self, text: &str) {
+        if self.told.len() < MOST_TEXTS && self.told.insert(text.to_owned()) {
+            eprintln!("bench can: {text}");
+        }
+    }
+}
+
+/// The inode behind a descriptor, which is one socket's as long as it is open anywhere.
+pub(crate) fn inode_of(descriptor: BorrowedFd<'_>) -> Option<u64> {
+    rustix::fs::fstat(descriptor).ok().map(|found| found.st_ino)
+}
+
+/// The wall clock, ns.
+pub(crate) fn wall_clock_ns() -> u64 {
+    let now = clock_gettime(ClockId::Realtime);
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
