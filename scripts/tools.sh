@@ -15,8 +15,8 @@ uv_version=0.13.9
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_valgrind && install_python && install_dask && install_hil && install_arm && install_gdb &&
-        install_browser && install_machines
+    install_strace && install_can_utils && install_valgrind && install_python && install_dask && install_hil && install_arm &&
+        install_gdb && install_browser && install_machines
 }
 
 apt_updated=no
@@ -79,6 +79,14 @@ install_compiler() {
 
 # Tells which files a program touches.
 install_strace() { need_program strace strace libunwind8; }
+
+# Programs of SocketCAN that `bench can` runs, and the one that python-can asks for interfaces.
+install_can_utils() {
+    local program
+    for program in candump cansend cangen canplayer cansniffer canbusload; do need_program "$program" can-utils || return 1; done
+    # shellcheck disable=SC2046 # a list of names
+    need_program ip iproute2 $([ "$(id -u)" = 0 ] || libraries_of iproute2)
+}
 
 install_valgrind() {
     if command -v valgrind >/dev/null; then return; fi

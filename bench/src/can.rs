@@ -1,7 +1,7 @@
 //! `bench can`: runs any SocketCAN program on embedded buses, on a machine whose kernel may have no CAN.
 //!
-//! How its system calls are answered is the crate `socketcan-guest`; here are the command line, the bus of a pair of programs that
-//! have no rig, and the exit code, which is the program's own.
+//! How its system calls are answered is the crate `socketcan-guest`; here are the command line, the bus of a pair of programs
+//! that have no rig, and the exit code, which is the program's own.
 
 pub mod cli;
 

@@ -62,8 +62,8 @@ pub enum Command {
     PingPong(PingPongArguments),
     /// Serve a bus over TCP by the socketcand protocol, for python-can, cantools and SavvyCAN.
     Gateway(GatewayArguments),
-    /// Run any SocketCAN program, unmodified, with an embedded bus as its interface vcan0; the kernel needs no CAN. The exit code is the
-    /// program's.
+    /// Run any SocketCAN program, unmodified, with an embedded bus as its interface vcan0; the kernel needs no CAN. The exit
+    /// code is the program's.
     Can(Box<CanArguments>),
     /// Show a run while it goes on, as a page for browsers, as JSON and for Prometheus; and act on it, if it is allowed.
     Watch(WatchArguments),

@@ -11,7 +11,7 @@
 kernel_modules=(
     virtio_pci virtio_blk can can_raw can_dev vcan
     sja1000 kvaser_pci
-    vxcan can_isotp can_gw slcan
+    vxcan can_isotp can_bcm can_gw slcan
 )
 
 # pack FOLDER: a cpio archive of it on standard output, as root's files, whoever packs them.

@@ -6,8 +6,9 @@
 //!         ◄── TX_EXPIRED, TX_STATUS, RX_CHANGED, RX_TIMEOUT, RX_STATUS ── both
 //! ```
 //!
-//! It knows no socket and no clock: commands, frames and the time come in, [`Action`]s go out. It differs from the kernel's in one
-//! thing: the next cycle is counted from when the last was due, not from when it was sent, so that a cyclic frame does not drift.
+//! It knows no socket and no clock: commands, frames and the time come in, [`Action`]s go out. It differs from the kernel's in
+//! one thing: the next cycle is counted from when the last was due, not from when it was sent, so that a cyclic frame does not
+//! drift.
 //!
 //! Source: Linux 6.1 `net/can/bcm.c`, `include/uapi/linux/can/bcm.h`.
 
@@ -30,7 +31,7 @@ const MOST_FRAMES: u32 = 256;
 pub(crate) enum Action {
     /// A frame goes to the interface of this index, and to the guests on it.
     Send(u32, FrameBytes),
-    /// A message goes to the guest; the index is that of the interface that it tells of.
+    /// A message goes to the guest; the index is that of the interface on which a frame came, 0 for a job that sends.
     Tell(u32, Vec<u8>),
 }
 
@@ -63,7 +64,7 @@ impl BroadcastManager {
             opcode::TX_READ => {
                 let job =
                     self.transmissions.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
-                actions.push(Action::Tell(interface, job.status()));
+                actions.push(Action::Tell(0, job.status()));
                 Ok(message::HEAD_BYTES)
             }
             opcode::RX_READ => {

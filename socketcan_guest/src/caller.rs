@@ -1,7 +1,7 @@
 //! The thread that makes a call: its memory and its descriptors.
 //!
-//! A descriptor is a number that `dup`, `fork` and `SCM_RIGHTS` give others of; what it stands for is found by a copy of it and the
-//! inode behind. The copy is closed again when the call is answered, so that the last close of the guest's is the last close.
+//! A descriptor is a number that `dup`, `fork` and `SCM_RIGHTS` give others of; what it stands for is found by a copy of it and
+//! the inode behind. The copy is closed again when the call is answered, so that the last close of the guest's is the last close.
 //!
 //! Both need the right to trace the guest, which the parent of a process has unless a container or the Yama module forbids it, or
 //! the guest's file may be executed but not read.

@@ -15,8 +15,8 @@
 //! | `ioctl` | the request is one of sockets and interfaces, 0x89xx |
 //! | `setsockopt`, `getsockopt` | the level is one of CAN, or the option is one that a Unix socket answers differently |
 //!
-//! Written by hand: `seccompiler` 0.5 builds filters but has no notification, `libseccomp` needs a system library, and the program
-//! is one screen.
+//! Written by hand: `seccompiler` 0.5 builds filters but has no notification, `libseccomp` needs a system library, and the
+//! program is one screen.
 //!
 //! Source: `seccomp(2)`, `seccomp_unotify(2)`; Linux `include/uapi/linux/filter.h`.
 

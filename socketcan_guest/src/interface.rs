@@ -1,7 +1,7 @@
 //! An interface as a guest sees it: its name, its index, what ioctls say of it, and the bus behind it.
 //!
-//! It answers as a classic CAN interface does that a vcan would be after `ip link set vcan0 mtu 16`: no CAN FD. It is up while its
-//! bus has a host.
+//! It answers as a classic CAN interface does that a vcan would be after `ip link set vcan0 mtu 16`: no CAN FD. It is up while
+//! its bus has a host.
 
 use crate::bus_peer::BusPeer;
 use rustix::io::Errno;
@@ -31,11 +31,11 @@ const SIOCSIFTXQLEN: u32 = 0x8943;
 const NO_ARP: u16 = 0x80;
 const UP_AND_RUNNING: u16 = 0x41;
 /// `ARPHRD_CAN`, the type of the interface.
-const HARDWARE: u16 = 280;
+pub(crate) const HARDWARE: u16 = 280;
 /// `CAN_MTU`.
-const MTU: u32 = 16;
+pub(crate) const MTU: u32 = 16;
 /// Length of vcan's transmit queue.
-const TRANSMIT_QUEUE: u32 = 1000;
+pub(crate) const TRANSMIT_QUEUE: u32 = 1000;
 
 /// The index of the first interface, if no other has it: above those that a machine usually has.
 const FIRST_INDEX: u32 = 100;

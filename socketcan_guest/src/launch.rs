@@ -1,8 +1,8 @@
 //! Starts a program under the filter and serves it until it ends.
 //!
-//! A thread of this process takes the filter upon itself, and starts the program, which inherits it; the thread then ends. What the
-//! thread itself does while it starts the program is answered like a guest's calls. So no code runs between `fork` and `exec`,
-//! and the listener needs no way from one process to the other.
+//! A thread of this process takes the filter upon itself, and starts the program, which inherits it; the thread then ends. What
+//! the thread itself does while it starts the program is answered like a guest's calls. So no code runs between `fork` and
+//! `exec`, and the listener needs no way from one process to the other.
 
 use crate::interface::{Interface, free_indices};
 use crate::supervisor::{MOST_INTERFACES, Supervisor};
@@ -56,8 +56,8 @@ enum Started {
     Program(io::Result<Child>),
 }
 
-/// Runs `command` so that its CAN sockets meet `interfaces`, each an embedded bus; waits for buses that have no host yet for so long.
-/// Gives the program's exit code, 128 and the signal's number if a signal ended it; `None` when a person ended the waiting.
+/// Runs `command` so that its CAN sockets meet `interfaces`, each an embedded bus; waits for buses that have no host yet for so
+/// long. Gives the program's exit code, 128 and the signal's number if a signal ended it; `None` when a person ended the waiting.
 ///
 /// # Errors
 /// [`GuestError`].

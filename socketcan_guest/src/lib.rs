@@ -18,6 +18,7 @@
 //! | `raw` | filters and options of `CAN_RAW` |
 //! | `bcm` | `CAN_BCM`: cyclic sending, changes, time-outs |
 //! | `names`, `options`, `ioctl`, `receive`, `send` | the answers, by system call |
+//! | `netlink` | the interfaces in the kernel's list of links |
 //! | `abi` | numbers and layouts |
 //!
 //! Preloading a library would be simpler, and would not reach a statically linked program or one of Go; a kernel module needs a
@@ -32,6 +33,7 @@ mod interface;
 mod ioctl;
 mod launch;
 mod names;
+mod netlink;
 mod notification;
 mod options;
 mod raw;

@@ -66,9 +66,8 @@ impl Supervisor {
                 number(if is_raw { libc::SOCK_RAW } else { libc::SOCK_DGRAM })
             }
             (libc::SOL_SOCKET, libc::SO_DOMAIN) => number(crate::abi::AF_CAN),
-            (libc::SOL_SOCKET, libc::SO_PROTOCOL) => {
-                number(if is_raw { crate::abi::CAN_RAW } else { crate::abi::CAN_BCM })
-            }
+            // The kernel does not keep it for CAN.
+            (libc::SOL_SOCKET, libc::SO_PROTOCOL) => number(0),
             (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => number(socket.tells_dropped.into()),
             (libc::SOL_SOCKET, _) => return Answer::Continue,
             _ => match &socket.kind {

@@ -1,9 +1,9 @@
 //! `recvmsg`, `recvmmsg` and `recvfrom` with an address: what a guest reads together with what the kernel would tell of it.
 //!
-//! The message is taken from the guest's own end by a copy of its descriptor, so that the order with what it reads natively is kept,
-//! and written into its memory with the address of the interface, the flags, the control messages of the kernel (time stamps) and
-//! the count of lost frames. A call that would block is kept and tried again when something was delivered; a message whose
-//! call a signal ended meanwhile goes to the next one.
+//! The message is taken from the guest's own end by a copy of its descriptor, so that the order with what it reads natively is
+//! kept, and written into its memory with the address of the interface, the flags, the control messages of the kernel (time
+//! stamps) and the count of lost frames. A call that would block is kept and tried again when something was delivered; a message
+//! whose call a signal ended meanwhile goes to the next one.
 
 #![allow(unsafe_code)] // recvmsg, nothing else
 
@@ -95,7 +95,11 @@ impl Header {
         Ok(bytes)
     }
 
-    fn scatter(&self, caller: Caller, mut bytes: &[u8]) -> Result<(), Errno> {
+    /// Spreads bytes over the parts; what does not fit is left.
+    ///
+    /// # Errors
+    /// `EFAULT`.
+    pub(crate) fn scatter(&self, caller: Caller, mut bytes: &[u8]) -> Result<(), Errno> {
         for (address, length) in &self.parts {
             let (here, rest) = bytes.split_at(bytes.len().min(*length));
             caller.write(*address, here)?;
@@ -104,7 +108,8 @@ impl Header {
         Ok(())
     }
 
-    fn room(&self) -> usize {
+    /// Bytes that the parts hold.
+    pub(crate) fn room(&self) -> usize {
         self.parts.iter().fold(0, |sum, (_, length)| sum.saturating_add(*length))
     }
 }
@@ -112,7 +117,10 @@ impl Header {
 impl Supervisor {
     /// A call that receives from a guest's socket, if the descriptor is one.
     pub(crate) fn receive(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let Some((inode, end)) = self.guest_socket(notification) else {
+            let links = !self.link_requests.is_empty();
+            return links.then(|| self.receive_links(notification)).flatten().unwrap_or(Answer::Continue);
+        };
         match self.try_to_receive(notification, inode, end.as_fd()) {
             Answer::Error(Errno::AGAIN) if may_wait(notification, end.as_fd()) => {
                 let timeout = socket_timeout(&end, Timeout::Recv).ok().flatten();

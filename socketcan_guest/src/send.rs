@@ -13,6 +13,7 @@ use crate::socket::{Kind, Note};
 use crate::supervisor::{Supervisor, wall_clock_ns};
 use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv};
+use std::io;
 use std::os::fd::AsFd;
 use std::time::Instant;
 
@@ -40,7 +41,10 @@ impl Supervisor {
 
     /// `sendto(fd, buffer, length, flags, address, address length)`.
     pub(crate) fn send_to(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let Some((inode, _end)) = self.guest_socket(notification) else {
+            self.note_link_request(notification);
+            return Answer::Continue;
+        };
         let [_, buffer, length, _, name, name_length] = notification.arguments;
         let name = (name != 0).then_some((name, name_length as i32));
         self.send_bytes_at(notification, inode, buffer, length as usize, name)
@@ -66,7 +70,10 @@ impl Supervisor {
 
     /// `sendmsg` and `sendmmsg`.
     pub(crate) fn send_message(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let Some((inode, _end)) = self.guest_socket(notification) else {
+            self.note_link_request(notification);
+            return Answer::Continue;
+        };
         let caller = Caller::new(notification.thread);
         let at = notification.arguments[1];
         if notification.call == libc::SYS_sendmsg {
@@ -135,8 +142,8 @@ impl Supervisor {
     /// Sends a frame of a guest on an interface.
     ///
     /// # Errors
-    /// `ENXIO` without an interface, `EINVAL` for what is no classic frame, `ENETDOWN` without a bus, `ENOBUFS` when the bus takes
-    /// no more for now.
+    /// `ENXIO` without an interface, `EINVAL` for what is no classic frame, `ENETDOWN` without a bus, `ENOBUFS` when the bus
+    /// takes no more for now.
     fn send_frame(&mut self, inode: u64, interface: u32, bytes: &[u8]) -> Result<(), Errno> {
         let known = self.interfaces.iter_mut().find(|known| known.index == interface);
         let interface = known.ok_or(Errno::NXIO)?;
@@ -242,8 +249,9 @@ impl Supervisor {
             Err(error) => {
                 self.refused_late += 1;
                 self.tell(&format!(
-                    "a write of {} bytes was accepted and dropped; the kernel answers {error:?}",
-                    bytes.len()
+                    "a write of {} bytes was accepted and dropped; the kernel answers: {}",
+                    bytes.len(),
+                    io::Error::from(error)
                 ));
             }
             Ok(()) => {}

@@ -7,6 +7,7 @@
 use crate::abi::CAN_BCM;
 use crate::caller::Caller;
 use crate::interface::Interface;
+use crate::netlink::LinkRequest;
 use crate::notification::{Answer, Listener, Notification};
 use crate::receive::WaitingCall;
 use crate::send::From;
@@ -52,6 +53,8 @@ pub(crate) struct Supervisor {
     pub(crate) sent: u64,
     /// Messages that were accepted natively and that the kernel would have refused.
     pub(crate) refused_late: u64,
+    /// Requests for links that the kernel has answered, and whose answers are not read yet.
+    pub(crate) link_requests: Vec<LinkRequest>,
     told: BTreeSet<String>,
     last_look: Instant,
 }
@@ -70,6 +73,7 @@ impl Supervisor {
             message_bytes: crate::socket::bytes_accounted_to_a_message()?,
             sent: 0,
             refused_late: 0,
+            link_requests: Vec::new(),
             told: BTreeSet::new(),
             last_look: Instant::now(),
         };

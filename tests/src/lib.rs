@@ -19,6 +19,7 @@
 //!   disturb ─ disturbances whose cause a report has to name
 //!   noise ── a node that babbles, and whether it was ever obeyed
 //!   pairs ─── runs with something and without, in turns, and the table of what it costs
+//!   socketcan  programs of SocketCAN under `bench can`, and what was recorded of them on vcan
 //!   viewers ─ ten of the live page, for scripts/viewers
 //! ```
 //!
@@ -52,6 +53,7 @@ pub mod records;
 pub mod scene;
 pub mod skip;
 pub mod small_disk;
+pub mod socketcan;
 pub mod turn;
 pub mod viewers;
 pub mod xcp;

@@ -80,6 +80,10 @@ impl Running {
         self.output[0].so_far()
     }
 
+    pub fn stdout(&self) -> String {
+        self.output[1].so_far()
+    }
+
     pub fn number(&self) -> u32 {
         self.child.id()
     }

@@ -1,5 +1,5 @@
 //! On real SocketCAN: Debian's kernel in a virtual machine runs emulator and controller on `vcan0`, and can-utils record,
-//! send and disturb. One machine does all three jobs, one after the other.
+//! send and disturb. One machine does all jobs, one after the other.
 //!
 //! No test here is ever skipped; without network for the first download it fails.
 
@@ -14,8 +14,9 @@ use system_tests::firmware;
 use system_tests::foreign_python::python;
 use system_tests::guest::{Guest, compare_candump, data_frames};
 use system_tests::records::{Table, count, json};
+use system_tests::socketcan;
 
-/// The machine after its three jobs.
+/// The machine after its jobs.
 fn machine() -> &'static Guest {
     static MACHINE: OnceLock<Guest> = OnceLock::new();
     MACHINE.get_or_init(|| {
@@ -28,7 +29,10 @@ fn machine() -> &'static Guest {
         let line = |n: u16| format!("(1700000000.{:06}) can7 5A5#{n:04X}\n", u32::from(n) * 1000);
         fs::write(payload.join("replay.log"), (0..REPLAYED).map(line).collect::<String>()).unwrap();
         // Between two jobs as long as `lines_of_run` wants it.
-        let jobs = ["job", "job-firmware", "job-foreign"].map(|job| format!("sh /airbench/{job}"));
+        fs::copy(socketcan::built("socketcan-answers"), payload.join("socketcan-answers")).unwrap();
+        fs::copy(socketcan::sources().join("can-utils.sh"), payload.join("can-utils.sh")).unwrap();
+        let jobs =
+            ["job", "job-firmware", "job-foreign", "job-answers"].map(|job| format!("sh /airbench/{job}"));
         let guest =
             Guest::run(&["--payload", payload.to_str().unwrap(), "--", &jobs.join(" && sleep 1.5 && ")]);
         assert_eq!(guest.codes().len(), FIRMWARE_CODES.len() + FOREIGN_CODES.len());
@@ -253,4 +257,14 @@ fn the_bus_that_went_down_was_counted(run: &Path) {
     let drive = |what: &str| serde_json::json!({ what: "drive" });
     let order = [place(drive("command-stale")), place("bus-back".into()), place(drive("command-fresh"))];
     assert!(place("bus-lost".into()) < order[0] && order.is_sorted(), "{kinds:?}");
+}
+
+/// So that what `bench can` is held against (`socketcan_answers.rs`) is the kernel's, and not what somebody once wrote down.
+#[test]
+fn socketcan_answers_are_those_that_are_recorded() {
+    let out = machine().out();
+    let answers = |path: &Path| fs::read_to_string(path).unwrap();
+    let recorded = socketcan::expected();
+    assert_eq!(answers(&out.join("socketcan-answers.txt")), answers(&recorded.join("answers.txt")));
+    assert_eq!(socketcan::texts(&out.join("can-utils")), socketcan::texts(&recorded.join("can-utils")));
 }

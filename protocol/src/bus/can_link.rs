@@ -20,8 +20,8 @@ impl CanLink {
         Self { interface: interface.into() }
     }
 
-    /// A socket on an interface that is down opens without a word and then drops everything, so ask first. Asked of the socket and
-    /// not of /sys, where an interface of another network namespace, or of `bench can`, does not stand.
+    /// A socket on an interface that is down opens without a word and then drops everything, so ask first. The socket is asked,
+    /// and not /sys, where an interface of `bench can` does not stand.
     fn check_up(&self, socket: BorrowedFd<'_>) -> io::Result<()> {
         // SAFETY: a plain C structure for which all zeros is a valid value.
         let mut request: libc::ifreq = unsafe { std::mem::zeroed() };

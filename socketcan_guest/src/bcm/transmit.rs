@@ -103,7 +103,7 @@ impl Transmission {
         if !self.head.interval_1.is_zero() && self.head.count > 0 {
             self.head.count -= 1;
             if self.head.count == 0 && self.head.flags & flag::TX_COUNTEVT != 0 {
-                actions.push(Action::Tell(self.interface, self.head.with(opcode::TX_EXPIRED, &[])));
+                actions.push(Action::Tell(0, self.head.with(opcode::TX_EXPIRED, &[])));
             }
         }
         self.send(actions);

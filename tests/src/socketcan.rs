@@ -1,0 +1,68 @@
+//! Programs of SocketCAN: what they answer on vcan, recorded in `tests/expected/socketcan`, and `bench can` as a process.
+
+use crate::binaries::{Program, workspace};
+use crate::process::Running;
+use crate::scene::Scene;
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// Folder of what was recorded on vcan.
+#[must_use]
+pub fn expected() -> PathBuf {
+    workspace().join("tests/expected/socketcan")
+}
+
+/// The sources of the programs.
+#[must_use]
+pub fn sources() -> PathBuf {
+    workspace().join("tests/c/socketcan")
+}
+
+/// Builds a program of `tests/c/socketcan` into `folder`, statically linked, and gives its path.
+#[must_use]
+pub fn build(folder: &Path, program: &str) -> PathBuf {
+    let path = folder.join(program);
+    let mut make = Command::new("make");
+    make.arg("-C").arg(sources()).arg(format!("BUILD={}", folder.display())).arg(&path);
+    let built = make.output().expect("make is installed");
+    assert!(built.status.success(), "{program} does not build:\n{}", String::from_utf8_lossy(&built.stderr));
+    path
+}
+
+/// A program that several tests start, built once.
+#[must_use]
+pub fn built(program: &'static str) -> PathBuf {
+    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
+    static BUILDING: std::sync::Mutex<()> = std::sync::Mutex::new(());
+    let folder = FOLDER.get_or_init(|| tempfile::tempdir().expect("a temporary folder"));
+    // A build that failed left nothing that another could take for good.
+    let _one_at_a_time = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    build(folder.path(), program)
+}
+
+/// `bench can` on the bus of a scene, with options separated by spaces, and a command.
+pub fn guest(scene: &Scene, options: &str, command: &[impl AsRef<OsStr>]) -> Command {
+    let mut can = Program::Bench.command();
+    can.args(["can", "--bus", &scene.url()]).args(options.split_whitespace()).arg("--").args(command);
+    can
+}
+
+/// The same with a line of shell.
+pub fn shell(scene: &Scene, options: &str, line: &str) -> Running {
+    Running::start("bench can", &mut guest(scene, options, &["sh", "-c", line]))
+}
+
+/// All files of a folder by name.
+#[must_use]
+pub fn texts(folder: &Path) -> BTreeMap<String, String> {
+    let files = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let text = |entry: fs::DirEntry| {
+        let text = fs::read_to_string(entry.path()).expect("a text");
+        (entry.file_name().to_string_lossy().into_owned(), text)
+    };
+    files.map(|entry| text(entry.expect("an entry"))).collect()
+}

@@ -1,0 +1,85 @@
+//! `bench can` answers as the kernel does: programs whose output was recorded on vcan (`vm_vcan.rs`) print the same on the
+//! embedded bus, without CAN in the kernel.
+
+use rustix::process::Signal;
+use std::fs;
+use system_tests::process::Running;
+use system_tests::scene::{SHORT, Scene};
+use system_tests::socketcan::{self, built, expected, guest};
+
+/// Lines of the recorded answers that differ, in their order, each with the answer here. These calls are native, so that nobody
+/// looks at them before they succeed; each is told on standard error. docs/socketcan-without-kernel.md has them too.
+const DIFFERENCES: [(&str, &str); 4] = [
+    ("write 8: -1 EINVAL", "write 8: 8"),
+    ("write 73: -1 EINVAL", "write 73: 73"),
+    ("write 9 bytes of data: -1 EINVAL", "write 9 bytes of data: 16"),
+    ("write not bound: -1 ENXIO", "write not bound: 16"),
+];
+
+/// The recorded answers, but for the differences.
+fn expected_answers() -> String {
+    let recorded = fs::read_to_string(expected().join("answers.txt")).unwrap();
+    let mut differences = DIFFERENCES.iter().peekable();
+    let mut expected = String::new();
+    for line in recorded.lines() {
+        let different = differences.next_if(|(on_vcan, _)| *on_vcan == line);
+        expected.push_str(different.map_or(line, |(_, here)| here));
+        expected.push('\n');
+    }
+    assert_eq!(differences.next(), None, "no such answer was recorded");
+    expected
+}
+
+#[test]
+fn every_system_call_answers_as_on_vcan() {
+    let scene = Scene::new(SHORT);
+    let answers = built("socketcan-answers");
+    let answered =
+        Running::start("answers", &mut guest(&scene, "--pair", &[answers.as_os_str(), "vcan0".as_ref()]))
+            .wait();
+    assert_eq!(answered.stdout, expected_answers(), "{}", answered.stderr);
+    let dropped = format!("{} messages of the program were accepted and dropped", DIFFERENCES.len());
+    let answered = answered.expect_code(0).expect_said(&[&dropped, "kernel answers: No such device"]);
+    answered.expect_said(&["CAN_TP16 is not served"]);
+}
+
+/// With the rest of the bus in another process: a bus that has other peers.
+#[test]
+fn can_utils_print_what_they_print_on_vcan() {
+    let scene = Scene::new(SHORT);
+    let _host = scene.bus_host("");
+    let folder = scene.path("can-utils");
+    let url = format!("vcan2={}", scene.url());
+    let script = socketcan::sources().join("can-utils.sh");
+    let command = ["sh".as_ref(), script.as_os_str(), "vcan2".as_ref(), folder.as_os_str()];
+    let _ = Running::start("can-utils", &mut guest(&scene, &format!("--interface {url}"), &command))
+        .wait()
+        .expect_code(0);
+    let mut expected = socketcan::texts(&expected().join("can-utils"));
+    expected.remove("down");
+    assert_eq!(socketcan::texts(&folder), expected);
+}
+
+#[test]
+fn a_listener_is_told_that_the_bus_went_down_as_on_vcan() {
+    let scene = Scene::new(SHORT);
+    let host = scene.bus_host("");
+    let listener = Running::start("candump", &mut guest(&scene, "", &["candump", "vcan0"]));
+    scene.wait_for_peers(1);
+    let peer = scene.peer();
+    let (mut told, mut tries) = (listener, 0);
+    // Until candump has bound its socket nothing reaches it.
+    while !told.stdout().contains("7E0") {
+        tries += 1;
+        assert!(tries < 3000, "candump shows nothing: {}", told.stderr());
+        peer.send(&protocol::can::CanFrame::new(0x7E0, &[]).to_bytes());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    host.signal(Signal::INT);
+    let _ = host.wait();
+    told.wait_for("Network is down");
+    let ended = told.wait();
+    let recorded = fs::read_to_string(expected().join("can-utils/down")).unwrap();
+    assert!(recorded.starts_with("read: Network is down\ncandump 1\n"), "{recorded}");
+    let _ = ended.expect_code(1).expect_said(&["read: Network is down", "vcan0 is down"]);
+}

@@ -1,0 +1,239 @@
+//! Foreign programs and our own, unmodified, on the embedded bus by `bench can`: python-can, firmware in C, `scripts/run`.
+
+use protocol::can::CanFrame;
+use rustix::process::Signal;
+use std::os::unix::fs::PermissionsExt;
+use std::process::Command;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::foreign_python::python;
+use system_tests::launch::Pace;
+use system_tests::peer::Packet;
+use system_tests::process::{PATIENCE, Running, wait_until};
+use system_tests::records::{count, json};
+use system_tests::scene::{SHORT, Scene};
+use system_tests::socketcan::{guest, shell};
+use system_tests::{firmware, turn};
+
+#[test]
+fn python_can_sends_filters_repeats_and_listens() {
+    let scene = Scene::new(SHORT);
+    let _host = scene.bus_host("");
+    let script = workspace().join("tests/python/socketcan_guest.py");
+    let python = python();
+    let command = [python.as_os_str(), script.as_os_str(), "vcan0".as_ref(), "echo".as_ref()];
+    let running = Running::start("python-can", &mut guest(&scene, "", &command));
+    let peer = scene.peer();
+    let mut answered = 0;
+    while answered < 100 {
+        match peer.receive(PATIENCE) {
+            Some(Packet::Frame(frame)) if frame.standard_id() == Some(0x3A0) => {
+                peer.send(&CanFrame::new(0x3A1, frame.data()).to_bytes());
+                answered += 1;
+            }
+            Some(Packet::Frame(_)) => {}
+            other => panic!("no frame but {other:?}; {}", running.stderr()),
+        }
+    }
+    let ended = running.wait().expect_code(0);
+    ended.expect_printed(&[
+        "a limited task ends",
+        "a notifier hears all",
+        "no CAN FD",
+        "answered by another peer",
+    ]);
+}
+
+#[test]
+fn the_firmware_for_socketcan_controls_the_rig_on_the_embedded_bus() {
+    let folder = tempfile::tempdir().unwrap();
+    let built = firmware::build(folder.path(), &["STATIC=-static"]);
+    let _turn = turn::take();
+    let scene = Scene::new("title = \"firmware\"\n[rig]\ncarriage_position_m = 0.15\n");
+    let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
+    let program = built.join("firmware-socketcan");
+    let running =
+        Running::start("firmware", &mut guest(&scene, "", &[program.as_os_str(), "vcan0".as_ref()]));
+    let _ = emulator.wait().expect_code(0);
+    // Its bus has gone with the rig.
+    let _ = running.wait().expect_code(0);
+    let summary = json(&scene.path("emulator/summary.json"));
+    assert_eq!(count(&summary, "/frames_malformed"), 0);
+    // It answers from its first sensors on; a machine that stands still skips cycles, and those need no answer.
+    let (accepted, cycles) = (count(&summary, "/drive_commands/accepted"), count(&summary, "/cycles"));
+    assert!(accepted > cycles / 2 && accepted > 100, "{accepted} commands in {cycles} cycles");
+}
+
+#[test]
+fn scripts_run_takes_the_interface_for_a_bus() {
+    let _turn = turn::take();
+    let scene = Scene::new(SHORT);
+    let programs = executable(Program::Bench, Build::Shipped);
+    let run = workspace().join("scripts/run");
+    let (out, experiment) = (scene.path("run"), scene.path("experiment.toml"));
+    let command = [
+        run.as_os_str(),
+        "--bus".as_ref(),
+        "can://vcan0".as_ref(),
+        "--out".as_ref(),
+        out.as_os_str(),
+        experiment.as_os_str(),
+    ];
+    let mut can = guest(&scene, "--pair", &command);
+    let ended = Running::start("scripts/run", can.env("AIRBENCH_BIN_DIR", programs.parent().unwrap())).wait();
+    // The short experiment has no bounds that could be broken.
+    let ended = ended.expect_code(0);
+    ended.expect_printed(&["can://vcan0"]);
+    let summary = json(&out.join("summary.json"));
+    assert_eq!(summary["ended_because"], "the controllers are done");
+    assert_eq!(count(&summary, "/frames_malformed"), 0);
+    assert!(count(&summary, "/frames_received") > 500);
+}
+
+#[test]
+fn two_foreign_programs_meet_on_a_bus_without_a_rig() {
+    let scene = Scene::new(SHORT);
+    let mut pair =
+        Running::start("pair", Program::Bench.command().args(["can", "--pair", "--bus", &scene.url()]));
+    pair.wait_for("hosting");
+    let listener =
+        Running::start("candump", &mut guest(&scene, "", &["candump", "-n", "3", "vcan0,5A5:7FF"]));
+    scene.wait_for_peers(1);
+    // Frames before candump has bound its socket pass it by.
+    while listener.stdout().lines().count() < 3 {
+        let _ = Running::start(
+            "cangen",
+            &mut guest(&scene, "", &["cangen", "vcan0", "-n", "3", "-I", "5A5", "-g", "1"]),
+        )
+        .wait()
+        .expect_code(0);
+    }
+    let _ = listener.wait().expect_code(0);
+    let ended = pair.interrupt();
+    let _ = ended.expect_said(&["the bus carried", "0 did not fit"]);
+}
+
+#[test]
+fn interfaces_of_several_buses_are_told_apart() {
+    let (scene, other) = (Scene::new(SHORT), Scene::new(SHORT));
+    let (_one, _two) = (scene.bus_host(""), other.bus_host(""));
+    let options = format!("--interface can0={} --interface can1={}", scene.url(), other.url());
+    let line = "candump -n 4 any & \
+                until cansend can0 001#; cansend can1 002#; sleep 0.05; ! kill -0 $!; do :; done; wait $!";
+    let ended = shell(&scene, &options, line).wait().expect_code(0);
+    for (interface, identifier) in [("can0", "001"), ("can1", "002")] {
+        let lines = ended.stdout.lines().filter(|line| line.contains(interface));
+        assert!(lines.clone().count() > 0, "{}", ended.stdout);
+        assert!(lines.clone().all(|line| line.contains(identifier)), "{}", ended.stdout);
+    }
+}
+
+#[test]
+fn canbusload_and_cansniffer_show_the_traffic() {
+    let scene = Scene::new(SHORT);
+    let _host = scene.bus_host("");
+    // Both draw on a terminal until they are interrupted.
+    let line = "cangen vcan0 -I 5A5 -L 8 -D 11223344 -g 2 & generator=$!; \
+                timeout -s INT 3 canbusload vcan0@500000; \
+                timeout -s INT 2 cansniffer vcan0 -t 0 </dev/null; kill $generator; true";
+    let ended = shell(&scene, "", line).wait().expect_code(0);
+    // Frames of a second, bits of a second, load.
+    let busy = |line: &str| {
+        let words: Vec<_> = line.split_whitespace().collect();
+        words.first() == Some(&"vcan0@500000") && words.get(1).is_some_and(|frames| *frames != "0")
+    };
+    assert!(ended.stdout.lines().any(busy), "{}", ended.stdout);
+    ended.expect_printed(&["5A5"]);
+}
+
+#[test]
+fn it_works_for_an_ordinary_user_without_capabilities_and_in_a_user_namespace() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o777)).unwrap();
+    let bench = folder.path().join("bench");
+    std::fs::copy(executable(Program::Bench, Build::Shipped), &bench).unwrap();
+    let line =
+        "candump -n 1 vcan0 & until cansend vcan0 123#42; sleep 0.05; ! kill -0 $!; do :; done; wait $!";
+    let ways: &[&[&str]] = if rustix::process::getuid().is_root() {
+        &[
+            &[
+                "setpriv",
+                "--reuid=65534",
+                "--regid=65534",
+                "--clear-groups",
+                "--inh-caps=-all",
+                "--bounding-set=-all",
+            ],
+            &[
+                "setpriv",
+                "--reuid=65534",
+                "--regid=65534",
+                "--clear-groups",
+                "unshare",
+                "--user",
+                "--map-root-user",
+            ],
+        ]
+    } else {
+        &[&["env"], &["unshare", "--user", "--map-root-user"]]
+    };
+    for (number, way) in ways.iter().enumerate() {
+        // A machine may forbid user namespaces; nobody can be in one then.
+        let mut probe = Command::new(way[0]);
+        if !probe.args(&way[1..]).arg("true").output().is_ok_and(|ended| ended.status.success()) {
+            system_tests::skip::tell("socketcan in a user namespace", "unshare --user is not permitted here");
+            continue;
+        }
+        let url = format!("unix://{}/bus{number}", folder.path().display());
+        let mut command = Command::new(way[0]);
+        command.args(&way[1..]).arg(&bench).args(["can", "--pair", "--bus", &url, "--", "sh", "-c", line]);
+        let ended = Running::start("bench can", command.current_dir(folder.path())).wait().expect_code(0);
+        ended.expect_printed(&["123   [1]  42"]);
+    }
+}
+
+#[test]
+fn what_cannot_be_is_said_with_what_to_do() {
+    let scene = Scene::new(SHORT);
+    let absent = Running::start("no host", &mut guest(&scene, "--wait-s 0", &["true"])).wait().expect_code(3);
+    let _ = absent.expect_said(&["no host at", "emulator run", "--pair"]);
+    let bench = executable(Program::Bench, Build::Shipped);
+    let inner = scene.url();
+    let nested =
+        [bench.as_os_str(), "can".as_ref(), "--bus".as_ref(), inner.as_ref(), "--".as_ref(), "true".as_ref()];
+    let nested = Running::start("nested", &mut guest(&scene, "--pair", &nested)).wait().expect_code(2);
+    let _ = nested.expect_said(&["does not nest"]);
+    let missing = Running::start("missing", &mut guest(&scene, "--pair", &["/no/such/program"])).wait();
+    let _ = missing.expect_code(2).expect_said(&["cannot start the command"]);
+    let kernels = Program::Bench.start(&[&"can", &"--bus", &"can://vcan0", &"--", &"true"]).wait();
+    let _ = kernels.expect_code(2).expect_said(&["embedded buses"]);
+}
+
+#[test]
+fn its_exit_code_is_the_programs_and_a_signal_goes_to_the_program() {
+    let scene = Scene::new(SHORT);
+    let _ = shell(&scene, "--pair", "exit 7").wait().expect_code(7);
+    let mut running = shell(
+        &scene,
+        "--pair",
+        "trap 'echo asked >&2; exit 9' TERM; echo ready >&2; while :; do sleep 0.1; done",
+    );
+    running.wait_for("ready");
+    running.signal(Signal::TERM);
+    let _ = running.wait().expect_code(9).expect_said(&["asked"]);
+    let killed = shell(&scene, "--pair", "kill -KILL $$").wait();
+    let _ = killed.expect_code(128 + 9);
+}
+
+#[test]
+fn a_program_waits_for_its_bus_and_a_person_can_end_the_waiting() {
+    let scene = Scene::new(SHORT);
+    let mut waiting = Running::start("bench can", &mut guest(&scene, "--wait-s 300", &["true"]));
+    waiting.wait_for("waiting for it");
+    let _ = waiting.interrupt();
+    let mut waiting =
+        Running::start("bench can", &mut guest(&scene, "--wait-s 300", &["cansend", "vcan0", "123#"]));
+    waiting.wait_for("waiting for it");
+    let _host = scene.bus_host("");
+    let _ = waiting.wait().expect_code(0);
+    wait_until("the socket's file", || scene.socket().exists());
+}
