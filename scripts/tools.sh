@@ -15,8 +15,8 @@ uv_version=0.13.9
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_can_utils && install_valgrind && install_python && install_dask && install_hil && install_arm &&
-        install_gdb && install_browser && install_machines
+    install_strace && install_can_utils && install_go && install_valgrind && install_python && install_dask && install_hil &&
+        install_arm && install_gdb && install_browser && install_machines
 }
 
 apt_updated=no
@@ -86,6 +86,23 @@ install_can_utils() {
     for program in candump cansend cangen canplayer cansniffer canbusload; do need_program "$program" can-utils || return 1; done
     # shellcheck disable=SC2046 # a list of names
     need_program ip iproute2 $([ "$(id -u)" = 0 ] || libraries_of iproute2)
+}
+
+# Builds a program of Go, whose runtime makes its system calls without a C library. Always unpacked: compiler and library alone, 80 MB
+# instead of all that golang-go recommends.
+install_go() {
+    local version folder="$tools/debian/usr/lib" packages
+    if command -v go >/dev/null || [ -x "$tools/bin/go" ]; then return 0; fi
+    [ "$(id -u)" != 0 ] || apt_get check -q >/dev/null || return 1 # with package lists
+    version=$(apt-cache depends golang-go 2>/dev/null | sed -n 's/^ *Depends: golang-\(1\.[0-9]*\)-go$/\1/p' | head -n 1)
+    [ -n "$version" ] || return 1
+    packages=$(mktemp -d) || return 1
+    # As root apt would drop its rights to download, which it cannot into a folder of root's.
+    (cd "$packages" && apt-get -o APT::Sandbox::User=root download -q "golang-$version-go" "golang-$version-src" >/dev/null) || return 1
+    mkdir -p "$tools/debian" "$tools/bin"
+    find "$packages" -name '*.deb' -exec dpkg -x {} "$tools/debian" \; && rm -rf "$packages"
+    printf '#!/bin/sh\nGOROOT=%s exec %s/bin/go "$@"\n' "$folder/go-$version" "$folder/go-$version" >"$tools/bin/go"
+    chmod +x "$tools/bin/go"
 }
 
 install_valgrind() {

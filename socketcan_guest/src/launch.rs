@@ -4,9 +4,11 @@
 //! the thread itself does while it starts the program is answered like a guest's calls. So no code runs between `fork` and
 //! `exec`, and the listener needs no way from one process to the other.
 
+use crate::caller::Caller;
 use crate::interface::{Interface, free_indices};
 use crate::supervisor::{MOST_INTERFACES, Supervisor};
 use crate::{GuestError, Named, filter};
+use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, Resource, Signal, getrlimit, kill_process, pidfd_open, setrlimit};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -75,6 +77,14 @@ pub fn run(
         named.map(|(named, index)| Interface::new(&named.name, &named.path, index)).collect();
     if !wait_for_hosts(&mut interfaces, patience, &signals)? {
         return Ok(None);
+    }
+    let here = rustix::thread::gettid().as_raw_nonzero().get();
+    // What is refused here is refused for every guest: it is said now and not when the first of them opens a socket.
+    let looked = Caller::new(here)
+        .descriptor(0)
+        .and_then(|_| Caller::new(here).read_array::<4>(&raw const here as u64));
+    if let Err(error @ (Errno::PERM | Errno::ACCESS | Errno::NOSYS)) = looked {
+        return Err(GuestError::Looking(error.into()));
     }
     let (report, reports) = channel();
     let command = command.to_vec();

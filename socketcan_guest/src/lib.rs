@@ -74,6 +74,12 @@ pub enum GuestError {
     /// The kernel or a container refuses the filter.
     #[error("{}", refused(.0))]
     Filter(io::Error),
+    /// The descriptors and the memory of other processes may not be looked at.
+    #[error(
+        "the CAN sockets of a program cannot be found: pidfd_getfd(2) or process_vm_readv(2): {0}; a container forbids it: allow \
+         it, as docker run --cap-add SYS_PTRACE does, or --security-opt seccomp=unconfined; Linux 5.6 or later is needed"
+    )]
+    Looking(io::Error),
     /// The program cannot be started.
     #[error("cannot start the command: {0}")]
     Command(io::Error),

@@ -11,7 +11,7 @@ use system_tests::peer::Packet;
 use system_tests::process::{PATIENCE, Running, wait_until};
 use system_tests::records::{count, json};
 use system_tests::scene::{SHORT, Scene};
-use system_tests::socketcan::{guest, shell};
+use system_tests::socketcan::{built, guest, shell};
 use system_tests::{firmware, turn};
 
 #[test]
@@ -206,6 +206,62 @@ fn what_cannot_be_is_said_with_what_to_do() {
     let _ = missing.expect_code(2).expect_said(&["cannot start the command"]);
     let kernels = Program::Bench.start(&[&"can", &"--bus", &"can://vcan0", &"--", &"true"]).wait();
     let _ = kernels.expect_code(2).expect_said(&["embedded buses"]);
+}
+
+/// As in a container: Docker's default profile refuses the second to whoever has no CAP_SYS_PTRACE.
+#[test]
+fn a_sandbox_that_forbids_it_is_told_with_what_to_allow() {
+    let scene = Scene::new(SHORT);
+    let forbid = built("forbid");
+    let bench = executable(Program::Bench, Build::Shipped);
+    for (call, advice) in
+        [(call_numbers::SECCOMP, "seccomp=unconfined"), (call_numbers::PIDFD_GETFD, "--cap-add SYS_PTRACE")]
+    {
+        let mut command = Command::new(&forbid);
+        command.arg(call.to_string()).arg(&bench).args([
+            "can",
+            "--pair",
+            "--bus",
+            &scene.url(),
+            "--",
+            "true",
+        ]);
+        let refused = Running::start("bench can", &mut command).wait().expect_code(2);
+        let _ = refused.expect_said(&[advice]);
+    }
+}
+
+/// Numbers of system calls on x86-64.
+mod call_numbers {
+    pub(super) const SECCOMP: i32 = 317;
+    pub(super) const PIDFD_GETFD: i32 = 438;
+}
+
+/// The runtime of Go makes its system calls by itself and waits in epoll; the program is linked statically, without a C library.
+#[test]
+fn a_program_of_go_finds_the_interface_reads_and_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("listen-and-answer");
+    let mut go = Command::new("go");
+    go.args(["build", "-o"]).arg(&program).arg(workspace().join("tests/go/listen_and_answer.go"));
+    go.env("GO111MODULE", "off").env("CGO_ENABLED", "0").env("GOCACHE", folder.path().join("cache"));
+    let built = go.output().expect("go is missing: run scripts/test, which gets it");
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+
+    let scene = Scene::new(SHORT);
+    let _host = scene.bus_host("");
+    let running =
+        Running::start("go", &mut guest(&scene, "", &[program.as_os_str(), "vcan0".as_ref(), "50".as_ref()]));
+    let peer = scene.peer();
+    wait_until("the program to bind its socket", || running.stdout().contains("bound to vcan0 mtu 16"));
+    for number in 0..50 {
+        peer.send(&CanFrame::new(0x3B0, &[number]).to_bytes());
+        match peer.receive(PATIENCE) {
+            Some(Packet::Frame(frame)) => assert_eq!(frame, CanFrame::new(0x3B1, &[number])),
+            other => panic!("no answer but {other:?}: {}", running.stderr()),
+        }
+    }
+    let _ = running.wait().expect_code(0);
 }
 
 #[test]
