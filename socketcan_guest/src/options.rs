@@ -46,10 +46,11 @@ impl Supervisor {
         raw.set(option, &value).map_or_else(Answer::Error, |()| Answer::Value(0))
     }
 
-    /// The value of `setsockopt`, as long as any may be; a longer one is refused by its length.
+    /// The value of `setsockopt`. One that is longer than any may be is refused unread, as the kernel does: it may not be there.
     fn read_value(&self, notification: &Notification) -> Result<Vec<u8>, Errno> {
-        let length = usize::try_from(notification.int(4)).map_err(|_| Errno::INVAL)?;
-        let mut value = vec![0; length.min(RawOptions::LONGEST_VALUE + 1)];
+        let length = usize::try_from(notification.int(4)).ok();
+        let length = length.filter(|length| *length <= RawOptions::LONGEST_VALUE).ok_or(Errno::INVAL)?;
+        let mut value = vec![0; length];
         Caller::new(notification.thread).read(notification.arguments[3], &mut value)?;
         if self.listener.is_alive(notification.id) { Ok(value) } else { Err(Errno::INTR) }
     }

@@ -7,29 +7,6 @@ use system_tests::process::Running;
 use system_tests::scene::{SHORT, Scene};
 use system_tests::socketcan::{self, built, expected, guest};
 
-/// Lines of the recorded answers that differ, in their order, each with the answer here. These calls are native, so that nobody
-/// looks at them before they succeed; each is told on standard error. docs/socketcan-without-kernel.md has them too.
-const DIFFERENCES: [(&str, &str); 4] = [
-    ("write 8: -1 EINVAL", "write 8: 8"),
-    ("write 73: -1 EINVAL", "write 73: 73"),
-    ("write 9 bytes of data: -1 EINVAL", "write 9 bytes of data: 16"),
-    ("write not bound: -1 ENXIO", "write not bound: 16"),
-];
-
-/// The recorded answers, but for the differences.
-fn expected_answers() -> String {
-    let recorded = fs::read_to_string(expected().join("answers.txt")).unwrap();
-    let mut differences = DIFFERENCES.iter().peekable();
-    let mut expected = String::new();
-    for line in recorded.lines() {
-        let different = differences.next_if(|(on_vcan, _)| *on_vcan == line);
-        expected.push_str(different.map_or(line, |(_, here)| here));
-        expected.push('\n');
-    }
-    assert_eq!(differences.next(), None, "no such answer was recorded");
-    expected
-}
-
 #[test]
 fn every_system_call_answers_as_on_vcan() {
     let scene = Scene::new(SHORT);
@@ -37,8 +14,10 @@ fn every_system_call_answers_as_on_vcan() {
     let answered =
         Running::start("answers", &mut guest(&scene, "--pair", &[answers.as_os_str(), "vcan0".as_ref()]))
             .wait();
-    assert_eq!(answered.stdout, expected_answers(), "{}", answered.stderr);
-    let dropped = format!("{} messages of the program were accepted and dropped", DIFFERENCES.len());
+    let difference = socketcan::first_difference(&answered.stdout, &socketcan::expected_answers());
+    assert_eq!(difference, None, "{}", answered.stderr);
+    let dropped =
+        format!("{} messages of the program were accepted and dropped", socketcan::DIFFERENCES.len());
     let answered = answered.expect_code(0).expect_said(&[&dropped, "kernel answers: No such device"]);
     answered.expect_said(&["CAN_TP16 is not served"]);
 }
