@@ -18,8 +18,6 @@ use std::time::{Duration, Instant};
 const RETRY_PERIOD: Duration = Duration::from_millis(100);
 /// Longest packet that is looked at: no frame is longer.
 const LONGEST_PACKET: usize = 64;
-/// Receive buffer asked for: the host's end bounds the queue, this end takes all of it.
-const QUEUE_BYTES: usize = 2 << 20;
 
 /// A frame as it crosses the bus.
 pub(crate) type FrameBytes = [u8; CAN_FRAME_BYTES];
@@ -66,8 +64,8 @@ impl BusPeer {
         let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
         let connected =
             socket_with(AddressFamily::UNIX, SocketType::SEQPACKET, flags, None).and_then(|socket| {
-                // What the kernel grants; a smaller queue holds a guest back earlier.
-                let _ = rustix::net::sockopt::set_socket_send_buffer_size(&socket, QUEUE_BYTES);
+                // The send buffer stays as the kernel makes it, some 280 frames: what waits longer for a bus that stands
+                // still is of no use to anybody.
                 connect(&socket, &SocketAddrUnix::new(&self.path)?)?;
                 Ok(socket)
             });

@@ -10,7 +10,7 @@ use crate::supervisor::{MOST_INTERFACES, Supervisor};
 use crate::{GuestError, Named, filter};
 use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, Resource, Signal, getrlimit, kill_process, pidfd_open, setrlimit};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::ffi::OsString;
 use std::io;
@@ -41,7 +41,6 @@ impl Signals {
         let signals = Self { interrupted: Arc::default(), terminated: Arc::default() };
         flag::register(SIGINT, Arc::clone(&signals.interrupted))?;
         flag::register(SIGTERM, Arc::clone(&signals.terminated))?;
-        flag::register(SIGHUP, Arc::clone(&signals.terminated))?;
         Ok(signals)
     }
 

@@ -2,8 +2,11 @@
 //! lost is counted where it is lost.
 
 use rustix::process::Signal;
+use std::time::Duration;
+use system_tests::foreign_python::python;
 use system_tests::launch::Pace;
-use system_tests::process::{Running, wait_until};
+use system_tests::peer::Packet;
+use system_tests::process::{PATIENCE, Running, wait_until};
 use system_tests::records::{count, json};
 use system_tests::scene::{RESTLESS, SHORT, Scene};
 use system_tests::socketcan::{built, guest, shell};
@@ -82,4 +85,57 @@ fn a_flood_through_it_arrives_whole_and_in_order() {
     };
     assert_eq!(told("received ") + told("lost at its queue ") + told("missing elsewhere "), 20_000);
     assert_eq!(told("missing elsewhere "), 0, "{}", received.stdout);
+}
+
+/// Sends by an address until the bus takes no more, then natively until its own queue does not.
+const SENDER: &str = "
+import errno, socket, struct, sys
+can = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+can.bind(('vcan0',))
+frame = struct.pack('=IB3x8s', 0x7F7, 8, bytes(8))
+print('ready', flush=True)
+sys.stdin.readline()
+addressed, native = 0, 0
+try:
+    while True:
+        can.sendto(frame, ('vcan0',))
+        addressed += 1
+except OSError as refused:
+    print('refused with', errno.errorcode[refused.errno], flush=True)
+can.setblocking(False)
+try:
+    while True:
+        can.send(frame)
+        native += 1
+except BlockingIOError:
+    print('accepted', addressed + native, 'of them natively', native, flush=True)
+sys.stdin.readline()
+";
+
+#[test]
+fn a_bus_that_stands_still_refuses_with_enobufs_holds_native_senders_and_loses_nothing_it_accepted() {
+    let scene = Scene::new(SHORT);
+    let host = scene.bus_host("");
+    let peer = scene.peer();
+    let python = python();
+    let command = [python.as_os_str(), "-c".as_ref(), SENDER.as_ref()];
+    let mut running = Running::start("sender", &mut guest(&scene, "", &command));
+    wait_until("the sender", || running.stdout().contains("ready"));
+    host.stop();
+    running.type_line("go");
+    wait_until("the sender to be held", || running.stdout().contains("natively"));
+    let said = running.stdout();
+    assert!(said.contains("refused with ENOBUFS"), "{said}");
+    let accepted: usize = said.split("accepted ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    host.signal(Signal::CONT);
+    for number in 0..accepted {
+        let frame = peer.receive(PATIENCE);
+        assert!(
+            matches!(frame, Some(Packet::Frame(_))),
+            "{frame:?} in place of frame {number} of {accepted}"
+        );
+    }
+    running.type_line("go");
+    let _ = running.wait().expect_code(0);
+    assert_eq!(peer.receive(Duration::from_millis(100)), None);
 }
