@@ -10,7 +10,7 @@ use cli::{CanArguments, InterfaceArgument};
 use protocol::bus::host::Host;
 use protocol::bus::{BusError, BusUrl};
 use protocol::exit::Exit;
-use realtime::Interrupt;
+use realtime::{Interrupt, Request};
 use socketcan_guest::{GuestError, Named};
 use std::io;
 use std::path::PathBuf;
@@ -21,6 +21,9 @@ use std::time::Duration;
 
 /// The interface of `--bus`.
 const FIRST_INTERFACE: &str = "vcan0";
+/// Priority of the thread that answers: above all programs without real-time priority, for which one that has it would wait in a
+/// call; below the rig, its host and its controllers.
+const FIFO_PRIORITY: u8 = 1;
 /// How often the end is looked for while a bus is hosted.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
@@ -84,7 +87,10 @@ fn try_to_run(arguments: &CanArguments) -> Result<i32, CanError> {
     let host = Host::bind(path, *wire, None)?;
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
-    let serving = std::thread::spawn(move || host.serve(&stopped));
+    let serving = std::thread::spawn(move || {
+        let _grants = realtime::acquire(&answering());
+        host.serve(&stopped)
+    });
     let ran = if arguments.command.is_empty() {
         wait_for_the_end(&arguments.bus)
     } else {
@@ -101,8 +107,15 @@ fn try_to_run(arguments: &CanArguments) -> Result<i32, CanError> {
 
 fn run_program(arguments: &CanArguments, named: &[Named]) -> Result<i32, CanError> {
     let patience = Duration::from_secs(arguments.wait_s.into());
-    let code = socketcan_guest::run(named, &arguments.command, patience)?;
+    let code = socketcan_guest::run(named, &arguments.command, patience, || {
+        let _grants = realtime::acquire(&answering());
+    })?;
     Ok(code.unwrap_or(Exit::Interrupted as i32))
+}
+
+/// What the threads ask for that others wait for. An ordinary user is refused, and goes on without.
+fn answering() -> Request {
+    Request { fifo_priority: Some(FIFO_PRIORITY), timer_slack: true, ..Request::default() }
 }
 
 fn wait_for_the_end(bus: &BusUrl) -> Result<i32, CanError> {

@@ -58,7 +58,8 @@ enum Started {
 }
 
 /// Runs `command` so that its CAN sockets meet `interfaces`, each an embedded bus; waits for buses that have no host yet for so
-/// long. Gives the program's exit code, 128 and the signal's number if a signal ended it; `None` when a person ended the waiting.
+/// long. `started` is called in the thread that answers once the program runs: what it changes of the thread is not inherited.
+/// Gives the program's exit code, 128 and the signal's number if a signal ended it; `None` when a person ended the waiting.
 ///
 /// # Errors
 /// [`GuestError`].
@@ -66,6 +67,7 @@ pub fn run(
     interfaces: &[Named],
     command: &[OsString],
     patience: Duration,
+    started: impl FnOnce(),
 ) -> Result<Option<i32>, GuestError> {
     if interfaces.len() > MOST_INTERFACES {
         return Err(GuestError::TooMany(MOST_INTERFACES));
@@ -98,6 +100,7 @@ pub fn run(
     let mut supervisor = Supervisor::new(listener, interfaces).map_err(GuestError::System)?;
     let mut child = serve_the_start(&mut supervisor, &reports)?;
     raise_limit_of_files();
+    started();
     let status = serve(&mut supervisor, &mut child, &signals).map_err(GuestError::System)?;
     supervisor.account();
     Ok(Some(status.code().unwrap_or_else(|| SIGNALLED + status.signal().unwrap_or(0))))
