@@ -189,10 +189,11 @@ impl Supervisor {
             Err(Errno::BADF | Errno::SRCH) => None,
             Err(error) => {
                 self.tell(&format!(
-                    "process {}: its descriptors cannot be looked at ({error:?}), so its CAN sockets do not work: it is a \
+                    "process {}: its descriptors cannot be looked at ({}), so its CAN sockets do not work: it is a \
                      program that may be executed but not read, or a container allows no pidfd_getfd (docker run \
                      --cap-add SYS_PTRACE, or --security-opt seccomp=unconfined)",
-                    notification.thread
+                    notification.thread,
+                    io::Error::from(error)
                 ));
                 None
             }

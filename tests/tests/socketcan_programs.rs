@@ -180,7 +180,8 @@ fn it_works_for_an_ordinary_user_without_capabilities_and_in_a_user_namespace() 
         // A machine may forbid user namespaces; nobody can be in one then.
         let mut probe = Command::new(way[0]);
         if !probe.args(&way[1..]).arg("true").output().is_ok_and(|ended| ended.status.success()) {
-            system_tests::skip::tell("socketcan in a user namespace", "unshare --user is not permitted here");
+            let name = "it_works_for_an_ordinary_user_without_capabilities_and_in_a_user_namespace";
+            system_tests::skip::tell(name, "unshare --user is not permitted here");
             continue;
         }
         let url = format!("unix://{}/bus{number}", folder.path().display());
