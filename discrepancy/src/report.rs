@@ -39,7 +39,7 @@ pub struct Report {
     pub inputs: InputFiles,
     /// Missing effects, the best first.
     pub named: Vec<NamedEffect>,
-    /// Effects below the smallest amplitude that is named, the best first; the extended rig file has them.
+    /// Effects that are too small to be named, the best first; the extended rig file has them.
     pub small: Vec<NamedEffect>,
     /// Baseline parameters that were significantly off.
     pub parameters: Vec<Quantity>,

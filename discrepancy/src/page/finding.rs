@@ -37,7 +37,7 @@ pub(super) fn finding(report: &Report) -> String {
     if !report.small.is_empty() {
         text += &heading("Smaller effects");
         text += &paragraph(
-            "Below the smallest amplitude that is named. They are part of the model, and the extended rig file has them: a real \
+            "Too small to be named. They are part of the model, and the extended rig file has them: a real \
              machine differs from its rig file by many of these.",
         );
         let row = |small: &NamedEffect| {

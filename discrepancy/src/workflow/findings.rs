@@ -52,11 +52,12 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
 
 /// The effects of the model: those that are named, and smaller ones.
 fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
-    let (mut at, mut index) = (0, 0);
+    let mut at = 0;
     let (mut named, mut small) = (Vec::new(), Vec::new());
     // What is not explained has no names, and the nearest effect.
     let model = if found.not_explained.is_some() { &found.model } else { &found.reported };
-    for ((placed, share), alternatives) in model.placed.iter().zip(&found.shares).zip(&found.alternatives) {
+    let all = model.placed.iter().zip(&found.shares).zip(&found.alternatives);
+    for (index, ((placed, share), alternatives)) in all.enumerate() {
         let errors = &model.errors[at..at + placed.coordinates.len()];
         at += placed.coordinates.len();
         let alternatives = alternatives
@@ -68,10 +69,9 @@ fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
             })
             .collect();
         let amplitude_variation = found.amplitude_variation.get(index).copied();
-        index += 1;
         let effect =
             NamedEffect { amplitude_variation, ..named_effect(placed, errors, *share, alternatives) };
-        if is_large(placed) || found.not_explained.is_some() {
+        if found.not_explained.is_some() || found.is_named(index) {
             named.push(effect)
         } else {
             small.push(effect)
@@ -135,7 +135,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let is_it = |other: &EffectEstimate| same(other, placed);
             let is_last = |fit: &&Refit| fit.placed.last().is_some_and(is_it);
             let alone = found.fitted.iter().filter(|fit| fit.placed.len() == 1).find(is_last);
-            let of_model = found.model.placed.iter().find(|other| is_it(other));
+            let of_model = found.model.placed.iter().position(is_it);
             let is_alike = found.alternatives.iter().flatten().any(|alternative| is_last(&&alternative.fit));
             let shown = alone.map_or(placed, |fit| &fit.placed[0]);
             let share = alone.map(|fit| {
@@ -143,12 +143,8 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             });
             let decision = if let Some(reason) = of_model.and(found.not_explained) {
                 reason.reason()
-            } else if let Some(placed) = of_model {
-                if is_large(placed) {
-                    "named"
-                } else {
-                    "part of the model, and below the smallest amplitude that is named"
-                }
+            } else if let Some(at) = of_model {
+                if found.is_named(at) { "named" } else { "part of the model, and too small to be named" }
             } else if is_alike && found.not_explained.is_none() {
                 "explains as much as what is named"
             } else if alone.is_some_and(|fit| !is_large(&fit.placed[0])) {
@@ -230,7 +226,7 @@ pub(super) fn summary(report: &Report) -> String {
             "Nothing is missing above the detection limits of these records.".to_owned()
         }
         Verdict::NothingMissing | Verdict::ParametersOnly if !report.small.is_empty() => {
-            format!("No effect is missing that is large enough to be named.{small}{off}")
+            format!("No effect is missing that is large enough to be named.{small}{off}{more}")
         }
         Verdict::NothingMissing | Verdict::ParametersOnly => format!("No effect is missing.{off}"),
         Verdict::Named => {

@@ -8,7 +8,7 @@ use plant::Axis;
 pub struct Reported {
     /// Effects, the best first.
     pub named: Vec<NamedEffect>,
-    /// Effects below the smallest amplitude that is named.
+    /// Effects that are too small to be named.
     #[serde(default)]
     pub small: Vec<NamedEffect>,
     /// Parameters that were off.
