@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   d_k, i_k   change of the amplitude that window k asks for beside the fitted model, and its information
-//!   Q = sum_k i_k (d_k - mean)^2       tau^2 = (Q - (n - 1)) / (sum i - sum i^2 / sum i), at least 0       CV_B = tau / |amplitude|
+//!   Q = sum_k i_k (d_k - mean)^2      tau^2 = (Q - (n - 1)) / (sum i - sum i^2 / sum i), at least 0      CV_B = tau / |amplitude|
 //! ```
 //!
 //! A law that is nearly right has one amplitude whatever the rig does. Another one absorbs more of what is missing in some windows

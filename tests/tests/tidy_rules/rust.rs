@@ -260,6 +260,7 @@ const DIMENSIONLESS: &[&str] = &[
     "spool",                 // position of a valve's spool, -1 to 1
     "velocity_feed_forward", // share
     "prior_std",             // of a factor
+    "amplitude_variation",   // between windows, over the amplitude
     "loss",                  // probability
     "size",                  // of a drawing, in its own units
     "values",                // of parameters, each with its own unit
