@@ -66,8 +66,8 @@ const MIN_AMPLITUDE_RATIO: f64 = 0.85;
 /// Share of the loss after calibration that an explanation may leave: impostors for what was left out left 0.54 and more on seed
 /// 13, a development seed, and on the frozen record without `inclination`; all but two right names left 0 to 0.45.
 const MOST_LOSS_LEFT: f64 = 0.5;
-/// Share of the excess that a name beside effects without one needs: on seed 13 hidden effects took 0.11 to 0.86 of it, and effects
-/// named where only a background was hidden 0.04 to 0.12.
+/// Share of the excess that a name beside effects without one needs: on seed 13 hidden effects took 0.11 to 0.86 of it, and
+/// effects named where only a background was hidden 0.04 to 0.12.
 const MIN_SHARE_BESIDE_SMALL: f64 = 0.2;
 /// Most baseline parameters that may be significantly off beside an effect: with more, it is an impostor that they carry.
 /// Chosen on draws of seed 4, a development seed.

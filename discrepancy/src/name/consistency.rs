@@ -2,11 +2,11 @@
 //!
 //! ```text
 //!   d_k, i_k   change of the amplitude that window k asks for beside the fitted model, and its information
-//!   Q = sum_k i_k (d_k - mean)^2      tau^2 = (Q - (n - 1)) / (sum i - sum i^2 / sum i), at least 0      CV_B = tau / |amplitude|
+//!   Q = sum_k i_k (d_k - mean)^2     tau^2 = (Q - (n - 1)) / (sum i - sum i^2 / sum i), at least 0     CV_B = tau / |amplitude|
 //! ```
 //!
-//! A law that is nearly right has one amplitude whatever the rig does. Another one absorbs more of what is missing in some windows
-//! than in others, and its amplitude differs between them by as much as its size.
+//! A law that is nearly right has one amplitude whatever the rig does. Another one absorbs more of what is missing in some
+//! windows than in others, and its amplitude differs between them by as much as its size.
 //!
 //! Source: DerSimonian, Laird 1986, Control. Clin. Trials 7(3): random effects. Takkouche et al. 1999, Am. J. Epidemiol. 150(2):
 //! between-study coefficient of variation.
