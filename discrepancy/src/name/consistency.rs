@@ -31,8 +31,8 @@ const MIN_GAIN_SHARE: f64 = 0.4;
 /// Share of the loss before it that a consistent effect must remove.
 const MIN_LOSS_SHARE: f64 = 0.1;
 
-/// Leaves the fits that are consistent and remove enough, the one with the least loss first; whether there is one. Where there is
-/// none, those above the amplitude floor stay.
+/// Leaves the fits that are consistent and remove enough, the one with the least loss first; whether there is one. All stay where
+/// there is none.
 pub(super) fn prefer_consistent(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
@@ -55,8 +55,6 @@ pub(super) fn prefer_consistent(
     let found = !consistent.is_empty();
     if found {
         *fits = consistent;
-    } else {
-        fits.retain(|fit| fit.placed.last().is_some_and(is_large));
     }
     found
 }
