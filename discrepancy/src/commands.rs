@@ -147,7 +147,7 @@ fn exit_of(report: &Report, strict: bool) -> Exit {
 /// The verification that does not confirm what was found.
 fn unconfirmed(report: &Report) -> Option<&Verification> {
     let verification = report.verification.as_ref().filter(|verification| !verification.confirmed);
-    verification.filter(|_| report.verdict != Verdict::NothingMissing)
+    verification.filter(|_| !report.is_rig_file_enough())
 }
 
 fn one_balance_outcome(

@@ -3,13 +3,14 @@
 //! ```text
 //!   calibration ──► linear screening of all candidates ──► refit of the best in the simulator ──► gain sufficient?
 //!                             ▲                                                                      │ yes: joins the model
-//!                             └───────── residual of the model, its sensitivities beside ────────────┘ up to three times
+//!                             └───────── residual of the model, its sensitivities beside ────────────┘ up to MAX_EFFECTS times
 //!   backward elimination of each effect; fits of the same round with nearly the same loss are its alternatives
 //! ```
 //!
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
-//! from the whole model raises the loss by a multiple of the null threshold. A misfit that three effects leave, or that a poor
-//! explanation leaves, is outside the catalogue.
+//! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect joins
+//! and stays when windows agree on its amplitude ([`consistency`]), small ones too. What a model without a name, or a poor one,
+//! leaves is outside the catalogue.
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
@@ -40,7 +41,7 @@ use start_states::{RefitWithInitialStates, refit_with_starts};
 
 /// Maximum number of effects.
 const MAX_EFFECTS: usize = 3;
-/// Maximum number of effects where the model leaves more than noise, those below the amplitude floor included.
+/// The same where the model leaves more than noise, those below the amplitude floor included.
 const MAX_ROUNDS: usize = 6;
 /// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
@@ -135,11 +136,16 @@ pub struct SelectionResult {
 }
 
 impl SelectionResult {
-    /// Whether the effect at this place of the model has a name: it is large, and beside small ones it takes much of the excess.
+    /// Whether the effect at this place of the model has a name.
     pub fn is_named(&self, at: usize) -> bool {
-        let only_large = self.model.placed.iter().all(is_large);
-        is_large(&self.model.placed[at]) && (only_large || self.shares[at] >= MIN_SHARE_BESIDE_SMALL)
+        is_named(&self.model, &self.shares, at)
     }
+}
+
+/// Whether an effect of a model has a name: it is large, and beside small ones it takes much of the excess.
+fn is_named(model: &Refit, shares: &[f64], at: usize) -> bool {
+    let only_large = model.placed.iter().all(is_large);
+    is_large(&model.placed[at]) && (only_large || shares[at] >= MIN_SHARE_BESIDE_SMALL)
 }
 
 /// Selects the effects that are missing from the baseline.
@@ -213,12 +219,17 @@ pub fn name(
     threshold = null.threshold();
     let limits = limits_of(&null, &columns, threshold);
     let lacks_fit = lacks_fit(here, model.loss);
-    let explains_too_little = lacks_fit
-        && (!model.placed.iter().any(is_large) || model.loss > MOST_LOSS_LEFT * calibrated.fit.loss);
+    let shares_of = |model: &Refit, rounds: &[Vec<Refit>]| {
+        shares(model, rounds, &calibrated, (calibrated.fit.loss - model.loss).max(1e-9))
+    };
+    let mut shares = shares_of(&model, &rounds);
+    let any_named = (0..model.placed.len()).any(|at| is_named(&model, &shares, at));
+    let explains_too_little = lacks_fit && (!any_named || model.loss > MOST_LOSS_LEFT * calibrated.fit.loss);
     if explains_too_little && let Some(first) = first {
         // It comes nearest to what is outside the catalogue.
         rounds = vec![vec![first.clone()]];
         model = first;
+        shares = shares_of(&model, &rounds);
     }
     let explained = with_needed(here, &model);
     let parameters_off = off(here, &explained).into_iter().filter(|off| *off).count();
@@ -240,8 +251,6 @@ pub fn name(
     } else {
         Vec::new()
     };
-    let excess = (calibrated.fit.loss - model.loss).max(1e-9);
-    let shares = shares(&model, &rounds, &calibrated, excess);
     let with_shares = model.placed.iter().zip(&shares);
     let alternatives = with_shares
         .map(|(placed, share)| alternatives(placed, *share, &model, &calibrated, &rounds))

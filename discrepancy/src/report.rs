@@ -29,6 +29,13 @@ pub enum Verdict {
     BadData,
 }
 
+impl Report {
+    /// Whether the rig file explains the records as it is: the extended one is the same.
+    pub(crate) fn is_rig_file_enough(&self) -> bool {
+        self.verdict == Verdict::NothingMissing && self.small.is_empty()
+    }
+}
+
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     pub schema_version: u32,

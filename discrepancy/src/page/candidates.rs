@@ -3,7 +3,7 @@
 use super::draw::{Bar, bars, figure};
 use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as text_cell};
 use super::words;
-use crate::report::{Candidate, Report, Verdict};
+use crate::report::{Candidate, Report};
 use crate::workflow::place_name;
 
 /// Candidates that are drawn; all stand in the table.
@@ -55,7 +55,7 @@ pub(super) fn limits(report: &Report) -> String {
         text += &table("Not excited", &["effect", "where"], rows);
     }
     // Without anything missing the limits are the answer, and stand further up.
-    if report.verdict != Verdict::NothingMissing {
+    if !report.is_rig_file_enough() {
         let limits = limits_table(report);
         if !limits.is_empty() {
             text += &heading("Detection limits");

@@ -13,7 +13,8 @@ use plant::effects::sheet;
 
 pub(super) fn title(report: &Report) -> &'static str {
     match report.verdict {
-        Verdict::NothingMissing => "Nothing above these limits",
+        Verdict::NothingMissing if report.small.is_empty() => "Nothing above these limits",
+        Verdict::NothingMissing => "What was found",
         Verdict::ParametersOnly => "What is off",
         Verdict::Named => "What is missing",
         Verdict::Ambiguous => "What it can be",
@@ -24,7 +25,7 @@ pub(super) fn title(report: &Report) -> &'static str {
 
 pub(super) fn finding(report: &Report) -> String {
     let mut text = String::new();
-    if report.verdict == Verdict::NothingMissing {
+    if report.is_rig_file_enough() {
         text += &paragraph(
             "The rig file explains the records as well as their noise lets anything do. An effect above its limit below would \
              have shown; a smaller one may be there.",
@@ -59,7 +60,7 @@ pub(super) fn finding(report: &Report) -> String {
             text += &heading("Numbers of the rig file that are off");
         }
         let about = "No effect is missing for these: the model is right, its numbers are not.";
-        if report.verdict == Verdict::ParametersOnly {
+        if report.verdict == Verdict::ParametersOnly && report.small.is_empty() {
             text += &paragraph(about);
         }
         text += &quantities("Parameters", "parameter", &report.parameters, |_| String::new());

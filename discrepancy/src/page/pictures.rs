@@ -31,7 +31,7 @@ pub(super) fn before(report: &Report, pictures: &Pictures) -> String {
     if pictures.traces.iter().any(|trace| trace.noise > 0.0) {
         lead += ", in units of the sensor's noise";
     }
-    lead += if report.verdict == Verdict::NothingMissing { ": it stays within it." } else { "." };
+    lead += if report.is_rig_file_enough() { ": it stays within it." } else { "." };
     all(report, pictures, Model::Before, &lead)
 }
 
@@ -122,10 +122,10 @@ fn close(report: &Report, trace: &Trace, model: Model) -> String {
     let (class, area) = look(model);
     plot.series("line s0", "trace s0", &columns(time_s, &measured, COLUMNS));
     plot.series(class, area, &columns(time_s, simulated, COLUMNS));
-    let name = match (model, report.verdict) {
-        (Model::Before, Verdict::NothingMissing) => "simulated",
-        (Model::Before, _) => "simulated, the rig file as it was",
-        (Model::After, _) => "simulated, with what was found",
+    let name = match model {
+        Model::Before if report.is_rig_file_enough() => "simulated",
+        Model::Before => "simulated, the rig file as it was",
+        Model::After => "simulated, with what was found",
     };
     let id = identifier(trace, model, "close");
     let title = format!("{}: measured and {name}", words::signal(&trace.signal));
@@ -158,7 +158,7 @@ fn whole(report: &Report, trace: &Trace, model: Model) -> String {
     let (unit, factor) = difference(trace);
     let has_noise = trace.noise > 0.0;
     let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value * factor).collect() };
-    let first = if report.verdict == Verdict::NothingMissing { "measured minus simulated" } else { "before" };
+    let first = if report.is_rig_file_enough() { "measured minus simulated" } else { "before" };
     let (before, after) = (scaled(&trace.before_residual), scaled(&trace.after_residual));
     let (low, high) = range(before.iter().chain(&after).copied()).unwrap_or((-1.0, 1.0));
     let reach = low.abs().max(high.abs()).max(if has_noise { 4.0 } else { f64::MIN_POSITIVE });

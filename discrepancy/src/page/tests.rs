@@ -111,6 +111,18 @@ fn small_effects_stand_apart_from_what_is_missing() {
 }
 
 #[test]
+fn where_only_small_effects_were_found_the_rig_file_is_not_called_right() {
+    let (mut report, pictures) = sample(Verdict::NothingMissing);
+    report.small = sample(Verdict::Named).0.small;
+    let seen = text(&page(&report, &pictures));
+    assert!(seen.contains("Nothing is missing that is large enough to be named"), "{seen}");
+    assert!(seen.contains("smaller: valve-offset at the load axis"), "{seen}");
+    for wrong in ["The rig file explains the records", "it stays within it"] {
+        assert!(!seen.contains(wrong), "{wrong}");
+    }
+}
+
+#[test]
 fn what_is_ambiguous_stands_together_with_the_experiment_that_tells() {
     let seen = text(&made(Verdict::Ambiguous));
     for part in [

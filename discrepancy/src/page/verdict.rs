@@ -8,7 +8,8 @@ use pagekit::page::escaped;
 /// The headline.
 pub(super) fn title(report: &Report) -> &'static str {
     doubt(report).unwrap_or(match report.verdict {
-        Verdict::NothingMissing => "Nothing is missing",
+        Verdict::NothingMissing if report.small.is_empty() => "Nothing is missing",
+        Verdict::NothingMissing => "Nothing is missing that is large enough to be named",
         Verdict::ParametersOnly => "Numbers of the rig are off",
         Verdict::Named => "What the simulation lacks",
         Verdict::Ambiguous => "Several explanations fit alike",
@@ -19,7 +20,7 @@ pub(super) fn title(report: &Report) -> &'static str {
 
 /// What a finding lacks: the support of the held-out record, or that nothing beside it is missing.
 fn doubt(report: &Report) -> Option<&'static str> {
-    if matches!(report.verdict, Verdict::NothingMissing | Verdict::BadData) {
+    if report.verdict == Verdict::BadData || report.is_rig_file_enough() {
         return None;
     }
     match &report.verification {
@@ -106,7 +107,7 @@ fn one(named: &NamedEffect, before: &str) -> String {
 
 /// How much of the gap of the held-out record is closed, over the signals that had one.
 fn misfit(report: &Report) -> Option<String> {
-    if matches!(report.verdict, Verdict::NothingMissing | Verdict::BadData) {
+    if report.verdict == Verdict::BadData || report.is_rig_file_enough() {
         return None;
     }
     let verification = report.verification.as_ref()?;

@@ -222,13 +222,13 @@ pub(super) fn summary(report: &Report) -> String {
         _ => String::new(),
     };
     match report.verdict {
-        Verdict::NothingMissing if report.small.is_empty() => {
+        _ if report.is_rig_file_enough() => {
             "Nothing is missing above the detection limits of these records.".to_owned()
         }
-        Verdict::NothingMissing | Verdict::ParametersOnly if !report.small.is_empty() => {
-            format!("No effect is missing that is large enough to be named.{small}{off}{more}")
+        Verdict::NothingMissing | Verdict::ParametersOnly => {
+            let size = if small.is_empty() { "" } else { " that is large enough to be named" };
+            format!("No effect is missing{size}.{small}{off}")
         }
-        Verdict::NothingMissing | Verdict::ParametersOnly => format!("No effect is missing.{off}"),
         Verdict::Named => {
             let named = report.named.iter().map(one).collect::<Vec<_>>().join(" and ");
             format!("Missing: {named}.{small}{off}{more}")
