@@ -8,9 +8,9 @@
 //! ```
 //!
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
-//! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect joins
-//! and stays when windows agree on its amplitude ([`consistency`]), small ones too. What a model without a name, or a poor one,
-//! leaves is outside the catalogue.
+//! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
+//! joins and stays when windows agree on its amplitude ([`consistency`]), small ones too. What a model without a name, or a poor
+//! one, leaves is outside the catalogue.
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
