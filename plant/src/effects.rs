@@ -200,6 +200,7 @@ pub(crate) struct Touched {
     pub(crate) air: bool,
     pub(crate) stored_air: bool,
     pub(crate) friction: bool,
+    pub(crate) force: bool,
     pub(crate) past_readings: bool,
 }
 
@@ -214,11 +215,13 @@ impl Touched {
                 Law::Supply => both.iter_mut().for_each(|axis| axis.air = true),
                 Law::StoredAir => (both[axis].air, both[axis].stored_air) = (true, true),
                 Law::Friction => both[axis].friction = true,
+                Law::Force => both[axis].force = true,
                 Law::PastReadings => both[axis].past_readings = true,
             });
             if effects.tabulated.adds_air() {
                 (both[axis].air, both[axis].stored_air) = (true, true);
             }
+            both[axis].force |= effects.tabulated.adds(Balance::Force);
         }
         both
     }

@@ -15,7 +15,7 @@ use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
 use super::tabulated::Seen;
 use super::{AxisEffects, OpenBalance, Touched};
 use crate::faults::{Faults, Outlet};
-use crate::integrator::laws::{At, Laws};
+use crate::integrator::laws::{At, Baseline, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
 use crate::lanes::{Axes, Choice, Mask, Pair};
 use crate::motion::{MotionSpan, Place, side};
@@ -39,6 +39,8 @@ pub(crate) struct Effects {
     /// What is broken: friction levels times these, and ways out of the chambers a and b.
     pub(super) friction_factors: [f64; 2],
     outlets: [[Outlet; 2]; 2],
+    /// Whether friction is the baseline's on both axes; most effects leave it so, and its own laws cost three times as much.
+    baseline_friction: bool,
 }
 
 /// Below this speed an axis on bristles counts as resting: far below what moves it a sensor's step in a second. A guess.
@@ -69,7 +71,9 @@ impl Effects {
             file_linkage: *rig.linkage(),
             friction_factors: [1.0; 2],
             outlets: Default::default(),
+            baseline_friction: false,
         });
+        effects.baseline_friction = effects.has_baseline_friction();
         effects.move_with(of);
         let forces = Forces::at(of, Some(&effects), &Lanes::load(state), Pair::both(0.0), state.linked);
         for (axis, channels) in effects.memory.channels.iter_mut().enumerate() {
@@ -96,6 +100,11 @@ impl Effects {
                 self.memory.moving.axes[axis].air_rate_w = [0.0; 2];
             }
         }
+        self.baseline_friction = self.has_baseline_friction();
+    }
+
+    fn has_baseline_friction(&self) -> bool {
+        self.touched.iter().all(|touched| !touched.friction) && self.friction_factors == [1.0; 2]
     }
 
     fn leaks(&self, axis: usize) -> bool {
@@ -279,8 +288,10 @@ impl Laws for Effects {
     }
 
     fn outside(&self, at: At<'_>, middle: &Middle) -> Pair {
-        let [drive, load] = [0, 1].map(|axis| self.force(axis, &seen(at, middle, axis)).sum(0.0));
-        at.held.hand + Pair::new(drive, load)
+        let force = |axis: usize| {
+            if self.touched[axis].force { self.force(axis, &seen(at, middle, axis)).sum(0.0) } else { 0.0 }
+        };
+        at.held.hand + Pair::new(force(0), force(1))
     }
 
     fn moving(&self, at: At<'_>) -> Mask {
@@ -292,6 +303,9 @@ impl Laws for Effects {
     }
 
     fn sliding(&self, at: At<'_>, middle: &Middle, carried: &Moving, push: Pair, moving: Mask) -> Pair {
+        if self.baseline_friction {
+            return Baseline.sliding(at, middle, &(), push, moving);
+        }
         let of = at.of;
         let [drive, load] = [0, 1].map(|axis| {
             let axis_states = &carried.axes[axis];
@@ -312,6 +326,9 @@ impl Laws for Effects {
     }
 
     fn starting(&self, at: At<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair {
+        if self.baseline_friction {
+            return Baseline.starting(at, middle, force, starts);
+        }
         let of = at.of;
         let [drive, load] = [0, 1].map(|axis| {
             let axis_states = &self.memory.moving.axes[axis];
@@ -323,6 +340,9 @@ impl Laws for Effects {
     }
 
     fn break_away(&self, at: At<'_>, middle: &Middle, force: Pair) -> Pair {
+        if self.baseline_friction {
+            return Baseline.break_away(at, middle, force);
+        }
         let of = at.of;
         let [drive, load] = [0, 1].map(|axis| {
             let axis_states = &self.memory.moving.axes[axis];
@@ -333,18 +353,27 @@ impl Laws for Effects {
     }
 
     fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2] {
+        if self.baseline_friction {
+            return Baseline.ways(at);
+        }
         let [drive, load] = at.from.velocity.to_array().map(side);
         let [to_middle, to_end] = &self.ways[usize::from(at.span.span_s < self.substep_s)][drive][load];
         [to_middle, to_end]
     }
 
     fn holds(&self, at: At<'_>, middle: &Middle, axis: usize, force: f64) -> bool {
+        if self.baseline_friction {
+            return Baseline.holds(at, middle, axis, force);
+        }
         let rubbing = self.rubbing(at.of, axis, middle, &self.memory.moving.axes[axis]);
         let levels = self.levels(at.of, axis, &rubbing, 0.0);
         at.of.motion.holds(at.from.place(axis).extension, force, &levels)
     }
 
     fn advance(&self, at: At<'_>, middle: &Middle, carried: &mut Moving, axis: usize, force: f64) -> Place {
+        if self.baseline_friction {
+            return Baseline.advance(at, middle, &mut (), axis, force);
+        }
         let (of, start) = (at.of, at.from.place(axis));
         let axis_states = &mut carried.axes[axis];
         let rubbing = self.rubbing(of, axis, middle, axis_states);
@@ -363,6 +392,9 @@ impl Laws for Effects {
     }
 
     fn air(&self, at: At<'_>, to: &mut Lanes, middle: &Middle, carried: &mut Moving) {
+        if !self.touched.iter().any(|touched| touched.stored_air) {
+            return;
+        }
         let (of, from) = (at.of, at.from);
         let span_s = at.span.span_s;
         let normal_pa = of.chambers.normal_pa();

@@ -44,7 +44,7 @@ impl Effect for EndCushion {
         name: "end-cushion",
         group: Group::Motion,
         place: PlaceKind::Axis,
-        laws: &[Law::Air],
+        laws: &[Law::Air, Law::Force],
         law: "near both ends the chamber that is emptied vents through a cushion orifice; an elastic stop ends the stroke",
         source: "eq. (4) for the orifice; range: effects.md, textbook prior",
         keys: &[

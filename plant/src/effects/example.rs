@@ -26,7 +26,7 @@ impl Effect for Example {
         name: "example",
         group: Group::Motion,
         place: PlaceKind::Axis,
-        laws: &[Law::Air, Law::StoredAir, Law::Friction],
+        laws: &[Law::Air, Law::StoredAir, Law::Friction, Law::Force],
         law: "a constant in every open balance",
         source: "none, made for the tests",
         keys: &[EffectKey {

@@ -73,8 +73,9 @@ impl Effects {
         let table = |open: f64| of.valve.conductances(open).map(|conductance| conductance / FLOW_PER_KV);
         let bent = on.valve_characteristic.map_or([0.0; 2], |effect| effect.terms(table, open));
         let characteristic = bent.map(|valve_characteristic| Characteristic { valve_characteristic });
-        let kv = [0, 1].map(|edge| characteristic[edge].sum(table(open)[edge]));
-        let kv_max = table(1.0);
+        let file_kv = table(open);
+        let kv = [0, 1].map(|edge| characteristic[edge].sum(file_kv[edge]));
+        let kv_max = on.valve_null_leakage.map_or([0.0; 2], |_| table(1.0));
         let mut ports = Ports {
             flow_m3_per_s: [0.0; 2],
             drawn_m3_per_s: 0.0,
@@ -97,13 +98,17 @@ impl Effects {
                 pipes.conductance[edge] = ports.edges[chamber][edge].sum(kv_open) * FLOW_PER_KV * shut;
             }
             let to_end_m = if chamber == 0 { at.extension_m } else { of.motion.stroke_m() - at.extension_m };
-            let (flow, port) = self.through(axis, &pipes, at.pressure_pa[chamber], to_end_m);
-            let port_pa = if flow == 0.0 {
-                self.shut_port_pa(axis, &pipes, at.pressure_pa[chamber])
+            let unresisted = [0, 1].map(|edge| self.edge(axis, &pipes, edge, at.pressure_pa[chamber]));
+            let (flow, port) = self.through(axis, &pipes, unresisted, at.pressure_pa[chamber], to_end_m);
+            let [supplied, vented] = if flow == 0.0 {
+                let port_pa = self.shut_port_pa(axis, &pipes, at.pressure_pa[chamber]);
+                [0, 1].map(|edge| self.edge(axis, &pipes, edge, port_pa))
+            } else if self.resists(axis) {
+                let port_pa = port.sum(at.pressure_pa[chamber]);
+                [0, 1].map(|edge| self.edge(axis, &pipes, edge, port_pa))
             } else {
-                port.sum(at.pressure_pa[chamber])
+                unresisted
             };
-            let [supplied, vented] = [0, 1].map(|edge| self.edge(axis, &pipes, edge, port_pa));
             ports.flow_m3_per_s[chamber] = flow;
             ports.port[chamber] = port;
             ports.drawn_m3_per_s += supplied.0.sum(supplied.1);
@@ -161,21 +166,29 @@ impl Effects {
         }
     }
 
-    /// Flow into a chamber through its port, m^3/s, and the drops at that flow.
-    fn through(&self, axis: usize, pipes: &Pipes, chamber_pa: f64, to_end_m: f64) -> (f64, Port) {
+    /// Whether anything lies between the chambers of an axis and their valve.
+    fn resists(&self, axis: usize) -> bool {
         let on = &self.on[axis];
-        let arrives = |port_pa: f64| -> f64 {
-            (0..2)
-                .map(|edge| self.edge(axis, pipes, edge, port_pa))
-                .map(|(terms, flow)| terms.sum(flow))
-                .sum()
+        on.line_resistance.is_some() || on.check_valve_restriction.is_some() || on.end_cushion.is_some()
+    }
+
+    /// Flow into a chamber through its port, m^3/s, and the drops at that flow; `unresisted` are the edges' flows without drops.
+    fn through(
+        &self,
+        axis: usize,
+        pipes: &Pipes,
+        unresisted: [(PortFlow, f64); 2],
+        chamber_pa: f64,
+        to_end_m: f64,
+    ) -> (f64, Port) {
+        let sum = |edges: [(PortFlow, f64); 2]| -> f64 {
+            edges.into_iter().map(|(terms, flow)| terms.sum(flow)).sum()
         };
-        let free = arrives(chamber_pa);
-        let resisted =
-            on.line_resistance.is_some() || on.check_valve_restriction.is_some() || on.end_cushion.is_some();
-        if !resisted || free == 0.0 {
+        let free = sum(unresisted);
+        if !self.resists(axis) || free == 0.0 {
             return (free, Port::default());
         }
+        let arrives = |port_pa: f64| sum([0, 1].map(|edge| self.edge(axis, pipes, edge, port_pa)));
         let drops = |flow: f64| self.drops(axis, flow, chamber_pa, to_end_m);
         // More arrives than passes: positive below the flow that is sought, negative above.
         let excess = |size: f64| arrives(drops(size.copysign(free)).sum(chamber_pa)) * free.signum() - size;

@@ -14,7 +14,7 @@
 //!
 //! Source: Newton's second law; range: effects.md, textbook prior (5 kg at 45 degrees are 35 N, added weights more).
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,7 +28,7 @@ impl Effect for Inclination {
         name: "inclination",
         group: Group::Motion,
         place: PlaceKind::Axis,
-        laws: &[],
+        laws: &[Law::Force],
         law: "a constant force along x: gravity on an inclined axis, a hanging load",
         source: "gravity along the axis; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -18,7 +18,7 @@
 //! effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -36,7 +36,7 @@ impl Effect for PositionDependentForce {
         name: "position-dependent-force",
         group: Group::Motion,
         place: PlaceKind::Axis,
-        laws: &[],
+        laws: &[Law::Force],
         law: "a force over x that does not flip with the velocity: hose or cable spring, cogging",
         source: "Hooke's law, cogging as a sine of its pitch; range: effects.md, textbook prior",
         keys: &[

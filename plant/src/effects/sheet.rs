@@ -86,7 +86,7 @@ pub enum Group {
     Sensor,
 }
 
-/// Laws of an axis that have a baseline form and one with effects. Forces and algebraic readings have one form only.
+/// Laws of an axis that have a baseline form and one with effects. Algebraic readings have one form only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Law {
     /// From command to spool.
@@ -99,6 +99,8 @@ pub enum Law {
     StoredAir,
     /// Friction.
     Friction,
+    /// Forces on the piston beside air, hand, contact and friction.
+    Force,
     /// Readings that depend on earlier instants.
     PastReadings,
 }
@@ -259,7 +261,7 @@ pub(crate) enum OpenBalance<'a> {
     SlidingLevel { at: &'a Rubbing, speed_m_per_s: f64, direction: f64 },
     /// Break-away level, N; laws: [`Law::Friction`].
     BreakAwayLevel { at: &'a Rubbing, direction: f64 },
-    /// Force on the piston along its extension, N; laws: none.
+    /// Force on the piston along its extension, N; laws: [`Law::Force`].
     Force(&'a Seen),
     /// Reading of the position by its truth, m; laws: none.
     PositionReading { truth_m: f64 },
