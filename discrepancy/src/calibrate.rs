@@ -11,13 +11,12 @@
 pub mod finer;
 
 use crate::engine::Engine;
+use crate::estimator::CALIBRATION;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{Linearisation, Refit, refit, relinearise};
 use crate::report::Quantity;
 use plant::RigParameters;
 
-/// Maximum number of iterations.
-const MAX_ITERATIONS: usize = 8;
 /// Share of the tolerance above which an error means that the records do not determine the parameter.
 const UNRESOLVED: f64 = 0.7;
 
@@ -29,7 +28,7 @@ pub struct Calibrated {
 
 pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> Calibrated {
     let first = refit(engine, baseline, &[], 0.0).expect("the baseline is a rig");
-    Calibrated { fit: relinearise(engine, first, 0.0, MAX_ITERATIONS - 1) }
+    Calibrated { fit: relinearise(engine, first, 0.0, CALIBRATION) }
 }
 
 impl Calibrated {

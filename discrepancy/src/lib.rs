@@ -9,7 +9,7 @@
 //! | [`windows`] | truncated simulation error: whitened residuals of windows |
 //! | [`engine`] | training records with their simulations and sensitivities |
 //! | `fit` | linear robust least squares over windows: the step of a fit, standard errors |
-//! | `descent` | the loop of nonlinear fits: steps while the loss falls |
+//! | `estimator` | Gauss-Newton of every nonlinear fit: options, globalisation, outcome |
 //! | `stats` | order statistics and means |
 //! | [`candidates`] | effects at places, and the scaling of their numbers |
 //! | [`parameters`] | baseline parameters as nuisance parameters |
@@ -35,9 +35,9 @@ pub mod candidates;
 pub mod check;
 pub mod cli;
 pub mod commands;
-pub(crate) mod descent;
 pub mod discrepancy_term;
 pub mod engine;
+pub(crate) mod estimator;
 pub mod extend;
 pub(crate) mod fit;
 pub(crate) mod folder;

@@ -26,6 +26,7 @@ mod start_states;
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
 use crate::engine::Engine;
+use crate::estimator::RELINEARISED;
 use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 use consistency::{amplitude_variation, eliminate_inconsistent, prefer_consistent, prefer_large};
@@ -45,8 +46,6 @@ const MAX_EFFECTS: usize = 3;
 const MAX_ROUNDS: usize = 6;
 /// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
-/// Maximum number of relinearisations of the parameter sensitivities.
-const RELINEARISATIONS: usize = 4;
 /// Mean log ratio of a window's chi2 to its degrees of freedom above which a model shows lack of fit (is inadequate).
 const LACK_OF_FIT_PER_DOF: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
@@ -285,7 +284,7 @@ pub(crate) fn on_all(engine: &Engine<'_>, found: &mut SelectionResult) {
 
 /// Refits a model with sensitivities relinearised at itself.
 fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
-    crate::refit::relinearise(engine, model, EFFECT_PARAMETER_PENALTY, RELINEARISATIONS)
+    crate::refit::relinearise(engine, model, EFFECT_PARAMETER_PENALTY, RELINEARISED)
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.

@@ -9,25 +9,16 @@
 //! and slip are useless. Source: discrepancy-notes.md, pipeline 6.
 
 use crate::candidates::Candidate;
-use crate::descent::descend;
 use crate::engine::Engine;
+use crate::estimator::{CANDIDATE, Convergence, Estimator, Iterate, Options, Outcome, Step};
 use crate::fit::{Fit, Products};
 use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use plant::RigParameters;
-use std::iter::successors;
 
 /// Smallest step of finite differences, and its share of the coordinate.
 const CHANGE: f64 = 0.02;
 const CHANGE_SHARE: f64 = 0.05;
-/// Maximum steps, maximum backtracking steps and their factor.
-const STEPS: usize = 7;
-const SHORTENINGS: usize = 3;
-const SHORTER: f64 = 0.4;
-/// Fall of the loss below which a fit has converged.
-const CONVERGED: f64 = 0.3;
-/// The same of relinearisations.
-pub(crate) const CONVERGED_RELINEARISED: f64 = 1.0;
 /// Prior standard deviations of coordinates: amplitudes, shapes.
 const AMPLITUDE_PRIOR_STD: f64 = 3.0;
 const SHAPE_PRIOR_STD: f64 = 0.7;
@@ -59,6 +50,26 @@ pub struct Refit {
     pub errors: Vec<f64>,
     /// Design effect: cluster-robust over model-based variance of the first amplitude; at least 1.
     pub(crate) design_effect: f64,
+    /// How the fit ended.
+    pub(crate) convergence: Convergence,
+}
+
+impl Iterate for Refit {
+    fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    fn is_at_bound(&self) -> bool {
+        is_at_bound(&self.placed)
+    }
+}
+
+/// Whether a coordinate is at the end of its range.
+pub(crate) fn is_at_bound(placed: &[EffectEstimate]) -> bool {
+    placed.iter().any(|effect| {
+        let coordinates = effect.coordinates.iter().enumerate();
+        coordinates.into_iter().any(|(key, at)| effect.candidate.fit_bounds(key).contains(at))
+    })
 }
 
 /// Parameter sensitivities and the point of linearisation.
@@ -151,11 +162,24 @@ pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed
         .loss
 }
 
-struct Iterate {
+/// Effects at some coordinates, simulated, with the parameters fitted linearly.
+struct Projected {
     placed: Vec<EffectEstimate>,
     simulated: Vec<f64>,
     residual: Vec<f64>,
     fit: Fit,
+    /// Prior loss of the coordinates.
+    prior: f64,
+}
+
+impl Iterate for Projected {
+    fn loss(&self) -> f64 {
+        self.fit.loss + self.prior
+    }
+
+    fn is_at_bound(&self) -> bool {
+        is_at_bound(&self.placed)
+    }
 }
 
 /// Fits effects from a start; `penalty` is due for each coordinate.
@@ -167,7 +191,7 @@ pub fn refit(
     start: &[EffectEstimate],
     penalty: f64,
 ) -> Option<Refit> {
-    refit_steps(engine, linearisation, start, penalty, STEPS)
+    refit_steps(engine, linearisation, start, penalty, CANDIDATE.steps)
 }
 
 /// The same with another maximum of steps; 0 evaluates the start.
@@ -184,7 +208,15 @@ pub(crate) fn refit_steps(
     let chosen: Vec<usize> = (0..all_precisions.len()).collect();
     let coordinates = coordinates(start);
     let mut parameter_products: Option<Products> = None;
-    let mut evaluate = |placed: Vec<EffectEstimate>| -> Option<Iterate> {
+    let prior = |placed: &[EffectEstimate]| -> f64 {
+        coordinates
+            .iter()
+            .map(|(at, key)| {
+                coordinate_precision(&placed[*at].candidate, *key) * placed[*at].coordinates[*key].powi(2)
+            })
+            .sum()
+    };
+    let mut evaluate = |placed: Vec<EffectEstimate>| -> Option<Projected> {
         let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
@@ -195,40 +227,39 @@ pub(crate) fn refit_steps(
             none => none.insert(engine.products(&residual, &linearisation.columns)),
         };
         let fit = products.fit_from(&parameters, &precisions, &off);
-        Some(Iterate { placed, simulated, residual, fit })
+        let prior = prior(&placed);
+        Some(Projected { placed, simulated, residual, fit, prior })
     };
-    let prior = |placed: &[EffectEstimate]| -> f64 {
-        coordinates
-            .iter()
-            .map(|(at, key)| {
-                coordinate_precision(&placed[*at].candidate, *key) * placed[*at].coordinates[*key].powi(2)
-            })
-            .sum()
-    };
-    let total = |iterate: &Iterate| iterate.fit.loss + prior(&iterate.placed);
-    let first = evaluate(start.to_vec())?;
-    // The last linearisation; one more than steps are taken, for the errors.
-    let (mut last, mut left) = (None, steps);
-    let iterate = descend(first, steps + 1, CONVERGED, total, |iterate| {
-        last = None;
+    let products_at = |iterate: &Projected| -> Option<Products> {
         let columns =
             coordinate_columns(engine, &linearisation.factors, &iterate.placed, &iterate.simulated)?;
         let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&columns).collect();
-        let products = last.insert(engine.products(&iterate.residual, &all));
-        left = left.checked_sub(1)?;
+        Some(engine.products(&iterate.residual, &all))
+    };
+    let first = evaluate(start.to_vec())?;
+    // The last linearisation.
+    let mut last = None;
+    let options = Options { steps, ..CANDIDATE };
+    let (iterate, convergence) = Estimator::new(options).descend(first, |estimator, iterate| {
+        last = products_at(iterate);
+        let Some(products) = &last else { return Step::Impossible };
         let from = prior_deviations(&linearisation.factors, &iterate.placed);
         let joint = products.fit_from(&chosen, &all_precisions, &from);
-        let shares = successors(Some(1.0), |share| Some(share * SHORTER));
-        shares.take(SHORTENINGS + 1).find_map(|share| {
+        let promised = iterate.loss() - joint.loss;
+        estimator.backtrack(iterate, promised, options.fractions, |share| {
             let mut placed = iterate.placed.clone();
             for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
                 let [least, most] = placed[*at].candidate.fit_bounds(*key);
                 let coordinate = &mut placed[*at].coordinates[*key];
                 *coordinate = (*coordinate + share * change).clamp(least, most);
             }
-            evaluate(placed).filter(|tried| total(tried) < total(iterate))
+            evaluate(placed)
         })
     });
+    if convergence.outcome == Outcome::StepLimit {
+        // For the errors.
+        last = products_at(&iterate);
+    }
     let products = last?;
     // At the final iterate: parameters as fitted, coordinates unchanged.
     let mut at_point = iterate.fit.clone();
@@ -249,9 +280,9 @@ pub(crate) fn refit_steps(
     for (factor, change) in factors.iter_mut().zip(&iterate.fit.coefficients) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
-    let loss =
-        iterate.fit.loss + prior(&iterate.placed) + model_penalty(coordinates.len(), &factors, penalty);
-    Some(Refit { placed: iterate.placed, factors, loss, squares: iterate.fit.squares, errors, design_effect })
+    let loss = iterate.loss() + model_penalty(coordinates.len(), &factors, penalty);
+    let Projected { placed, fit, .. } = iterate;
+    Some(Refit { placed, factors, loss, squares: fit.squares, errors, design_effect, convergence })
 }
 
 /// Parameter sensitivities linearised at a model.
@@ -270,19 +301,22 @@ pub(crate) fn linearise_at(
 }
 
 /// Refits a model with the parameters linearised anew at its own values, until the loss converges.
-pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, penalty: f64, times: usize) -> Refit {
-    let mut best = model;
-    for _ in 0..times {
-        let Some(next) = refit(engine, &linearise(engine, &best), &best.placed, penalty) else { break };
-        let converged = next.loss > best.loss - CONVERGED_RELINEARISED;
+pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, penalty: f64, options: Options) -> Refit {
+    let (fit, outer) = Estimator::new(options).descend(model, |_, best| {
+        let Some(next) = refit(engine, &linearise(engine, best), &best.placed, penalty) else {
+            return Step::Impossible;
+        };
         if next.loss < best.loss {
-            best = next;
+            let convergence = best.convergence.then(next.convergence);
+            Step::Taken(Refit { convergence, ..next })
+        } else {
+            Step::Refused { promised: 0.0 }
         }
-        if converged {
-            break;
-        }
+    });
+    if outer.outcome == Outcome::StepLimit {
+        return Refit { convergence: Convergence { outcome: outer.outcome, ..fit.convergence }, ..fit };
     }
-    best
+    fit
 }
 
 /// Sensitivities to each coordinate of a model, in the order of effects and keys; `simulated` are its readings. `None` where a

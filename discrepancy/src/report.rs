@@ -3,6 +3,7 @@
 //! Lists have a deterministic order, and nothing depends on time, threads or machine: two runs write the same bytes. Only `gap`
 //! and `verification` know the held-out record.
 
+use crate::estimator::Convergence;
 use plant::effects::sheet::{Part, Place};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -55,6 +56,8 @@ pub struct Report {
     pub(crate) insignificant: Vec<Quantity>,
     /// Whether the reported model leaves no more on the training records than their noise; null where none was judged.
     pub adequate: Option<bool>,
+    /// How the fit of the reported model ended; null where none was fitted.
+    pub(crate) fit: Option<Convergence>,
     /// The missing term outside the catalogue.
     pub outside: Option<Outside>,
     /// The effect of the catalogue that comes nearest to a term outside it.
@@ -172,6 +175,8 @@ pub struct Candidate {
     pub(crate) score: f64,
     /// Share of the excess that it removes alone, after its refit; null when it was not refitted.
     pub share_explained: Option<f64>,
+    /// How its refit ended; null when it was not refitted alone.
+    pub(crate) fit: Option<Convergence>,
     /// Its amplitude, refitted or linear, in the unit of its sheet.
     pub amplitude: f64,
     /// Unit of the amplitude.

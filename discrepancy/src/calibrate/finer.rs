@@ -9,11 +9,12 @@
 //!
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
-use super::{Calibrated, MAX_ITERATIONS, UNRESOLVED};
+use super::{Calibrated, UNRESOLVED};
 use crate::engine::{Engine, FACTOR_CHANGE};
+use crate::estimator::{CALIBRATION, Estimator, Iterate};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{CONVERGED_RELINEARISED, MOST_OFF, Refit, parameter_precisions};
+use crate::refit::{MOST_OFF, Refit, parameter_precisions};
 use crate::report::Quantity;
 use plant::RigParameters;
 use plant::parameters::table::KEYS;
@@ -37,6 +38,23 @@ struct TableEntry {
     prior_std: f64,
 }
 
+/// All factors, and the linear fit there, whose loss is that of the next iterate but for what is not linear.
+struct Linearised {
+    factors: Vec<f64>,
+    products: Products,
+    fit: Fit,
+}
+
+impl Iterate for Linearised {
+    fn loss(&self) -> f64 {
+        self.fit.loss
+    }
+
+    fn is_at_bound(&self) -> bool {
+        self.factors.iter().any(|factor| (factor - 1.0).abs() >= 2.0 * MOST_OFF)
+    }
+}
+
 /// Result for every entry.
 #[derive(Clone, Debug)]
 pub struct Finer {
@@ -57,28 +75,20 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
 
     let mut factors: Vec<f64> = calibrated.fit.factors.to_vec();
     factors.resize(precisions.len(), 1.0);
-    let mut best: Option<(Vec<f64>, Products, Fit)> = None;
-    for _ in 0..MAX_ITERATIONS {
-        // At the end of a range the last iterate stands.
-        let Some((tried, columns)) = with(rig, &entries, &factors).zip(columns(engine, &entries, &factors))
-        else {
-            break;
-        };
-        let residual = engine.residual(&engine.simulate(&tried));
-        let products = engine.products(&residual, &columns);
+    let linearised = |factors: Vec<f64>| -> Option<Linearised> {
+        let residual = engine.residual(&engine.simulate(&with(rig, &entries, &factors)?));
+        let products = engine.products(&residual, &columns(engine, &entries, &factors)?);
         let off: Vec<f64> = factors.iter().map(|factor| factor - 1.0).collect();
         let fit = products.fit_from(&all, &precisions, &off);
-        let before = best.as_ref().map_or(f64::INFINITY, |(.., fit)| fit.loss);
-        if fit.loss < before {
-            let next = moved(rig, &entries, &factors, &fit.coefficients)?;
-            let at = std::mem::replace(&mut factors, next);
-            best = Some((at, products, fit.clone()));
-        }
-        if fit.loss > before - CONVERGED_RELINEARISED {
-            break;
-        }
-    }
-    let (at, products, fit) = best?;
+        Some(Linearised { factors, products, fit })
+    };
+    // At the end of a range the last iterate stands.
+    let (best, _) = Estimator::new(CALIBRATION).descend(linearised(factors)?, |estimator, from| {
+        estimator.backtrack(from, 0.0, CALIBRATION.fractions, |_| {
+            linearised(moved(rig, &entries, &from.factors, &from.fit.coefficients)?)
+        })
+    });
+    let Linearised { factors: at, products, fit } = best;
     // Points of tables times their common factor.
     let in_file = entries
         .iter()

@@ -9,27 +9,21 @@
 
 use super::EFFECT_PARAMETER_PENALTY;
 use super::null_distribution::above_outlier_limit;
-use crate::descent::descend;
 use crate::engine::Engine;
+use crate::estimator::{Estimator, Iterate, JOINT, Step};
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
-    EffectEstimate, MOST_OFF, Refit, coordinate_columns, model_penalty, prior_deviations, prior_precisions,
-    rig_of,
+    EffectEstimate, MOST_OFF, Refit, coordinate_columns, is_at_bound, model_penalty, prior_deviations,
+    prior_precisions, rig_of,
 };
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Maximum steps, maximum backtracking steps and their factor.
-const STEPS: usize = 6;
-const SHORTENINGS: i32 = 4;
-const SHORTER: f64 = 0.4;
 /// Maximum number of exclusions of windows from a step, and the excess over the predicted squares that excludes one, in standard
 /// deviations.
 const EXCLUSIONS: usize = 4;
 const NONLINEAR_EXCESS: f64 = 6.0;
-/// Fall of the loss below which a fit has converged.
-const CONVERGED: f64 = 0.3;
 
 /// Grid of fractions by which the deviations of the parameters are scaled.
 const SHRINK_FACTORS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
@@ -55,7 +49,7 @@ pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
 }
 
 /// A simulated model.
-struct Iterate {
+struct Simulated {
     placed: Vec<EffectEstimate>,
     factors: [f64; COUNT],
     simulated: Vec<f64>,
@@ -64,6 +58,17 @@ struct Iterate {
     squares: Vec<f64>,
     /// Loss of the windows and of the priors.
     loss: f64,
+}
+
+impl Iterate for Simulated {
+    fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    fn is_at_bound(&self) -> bool {
+        let is_far = |factor: &f64| (factor - 1.0).abs() >= MOST_OFF;
+        is_at_bound(&self.placed) || self.factors.iter().any(is_far)
+    }
 }
 
 /// Fits a model in the simulator with the parameters that are not `needed` at the rig file's values; `None` where no rig can have
@@ -76,19 +81,17 @@ pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; C
     let start = iterate(engine, model.placed.clone(), factors)?;
     let chosen: Vec<usize> =
         (0..COUNT + coordinates(&start.placed)).filter(|at| *at >= COUNT || needed[*at]).collect();
-    let iterate = descend(
-        start,
-        STEPS,
-        CONVERGED,
-        |iterate| iterate.loss,
-        |iterate| stepped(engine, iterate, &linearised(engine, iterate)?, &chosen),
-    );
+    let (iterate, convergence) = Estimator::new(JOINT).descend(start, |estimator, iterate| {
+        linearised(engine, iterate).map_or(Step::Impossible, |linearisation| {
+            stepped(engine, estimator, iterate, &linearisation, &chosen)
+        })
+    });
     let errors = errors(engine, &linearised(engine, &iterate)?, &iterate);
-    let Iterate { placed, factors, squares, loss, .. } = iterate;
-    Some(Refit { placed, factors, loss, squares, errors, design_effect: model.design_effect })
+    let Simulated { placed, factors, squares, loss, .. } = iterate;
+    Some(Refit { placed, factors, loss, squares, errors, design_effect: model.design_effect, convergence })
 }
 
-fn iterate(engine: &Engine<'_>, placed: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Iterate> {
+fn iterate(engine: &Engine<'_>, placed: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Simulated> {
     let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
     let residual = engine.residual(&simulated);
     let squares = engine.squares(&residual);
@@ -97,7 +100,7 @@ fn iterate(engine: &Engine<'_>, placed: Vec<EffectEstimate>, factors: [f64; COUN
     let loss = loss(&squares, engine.scaled_dof())
         + prior[..COUNT].iter().sum::<f64>()
         + prior[COUNT..].iter().sum::<f64>();
-    Some(Iterate { placed, factors, simulated, residual, squares, loss })
+    Some(Simulated { placed, factors, simulated, residual, squares, loss })
 }
 
 /// Number of coordinates of the effects.
@@ -116,7 +119,7 @@ struct JointLinearisation {
 
 impl JointLinearisation {
     /// Normal equations with the sensitivities of some windows set to zero.
-    fn products(&self, engine: &Engine<'_>, iterate: &Iterate, out: &[usize]) -> Products {
+    fn products(&self, engine: &Engine<'_>, iterate: &Simulated, out: &[usize]) -> Products {
         let mut columns = Cow::from(&self.columns);
         if !out.is_empty() {
             for column in columns.to_mut() {
@@ -127,7 +130,7 @@ impl JointLinearisation {
     }
 }
 
-fn linearised(engine: &Engine<'_>, iterate: &Iterate) -> Option<JointLinearisation> {
+fn linearised(engine: &Engine<'_>, iterate: &Simulated) -> Option<JointLinearisation> {
     let rig = rig_of(engine.rig(), &iterate.placed, &[1.0; COUNT])?;
     let mut columns = engine.parameter_columns(&rig, &iterate.factors);
     columns.extend(coordinate_columns(engine, &iterate.factors, &iterate.placed, &iterate.simulated)?);
@@ -139,34 +142,47 @@ fn linearised(engine: &Engine<'_>, iterate: &Iterate) -> Option<JointLinearisati
 /// The better of two Gauss-Newton steps: with all windows, and without outlying windows, whose linearisation is unreliable.
 fn stepped(
     engine: &Engine<'_>,
-    iterate: &Iterate,
+    estimator: &mut Estimator,
+    iterate: &Simulated,
     linearisation: &JointLinearisation,
     chosen: &[usize],
-) -> Option<Iterate> {
+) -> Step<Simulated> {
     let far: Vec<usize> = above_outlier_limit(&iterate.squares, engine.scaled_dof()).collect();
-    let with_all = line_search(engine, iterate, linearisation, chosen, &[]);
-    let without =
-        if far.is_empty() { None } else { line_search(engine, iterate, linearisation, chosen, &far) };
-    [with_all, without].into_iter().flatten().min_by(|left, right| left.loss.total_cmp(&right.loss))
+    let with_all = line_search(engine, estimator, iterate, linearisation, chosen, &[]);
+    if far.is_empty() {
+        return with_all;
+    }
+    match (with_all, line_search(engine, estimator, iterate, linearisation, chosen, &far)) {
+        (Step::Taken(all), Step::Taken(fewer)) => {
+            Step::Taken(if fewer.loss.total_cmp(&all.loss).is_lt() { fewer } else { all })
+        }
+        (_, Step::Taken(fewer)) => Step::Taken(fewer),
+        (with_all, _) => with_all,
+    }
 }
 
 /// A Gauss-Newton step that lowers the loss, without the windows `out`. Windows whose squares exceed the linearised prediction,
 /// as around a break-away, are excluded too; then the step is shortened.
 fn line_search(
     engine: &Engine<'_>,
-    iterate: &Iterate,
+    estimator: &mut Estimator,
+    iterate: &Simulated,
     linearisation: &JointLinearisation,
     chosen: &[usize],
     out: &[usize],
-) -> Option<Iterate> {
+) -> Step<Simulated> {
     let part = |of: &[f64]| chosen.iter().map(|at| of[*at]).collect::<Vec<_>>();
     let (precisions, from) = (part(&linearisation.precisions), part(&linearisation.from));
+    let [whole, shorter @ ..] = JOINT.fractions else { unreachable!("a whole step is tried first") };
     let mut out = out.to_vec();
+    let mut promised = 0.0;
     for _ in 0..EXCLUSIONS {
         let fit = linearisation.products(engine, iterate, &out).fit_from(chosen, &precisions, &from);
-        let tried = step_by(engine, iterate, chosen, &fit, 1.0)?;
+        promised = iterate.loss - fit.loss;
+        estimator.count();
+        let Some(tried) = step_by(engine, iterate, chosen, &fit, *whole) else { return Step::Impossible };
         if tried.loss < iterate.loss {
-            return Some(tried);
+            return Step::Taken(tried);
         }
         let nonlinear = |window: &usize| {
             tried.squares[*window] - fit.squares[*window]
@@ -177,17 +193,22 @@ fn line_search(
         out.sort_unstable();
         out.dedup();
         if out.len() == before {
-            return (1..=SHORTENINGS).find_map(|times| {
-                step_by(engine, iterate, chosen, &fit, SHORTER.powi(times))
-                    .filter(|tried| tried.loss < iterate.loss)
+            return estimator.backtrack(iterate, promised, shorter, |fraction| {
+                step_by(engine, iterate, chosen, &fit, fraction)
             });
         }
     }
-    None
+    Step::Refused { promised }
 }
 
 /// The point after a fraction of a step.
-fn step_by(engine: &Engine<'_>, from: &Iterate, chosen: &[usize], step: &Fit, share: f64) -> Option<Iterate> {
+fn step_by(
+    engine: &Engine<'_>,
+    from: &Simulated,
+    chosen: &[usize],
+    step: &Fit,
+    share: f64,
+) -> Option<Simulated> {
     let (mut placed, mut factors) = (from.placed.clone(), from.factors);
     let mut changes = vec![0.0; COUNT + coordinates(&placed)];
     chosen.iter().zip(&step.coefficients).for_each(|(at, coefficient)| changes[*at] = share * coefficient);
@@ -206,7 +227,7 @@ fn step_by(engine: &Engine<'_>, from: &Iterate, chosen: &[usize], step: &Fit, sh
 }
 
 /// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.
-fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, iterate: &Iterate) -> Vec<f64> {
+fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, iterate: &Simulated) -> Vec<f64> {
     let products = linearisation.products(engine, iterate, &[]);
     let all: Vec<usize> = (0..products.columns()).collect();
     let weights = products.weights(&iterate.squares);

@@ -3,6 +3,7 @@
 use super::draw::{Bar, bars, figure};
 use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as text_cell};
 use super::words;
+use crate::estimator::Convergence;
 use crate::report::{Candidate, Report};
 use crate::workflow::place_name;
 
@@ -34,13 +35,19 @@ pub(super) fn candidates(report: &Report) -> String {
             number(words::short(one.score)),
             number(one.share_explained.map_or_else(|| words::NOTHING.to_owned(), words::percent)),
             number(words::with_unit(&words::short(one.amplitude), &one.unit)),
-            Cell::Sentence(one.decision.clone()),
+            Cell::Sentence(with_doubt(one)),
         ]
     };
     let heads = ["effect", "where", "score", "explains alone", "amplitude", "what became of it"];
     let count = report.candidates.len();
     let all = table("All candidates", &heads, report.candidates.iter().map(row));
     charts(&[drawn]) + &folded(&format!("All {count} candidates, and what became of each"), &all)
+}
+
+/// The decision, and what to doubt about the fit that it rests on.
+fn with_doubt(one: &Candidate) -> String {
+    let doubt = one.fit.and_then(Convergence::doubt);
+    doubt.map_or_else(|| one.decision.clone(), |doubt| format!("{}; {doubt}", one.decision))
 }
 
 pub(super) fn limits(report: &Report) -> String {

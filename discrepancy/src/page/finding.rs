@@ -4,6 +4,7 @@ use super::candidates;
 use super::draw::{Plot, Sample, figure, range};
 use super::markup::{Cell, charts, heading, number, paragraph, table, words as text_cell};
 use super::words;
+use crate::estimator::Convergence;
 use crate::outside::SHIFTS;
 use crate::report::{
     Curve, Dependence, LocatedTerm, LocatedVariable, NamedEffect, Outside, Quantity, Report, Surface,
@@ -70,6 +71,9 @@ pub(super) fn finding(report: &Report) -> String {
             "Moved along with the fit, by too little to call them off; the extended rig file has them as well:",
         );
         text += &quantities("Moved along", "parameter", &report.insignificant, |_| String::new());
+    }
+    if let Some(doubt) = report.fit.and_then(Convergence::doubt) {
+        text += &paragraph(&format!("Numbers of the model with care: {doubt}."));
     }
     if let Some(outside) = &report.outside {
         text += &unknown(outside);

@@ -192,6 +192,7 @@ fn candidates(size: f64) -> Vec<Candidate> {
                 place,
                 score: size * 240.0 / (1.0 + 1.6 * at_place as f64) + 0.4,
                 share_explained: (at_place < 4).then(|| 0.97 / (1.0 + at_place as f64)),
+                fit: None,
                 amplitude: sheet.keys[0].drawn[0],
                 unit: sheet.keys[0].unit.name().to_owned(),
                 decision: if at_place == 0 { "named" } else { "explained by the first" }.to_owned(),

@@ -249,6 +249,7 @@ impl Study {
                     place: place(&entry.effect),
                     score: evaluation.score,
                     share_explained: Some(evaluation.share),
+                    fit: None,
                     amplitude: evaluation.number * factor,
                     unit: unit.into(),
                     decision,

@@ -9,9 +9,9 @@
 //! linearisation.
 
 use super::with_tables;
-use crate::descent::descend;
 use crate::engine::{Engine, FACTOR_CHANGE};
-use crate::fit::{Products, loss};
+use crate::estimator::{Convergence, Estimator, Options, Outcome, Step, TABLES, TABLES_WITHIN};
+use crate::fit::loss;
 use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
@@ -27,12 +27,6 @@ const CHANGE_SHARE: f64 = 0.05;
 /// Prior standard deviations of values, beyond what occurs.
 const FORCE_PRIOR_STD_N: f64 = 200.0;
 const FLOW_PRIOR_STD_NL_PER_MIN: f64 = 200.0;
-/// Steps with the same derivatives, which cost many times a step.
-const STEPS_PER_LINEARISATION: usize = 3;
-/// Step fractions of the line search.
-const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
-/// Fall of the loss below which a fit has converged.
-const CONVERGED: f64 = 1.0;
 /// Folds of the cross-validation.
 const FOLDS: usize = 5;
 
@@ -182,6 +176,20 @@ pub(super) struct Iterate {
     pub(super) loss: f64,
 }
 
+impl crate::estimator::Iterate for Iterate {
+    fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    fn is_at_bound(&self) -> bool {
+        let is_far = |factor: &f64| (factor - 1.0).abs() >= MOST_OFF;
+        let is_most = |fitted: &FittedTable| {
+            fitted.table.value.iter().any(|value| value.abs() >= fitted.table.balance.most())
+        };
+        self.model.factors.iter().any(is_far) || self.model.tables.iter().any(is_most)
+    }
+}
+
 impl Iterate {
     /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
@@ -212,6 +220,7 @@ impl Iterate {
             squares: Vec::new(),
             errors,
             design_effect: 1.0,
+            convergence: Convergence::default(),
         }
     }
 }
@@ -347,38 +356,43 @@ pub(super) fn needed(
 
 /// Gauss-Newton until convergence.
 pub(super) fn fit(engine: &Engine<'_>, start: Iterate, steps: usize) -> Iterate {
-    let loss = |point: &Iterate| point.loss;
-    descend(start, steps, CONVERGED, loss, |point| {
-        let linearisation = TableLinearisation::of(engine, point.model.clone())?;
-        Some(self::steps(engine, point.clone(), &linearisation.with(&[])))
-    })
+    let options = Options { steps, ..TABLES };
+    let (fitted, _) = Estimator::new(options).descend(start, |estimator, point| {
+        let Some(linearisation) = TableLinearisation::of(engine, point.model.clone()) else {
+            return Step::Impossible;
+        };
+        let (next, within) = steps_within(engine, point.clone(), &linearisation.with(&[]));
+        estimator.count_all(within);
+        match within {
+            Convergence { iterations: 0, outcome: Outcome::Stalled, .. } => {
+                Step::Refused { promised: f64::INFINITY }
+            }
+            Convergence { iterations: 0, .. } => Step::Refused { promised: 0.0 },
+            _ => Step::Taken(next),
+        }
+    });
+    fitted
 }
 
 /// Steps with the same sensitivities, one column for each free coordinate.
 pub(super) fn steps(engine: &Engine<'_>, start: Iterate, linearisation: &[&[f64]]) -> Iterate {
-    let (coordinates, precisions) = (start.model.coordinates(), start.model.precisions());
-    let mut products = engine.products(&start.residual, linearisation);
-    let loss = |point: &Iterate| point.loss;
-    descend(start, STEPS_PER_LINEARISATION, CONVERGED, loss, |point| {
-        products.set_residual(&point.residual, linearisation, engine.rows());
-        line_search(engine, point, &coordinates, &products, &precisions)
-    })
+    steps_within(engine, start, linearisation).0
 }
 
-/// Backtracking line search: the longest step that lowers the loss.
-fn line_search(
-    engine: &Engine<'_>,
-    point: &Iterate,
-    coordinates: &[Coordinate],
-    products: &Products,
-    precisions: &[f64],
-) -> Option<Iterate> {
-    let joint = products.fit(&(0..coordinates.len()).collect::<Vec<_>>(), precisions);
-    SHARES.iter().find_map(|share| {
-        let changes = coordinates.iter().zip(&joint.coefficients);
-        let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {
-            model.perturbed(*coordinate, share * change)
-        });
-        Iterate::of(engine, model).filter(|tried| tried.loss < point.loss)
+fn steps_within(engine: &Engine<'_>, start: Iterate, linearisation: &[&[f64]]) -> (Iterate, Convergence) {
+    let (coordinates, precisions) = (start.model.coordinates(), start.model.precisions());
+    let all: Vec<usize> = (0..coordinates.len()).collect();
+    let mut products = engine.products(&start.residual, linearisation);
+    Estimator::new(TABLES_WITHIN).descend(start, |estimator, point| {
+        products.set_residual(&point.residual, linearisation, engine.rows());
+        let joint = products.fit(&all, &precisions);
+        let promised = point.loss - point.model.penalty() - joint.loss;
+        estimator.backtrack(point, promised, TABLES_WITHIN.fractions, |fraction| {
+            let changes = coordinates.iter().zip(&joint.coefficients);
+            let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {
+                model.perturbed(*coordinate, fraction * change)
+            });
+            Iterate::of(engine, model)
+        })
     })
 }

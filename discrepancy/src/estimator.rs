@@ -1,0 +1,258 @@
+//! Gauss-Newton for every nonlinear fit of the workflow: one loop, one rule of globalisation, one set of options, one outcome.
+//!
+//! ```text
+//!   linearise at the iterate ──► full step, then shorter ones, until the simulated loss falls ──► next iterate
+//!                                          │ none does
+//!                                          ▼
+//!                converged if the linearised model promises less than the tolerance, else stalled
+//! ```
+//!
+//! Backtracking on the simulated loss: a step counts only if the loss of the simulator falls, not that of the linearised model.
+//! Callers know how to linearise and which fits are linear within a step ([`crate::refit`] takes the baseline parameters as
+//! linear, [`crate::name`] and [`crate::tabulate`] simulate them). Through stick-slip the loss has steps, so that neither the
+//! slope nor a sufficient decrease is asked for.
+//!
+//! Source: Björck, Numerical Methods for Least Squares Problems, SIAM 1996, chapter 9 (damped Gauss-Newton, variable projection).
+
+use serde::Serialize;
+
+/// Options of a fit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Options {
+    /// Most accepted steps.
+    pub(crate) steps: usize,
+    /// Fall of the loss in a step below which the fit has converged. The loss is minus twice a log-likelihood, so that 1 is one
+    /// standard error of a parameter squared; the bounds are below what decides between two models.
+    pub(crate) converged: f64,
+    /// Fractions of the step that are tried, longest first.
+    pub(crate) fractions: &'static [f64],
+}
+
+/// Backtracking factor.
+const SHORTER: f64 = 0.4;
+const SHORTER_TWICE: f64 = SHORTER * SHORTER;
+
+/// A candidate beside fixed parameter sensitivities. A step that is still too long at the last fraction crosses a break-away.
+pub(crate) const CANDIDATE: Options =
+    Options { steps: 7, converged: 0.3, fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER] };
+/// All numbers of a model, with one fraction more: this is the model that is reported.
+pub(crate) const JOINT: Options = Options {
+    steps: 6,
+    converged: 0.3,
+    fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER, SHORTER_TWICE * SHORTER_TWICE],
+};
+/// Tables: each step is some [`TABLES_WITHIN`] with the same derivatives, which cost many times a step.
+pub(crate) const TABLES: Options = Options { steps: 7, converged: 1.0, fractions: &[1.0, 0.4, 0.15, 0.05] };
+/// The same with the derivatives held.
+pub(crate) const TABLES_WITHIN: Options = Options { steps: 3, ..TABLES };
+/// New linearisations of the parameters beside a candidate: those of a model that has an effect differ from the rig file's.
+pub(crate) const RELINEARISED: Options = Options { steps: 4, converged: 1.0, fractions: &[1.0] };
+/// New linearisations of the parameters alone, from the rig file's values to a supply or a mass that is a tenth off.
+pub(crate) const CALIBRATION: Options = Options { steps: 7, ..RELINEARISED };
+
+/// How a fit ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Outcome {
+    /// The last step lowered the loss by less than the tolerance, or none promised more.
+    #[default]
+    Converged,
+    /// No step leads further, and a number is at the end of its range.
+    Bound,
+    /// The linearised model promised more, and no step lowered the simulated loss.
+    Stalled,
+    /// The steps were used up.
+    StepLimit,
+}
+
+/// How a fit ended and what it took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub(crate) struct Convergence {
+    pub(crate) outcome: Outcome,
+    /// Accepted steps.
+    pub(crate) iterations: usize,
+    /// Simulations of the records for the loss; derivatives are not counted.
+    pub(crate) evaluations: usize,
+}
+
+impl Convergence {
+    /// What to doubt about it, in words.
+    pub(crate) fn doubt(self) -> Option<&'static str> {
+        match self.outcome {
+            Outcome::Converged => None,
+            Outcome::Bound => Some("its fit ended at the end of a range"),
+            Outcome::Stalled => Some("its fit stalled: no step lowered the simulated loss"),
+            Outcome::StepLimit => Some("its fit used up its steps"),
+        }
+    }
+
+    /// Of one fit after another.
+    pub(crate) fn then(self, next: Self) -> Self {
+        Convergence {
+            outcome: next.outcome,
+            iterations: self.iterations + next.iterations,
+            evaluations: self.evaluations + next.evaluations,
+        }
+    }
+}
+
+/// A simulated model.
+pub(crate) trait Iterate {
+    /// Loss of the windows with priors and penalties.
+    fn loss(&self) -> f64;
+    /// Whether a number is at the end of its range.
+    fn is_at_bound(&self) -> bool;
+}
+
+/// A step that was searched for.
+pub(crate) enum Step<P> {
+    /// The next iterate.
+    Taken(P),
+    /// No fraction lowers the loss, though the linearised model promises this fall.
+    Refused { promised: f64 },
+    /// No linearisation: a neighbouring rig does not exist.
+    Impossible,
+}
+
+/// The loop of one fit, which counts.
+#[derive(Debug)]
+pub(crate) struct Estimator {
+    options: Options,
+    evaluations: usize,
+}
+
+impl Estimator {
+    pub(crate) fn new(options: Options) -> Self {
+        Estimator { options, evaluations: 0 }
+    }
+
+    /// The longest fraction of a step that lowers the loss; `at` simulates a fraction.
+    pub(crate) fn backtrack<P: Iterate>(
+        &mut self,
+        from: &P,
+        promised: f64,
+        fractions: &[f64],
+        mut at: impl FnMut(f64) -> Option<P>,
+    ) -> Step<P> {
+        for fraction in fractions {
+            self.evaluations += 1;
+            if let Some(tried) = at(*fraction)
+                && tried.loss() < from.loss()
+            {
+                return Step::Taken(tried);
+            }
+        }
+        Step::Refused { promised }
+    }
+
+    /// Counts a simulation outside [`Estimator::backtrack`].
+    pub(crate) fn count(&mut self) {
+        self.evaluations += 1;
+    }
+
+    /// Counts those of a fit within a step.
+    pub(crate) fn count_all(&mut self, within: Convergence) {
+        self.evaluations += within.evaluations;
+    }
+
+    /// Steps from a start until convergence.
+    pub(crate) fn descend<P: Iterate>(
+        mut self,
+        start: P,
+        mut step: impl FnMut(&mut Self, &P) -> Step<P>,
+    ) -> (P, Convergence) {
+        let mut point = start;
+        let (mut outcome, mut iterations) = (Outcome::StepLimit, 0);
+        while iterations < self.options.steps {
+            let next = match step(&mut self, &point) {
+                Step::Taken(next) => next,
+                Step::Refused { promised } if promised > self.options.converged => {
+                    outcome = Outcome::Stalled;
+                    break;
+                }
+                Step::Refused { .. } | Step::Impossible => {
+                    outcome = Outcome::Converged;
+                    break;
+                }
+            };
+            iterations += 1;
+            let fall = point.loss() - next.loss();
+            point = next;
+            if fall < self.options.converged {
+                outcome = Outcome::Converged;
+                break;
+            }
+        }
+        if outcome != Outcome::StepLimit && point.is_at_bound() {
+            outcome = Outcome::Bound;
+        }
+        let convergence = Convergence { outcome, iterations, evaluations: self.evaluations };
+        (point, convergence)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A number with a loss of it, within 0 to 10.
+    #[derive(Clone, Copy, Debug)]
+    struct At(f64, fn(f64) -> f64);
+
+    impl Iterate for At {
+        fn loss(&self) -> f64 {
+            self.1(self.0)
+        }
+
+        fn is_at_bound(&self) -> bool {
+            [0.0, 10.0].contains(&self.0)
+        }
+    }
+
+    const OPTIONS: Options = Options { steps: 20, converged: 1e-6, fractions: &[1.0, 0.5, 0.25] };
+
+    /// Newton's method with a slope and a curvature that belong to the loss, or do not.
+    fn fitted(loss: fn(f64) -> f64, start: f64, slope: fn(f64) -> f64, curvature: f64) -> (At, Convergence) {
+        Estimator::new(OPTIONS).descend(At(start, loss), |estimator, at| {
+            let step = -slope(at.0) / curvature;
+            let promised = 0.5 * slope(at.0) * slope(at.0) / curvature;
+            estimator.backtrack(at, promised, OPTIONS.fractions, |fraction| {
+                Some(At((at.0 + fraction * step).clamp(0.0, 10.0), loss))
+            })
+        })
+    }
+
+    #[test]
+    fn a_parabola_converges_and_says_what_it_took() {
+        let (at, convergence) = fitted(|x| (x - 3.0).powi(2), 9.0, |x| 2.0 * (x - 3.0), 2.0);
+        assert_eq!((at.0, convergence.outcome), (3.0, Outcome::Converged));
+        assert_eq!((convergence.iterations, convergence.evaluations), (1, 4));
+    }
+
+    #[test]
+    fn a_step_that_is_too_long_is_shortened() {
+        let (at, convergence) = fitted(|x| (x - 3.0).powi(2), 9.0, |x| 2.0 * (x - 3.0), 0.6);
+        assert!((at.0 - 3.0).abs() < 1e-2, "{at:?}");
+        assert!(convergence.evaluations > convergence.iterations, "{convergence:?}");
+    }
+
+    #[test]
+    fn a_minimum_beyond_the_range_ends_at_the_bound() {
+        let (at, convergence) = fitted(|x| (x - 12.0).powi(2), 5.0, |x| 2.0 * (x - 12.0), 2.0);
+        assert_eq!((at.0, convergence.outcome), (10.0, Outcome::Bound));
+        let (at, convergence) = fitted(|x| x * x, 5.0, |x| 2.0 * x, 2.0);
+        assert_eq!((at.0, convergence.outcome), (0.0, Outcome::Bound));
+    }
+
+    #[test]
+    fn a_wrong_slope_stalls() {
+        let (at, convergence) = fitted(|x| (x - 3.0).powi(2), 9.0, |x| -2.0 * (x - 3.0), 20.0);
+        assert_eq!((at.0, convergence.outcome, convergence.iterations), (9.0, Outcome::Stalled, 0));
+    }
+
+    #[test]
+    fn steps_that_are_used_up_are_no_convergence() {
+        let (_, convergence) = fitted(|x| (x - 3.0).powi(2), 9.0, |x| 2.0 * (x - 3.0), 200.0);
+        assert_eq!((convergence.outcome, convergence.iterations), (Outcome::StepLimit, 20));
+    }
+}
