@@ -16,7 +16,7 @@ cargo_fuzz_version=0.13.2
 
 install_tools() {
     install_strace && install_can_utils && install_go && install_valgrind && install_python && install_dask && install_hil &&
-        install_arm && install_gdb && install_browser && install_machines
+        install_arm && install_qemu_arm && install_gdb && install_browser && install_machines
 }
 
 apt_updated=no
@@ -184,25 +184,32 @@ install_python_can_tests() {
         tar -xz -C "$tools/python-can" --strip-components 1 --wildcards -f "$tools/python-can"/python_can-*.tar.gz '*/test'
 }
 
-# The compiler of tests/firmware/stm32f103 and its C library: 85 MB to download, 8 s. Unpacked for root too, and for one
-# processor: 82 MB on the disk in the place of 800.
+# The compiler of tests/firmware's boards and its C library: 85 MB to download, 8 s. Unpacked for root too, and for two
+# processors: 97 MB on the disk in the place of 800.
 install_arm() {
-    local package arm="$tools/arm" program
+    local package arm="$tools/arm" program processors='v7-m v7-r+fp.sp/hard'
     if command -v arm-none-eabi-gcc >/dev/null && [ -d /usr/lib/picolibc/arm-none-eabi ]; then return 0; fi
-    if [ -x "$tools/bin/arm-none-eabi-gcc" ] && [ -f "$arm/complete" ]; then return 0; fi
+    if [ -x "$tools/bin/arm-none-eabi-gcc" ] && [ "$(cat "$arm/complete" 2>/dev/null)" = "$processors" ]; then return 0; fi
     rm -rf "$arm" && mkdir -p "$arm/packages" "$tools/bin" || return 1
     if [ "$(id -u)" = 0 ] && [ $apt_updated = no ]; then apt-get update -q >/dev/null && apt_updated=yes; fi
     (cd "$arm/packages" && apt-get download -q gcc-arm-none-eabi binutils-arm-none-eabi picolibc-arm-none-eabi >/dev/null 2>&1) ||
         return 1
     for package in "$arm"/packages/*.deb; do
         # A pattern that this package has nothing of is no failure.
+        # shellcheck disable=SC2086 # a list
         dpkg-deb --fsys-tarfile "$package" | tar -x -C "$arm" --no-anchored --wildcards --exclude '*lto-dump' \
-            'usr/bin/arm-none-eabi-*' 'arm-none-eabi/[0-9]*/cc1' collect2 liblto_plugin.so '[0-9]*/include' include-fixed v7-m \
-            'usr/lib/arm-none-eabi' 'picolibc/arm-none-eabi/include' 2>/dev/null || true
+            'usr/bin/arm-none-eabi-*' 'arm-none-eabi/[0-9]*/cc1' collect2 liblto_plugin.so '[0-9]*/include' include-fixed \
+            $processors 'usr/lib/arm-none-eabi' 'picolibc/arm-none-eabi/include' 2>/dev/null || true
     done
     rm -rf "$arm/packages"
     for program in "$arm"/usr/bin/arm-none-eabi-*; do ln -sf "$program" "$tools/bin/"; done
-    "$tools/bin/arm-none-eabi-gcc" --version >/dev/null && touch "$arm/complete"
+    "$tools/bin/arm-none-eabi-gcc" --version >/dev/null && echo "$processors" >"$arm/complete"
+}
+
+# The emulator of tests/firmware's Cortex-R5F.
+install_qemu_arm() {
+    # shellcheck disable=SC2046 # a list of names
+    need_program qemu-system-aarch64 qemu-system-arm $([ "$(id -u)" = 0 ] || libraries_of qemu-system-arm)
 }
 
 # The debugger of tests/firmware's ELF.

@@ -11,7 +11,7 @@ use protocol::bus::host::Host;
 use protocol::bus::{BusError, BusUrl};
 use protocol::exit::Exit;
 use realtime::{Interrupt, Request};
-use socketcan_guest::{GuestError, Named};
+use socketcan_guest::{Guest, GuestError, Named};
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -106,8 +106,12 @@ fn try_to_run(arguments: &CanArguments) -> Result<i32, CanError> {
 }
 
 fn run_program(arguments: &CanArguments, named: &[Named]) -> Result<i32, CanError> {
-    let patience = Duration::from_secs(arguments.wait_s.into());
-    let code = socketcan_guest::run(named, &arguments.command, patience, || {
+    let guest = Guest {
+        command: &arguments.command,
+        patience: Duration::from_secs(arguments.wait_s.into()),
+        ends_with_bus: arguments.end_with_bus,
+    };
+    let code = socketcan_guest::run(named, &guest, || {
         let _grants = realtime::acquire(&answering());
     })?;
     Ok(code.unwrap_or(Exit::Interrupted as i32))

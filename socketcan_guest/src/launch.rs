@@ -7,7 +7,7 @@
 use crate::caller::Caller;
 use crate::interface::{Interface, free_indices};
 use crate::supervisor::{MOST_INTERFACES, Supervisor};
-use crate::{GuestError, Named, filter};
+use crate::{Guest, GuestError, Named, filter};
 use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, Resource, Signal, getrlimit, kill_process, pidfd_open, setrlimit};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -57,16 +57,14 @@ enum Started {
     Program(io::Result<Child>),
 }
 
-/// Runs `command` so that its CAN sockets meet `interfaces`, each an embedded bus; waits for buses that have no host yet for so
-/// long. `started` is called in the thread that answers once the program runs: what it changes of the thread is not inherited.
+/// Runs the guest so that its CAN sockets meet `interfaces`, each an embedded bus. `started` is called in the thread that answers once the program runs: what it changes of the thread is not inherited.
 /// Gives the program's exit code, 128 and the signal's number if a signal ended it; `None` when a person ended the waiting.
 ///
 /// # Errors
 /// [`GuestError`].
 pub fn run(
     interfaces: &[Named],
-    command: &[OsString],
-    patience: Duration,
+    guest: &Guest<'_>,
     started: impl FnOnce(),
 ) -> Result<Option<i32>, GuestError> {
     if interfaces.len() > MOST_INTERFACES {
@@ -76,7 +74,7 @@ pub fn run(
     let named = interfaces.iter().zip(free_indices());
     let mut interfaces: Vec<_> =
         named.map(|(named, index)| Interface::new(&named.name, &named.path, index)).collect();
-    if !wait_for_hosts(&mut interfaces, patience, &signals)? {
+    if !wait_for_hosts(&mut interfaces, guest.patience, &signals)? {
         return Ok(None);
     }
     let here = rustix::thread::gettid().as_raw_nonzero().get();
@@ -88,7 +86,7 @@ pub fn run(
         return Err(GuestError::Looking(error.into()));
     }
     let (report, reports) = channel();
-    let command = command.to_vec();
+    let command = guest.command.to_vec();
     let starter = thread::spawn(move || start(&command, &report)).thread().clone();
     let listener = match reports.recv() {
         Ok(Started::Listening(listener)) => listener,
@@ -101,7 +99,7 @@ pub fn run(
     let mut child = serve_the_start(&mut supervisor, &reports)?;
     raise_limit_of_files();
     started();
-    let status = serve(&mut supervisor, &mut child, &signals).map_err(GuestError::System)?;
+    let status = serve(&mut supervisor, &mut child, &signals, guest.ends_with_bus).map_err(GuestError::System)?;
     supervisor.account();
     Ok(Some(status.code().unwrap_or_else(|| SIGNALLED + status.signal().unwrap_or(0))))
 }
@@ -171,7 +169,12 @@ fn raise_limit_of_files() {
     let _ = setrlimit(Resource::Nofile, limit);
 }
 
-fn serve(supervisor: &mut Supervisor, child: &mut Child, signals: &Signals) -> io::Result<ExitStatus> {
+fn serve(
+    supervisor: &mut Supervisor,
+    child: &mut Child,
+    signals: &Signals,
+    ends_with_bus: bool,
+) -> io::Result<ExitStatus> {
     let pid = Pid::from_child(child);
     let end = pidfd_open(pid, PidfdFlags::empty())?;
     supervisor.watch_child(end.as_fd())?;
@@ -179,7 +182,8 @@ fn serve(supervisor: &mut Supervisor, child: &mut Child, signals: &Signals) -> i
         if supervisor.turn()? {
             return child.wait();
         }
-        if signals.terminated.swap(false, Ordering::Relaxed) {
+        let a_bus_went = std::mem::take(&mut supervisor.a_bus_went);
+        if signals.terminated.swap(false, Ordering::Relaxed) || (ends_with_bus && a_bus_went) {
             // It may have ended meanwhile.
             let _ = kill_process(pid, Signal::TERM);
         }

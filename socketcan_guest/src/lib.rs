@@ -43,8 +43,10 @@ mod socket;
 mod supervisor;
 
 pub use launch::run;
+use std::ffi::OsString;
 use std::io;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// An interface for the programs: its name, and the socket of the embedded bus that it stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,6 +55,17 @@ pub struct Named {
     pub name: String,
     /// Path of the bus's socket.
     pub path: PathBuf,
+}
+
+/// The program, and when it starts and ends.
+#[derive(Debug)]
+pub struct Guest<'a> {
+    /// The program and its arguments.
+    pub command: &'a [OsString],
+    /// How long to wait for the hosts of the buses before it starts.
+    pub patience: Duration,
+    /// Ends it by SIGTERM when the host of a bus ends, for programs that do not notice.
+    pub ends_with_bus: bool,
 }
 
 /// Why a program cannot be run so.

@@ -53,6 +53,8 @@ pub(crate) struct Supervisor {
     pub(crate) sent: u64,
     /// Messages that were accepted natively and that the kernel would have refused.
     pub(crate) refused_late: u64,
+    /// Whether the host of a bus has ended.
+    pub(crate) a_bus_went: bool,
     /// Requests for links that the kernel has answered, and whose answers are not read yet.
     pub(crate) link_requests: Vec<LinkRequest>,
     told: BTreeSet<String>,
@@ -73,6 +75,7 @@ impl Supervisor {
             message_bytes: crate::socket::bytes_accounted_to_a_message()?,
             sent: 0,
             refused_late: 0,
+            a_bus_went: false,
             link_requests: Vec::new(),
             told: BTreeSet::new(),
             last_look: Instant::now(),
@@ -275,6 +278,7 @@ impl Supervisor {
             return;
         }
         let (index, name) = (interface.index, interface.name.clone());
+        self.a_bus_went = true;
         eprintln!("bench can: {name} is down: its bus has gone; looking for it");
         self.release_held(place);
         let bound: Vec<u64> = self

@@ -45,6 +45,9 @@ pub struct CanArguments {
     /// How long to wait for the host of a bus before the program starts, s.
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub wait_s: u16,
+    /// Send the program SIGTERM when the host of a bus ends, for one that does not notice.
+    #[arg(long)]
+    pub end_with_bus: bool,
     /// The program and its arguments, unmodified.
     #[arg(last = true, value_name = "COMMAND")]
     pub command: Vec<OsString>,

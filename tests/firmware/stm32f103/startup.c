@@ -1,14 +1,8 @@
-/* The vector table, and what comes before main: data from flash, zeros, a known pattern in the stack.
+/* The vector table, and what comes before main.
  *
  * A fault or an interrupt that nobody asked for stops the core; the rig shuts the valve of a controller that is silent.
  */
-#include <stddef.h>
-#include <stdint.h>
-
-#define STACK_PATTERN 0xA5A5A5A5U
-
-/* Of the linker script. */
-extern uint32_t data_in_flash[], data_begin[], data_end[], bss_begin[], bss_end[], stack_begin[], stack_free[], stack_end[];
+#include "memory.h"
 
 int main(void);
 void reset(void);
@@ -29,16 +23,7 @@ __attribute__((section(".vectors"), used)) static void (*const vectors[EXCEPTION
 
 void reset(void)
 {
-    for (volatile uint32_t *word = stack_begin; word < stack_free; word++) {
-        *word = STACK_PATTERN;
-    }
-    const uint32_t *from = data_in_flash;
-    for (volatile uint32_t *to = data_begin; to < data_end; to++) {
-        *to = *from++;
-    }
-    for (volatile uint32_t *word = bss_begin; word < bss_end; word++) {
-        *word = 0U;
-    }
+    memory_init();
     (void)main();
     stopped();
 }
