@@ -99,7 +99,8 @@ pub fn run(
     let mut child = serve_the_start(&mut supervisor, &reports)?;
     raise_limit_of_files();
     started();
-    let status = serve(&mut supervisor, &mut child, &signals, guest.ends_with_bus).map_err(GuestError::System)?;
+    let status =
+        serve(&mut supervisor, &mut child, &signals, guest.ends_with_bus).map_err(GuestError::System)?;
     supervisor.account();
     Ok(Some(status.code().unwrap_or_else(|| SIGNALLED + status.signal().unwrap_or(0))))
 }

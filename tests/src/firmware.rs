@@ -60,6 +60,8 @@ pub struct Positioned {
     pub cycles: usize,
     /// Cycles that are left out, since the machine had held the loop up.
     pub left_out: usize,
+    /// Rests with cycles in the static error.
+    pub rests: usize,
 }
 
 /// Reads off the frames of a whole run how it positioned. What a machine that stood still did to the loop is left out, and
@@ -70,6 +72,13 @@ pub fn positioned(frames: &[CanFrame]) -> Positioned {
 
 /// The same of a run that ended after so many repetitions.
 pub fn positioned_in(frames: &[CanFrame], repetitions: u64) -> Positioned {
+    let done = positioned_where_it_ran(frames, repetitions);
+    assert_eq!(done.rests as u64, 2 * repetitions, "all rests are there");
+    done
+}
+
+/// The same, of which a machine that stood still may have left nothing.
+pub fn positioned_where_it_ran(frames: &[CanFrame], repetitions: u64) -> Positioned {
     let experiment_cycles = repetitions * 2 * (MOVE_CYCLES + REST_CYCLES);
     let mut counted = Counted::default();
     frames.iter().filter_map(|frame| Frame::decode(frame).ok()).for_each(|frame| counted.take(&frame));
@@ -91,7 +100,7 @@ pub fn positioned_in(frames: &[CanFrame], repetitions: u64) -> Positioned {
             rests.entry(part).or_default().push(error_m);
         }
     }
-    assert_eq!(rests.len() as u64, 2 * repetitions, "all rests are there");
+    done.rests = rests.len();
     let means = rests.values().map(|errors_m| errors_m.iter().sum::<f64>() / errors_m.len() as f64);
     done.position_error_static_m = means.fold(0.0, f64::max);
     for (cycle, told_m) in counted.set_points_m.range(began + 1..began + experiment_cycles) {

@@ -33,6 +33,7 @@ mod faults_table;
 mod find_effect;
 mod firmware;
 mod firmware_elf;
+mod firmware_r5f;
 mod fmu;
 mod gateway;
 mod gateway_hostile;

@@ -113,6 +113,20 @@ fn two_foreign_programs_meet_on_a_bus_without_a_rig() {
 }
 
 #[test]
+fn a_program_that_does_not_notice_the_end_of_its_bus_is_ended_with_it() {
+    let scene = Scene::new(SHORT);
+    let host = scene.bus_host("");
+    let sleeper = Running::start("sleep", &mut guest(&scene, "--end-with-bus", &["sleep", "1000"]));
+    let mut waiter = Running::start("sh", &mut guest(&scene, "", &["sh", "-c", "read line; exit 7"]));
+    scene.wait_for_peers(2);
+    let _ = host.interrupt();
+    let _ = sleeper.wait().expect_code(128 + 15);
+    waiter.wait_for("is down");
+    waiter.type_line("");
+    let _ = waiter.wait().expect_code(7);
+}
+
+#[test]
 fn interfaces_of_several_buses_are_told_apart() {
     let (scene, other) = (Scene::new(SHORT), Scene::new(SHORT));
     let (_one, _two) = (scene.bus_host(""), other.bus_host(""));
