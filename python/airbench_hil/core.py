@@ -14,11 +14,14 @@ _NS_A_BIT = 1_000_000_000 // _BITRATE
 _STACK_PATTERN = 0xA5A5A5A5
 _RF0R, _FIFO_MASK, _FIFO_DEPTH = 0x0C, 3, 3
 
+# What the core's exceptions are called (DDI 0337, table 5-1). Number 1, reset, is the firmware's word for the end of main.
+_EXCEPTIONS = {2: "NMI", 3: "HardFault", 4: "MemManage", 5: "BusFault", 6: "UsageFault", 11: "SVCall", 14: "PendSV", 15: "SysTick"}
+
 CHIPS = {"stm32f103": {"bus": "bxcan1", "can_base": 0x40006400, "hz": 8_000_000}}
 
 
 class CoreStopped(Exception):
-    """The emulator cannot go on: an instruction or an access that the chip does not have."""
+    """The emulator cannot go on: an instruction or an access that the chip does not have; or the firmware says that it stopped."""
 
 
 def wire_ns(raw_id, length):
@@ -48,6 +51,7 @@ class Core:
             self.sim = labwired.Sim(str(elf), system=str(system_file(chip, folder)))
         self.not_taken = self.lost_at_fifo = self.refused = 0
         self.why_refused = ""
+        self._record = self._symbol("fault_record")
 
     def close(self):
         """Nothing runs that had to be ended."""
@@ -110,20 +114,34 @@ class Core:
             now_ns = ends_ns
             self.hear(frame)
         self.run_ns(CYCLE_NS - now_ns)
+        self.check()
         return self.said()
+
+    def check(self):
+        """Raises CoreStopped when the ELF has a `fault_record`, two words, and the first is not 0: an exception's number, its pc."""
+        exception = self.word(self._record) if self._record else 0
+        if exception == 1:
+            raise CoreStopped("its main has returned")
+        if exception:
+            name = _EXCEPTIONS.get(exception, f"interrupt {exception - 16}" if exception > 15 else f"exception {exception}")
+            raise CoreStopped(f"{name}, pc {self.word(self._record + 4):#010x}")
 
     def stack(self):
         """Bytes of the stack that were used, and its size; None when the ELF has none between `stack_begin` and `stack_end`."""
-        try:
-            begin, end = self.sim.symbol("stack_begin"), self.sim.symbol("stack_end")
-        except (KeyError, ValueError):
-            return None
+        begin, end = self._symbol("stack_begin"), self._symbol("stack_end")
         if begin is None or end is None:
             return None
         free = 0
         while begin + free < end and self.word(begin + free) == _STACK_PATTERN:
             free += 4
         return end - begin - free, end - begin
+
+    def _symbol(self, name):
+        """Its address; None when the ELF has none of that name."""
+        try:
+            return self.sim.symbol(name)
+        except (KeyError, ValueError):
+            return None
 
     def word(self, address):
         """Four bytes of its memory."""

@@ -19,8 +19,8 @@ def _arguments(words, prog):
         prog=prog,
         description="Runs the ELF of a microcontroller in labwired as a controller in lockstep with the rig: 1 ms of the core "
         "for each cycle of the bus. The emulator gets --pace lockstep --members 1. Ends with the bus.",
-        epilog="Exit codes: 0 the bus has ended; 2 usage or bad input; 3 no bus or no cycle on it, or the core stopped; "
-        "4 lockstep time-out; 130 interrupted.",
+        epilog="Exit codes: 0 the bus has ended; 2 usage or bad input; 3 no bus or no cycle on it, or the core stopped, by a fault "
+        "or since its main returned; 4 lockstep time-out; 130 interrupted.",
     )
     parser.add_argument("--elf", required=True, metavar="FILE", help="the program, as it would be flashed")
     parser.add_argument("--chip", default="stm32f103", help="the microcontroller (default: %(default)s)")
@@ -107,6 +107,7 @@ def main(words=None, prog="scripts/mcu"):
     try:
         for _ in range(asked.boot_ms):
             core.run_ns(1_000_000)
+        core.check()
         core.said()
         bus = peer.Peer(path)
         bus.join(asked.name)

@@ -21,7 +21,8 @@ bool port_init(const char *bus);
 /* The oldest frame that waits in the receive queue; false when none does. */
 bool port_receive(struct port_frame *frame);
 
-/* Hands a frame to the transmit queue; false when it is full: the frame is dropped. */
+/* Hands a frame to the transmit queue, in place of older ones of its identifier as far as the controller can take them back; false
+ * when the queue is full: the frame is dropped. */
 bool port_send(const struct port_frame *frame);
 
 /* Milliseconds since some moment, modulo 2^32. */

@@ -309,6 +309,50 @@ fn the_emulator_of_the_chip_differs_from_it_where_the_page_says() {
 }
 
 #[test]
+fn after_a_bus_that_took_nothing_it_sends_the_newest_command_and_no_old_one() {
+    let said = run_script_of("hil", "stm32f103_stale.py", &[built().join("firmware-count.elf")]);
+    let seen: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    assert_eq!(seen["given_up"], true, "the frame in a mailbox is taken back: {said}");
+    assert_eq!(seen["command_cycles"], serde_json::json!([seen["newest_cycle"]]), "{said}");
+    let sent: Vec<u64> = serde_json::from_value(seen["sent"].clone()).expect("identifiers");
+    let different: std::collections::BTreeSet<_> = sent.iter().collect();
+    assert_eq!(different.len(), sent.len(), "one of each: {said}");
+    assert!(sent.len() == 3, "command, chain status and values: {said}");
+}
+
+/// The ELF with an instruction of its own in place of a function's first.
+fn patched(folder: &Path, function: &str, instruction: u16) -> PathBuf {
+    let patched = folder.join("patched.elf");
+    std::fs::copy(elf(), &patched).expect("a copy");
+    let mut debugger = Command::new("gdb-multiarch");
+    debugger.env("PATH", tools_path()).args(["-nx", "-batch", "--write"]).arg(&patched);
+    debugger.args(["-ex", &format!("set {{short}}{function} = {instruction}")]);
+    let _ = Running::start("gdb", &mut debugger).wait().expect_code(0);
+    patched
+}
+
+#[test]
+fn a_fault_and_the_end_of_main_are_told_and_no_silence() {
+    const UDF: u16 = 0xDE00;
+    const BX_LR: u16 = 0x4770;
+    for (function, instruction, words) in [
+        ("motion_step", UDF, "the core stopped: HardFault, pc 0x0800"),
+        ("loop_run", BX_LR, "the core stopped: its main has returned"),
+    ] {
+        let scene = scene("");
+        let emulator = scene.emulator(Pace::Lockstep).with("--members 1 --seconds 0.3").start();
+        let mut command = Command::new(workspace().join("scripts/mcu"));
+        command.arg("--elf").arg(patched(&scene.path(""), function, instruction));
+        let _ = Running::start("mcu", command.args(["--bus", &scene.url()]))
+            .wait()
+            .expect_code(3)
+            .expect_said(&[words]);
+        // The rig has lost its member, or never had it.
+        drop(emulator);
+    }
+}
+
+#[test]
 fn a_millisecond_of_it_fits_into_that_of_a_real_cortex_m3() {
     let counted = run_script_of("hil", "cortex_m3_cycles.py", &[built().join("firmware-count.elf")]);
     eprintln!("{counted}");

@@ -140,6 +140,26 @@ bool port_receive(struct port_frame *frame)
     return true;
 }
 
+/* Gives up the frames of this identifier that still wait: a newer one says more, and the rig must not act on the old ones when the
+ * bus comes back. One that is on the wire at this moment is still sent. */
+static void forget(uint32_t id)
+{
+    for (uint32_t mailbox = 0; mailbox < CAN_MAILBOXES; mailbox++) {
+        if ((CAN_TSR & CAN_TSR_TME(mailbox)) == 0U && CAN_TIR(mailbox) >> CAN_STID_SHIFT == id) {
+            CAN_TSR = CAN_TSR_ABRQ(mailbox);
+        }
+    }
+    uint32_t kept = 0U;
+    for (uint32_t i = 0; i < queue.count; i++) {
+        const struct port_frame *frame = &queue.frames[(queue.first + i) % QUEUE_FRAMES];
+        if (frame->id != id) {
+            queue.frames[(queue.first + kept) % QUEUE_FRAMES] = *frame;
+            kept++;
+        }
+    }
+    queue.count = kept;
+}
+
 static bool into_mailbox(const struct port_frame *frame)
 {
     for (uint32_t mailbox = 0; mailbox < CAN_MAILBOXES; mailbox++) {
@@ -164,6 +184,7 @@ static void send_what_waits(void)
 
 bool port_send(const struct port_frame *frame)
 {
+    forget(frame->id);
     send_what_waits();
     if (queue.count == 0U && into_mailbox(frame)) {
         return true;

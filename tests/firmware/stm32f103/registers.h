@@ -43,6 +43,7 @@
 #define CAN_MSR_INAK (1U << 0)
 #define CAN_MSR_SLAK (1U << 1)
 #define CAN_TSR REGISTER(CAN_BASE + 0x008U)
+#define CAN_TSR_ABRQ(mailbox) (1U << (7U + 8U * (mailbox)))
 #define CAN_TSR_TME(mailbox) (1U << (26U + (mailbox)))
 #define CAN_RF0R REGISTER(CAN_BASE + 0x00CU)
 #define CAN_RF0R_FMP (3U << 0)

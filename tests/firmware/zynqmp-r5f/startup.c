@@ -1,7 +1,7 @@
-/* The vectors, and what comes before main: floating point, data, zeros, a known pattern in the stack.
+/* The vectors, and what comes before main.
  *
- * A fault ends the program: a debugger or an emulator with semihosting is told which, and stops; without either the core stands
- * still. The rig shuts the valve of a controller that is silent.
+ * A fault and the end of main stop the core: a debugger or an emulator with semihosting is told why, and ends the program; without
+ * either the core stands still. The rig shuts the valve of a controller that is silent.
  */
 #include "memory.h"
 
@@ -60,12 +60,6 @@ __attribute__((naked, used, target("arm"))) void reset(void)
                      ".ltorg\n");
 }
 
-void prepare(void)
-{
-    memory_init();
-    (void)main();
-}
-
 static void semihost(uint32_t operation, const void *parameter)
 {
     register uint32_t r0 __asm__("r0") = operation;
@@ -73,16 +67,28 @@ static void semihost(uint32_t operation, const void *parameter)
     __asm__ volatile("svc 0xAB" : "+r"(r0) : "r"(r1) : "memory", "lr");
 }
 
+static void leave(const char *why, const char *where)
+{
+    static const uint32_t EXIT[] = {APPLICATION_EXIT, EXIT_CODE};
+    semihost(SYS_WRITE0, "firmware: ");
+    semihost(SYS_WRITE0, why);
+    semihost(SYS_WRITE0, where);
+    semihost(SYS_EXIT_EXTENDED, EXIT);
+}
+
+void prepare(void)
+{
+    memory_init();
+    (void)main();
+    leave("main has returned", "\n");
+}
+
 void fault(uint32_t vector, uint32_t address)
 {
     static const char *const NAMES[] = {"", "undefined instruction", "", "prefetch abort", "data abort"};
-    static const uint32_t EXIT[] = {APPLICATION_EXIT, EXIT_CODE};
-    char digits[] = " at 0x00000000\n";
-    for (uint32_t i = 0; i < 8U; i++, address >>= 4) {
-        digits[13U - i] = "0123456789ABCDEF"[address & 0xFU];
+    char where[] = " at 0x00000000\n";
+    for (uint32_t digit = 13U; digit > 5U; digit--, address >>= 4) {
+        where[digit] = "0123456789ABCDEF"[address & 0xFU];
     }
-    semihost(SYS_WRITE0, "firmware: ");
-    semihost(SYS_WRITE0, NAMES[vector]);
-    semihost(SYS_WRITE0, digits);
-    semihost(SYS_EXIT_EXTENDED, EXIT);
+    leave(NAMES[vector], where);
 }
