@@ -57,8 +57,9 @@ enum Started {
     Program(io::Result<Child>),
 }
 
-/// Runs the guest so that its CAN sockets meet `interfaces`, each an embedded bus. `started` is called in the thread that answers once the program runs: what it changes of the thread is not inherited.
-/// Gives the program's exit code, 128 and the signal's number if a signal ended it; `None` when a person ended the waiting.
+/// Runs the guest so that its CAN sockets meet `interfaces`, each an embedded bus. `started` is called in the thread that answers
+/// once the program runs: what it changes of the thread is not inherited. Gives the program's exit code, 128 and the signal's
+/// number if a signal ended it; `None` when a person ended the waiting.
 ///
 /// # Errors
 /// [`GuestError`].

@@ -16,6 +16,12 @@ PLACES = {"core": (0, 4), "ttc": (4, 6), "milliseconds": (6, 8)}
 STARTING_S = 1.0
 
 
+def ticks(path):
+    """Seconds of the bus at which the rig sent its ticks."""
+    with open(path, encoding="ascii") as file:
+        return [float(line.split()[0][1:-1]) for line in file if line.split()[2].startswith(f"{TICK}#")]
+
+
 def answers(path):
     """Seconds of the bus and the three counters, without their overflows."""
     before, wrapped = {}, dict.fromkeys(PLACES, 0)
@@ -48,7 +54,8 @@ def main():
     told = list(answers(sys.argv[1]))
     began = told[0][0]
     told = [(stamp - began, counts) for stamp, counts in told if stamp - began > STARTING_S]
-    report = {"answers": len(told), "seconds": round(told[-1][0] - told[0][0], 3)}
+    asked = sum(stamp - began > STARTING_S for stamp in ticks(sys.argv[1]))
+    report = {"ticks": asked, "answers": len(told), "seconds": round(told[-1][0] - told[0][0], 3)}
     for name, nominal in NOMINAL.items():
         slope, offsets = line([(stamp, counts[name]) for stamp, counts in told])
         offsets_us = sorted(abs(offset) / nominal * 1e6 for offset in offsets)

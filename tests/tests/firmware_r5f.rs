@@ -2,6 +2,7 @@
 //!
 //! For function: what QEMU does late is not judged.
 
+use protocol::frames::{Frame, MainChainState};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -16,13 +17,12 @@ use system_tests::records::{bus_log, count, json};
 use system_tests::scene::Scene;
 use system_tests::turn;
 
-use protocol::frames::{Frame, MainChainState};
-
 /// The first of two repetitions: out, a rest, back, a rest.
 const REPETITION_CYCLES: u32 = 8_000;
 /// How often a machine may stand still for too long.
 const ATTEMPTS: usize = 3;
-/// QEMU 7.2 ends so when a frame meets a receive FIFO that is full and half read, which a core can be that was held up (docs/qemu.md).
+/// QEMU 7.2 ends so when a frame meets a receive FIFO that is full and half read, as that of a core may be that was held up
+/// (docs/qemu.md).
 const QEMU_BROKE: &str = "fifo8_push: Assertion";
 
 fn built() -> &'static Path {
