@@ -9,7 +9,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::firmware::{DYNAMIC_M, Positioned, STATIC_M, build, positioned_where_it_ran};
-use system_tests::foreign_python::tools_path;
+use system_tests::foreign_python::{python, tools_path};
 use system_tests::launch::Pace;
 use system_tests::peer::Packet;
 use system_tests::process::{PATIENCE, Running};
@@ -214,6 +214,25 @@ fn gdb_stops_it_while_the_rig_goes_on_and_a_fault_is_told() {
     ]);
     let _ = qemu.wait().expect_code(3).expect_said(&["firmware: prefetch abort at 0xC0000000"]);
     let _ = emulator.interrupt().expect_code(130);
+}
+
+#[test]
+fn its_clocks_go_at_the_rates_that_the_port_takes_them_for() {
+    let programs = executable(Program::Bench, Build::Shipped);
+    let _turn = turn::take();
+    let mut command = Command::new(workspace().join("scripts/qemu-clock"));
+    command.env("AIRBENCH_BIN_DIR", programs.parent().expect("a folder"));
+    command.env("AIRBENCH_PYTHON", python()).env("PATH", tools_path()).arg("10");
+    let ended = Running::start("qemu-clock", &mut command).wait().expect_code(0);
+    eprintln!("{}", ended.stdout);
+    let report: serde_json::Value = serde_json::from_str(&ended.stdout).expect("JSON");
+    assert!(count(&report, "/answers") > 50, "{report}");
+    for counter in ["core", "ttc", "milliseconds"] {
+        // Of a few seconds on a machine that may stand still; docs/qemu.md has a minute.
+        let drift_ppm = report[counter]["drift_ppm"].as_f64().expect("a number");
+        assert!(drift_ppm.abs() < 1e4, "{counter}: {report}");
+    }
+    let _ = Running::start("qemu-clock", command.arg("soon")).wait().expect_code(2);
 }
 
 #[test]
