@@ -106,7 +106,7 @@ fn positions(elf: &Path) -> Option<Positioned> {
     assert_eq!(count(&summary, "/drive_commands/breaks"), 0, "its counters go up by one");
     let done = positioned_where_it_ran(&bus_log(&scene.path("emulator/bus.log")), 1);
     eprintln!("{done:?}");
-    (done.rests == 2 && done.cycles > done.left_out).then_some(done)
+    (done.rests > 0 && done.cycles > done.left_out).then_some(done)
 }
 
 #[test]
