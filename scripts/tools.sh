@@ -15,8 +15,8 @@ uv_version=0.13.9
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_can_utils && install_go && install_valgrind && install_python && install_dask && install_hil &&
-        install_arm && install_qemu_arm && install_gdb && install_browser && install_machines
+    install_strace && install_can_utils && install_go && install_musl && install_valgrind && install_python && install_dask &&
+        install_hil && install_arm && install_qemu_arm && install_gdb && install_browser && install_machines
 }
 
 apt_updated=no
@@ -103,6 +103,24 @@ install_go() {
     find "$packages" -name '*.deb' -exec dpkg -x {} "$tools/debian" \; && rm -rf "$packages"
     printf '#!/bin/sh\nGOROOT=%s exec %s/bin/go "$@"\n' "$folder/go-$version" "$folder/go-$version" >"$tools/bin/go"
     chmod +x "$tools/bin/go"
+}
+
+# Builds a program of C with another C library, musl; its compiler is gcc. Always unpacked, 1 MB, and told where it lies. The
+# kernel's headers are those of gcc's own library.
+install_musl() {
+    local folder="$tools/debian" machine packages specs
+    machine=$(uname -m)-linux
+    specs="$folder/usr/lib/$machine-musl/musl-gcc.specs"
+    if command -v musl-gcc >/dev/null || [ -x "$tools/bin/musl-gcc" ]; then return 0; fi
+    [ "$(id -u)" != 0 ] || apt_get check -q >/dev/null || return 1 # with package lists
+    packages=$(mktemp -d) || return 1
+    (cd "$packages" && apt-get -o APT::Sandbox::User=root download -q musl-tools musl-dev >/dev/null) || return 1
+    mkdir -p "$folder" "$tools/bin"
+    find "$packages" -name '*.deb' -exec dpkg -x {} "$folder" \; && rm -rf "$packages"
+    sed -i "s#/usr/\(lib\|include\)/$machine-musl#$folder&#g" "$specs" || return 1
+    printf '#!/bin/sh\nexec gcc "$@" -specs %s -idirafter /usr/include -idirafter /usr/include/%s-gnu\n' "$specs" "$machine" \
+        >"$tools/bin/musl-gcc"
+    chmod +x "$tools/bin/musl-gcc"
 }
 
 install_valgrind() {

@@ -1,6 +1,7 @@
 //! Programs of SocketCAN: what they answer on vcan, recorded in `tests/expected/socketcan`, and `bench can` as a process.
 
 use crate::binaries::{Program, workspace};
+use crate::foreign_python::tools_path;
 use crate::process::Running;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -46,12 +47,14 @@ pub fn sources() -> PathBuf {
     workspace().join("tests/c/socketcan")
 }
 
-/// Builds a program of `tests/c/socketcan` into `folder`, statically linked, and gives its path.
+/// Builds a program of `tests/c/socketcan` into `folder`, statically linked, and gives its path. The compiler is that of a C
+/// library: `gcc`, or `musl-gcc`.
 #[must_use]
-pub fn build(folder: &Path, program: &str) -> PathBuf {
+pub fn build(folder: &Path, program: &str, compiler: &str) -> PathBuf {
     let path = folder.join(program);
     let mut make = Command::new("make");
     make.arg("-C").arg(sources()).arg(format!("BUILD={}", folder.display())).arg(&path);
+    make.arg(format!("CC={compiler}")).env("PATH", tools_path());
     let built = make.output().expect("make is installed");
     assert!(built.status.success(), "{program} does not build:\n{}", String::from_utf8_lossy(&built.stderr));
     path
@@ -65,7 +68,31 @@ pub fn built(program: &'static str) -> PathBuf {
     let folder = FOLDER.get_or_init(|| tempfile::tempdir().expect("a temporary folder"));
     // A build that failed left nothing that another could take for good.
     let _one_at_a_time = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    build(folder.path(), program)
+    build(folder.path(), program, "gcc")
+}
+
+/// Builds the program of `tests/rust`, statically linked, and gives its path.
+#[must_use]
+pub fn built_of_rust() -> PathBuf {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    let program = PROGRAM.get_or_init(|| {
+        let mut cargo = Command::new(option_env!("CARGO").unwrap_or("cargo"));
+        cargo.current_dir(workspace()).args([
+            "rustc",
+            "--release",
+            "--quiet",
+            "--locked",
+            "-p",
+            "static-guest",
+        ]);
+        // For the last link alone: what is below it has been compiled for either kind.
+        let built = cargo.args(["--", "-C", "target-feature=+crt-static"]).output().expect("cargo starts");
+        assert!(built.status.success(), "it does not build:\n{}", String::from_utf8_lossy(&built.stderr));
+        let target =
+            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
+        target.join("release/static-guest")
+    });
+    program.clone()
 }
 
 /// `bench can` on the bus of a scene, with options separated by spaces, and a command.

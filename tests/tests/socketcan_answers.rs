@@ -3,23 +3,58 @@
 
 use rustix::process::Signal;
 use std::fs;
-use system_tests::process::Running;
+use std::path::Path;
+use system_tests::process::{Ended, Running};
 use system_tests::scene::{SHORT, Scene};
 use system_tests::socketcan::{self, built, expected, guest};
 
-#[test]
-fn every_system_call_answers_as_on_vcan() {
-    let scene = Scene::new(SHORT);
-    let answers = built("socketcan-answers");
-    let answered =
-        Running::start("answers", &mut guest(&scene, "--pair", &[answers.as_os_str(), "vcan0".as_ref()]))
-            .wait();
+/// What a program prints, on a bus of its own.
+#[track_caller]
+fn output_of(scene: &Scene, program: &Path) -> Ended {
+    let command = [program.as_os_str(), "vcan0".as_ref()];
+    Running::start(&program.display().to_string(), &mut guest(scene, "--pair", &command)).wait()
+}
+
+#[track_caller]
+fn answers_as_on_vcan(program: &Path) {
+    let answered = output_of(&Scene::new(SHORT), program);
     let difference = socketcan::first_difference(&answered.stdout, &socketcan::expected_answers());
     assert_eq!(difference, None, "{}", answered.stderr);
     let dropped =
         format!("{} messages of the program were accepted and dropped", socketcan::DIFFERENCES.len());
     let answered = answered.expect_code(0).expect_said(&[&dropped, "kernel answers: No such device"]);
     answered.expect_said(&["CAN_TP16 is not served"]);
+}
+
+#[test]
+fn every_system_call_answers_as_on_vcan() {
+    answers_as_on_vcan(&built("socketcan-answers"));
+}
+
+/// The same program with another C library inside, which makes other calls for the same functions.
+#[test]
+fn every_system_call_of_a_program_of_musl_answers_as_on_vcan() {
+    let folder = tempfile::tempdir().unwrap();
+    answers_as_on_vcan(&socketcan::build(folder.path(), "socketcan-answers", "musl-gcc"));
+}
+
+#[test]
+fn a_statically_linked_program_of_rust_prints_what_it_prints_on_vcan() {
+    let program = socketcan::built_of_rust();
+    assert!(is_statically_linked(&program), "{} asks for a dynamic linker", program.display());
+    let ended = output_of(&Scene::new(SHORT), &program).expect_code(0);
+    let recorded = fs::read_to_string(expected().join("rust.txt")).unwrap();
+    assert_eq!(socketcan::first_difference(&ended.stdout, &recorded), None, "{}", ended.stderr);
+}
+
+/// Whether an ELF of 64 bits has no segment that names its interpreter, PT_INTERP.
+fn is_statically_linked(program: &Path) -> bool {
+    let bytes = fs::read(program).unwrap();
+    let number = |at: usize, length: usize| {
+        bytes[at..at + length].iter().rev().fold(0_usize, |number, byte| number << 8 | usize::from(*byte))
+    };
+    let (first, size, count) = (number(32, 8), number(54, 2), number(56, 2));
+    (0..count).all(|place| number(first + place * size, 4) != 3)
 }
 
 /// With the rest of the bus in another process: a bus that has other peers.

@@ -30,6 +30,7 @@ fn machine() -> &'static Guest {
         fs::write(payload.join("replay.log"), (0..REPLAYED).map(line).collect::<String>()).unwrap();
         // Between two jobs as long as `lines_of_run` wants it.
         fs::copy(socketcan::built("socketcan-answers"), payload.join("socketcan-answers")).unwrap();
+        fs::copy(socketcan::built_of_rust(), payload.join("static-guest")).unwrap();
         fs::copy(socketcan::sources().join("can-utils.sh"), payload.join("can-utils.sh")).unwrap();
         let jobs =
             ["job", "job-firmware", "job-foreign", "job-answers"].map(|job| format!("sh /airbench/{job}"));
@@ -269,6 +270,7 @@ fn socketcan_answers_are_those_that_are_recorded() {
         assert_eq!(socketcan::first_difference(&answers(&out.join(file)), expected), None, "{file}");
     };
     same("socketcan-answers.txt", &answers(&recorded.join("answers.txt")));
+    same("rust.txt", &answers(&recorded.join("rust.txt")));
     assert_eq!(socketcan::texts(&out.join("can-utils")), socketcan::texts(&recorded.join("can-utils")));
     // On this kernel `bench can` has to find a thread's descriptors by its process.
     same("socketcan-answers-guest.txt", &socketcan::expected_answers());

@@ -15,11 +15,26 @@
 const char *interface_name;
 int interface_index;
 
+/* Only the C library of GNU has strerrorname_np. */
+static const char *name_of(int error)
+{
+#define NAME(name) \
+    case name: return #name
+    switch (error) {
+        NAME(E2BIG); NAME(EADDRNOTAVAIL); NAME(EAGAIN); NAME(EBADF); NAME(EBADMSG); NAME(ECOMM); NAME(EFAULT); NAME(EILSEQ);
+        NAME(EINTR); NAME(EINVAL); NAME(EISCONN); NAME(EMSGSIZE); NAME(ENETDOWN); NAME(ENOBUFS); NAME(ENODEV); NAME(ENOENT);
+        NAME(ENOPROTOOPT); NAME(ENOTCONN); NAME(ENXIO); NAME(EOPNOTSUPP); NAME(EPROTONOSUPPORT); NAME(EPROTOTYPE); NAME(ERANGE);
+        NAME(ETIMEDOUT);
+    default: return strerror(error);
+    }
+#undef NAME
+}
+
 int answer(const char *what, long result)
 {
     const int error = errno;
     if (result == -1) {
-        printf("%s: -1 %s\n", what, strerrorname_np(error));
+        printf("%s: -1 %s\n", what, name_of(error));
     } else {
         printf("%s: %ld\n", what, result);
     }
