@@ -83,7 +83,9 @@ install_strace() { need_program strace strace libunwind8; }
 # Programs of SocketCAN that `bench can` runs, and the one that python-can asks for interfaces.
 install_can_utils() {
     local program
-    for program in candump cansend cangen canplayer cansniffer canbusload; do need_program "$program" can-utils || return 1; done
+    for program in candump cansend cangen canplayer cansniffer canbusload isotpsend isotprecv; do
+        need_program "$program" can-utils || return 1
+    done
     # shellcheck disable=SC2046 # a list of names
     need_program ip iproute2 $([ "$(id -u)" = 0 ] || libraries_of iproute2)
 }

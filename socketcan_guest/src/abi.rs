@@ -8,8 +8,8 @@ use protocol::can::CAN_FRAME_BYTES;
 
 /// `AF_CAN`.
 pub(crate) const AF_CAN: i32 = 29;
-/// `sizeof(struct canfd_frame)`, `CANFD_MTU`.
-pub(crate) const CANFD_FRAME_BYTES: usize = 72;
+/// Where a frame's data begin.
+pub(crate) const CAN_FRAME_DATA_AT: usize = 8;
 /// Largest data length of a classic frame.
 pub(crate) const MOST_DATA: u8 = 8;
 
@@ -19,10 +19,13 @@ pub(crate) const SOL_CAN_FIRST: i32 = 100;
 pub(crate) const SOL_CAN_LAST: i32 = 107;
 /// `SOL_CAN_RAW`.
 pub(crate) const SOL_CAN_RAW: i32 = 101;
+/// `SOL_CAN_ISOTP`.
+pub(crate) const SOL_CAN_ISOTP: i32 = 106;
 
 /// Protocols of `AF_CAN`.
 pub(crate) const CAN_RAW: i32 = 1;
 pub(crate) const CAN_BCM: i32 = 2;
+pub(crate) const CAN_ISOTP: i32 = 6;
 /// One more than the largest protocol that the kernel's table has room for.
 pub(crate) const CAN_PROTOCOLS: i32 = 8;
 

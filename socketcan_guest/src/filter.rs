@@ -10,8 +10,8 @@
 //! | `socket` | the family is `AF_CAN` |
 //! | `bind`, `connect`, `listen`, `accept`, `shutdown`, `getsockname`, `getpeername` | always |
 //! | `recvmsg`, `recvmmsg`, `sendmsg`, `sendmmsg` | always: address, flags and control messages are in memory |
-//! | `recvfrom`, `sendto` | there is an address; a sent length is not that of a frame, up to [`LONGEST_MESSAGE`] |
-//! | `write` | the length is at most that of a CAN FD frame, and neither a frame's nor an eventfd's |
+//! | `recvfrom`, `sendto` | there is an address; a sent length is not that of a frame |
+//! | `write` | the length is neither a frame's nor an eventfd's |
 //! | `ioctl` | the request is one of sockets and interfaces, 0x89xx |
 //! | `setsockopt`, `getsockopt` | the level is one of CAN, or the option is one that a Unix socket answers differently |
 //!
@@ -22,14 +22,12 @@
 
 #![allow(unsafe_code)] // prctl and seccomp, nothing else
 
-use crate::abi::{AF_CAN, CANFD_FRAME_BYTES, SOL_CAN_FIRST, SOL_CAN_LAST};
+use crate::abi::{AF_CAN, SOL_CAN_FIRST, SOL_CAN_LAST};
 use libc::sock_filter;
 use protocol::can::CAN_FRAME_BYTES;
 use std::io;
 use std::os::fd::{FromRawFd, OwnedFd};
 
-/// Longest message of the broadcast manager: its head and 256 frames.
-const LONGEST_MESSAGE: u32 = 56 + 256 * 16;
 /// What an eventfd is written with; programs wake their threads so at a high rate.
 const EVENTFD_BYTES: u32 = 8;
 
@@ -127,14 +125,12 @@ fn conditions_of(call: libc::c_long) -> Vec<sock_filter> {
             steps.extend(notify_with_address());
             steps.push(load(2));
             steps.extend(when(EQUAL, frame, ALLOW));
-            steps.extend(when(ABOVE, LONGEST_MESSAGE, ALLOW));
             steps.push(NOTIFY);
         }
         libc::SYS_write => {
             steps.push(load(2));
             steps.extend(when(EQUAL, frame, ALLOW));
             steps.extend(when(EQUAL, EVENTFD_BYTES, ALLOW));
-            steps.extend(when(ABOVE, CANFD_FRAME_BYTES as u32, ALLOW));
             steps.push(NOTIFY);
         }
         _ => steps.push(NOTIFY),
@@ -262,13 +258,13 @@ mod tests {
     }
 
     #[test]
-    fn lengths_that_are_no_frames_are_notified_and_long_ones_are_not() {
+    fn lengths_that_are_no_frames_are_notified() {
         for (length, expected) in
-            [(0, true), (5, true), (8, false), (15, true), (17, true), (72, true), (73, false), (4096, false)]
+            [(0, true), (5, true), (8, false), (15, true), (16, false), (17, true), (72, true), (8200, true)]
         {
             assert_notified(expected, libc::SYS_write, [3, 1, length, 0, 0, 0]);
         }
-        for (length, expected) in [(0, true), (8, true), (72, true), (4152, true), (4153, false)] {
+        for (length, expected) in [(0, true), (8, true), (16, false), (72, true), (8200, true)] {
             assert_notified(expected, libc::SYS_sendto, [3, 1, length, 0, 0, 0]);
         }
     }

@@ -17,6 +17,7 @@
 //! | `socket` | a guest's socket: its queue, and what is known of each frame in it |
 //! | `raw` | filters and options of `CAN_RAW` |
 //! | `bcm` | `CAN_BCM`: cyclic sending, changes, time-outs |
+//! | `isotp`, `transport` | `CAN_ISOTP`: the protocol, and its sockets |
 //! | `names`, `options`, `ioctl`, `receive`, `send` | the answers, by system call |
 //! | `netlink` | the interfaces in the kernel's list of links |
 //! | `abi` | numbers and layouts |
@@ -31,6 +32,7 @@ mod caller;
 mod filter;
 mod interface;
 mod ioctl;
+mod isotp;
 mod launch;
 mod names;
 mod netlink;
@@ -41,6 +43,7 @@ mod receive;
 mod send;
 mod socket;
 mod supervisor;
+mod transport;
 
 pub use launch::run;
 use std::ffi::OsString;

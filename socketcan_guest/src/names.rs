@@ -3,20 +3,20 @@
 //! Source: Linux 6.1 `net/can/af_can.c` (`can_create`), `net/can/raw.c` (`raw_bind`, `raw_getname`, `raw_ops`), `net/can/bcm.c`
 //! (`bcm_connect`, `bcm_ops`).
 
-use crate::abi::{self, CAN_BCM, CAN_PROTOCOLS, CAN_RAW};
+use crate::abi::{self, CAN_BCM, CAN_ISOTP, CAN_PROTOCOLS, CAN_RAW};
 use crate::bcm::BroadcastManager;
 use crate::caller::Caller;
 use crate::notification::{Answer, Notification};
 use crate::raw::RawOptions;
 use crate::socket::{self, Kind};
 use crate::supervisor::{Supervisor, inode_of};
+use crate::transport::Transport;
 use rustix::io::Errno;
 use std::io;
 use std::os::fd::AsFd;
 
 /// Names of the protocols that are not served.
-const OTHERS: [(i32, &str); 5] =
-    [(3, "CAN_TP16"), (4, "CAN_TP20"), (5, "CAN_MCNET"), (6, "CAN_ISOTP"), (7, "CAN_J1939")];
+const OTHERS: [(i32, &str); 4] = [(3, "CAN_TP16"), (4, "CAN_TP20"), (5, "CAN_MCNET"), (7, "CAN_J1939")];
 
 impl Supervisor {
     /// `socket(AF_CAN, type, protocol)`.
@@ -30,6 +30,7 @@ impl Supervisor {
         let (wanted, made) = match protocol {
             CAN_RAW => (libc::SOCK_RAW, Kind::Raw(RawOptions::default())),
             CAN_BCM => (libc::SOCK_DGRAM, Kind::Bcm(Box::<BroadcastManager>::default())),
+            CAN_ISOTP => (libc::SOCK_DGRAM, Kind::Transport(Box::<Transport>::default())),
             other => {
                 if let Some((_, name)) = OTHERS.iter().find(|(number, _)| *number == other) {
                     self.tell(&format!("socket: {name} is not served; the call fails with EPROTONOSUPPORT"));
@@ -40,23 +41,17 @@ impl Supervisor {
         if kind != wanted {
             return Errno::PROTOTYPE.into();
         }
-        match self.inject_socket(notification, made, kind_and_flags, protocol) {
+        match self.inject_socket(notification, made, kind_and_flags) {
             Ok(()) => Answer::Deferred,
             Err(error) => Errno::from_io_error(&error).unwrap_or(Errno::NOMEM).into(),
         }
     }
 
-    fn inject_socket(
-        &mut self,
-        notification: &Notification,
-        kind: Kind,
-        flags: i32,
-        protocol: i32,
-    ) -> io::Result<()> {
+    fn inject_socket(&mut self, notification: &Notification, kind: Kind, flags: i32) -> io::Result<()> {
         let non_blocking = flags & libc::SOCK_NONBLOCK != 0;
-        let (made, theirs) = socket::make(kind, non_blocking, self.message_bytes)?;
+        let (made, theirs) = socket::make(kind, non_blocking, &self.accounts)?;
         let inode = inode_of(theirs.as_fd()).ok_or_else(|| io::Error::from(io::ErrorKind::OutOfMemory))?;
-        self.add_socket(inode, made, protocol)?;
+        self.add_socket(inode, made)?;
         // The guest may use it as soon as it has it, so it is known before.
         let injected = self.listener.inject(notification.id, theirs.as_fd(), flags & libc::SOCK_CLOEXEC != 0);
         if injected.is_err() {
@@ -68,6 +63,9 @@ impl Supervisor {
     /// `bind`: to an interface, or with index 0 to any.
     pub(crate) fn bind(&mut self, notification: &Notification) -> Answer {
         let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+        if self.sockets.get(&inode).is_some_and(|socket| socket.transport().is_some()) {
+            return self.bind_transport(notification, inode);
+        }
         let interface = match self.read_interface(notification) {
             Ok(interface) => interface,
             Err(error) => return error.into(),
@@ -96,7 +94,7 @@ impl Supervisor {
         let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
         let interface = self.read_interface(notification);
         let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
-        if socket.raw().is_some() {
+        if !matches!(socket.kind, Kind::Bcm(_)) {
             return Errno::OPNOTSUPP.into();
         }
         let interface = match interface {
@@ -130,10 +128,12 @@ impl Supervisor {
     pub(crate) fn own_name(&mut self, notification: &Notification) -> Answer {
         let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
         let Some(socket) = self.sockets.get(&inode) else { return Answer::Continue };
-        if socket.raw().is_none() {
-            return Errno::OPNOTSUPP.into();
-        }
-        let address = abi::address(socket.interface.unwrap_or(0));
+        let interface = socket.interface.unwrap_or(0);
+        let address = match &socket.kind {
+            Kind::Raw(_) => abi::address(interface).to_vec(),
+            Kind::Transport(transport) => transport.address(interface).to_vec(),
+            Kind::Bcm(_) => return Errno::OPNOTSUPP.into(),
+        };
         let [_, at, length_at, ..] = notification.arguments;
         let caller = Caller::new(notification.thread);
         let written = caller.read_array(length_at).map(i32::from_ne_bytes).and_then(|room| {

@@ -1,6 +1,6 @@
-//! `setsockopt` and `getsockopt`: those of `CAN_RAW`, and those of all sockets that a Unix socket answers differently.
+//! `setsockopt` and `getsockopt`: those of `CAN_RAW` and `CAN_ISOTP`, and those of all sockets that a Unix socket answers differently.
 
-use crate::abi::SOL_CAN_RAW;
+use crate::abi::{SOL_CAN_ISOTP, SOL_CAN_RAW};
 use crate::caller::Caller;
 use crate::notification::{Answer, Notification};
 use crate::raw::RawOptions;
@@ -39,11 +39,13 @@ impl Supervisor {
                 _ => return Answer::Continue,
             }
         }
-        let Kind::Raw(raw) = &mut socket.kind else { return Errno::OPNOTSUPP.into() };
-        if level != SOL_CAN_RAW {
-            return Errno::INVAL.into();
-        }
-        raw.set(option, &value).map_or_else(Answer::Error, |()| Answer::Value(0))
+        let set = match &mut socket.kind {
+            Kind::Raw(raw) if level == SOL_CAN_RAW => raw.set(option, &value),
+            Kind::Transport(transport) if level == SOL_CAN_ISOTP => transport.protocol.set(option, &value),
+            Kind::Raw(_) | Kind::Transport(_) => Err(Errno::INVAL),
+            Kind::Bcm(_) => Err(Errno::OPNOTSUPP),
+        };
+        set.map_or_else(Answer::Error, |()| Answer::Value(0))
     }
 
     /// The value of `setsockopt`. One that is longer than any may be is refused unread, as the kernel does: it may not be there.
@@ -73,8 +75,11 @@ impl Supervisor {
             (libc::SOL_SOCKET, _) => return Answer::Continue,
             _ => match &socket.kind {
                 Kind::Bcm(_) => Err(Errno::OPNOTSUPP),
-                Kind::Raw(_) if level != SOL_CAN_RAW => Err(Errno::INVAL),
-                Kind::Raw(raw) => raw.get(option),
+                Kind::Raw(raw) if level == SOL_CAN_RAW => raw.get(option),
+                Kind::Transport(transport) if level == SOL_CAN_ISOTP => {
+                    transport.protocol.get(option).map(|value| (value, true))
+                }
+                Kind::Raw(_) | Kind::Transport(_) => Err(Errno::INVAL),
             },
         };
         let written =

@@ -9,9 +9,11 @@
 
 use crate::abi::{self, u32_at, u64_at};
 use crate::caller::Caller;
+use crate::isotp::LONGEST_PDU;
 use crate::notification::{Answer, Notification};
 use crate::socket::{GuestSocket, Note};
 use crate::supervisor::Supervisor;
+use crate::transport;
 use rustix::fs::{OFlags, fcntl_getfl};
 use rustix::io::Errno;
 use rustix::net::sockopt::{Timeout, socket_timeout};
@@ -22,8 +24,12 @@ use std::time::Instant;
 /// `sizeof(struct msghdr)` and `sizeof(struct mmsghdr)`, and where the second has the length.
 const HEADER_BYTES: usize = 56;
 const LONG_HEADER_BYTES: u64 = 64;
-/// Longest message that a guest's queue holds: one of the broadcast manager.
-const LONGEST_MESSAGE: usize = 8192;
+/// Room for the longest message of a guest, one of the transport protocol, and some bytes more: a longer one is none.
+pub(crate) const LONGEST_MESSAGE: usize = LONGEST_PDU + 48;
+/// The same of sockets of other protocols: one of the broadcast manager.
+pub(crate) const LONGEST_OTHER: usize = 8192;
+/// What a transport socket lets its reader ask for.
+const TRANSPORT_FLAGS: i32 = libc::MSG_DONTWAIT | libc::MSG_TRUNC | libc::MSG_PEEK;
 /// Room for the kernel's control messages.
 const CONTROL_WORDS: usize = 32;
 /// `sizeof(struct cmsghdr)`.
@@ -143,7 +149,7 @@ impl Supervisor {
                 continue;
             }
             // The number may stand for something else by now, as after a close by another thread.
-            let answer = match self.guest_socket(&call.notification) {
+            let answer = match self.find_socket(&call.notification) {
                 Some((found, end)) if found == inode => {
                     self.try_to_receive(&call.notification, inode, end.as_fd())
                 }
@@ -166,6 +172,14 @@ impl Supervisor {
         } else {
             flags_at(notification)
         });
+        if let Some(transport) = socket.transport() {
+            if flags & !TRANSPORT_FLAGS != 0 {
+                return Errno::INVAL.into();
+            }
+            if transport.protocol.identifiers().is_none() {
+                return Errno::ADDRNOTAVAIL.into();
+            }
+        }
         if flags & libc::MSG_ERRQUEUE != 0 {
             return Errno::AGAIN.into();
         }
@@ -220,12 +234,27 @@ fn receive_from(
     let message = take(socket, end, flags)?;
     let bytes = &message.bytes[..message.bytes.len().min(length as usize)];
     caller.write(buffer, bytes)?;
-    let address = abi::address(message.note.interface);
+    let address = sender(socket, &message);
     caller.write(name, &address[..address.len().min(room as usize)])?;
     caller.write(name_length, &(address.len() as i32).to_ne_bytes())?;
-    let length = bytes.len();
+    let length = told_length(socket, flags, bytes.len(), &message);
     taken.push(message);
     Ok(length)
+}
+
+/// The address that a message is said to come from: its interface, and for the transport protocol an empty rest.
+fn sender(socket: &GuestSocket, message: &Message) -> Vec<u8> {
+    let mut address = abi::address(message.note.interface).to_vec();
+    if socket.transport().is_some() {
+        address.resize(transport::ADDRESS_BYTES, 0);
+    }
+    address
+}
+
+/// What a call returns that has put so many bytes into the guest's buffer; with `MSG_TRUNC` the transport protocol tells the whole.
+fn told_length(socket: &GuestSocket, flags: i32, length: usize, message: &Message) -> usize {
+    let whole = flags & libc::MSG_TRUNC != 0 && socket.transport().is_some();
+    if whole { message.bytes.len() } else { length }
 }
 
 /// One message into the `struct msghdr` at an address.
@@ -246,7 +275,7 @@ fn receive_one(
         told |= libc::MSG_TRUNC;
     }
     if header.name != 0 {
-        let address = abi::address(message.note.interface);
+        let address = sender(socket, &message);
         let room = usize::try_from(header.name_bytes).map_err(|_| Errno::INVAL)?;
         caller.write(header.name, &address[..address.len().min(room)])?;
         caller.write(header_at + 8, &(address.len() as u32).to_ne_bytes())?;
@@ -262,6 +291,7 @@ fn receive_one(
     caller.write(header.control, &control)?;
     caller.write(header_at + 40, &(control.len() as u64).to_ne_bytes())?;
     caller.write(header_at + 48, &told.to_ne_bytes())?;
+    let length = told_length(socket, flags, length, &message);
     taken.push(message);
     Ok(length)
 }
@@ -311,22 +341,22 @@ fn take(socket: &mut GuestSocket, end: BorrowedFd<'_>, flags: i32) -> Result<Mes
         return Ok(message);
     }
     let note = socket.next_note();
-    let (bytes, control) = take_bytes(end, flags & libc::MSG_PEEK)?;
+    let room = if socket.transport().is_some() { LONGEST_MESSAGE } else { LONGEST_OTHER };
+    let (bytes, control) = take_bytes(end, room, flags & libc::MSG_PEEK)?;
     if bytes.is_empty() {
         if peeks {
             // An error is told once.
-            let _ = take_bytes(end, 0);
+            let _ = take_bytes(end, room, 0);
         }
         return Err(note.and_then(|note| note.error).unwrap_or(Errno::NETDOWN));
     }
-    let unknown =
-        Note { interface: socket.interface.unwrap_or(0), flags: 0, dropped: 0, stamp_ns: 0, error: None };
+    let unknown = Note::new(socket.interface.unwrap_or(0), 0);
     Ok(Message { bytes, control, note: note.unwrap_or(unknown) })
 }
 
 /// A message and the kernel's control messages with it.
-fn take_bytes(end: BorrowedFd<'_>, peek: i32) -> Result<(Vec<u8>, Vec<u8>), Errno> {
-    let mut bytes = vec![0_u8; LONGEST_MESSAGE];
+fn take_bytes(end: BorrowedFd<'_>, room: usize, peek: i32) -> Result<(Vec<u8>, Vec<u8>), Errno> {
+    let mut bytes = vec![0_u8; room];
     let mut control = [0_u64; CONTROL_WORDS];
     let mut part = libc::iovec { iov_base: bytes.as_mut_ptr().cast(), iov_len: bytes.len() };
     // SAFETY: a plain C structure for which all zeros is a valid value.

@@ -8,19 +8,21 @@ use crate::bcm::Action;
 use crate::bus_peer::{FrameBytes, Sent};
 use crate::caller::Caller;
 use crate::notification::{Answer, Notification};
-use crate::receive::Header;
+use crate::receive::{Header, LONGEST_MESSAGE, LONGEST_OTHER};
 use crate::socket::{Kind, Note};
 use crate::supervisor::{Supervisor, wall_clock_ns};
+use crate::transport::SendingCall;
+use rustix::fs::{OFlags, fcntl_getfl};
 use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv};
 use std::io;
-use std::os::fd::AsFd;
+use std::os::fd::{AsFd, BorrowedFd};
 use std::time::Instant;
 
 /// Messages that are taken from a guest before the next one has its turn.
 const BATCH: usize = 16;
-/// Longest message of the broadcast manager, and one byte more.
-const ROOM: usize = 8192;
+/// Batches that are taken before a call is answered: more than a queue holds, and an end to it.
+const BATCHES: usize = 64;
 
 /// Which of the frames that pass an interface is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,48 +36,63 @@ pub(crate) enum From {
 impl Supervisor {
     /// `write` of a length that is no frame's. The kernel looks at the interface before the length.
     pub(crate) fn write(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
-        let [_, buffer, length, ..] = notification.arguments;
-        self.send_bytes_at(notification, inode, buffer, length as usize, None)
+        let Some((inode, end)) = self.guest_socket(notification) else { return Answer::Continue };
+        self.send_bytes_at(notification, inode, end.as_fd(), None)
     }
 
     /// `sendto(fd, buffer, length, flags, address, address length)`.
     pub(crate) fn send_to(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else {
+        let Some((inode, end)) = self.guest_socket(notification) else {
             self.note_link_request(notification);
             return Answer::Continue;
         };
-        let [_, buffer, length, _, name, name_length] = notification.arguments;
+        let [.., name, name_length] = notification.arguments;
         let name = (name != 0).then_some((name, name_length as i32));
-        self.send_bytes_at(notification, inode, buffer, length as usize, name)
+        self.send_bytes_at(notification, inode, end.as_fd(), name)
     }
 
     fn send_bytes_at(
         &mut self,
         notification: &Notification,
         inode: u64,
-        buffer: u64,
-        length: usize,
+        end: BorrowedFd<'_>,
         name: Option<(u64, i32)>,
     ) -> Answer {
+        let [_, buffer, length, ..] = notification.arguments;
         let caller = Caller::new(notification.thread);
-        let mut bytes = vec![0; length.min(ROOM)];
-        let sent = caller
+        let mut bytes = vec![0; (length as usize).min(LONGEST_MESSAGE)];
+        let read = caller
             .read(buffer, &mut bytes)
             .and_then(|()| read_name(caller, name))
-            .and_then(|name| self.check_alive(notification).map(|()| name))
-            .and_then(|name| self.send(inode, name.as_deref(), &bytes));
-        sent.map_or_else(Answer::Error, |()| Answer::Value(bytes.len() as i64))
+            .and_then(|name| self.check_alive(notification).map(|()| name));
+        let value = bytes.len() as i64;
+        match read {
+            Err(error) => error.into(),
+            // Where a message goes is a matter of `bind`, whatever address is given.
+            Ok(_) if self.is_transport(inode) => {
+                self.send_transport(inode, end, bytes, sending_call(notification, end, value))
+            }
+            Ok(name) => self
+                .send(inode, name.as_deref(), &bytes)
+                .map_or_else(Answer::Error, |()| Answer::Value(value)),
+        }
+    }
+
+    fn is_transport(&self, inode: u64) -> bool {
+        self.sockets.get(&inode).is_some_and(|socket| socket.transport().is_some())
     }
 
     /// `sendmsg` and `sendmmsg`.
     pub(crate) fn send_message(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else {
+        let Some((inode, end)) = self.guest_socket(notification) else {
             self.note_link_request(notification);
             return Answer::Continue;
         };
         let caller = Caller::new(notification.thread);
         let at = notification.arguments[1];
+        if self.is_transport(inode) {
+            return self.send_transport_message(notification, inode, end.as_fd());
+        }
         if notification.call == libc::SYS_sendmsg {
             let sent = self.send_one(notification, inode, caller, at);
             return sent.map_or_else(Answer::Error, |length| Answer::Value(length as i64));
@@ -110,11 +127,39 @@ impl Supervisor {
         Ok(bytes.len())
     }
 
+    /// The first of several, which is what a call that was interrupted would have sent.
+    fn send_transport_message(
+        &mut self,
+        notification: &Notification,
+        inode: u64,
+        end: BorrowedFd<'_>,
+    ) -> Answer {
+        let caller = Caller::new(notification.thread);
+        let at = notification.arguments[1];
+        let is_one = notification.call == libc::SYS_sendmsg;
+        let read = Header::read(caller, at).and_then(|header| header.gather(caller)).and_then(|bytes| {
+            self.check_alive(notification)?;
+            if !is_one {
+                caller.write(at + 56, &(bytes.len() as u32).to_ne_bytes())?;
+            }
+            Ok(bytes)
+        });
+        match read {
+            Err(error) => error.into(),
+            Ok(bytes) => {
+                let value = if is_one { bytes.len() as i64 } else { 1 };
+                self.send_transport(inode, end, bytes, sending_call(notification, end, value))
+            }
+        }
+    }
+
     /// Sends for a guest; `name` is the address that it gave.
     fn send(&mut self, inode: u64, name: Option<&[u8]>, bytes: &[u8]) -> Result<(), Errno> {
         let Some(socket) = self.sockets.get_mut(&inode) else { return Err(Errno::BADF) };
         let bound = socket.interface;
         match &mut socket.kind {
+            // It has written a frame before that the bus does not take yet.
+            Kind::Raw(_) if socket.held.is_some() => Err(Errno::NOBUFS),
             Kind::Raw(_) => {
                 let interface = match name {
                     Some(name) => abi::interface_of(name).ok_or(Errno::INVAL)?,
@@ -136,6 +181,7 @@ impl Supervisor {
                 self.carry_out(inode, actions);
                 Ok(())
             }
+            Kind::Transport(_) => self.send_transport_natively(inode, bytes),
         }
     }
 
@@ -144,7 +190,7 @@ impl Supervisor {
     /// # Errors
     /// `ENXIO` without an interface, `EINVAL` for what is no classic frame, `ENETDOWN` without a bus, `ENOBUFS` when the bus
     /// takes no more for now.
-    fn send_frame(&mut self, inode: u64, interface: u32, bytes: &[u8]) -> Result<(), Errno> {
+    pub(crate) fn send_frame(&mut self, inode: u64, interface: u32, bytes: &[u8]) -> Result<(), Errno> {
         let known = self.interfaces.iter_mut().find(|known| known.index == interface);
         let interface = known.ok_or(Errno::NXIO)?;
         let frame: &FrameBytes = bytes.try_into().map_err(|_| Errno::INVAL)?;
@@ -169,7 +215,7 @@ impl Supervisor {
     /// Gives a frame to every guest's socket on the interface whose filters it passes.
     pub(crate) fn spread(&mut self, interface: u32, frame: &FrameBytes, from: From) {
         let (id, stamp_ns, now) = (identifier(frame), wall_clock_ns(), Instant::now());
-        let mut wanted = Vec::new();
+        let (mut wanted, mut transported) = (Vec::new(), Vec::new());
         for (inode, socket) in self.sockets.iter_mut().filter(|(_, socket)| socket.listens_on(interface)) {
             let is_own = from == From::Guest(*inode);
             let mut actions = Vec::new();
@@ -183,6 +229,15 @@ impl Supervisor {
                     socket.deliver(frame, Note { interface, flags, dropped: 0, stamp_ns, error: None });
                 }
                 Kind::Bcm(manager) => manager.take_frame(interface, frame, now, &mut actions),
+                Kind::Transport(_) if is_own => {}
+                Kind::Transport(transport) => {
+                    let mut events = Vec::new();
+                    let was_sending = transport.protocol.is_sending();
+                    transport.protocol.take_frame(frame, now, &mut events);
+                    if !events.is_empty() || was_sending && !transport.protocol.is_sending() {
+                        transported.push((*inode, events));
+                    }
+                }
             }
             if !actions.is_empty() || !socket.waiting.is_empty() {
                 wanted.push((*inode, actions));
@@ -191,6 +246,9 @@ impl Supervisor {
         for (inode, actions) in wanted {
             self.carry_out(inode, actions);
             self.serve_waiting(inode);
+        }
+        for (inode, events) in transported {
+            self.carry_out_transport(inode, events);
         }
     }
 
@@ -205,10 +263,7 @@ impl Supervisor {
                 Action::Tell(interface, message) => {
                     let stamp_ns = wall_clock_ns();
                     if let Some(socket) = self.sockets.get_mut(&inode) {
-                        socket.deliver(
-                            &message,
-                            Note { interface, flags: 0, dropped: 0, stamp_ns, error: None },
-                        );
+                        socket.deliver(&message, Note::new(interface, stamp_ns));
                     }
                     self.serve_waiting(inode);
                 }
@@ -216,26 +271,47 @@ impl Supervisor {
         }
     }
 
-    /// Takes what a guest has written natively, a few messages, so that others have their turn. A frame for which the bus has no
-    /// room is held, and with it the guest, whose queue to us fills.
-    pub(crate) fn take_from(&mut self, inode: u64) {
-        for _ in 0..BATCH {
-            let Some(socket) = self.sockets.get(&inode).filter(|socket| socket.held.is_none()) else {
+    /// Takes what a guest has written natively, all of it.
+    pub(crate) fn take_all_from(&mut self, inode: u64) {
+        for _ in 0..BATCHES {
+            if !self.take_from(inode) {
                 return;
-            };
-            let mut bytes = [0_u8; ROOM];
-            match recv(socket.as_fd(), &mut bytes, RecvFlags::DONTWAIT) {
-                // A guest that closes it with frames unread is told of first, and once.
-                Err(Errno::INTR | Errno::CONNRESET) => {}
-                Err(Errno::AGAIN) => return,
-                Ok((_, 0)) | Err(_) => return self.remove_socket(inode),
-                Ok((_, length)) => self.send_native(inode, &bytes[..length]),
             }
         }
     }
 
+    /// Takes what a guest has written natively, a few messages, so that others have their turn; true when there may be more. A frame
+    /// for which the bus has no room is held, and with it the guest, whose queue to us fills.
+    pub(crate) fn take_from(&mut self, inode: u64) -> bool {
+        for _ in 0..BATCH {
+            let Some(socket) = self.sockets.get(&inode).filter(|socket| socket.held.is_none()) else {
+                return false;
+            };
+            let mut bytes = [0_u8; LONGEST_OTHER];
+            match recv(socket.as_fd(), &mut bytes, RecvFlags::DONTWAIT) {
+                // A guest that closes it with frames unread is told of first, and once.
+                Err(Errno::INTR | Errno::CONNRESET) => {}
+                Err(Errno::AGAIN) => return false,
+                // The end of a message that is being sent is awaited, as the kernel lets `close` wait for it.
+                Ok((_, 0)) | Err(_) if socket.has_more_to_send() => return false,
+                Ok((_, 0)) | Err(_) => {
+                    self.remove_socket(inode);
+                    return false;
+                }
+                Ok((_, length)) => self.send_native(inode, &bytes[..length]),
+            }
+        }
+        true
+    }
+
     fn send_native(&mut self, inode: u64, bytes: &[u8]) {
-        match self.send(inode, None, bytes) {
+        let sent = self.send(inode, None, bytes);
+        self.note_native(inode, bytes, sent);
+    }
+
+    /// What came of a message that was written natively: it is held where the bus has no room.
+    pub(crate) fn note_native(&mut self, inode: u64, bytes: &[u8], sent: Result<(), Errno>) {
+        match sent {
             Err(Errno::NOBUFS) => {
                 let socket = self.sockets.get_mut(&inode).expect("it has sent");
                 let interface = socket.interface.unwrap_or(0);
@@ -275,6 +351,18 @@ impl Supervisor {
     fn check_alive(&self, notification: &Notification) -> Result<(), Errno> {
         if self.listener.is_alive(notification.id) { Ok(()) } else { Err(Errno::INTR) }
     }
+}
+
+/// A call that sends a message and returns `value` when all is well.
+fn sending_call(notification: &Notification, end: BorrowedFd<'_>, value: i64) -> SendingCall {
+    let flags = match notification.call {
+        libc::SYS_sendto | libc::SYS_sendmmsg => notification.int(3),
+        libc::SYS_sendmsg => notification.int(2),
+        _ => 0,
+    };
+    let may_wait = flags & libc::MSG_DONTWAIT == 0
+        && fcntl_getfl(end).is_ok_and(|flags| !flags.contains(OFlags::NONBLOCK));
+    SendingCall { id: notification.id, value, may_wait }
 }
 
 /// The address that a call has, as bytes.

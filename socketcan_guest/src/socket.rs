@@ -15,11 +15,15 @@ use crate::bcm::BroadcastManager;
 use crate::bus_peer::FrameBytes;
 use crate::raw::RawOptions;
 use crate::receive::{Message, WaitingCall};
+use crate::transport::Transport;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
-use rustix::net::{AddressFamily, SendFlags, SocketFlags, SocketType, send, socketpair};
-use std::collections::VecDeque;
+use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketFlags, SocketType, recv, send, socketpair};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, VecDeque};
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
+use std::rc::Rc;
 
 /// Notes that are kept without looking at how many are still of use.
 const FEW_NOTES: usize = 64;
@@ -39,10 +43,18 @@ pub(crate) struct Note {
     pub(crate) error: Option<Errno>,
 }
 
+impl Note {
+    /// That of a message about which there is no more to know.
+    pub(crate) fn new(interface: u32, stamp_ns: u64) -> Self {
+        Self { interface, flags: 0, dropped: 0, stamp_ns, error: None }
+    }
+}
+
 /// What a socket is.
 pub(crate) enum Kind {
     Raw(RawOptions),
     Bcm(Box<BroadcastManager>),
+    Transport(Box<Transport>),
 }
 
 /// A CAN socket of a guest.
@@ -52,9 +64,10 @@ pub(crate) struct GuestSocket {
     pub(crate) kind: Kind,
     /// Index of its interface, 0 for any; `None` before `bind`.
     pub(crate) interface: Option<u32>,
-    notes: VecDeque<Note>,
-    /// Bytes that the kernel accounts to one message; see [`bytes_accounted_to_a_message`].
-    message_bytes: usize,
+    /// Each with the bytes that the kernel accounts to its message.
+    notes: VecDeque<(Note, usize)>,
+    noted_bytes: usize,
+    accounts: Rc<Accounts>,
     dropped: u32,
     /// Whether `SO_RXQ_OVFL` was asked for.
     pub(crate) tells_dropped: bool,
@@ -72,7 +85,7 @@ pub(crate) struct GuestSocket {
 pub(crate) fn make(
     kind: Kind,
     non_blocking: bool,
-    message_bytes: usize,
+    accounts: &Rc<Accounts>,
 ) -> io::Result<(GuestSocket, OwnedFd)> {
     let flags = if non_blocking { SocketFlags::NONBLOCK } else { SocketFlags::empty() };
     let (end, theirs) =
@@ -82,7 +95,8 @@ pub(crate) fn make(
         kind,
         interface: None,
         notes: VecDeque::new(),
-        message_bytes,
+        noted_bytes: 0,
+        accounts: Rc::clone(accounts),
         dropped: 0,
         tells_dropped: false,
         last_stamp_ns: None,
@@ -93,13 +107,28 @@ pub(crate) fn make(
     Ok((socket, theirs))
 }
 
-/// Bytes that this kernel accounts to one message of a frame's length, in a queue of Unix sockets: data, head, rounding.
-pub(crate) fn bytes_accounted_to_a_message() -> io::Result<usize> {
-    let (one, _other) = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)?;
-    send(&one, &[0; 16], SendFlags::NOSIGNAL)?;
-    match unread_bytes(one.as_fd()) {
-        0 => Err(io::Error::other("the kernel accounts nothing to a message")),
-        bytes => Ok(bytes),
+/// How many bytes this kernel accounts to a message in a queue of Unix sockets: data, head, rounding. Tried out once for each length.
+pub(crate) struct Accounts {
+    pair: (OwnedFd, OwnedFd),
+    known: RefCell<BTreeMap<usize, usize>>,
+}
+
+impl Accounts {
+    pub(crate) fn new() -> io::Result<Self> {
+        let pair = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)?;
+        Ok(Self { pair, known: RefCell::default() })
+    }
+
+    fn of(&self, message: &[u8]) -> usize {
+        *self.known.borrow_mut().entry(message.len()).or_insert_with(|| {
+            let (one, other) = &self.pair;
+            if send(one, message, SendFlags::DONTWAIT | SendFlags::NOSIGNAL).is_err() {
+                return message.len();
+            }
+            let bytes = unread_bytes(one.as_fd());
+            let _ = recv(other, &mut [0_u8; 1], RecvFlags::DONTWAIT);
+            bytes
+        })
     }
 }
 
@@ -126,7 +155,9 @@ impl GuestSocket {
                 if self.notes.len() >= FEW_NOTES && self.notes.len().is_power_of_two() {
                     self.forget_read_notes();
                 }
-                self.notes.push_back(note);
+                let bytes = self.accounts.of(message);
+                self.notes.push_back((note, bytes));
+                self.noted_bytes += bytes;
             }
             // The guest has closed it: its end is read next.
             Err(Errno::PIPE | Errno::CONNRESET) => {}
@@ -136,16 +167,28 @@ impl GuestSocket {
 
     /// Forgets the notes of messages that the guest has read.
     pub(crate) fn forget_read_notes(&mut self) {
-        let unread = unread_bytes(self.end.as_fd()).div_ceil(self.message_bytes);
-        while self.notes.len() > unread {
-            self.last_stamp_ns = self.notes.pop_front().map(|note| note.stamp_ns).or(self.last_stamp_ns);
+        let unread = unread_bytes(self.end.as_fd());
+        while self.noted_bytes > unread {
+            let Some((note, bytes)) = self.notes.pop_front() else { break };
+            self.noted_bytes -= bytes;
+            self.last_stamp_ns = Some(note.stamp_ns);
         }
     }
 
     /// The note of the message that is read next.
     pub(crate) fn next_note(&mut self) -> Option<Note> {
         self.forget_read_notes();
-        self.notes.front().copied()
+        self.notes.front().map(|(note, _)| *note)
+    }
+
+    /// Takes an error out of the guest's queue, by a copy of the guest's end, if it is what the guest reads next.
+    pub(crate) fn take_error(&mut self, end: BorrowedFd<'_>) -> Option<Errno> {
+        let error = self.next_note()?.error?;
+        let mut byte = [0_u8; 1];
+        match recv(end, &mut byte, RecvFlags::DONTWAIT | RecvFlags::PEEK) {
+            Ok((_, 0)) => recv(end, &mut byte, RecvFlags::DONTWAIT).is_ok().then_some(error),
+            _ => None,
+        }
     }
 
     /// When the message came that was read last, ns of the wall clock.
@@ -164,8 +207,15 @@ impl GuestSocket {
     pub(crate) fn raw(&self) -> Option<&RawOptions> {
         match &self.kind {
             Kind::Raw(options) => Some(options),
-            Kind::Bcm(_) => None,
+            Kind::Bcm(_) | Kind::Transport(_) => None,
         }
+    }
+
+    /// Whether the guests have closed it.
+    pub(crate) fn has_hung_up(&self) -> bool {
+        let now = Timespec { tv_sec: 0, tv_nsec: 0 };
+        let mut set = [PollFd::new(self, PollFlags::empty())];
+        poll(&mut set, Some(&now)) == Ok(1) && set[0].revents().contains(PollFlags::HUP)
     }
 
     /// Whether it is bound to this interface or to any.
@@ -177,13 +227,12 @@ impl GuestSocket {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rustix::net::{RecvFlags, recv};
 
     const NOTE: Note = Note { interface: 7, flags: 0, dropped: 0, stamp_ns: 0, error: None };
 
     fn new() -> (GuestSocket, OwnedFd) {
-        let bytes = bytes_accounted_to_a_message().unwrap();
-        make(Kind::Raw(RawOptions::default()), false, bytes).unwrap()
+        let accounts = Rc::new(Accounts::new().unwrap());
+        make(Kind::Raw(RawOptions::default()), false, &accounts).unwrap()
     }
 
     #[test]
@@ -198,6 +247,20 @@ mod tests {
         }
         assert_eq!(socket.last_stamp_ns(), Some(149));
         assert!(socket.notes.len() <= 50);
+    }
+
+    #[test]
+    fn notes_follow_messages_of_any_length() {
+        let (mut socket, theirs) = new();
+        let length = |number: usize| [16, 4152, 72, 0, 300, 9000][number % 6];
+        for number in 0..12 {
+            socket.deliver(&vec![1; length(number)], Note { stamp_ns: number as u64, ..NOTE });
+        }
+        for number in 0..12 {
+            assert_eq!(socket.next_note().map(|note| note.stamp_ns), Some(number as u64));
+            assert_eq!(recv(&theirs, &mut [0_u8; 9000], RecvFlags::DONTWAIT).unwrap().1, length(number));
+        }
+        assert_eq!(socket.next_note(), None);
     }
 
     #[test]

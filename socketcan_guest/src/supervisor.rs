@@ -4,21 +4,21 @@
 //! kept, and a guest that writes faster than its bus takes is held back by its own queue. Each turn takes a few messages of each
 //! source.
 
-use crate::abi::CAN_BCM;
 use crate::caller::Caller;
 use crate::interface::Interface;
 use crate::netlink::LinkRequest;
 use crate::notification::{Answer, Listener, Notification};
 use crate::receive::WaitingCall;
 use crate::send::From;
-use crate::socket::{GuestSocket, Kind, Note};
-use rustix::event::{Timespec, epoll};
+use crate::socket::{Accounts, GuestSocket, Kind, Note};
+use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 use rustix::io::Errno;
 use rustix::time::{ClockId, clock_gettime};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 /// Calls that are answered in one turn, and frames that are taken from a bus.
@@ -44,11 +44,11 @@ pub(crate) struct Supervisor {
     pub(crate) interfaces: Vec<Interface>,
     /// Guests' sockets by the inode of the guest's end.
     pub(crate) sockets: BTreeMap<u64, GuestSocket>,
-    /// Those that are broadcast managers.
-    pub(crate) managers: BTreeSet<u64>,
+    /// Those that do things by time: broadcast managers and transport protocols.
+    pub(crate) timed: BTreeSet<u64>,
     /// Calls that wait for a message, of all sockets.
     pub(crate) waiting_calls: usize,
-    pub(crate) message_bytes: usize,
+    pub(crate) accounts: Rc<Accounts>,
     /// Frames of guests that a bus took.
     pub(crate) sent: u64,
     /// Messages that were accepted natively and that the kernel would have refused.
@@ -70,9 +70,9 @@ impl Supervisor {
             epoll,
             interfaces,
             sockets: BTreeMap::new(),
-            managers: BTreeSet::new(),
+            timed: BTreeSet::new(),
             waiting_calls: 0,
-            message_bytes: crate::socket::bytes_accounted_to_a_message()?,
+            accounts: Rc::new(Accounts::new()?),
             sent: 0,
             refused_late: 0,
             a_bus_went: false,
@@ -106,7 +106,14 @@ impl Supervisor {
     pub(crate) fn turn_for(&mut self, longest: Duration) -> io::Result<bool> {
         let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
         let patience = self.patience().min(longest);
-        let patience = Timespec { tv_sec: 0, tv_nsec: patience.subsec_nanos().into() };
+        let mut patience = Timespec { tv_sec: 0, tv_nsec: patience.subsec_nanos().into() };
+        // epoll_wait counts in ms, which is coarse for the gaps of the transport protocol; poll waits to the ns.
+        if patience.tv_nsec % 1_000_000 != 0 {
+            match poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(&patience)) {
+                Ok(_) | Err(Errno::INTR) => patience.tv_nsec = 0,
+                Err(error) => return Err(error.into()),
+            }
+        }
         let events: Vec<(u64, epoll::EventFlags)> = match epoll::wait(&self.epoll, &mut room, Some(&patience))
         {
             Ok((events, _)) => events.iter().map(|event| (event.data.u64(), event.flags)).collect(),
@@ -125,21 +132,22 @@ impl Supervisor {
                     }
                     self.take_from_bus(place);
                 }
-                inode => self.take_from(inode),
+                inode => _ = self.take_from(inode),
             }
         }
-        self.advance_managers();
+        self.advance_timed();
         self.look_around();
         Ok(has_ended)
     }
 
     fn patience(&self) -> Duration {
         let now = Instant::now();
-        let managers = self.managers.iter().filter_map(|inode| match &self.sockets.get(inode)?.kind {
+        let timed = self.timed.iter().filter_map(|inode| match &self.sockets.get(inode)?.kind {
             Kind::Bcm(manager) => manager.due(),
+            Kind::Transport(transport) => transport.protocol.due(),
             Kind::Raw(_) => None,
         });
-        let mut due = managers.min();
+        let mut due = timed.min();
         if self.waiting_calls > 0 {
             let calls = self.sockets.values().flat_map(|socket| &socket.waiting);
             due = calls.filter_map(|call| call.deadline).chain(due).min();
@@ -177,8 +185,16 @@ impl Supervisor {
         }
     }
 
-    /// The guest's socket that a call's first argument stands for, and a copy of the descriptor; `None` when it is none of ours.
+    /// The guest's socket that a call's first argument stands for, and a copy of the descriptor; `None` when it is none of ours. What
+    /// the guest wrote natively before the call goes first.
     pub(crate) fn guest_socket(&mut self, notification: &Notification) -> Option<(u64, OwnedFd)> {
+        let found = self.find_socket(notification)?;
+        self.take_all_from(found.0);
+        Some(found)
+    }
+
+    /// The same, and leaves what the guest wrote where it is.
+    pub(crate) fn find_socket(&mut self, notification: &Notification) -> Option<(u64, OwnedFd)> {
         // Without a socket there is nothing to look for, and most programs make most of these calls on other descriptors.
         if self.sockets.is_empty() {
             return None;
@@ -204,10 +220,10 @@ impl Supervisor {
     }
 
     /// Takes a new socket into the loop.
-    pub(crate) fn add_socket(&mut self, inode: u64, socket: GuestSocket, protocol: i32) -> io::Result<()> {
+    pub(crate) fn add_socket(&mut self, inode: u64, socket: GuestSocket) -> io::Result<()> {
         epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(inode), epoll::EventFlags::IN)?;
-        if protocol == CAN_BCM {
-            self.managers.insert(inode);
+        if socket.raw().is_none() {
+            self.timed.insert(inode);
         }
         self.sockets.insert(inode, socket);
         Ok(())
@@ -222,7 +238,7 @@ impl Supervisor {
                 self.listener.answer(call.notification.id, Answer::Error(Errno::BADF));
             }
         }
-        self.managers.remove(&inode);
+        self.timed.remove(&inode);
     }
 
     /// Whether what the guest writes is taken from now on.
@@ -294,21 +310,23 @@ impl Supervisor {
 
     /// Lets the next call that receives fail with this error; natively it reads a message of length 0.
     pub(crate) fn tell_error(&mut self, inode: u64, interface: u32, error: Errno) {
-        let note = Note { interface, flags: 0, dropped: 0, stamp_ns: wall_clock_ns(), error: Some(error) };
-        if let Some(socket) = self.sockets.get_mut(&inode).filter(|socket| socket.raw().is_some()) {
+        let note = Note { error: Some(error), ..Note::new(interface, wall_clock_ns()) };
+        let socket = self.sockets.get_mut(&inode).filter(|socket| !matches!(socket.kind, Kind::Bcm(_)));
+        if let Some(socket) = socket {
             socket.deliver(&[], note);
         }
         self.serve_waiting(inode);
     }
 
-    fn advance_managers(&mut self) {
+    fn advance_timed(&mut self) {
         let now = Instant::now();
-        for inode in self.managers.iter().copied().collect::<Vec<_>>() {
+        for inode in self.timed.iter().copied().collect::<Vec<_>>() {
             let mut actions = Vec::new();
             if let Some(Kind::Bcm(manager)) = self.sockets.get_mut(&inode).map(|socket| &mut socket.kind) {
                 manager.advance(now, &mut actions);
             }
             self.carry_out(inode, actions);
+            self.advance_transport(inode, now);
         }
     }
 
@@ -334,6 +352,7 @@ impl Supervisor {
         if self.waiting_calls > 0 {
             self.end_waiting(|listener, call| !listener.is_alive(call.notification.id));
         }
+        self.forget_dead_senders();
     }
 
     /// Forgets the waiting calls that are over.

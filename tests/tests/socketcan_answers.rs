@@ -2,6 +2,7 @@
 //! embedded bus, without CAN in the kernel.
 
 use rustix::process::Signal;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use system_tests::process::{Ended, Running};
@@ -57,21 +58,30 @@ fn is_statically_linked(program: &Path) -> bool {
     (0..count).all(|place| number(first + place * size, 4) != 3)
 }
 
-/// With the rest of the bus in another process: a bus that has other peers.
-#[test]
-fn can_utils_print_what_they_print_on_vcan() {
+/// What a script leaves that starts programs of can-utils. The rest of the bus is in another process: a bus that has other peers.
+fn texts_of(script: &str) -> BTreeMap<String, String> {
     let scene = Scene::new(SHORT);
     let _host = scene.bus_host("");
-    let folder = scene.path("can-utils");
+    let folder = scene.path("texts");
     let url = format!("vcan2={}", scene.url());
-    let script = socketcan::sources().join("can-utils.sh");
+    let script = socketcan::sources().join(script);
     let command = ["sh".as_ref(), script.as_os_str(), "vcan2".as_ref(), folder.as_os_str()];
     let _ = Running::start("can-utils", &mut guest(&scene, &format!("--interface {url}"), &command))
         .wait()
         .expect_code(0);
+    socketcan::texts(&folder)
+}
+
+#[test]
+fn can_utils_print_what_they_print_on_vcan() {
     let mut expected = socketcan::texts(&expected().join("can-utils"));
     expected.remove("down");
-    assert_eq!(socketcan::texts(&folder), expected);
+    assert_eq!(texts_of("can-utils.sh"), expected);
+}
+
+#[test]
+fn isotpsend_and_isotprecv_print_what_they_print_on_vcan() {
+    assert_eq!(texts_of("isotp.sh"), socketcan::texts(&expected().join("isotp")));
 }
 
 #[test]

@@ -31,7 +31,9 @@ fn machine() -> &'static Guest {
         // Between two jobs as long as `lines_of_run` wants it.
         fs::copy(socketcan::built("socketcan-answers"), payload.join("socketcan-answers")).unwrap();
         fs::copy(socketcan::built_of_rust(), payload.join("static-guest")).unwrap();
-        fs::copy(socketcan::sources().join("can-utils.sh"), payload.join("can-utils.sh")).unwrap();
+        for script in ["can-utils.sh", "isotp.sh"] {
+            fs::copy(socketcan::sources().join(script), payload.join(script)).unwrap();
+        }
         let jobs =
             ["job", "job-firmware", "job-foreign", "job-answers"].map(|job| format!("sh /airbench/{job}"));
         let guest =
@@ -271,7 +273,9 @@ fn socketcan_answers_are_those_that_are_recorded() {
     };
     same("socketcan-answers.txt", &answers(&recorded.join("answers.txt")));
     same("rust.txt", &answers(&recorded.join("rust.txt")));
-    assert_eq!(socketcan::texts(&out.join("can-utils")), socketcan::texts(&recorded.join("can-utils")));
+    for folder in ["can-utils", "isotp"] {
+        assert_eq!(socketcan::texts(&out.join(folder)), socketcan::texts(&recorded.join(folder)), "{folder}");
+    }
     // On this kernel `bench can` has to find a thread's descriptors by its process.
     same("socketcan-answers-guest.txt", &socketcan::expected_answers());
 }

@@ -39,5 +39,6 @@ void messages(void);
 void stamps_and_losses(void);
 void descriptors(void);
 void broadcast_manager(void);
+void transport_protocol(void);
 
 #endif

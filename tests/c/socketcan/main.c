@@ -122,5 +122,6 @@ int main(int count, char **arguments)
     stamps_and_losses();
     descriptors();
     broadcast_manager();
+    transport_protocol();
     return 0;
 }

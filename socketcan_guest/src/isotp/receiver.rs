@@ -1,0 +1,162 @@
+//! The side that receives a message.
+
+use super::settings::{Settings, flag};
+use super::{DATA_BYTES, Event, LONGEST_PDU, OTHER_SIDE};
+use rustix::io::Errno;
+use std::time::Instant;
+
+/// Statuses of our flow control frames.
+const GO_ON: u8 = 0;
+const OVERFLOW: u8 = 2;
+
+/// A message of which the first frame is there.
+#[derive(Debug)]
+struct Reception {
+    length: usize,
+    bytes: Vec<u8>,
+    /// Number of the next frame, modulo 16.
+    sequence: u8,
+    received_in_block: u8,
+    /// When the next frame must be there; a mere listener does not wait for the second.
+    until: Option<Instant>,
+    last: Option<Instant>,
+}
+
+/// What is being received.
+#[derive(Debug, Default)]
+pub(super) struct Receiver(Option<Reception>);
+
+impl Receiver {
+    pub(super) fn is_busy(&self) -> bool {
+        self.0.is_some()
+    }
+
+    pub(super) fn due(&self) -> Option<Instant> {
+        self.0.as_ref()?.until
+    }
+
+    pub(super) fn advance(&mut self, now: Instant, events: &mut Vec<Event>) {
+        if self.due().is_some_and(|until| until <= now) {
+            self.0 = None;
+            events.push(Event::ReceivingFailed(Errno::TIMEDOUT));
+        }
+    }
+
+    /// A single frame ends whatever was being received.
+    pub(super) fn take_single(
+        &mut self,
+        data: &[u8],
+        length: usize,
+        settings: &Settings,
+        events: &mut Vec<Event>,
+    ) {
+        self.0 = None;
+        let begin = settings.address_bytes() + 1;
+        let count = usize::from(data[begin - 1] & 0x0F);
+        let end = begin + count;
+        if count == 0 || end > length {
+            return;
+        }
+        let is_right = !settings.checks_padding() || settings.is_padded_right(data, length, end);
+        events.push(if is_right {
+            Event::Received(data[begin..end].to_vec())
+        } else {
+            Event::ReceivingFailed(Errno::BADMSG)
+        });
+    }
+
+    /// Gives the data of a flow control frame.
+    pub(super) fn take_first(
+        &mut self,
+        data: &[u8],
+        length: usize,
+        settings: &Settings,
+        now: Instant,
+    ) -> Option<Vec<u8>> {
+        self.0 = None;
+        // It fills its frame.
+        if length != DATA_BYTES {
+            return None;
+        }
+        let at = settings.address_bytes();
+        let in_12_bits = usize::from(data[at] & 0x0F) << 8 | usize::from(data[at + 1]);
+        let (count, begin) = match in_12_bits {
+            0 => {
+                let bytes = data[at + 2..at + 6].try_into().expect("four bytes");
+                (u32::from_be_bytes(bytes) as usize, at + 6)
+            }
+            count => (count, at + 2),
+        };
+        // It would have fitted a single frame.
+        if count + begin < DATA_BYTES {
+            return None;
+        }
+        if count > LONGEST_PDU {
+            return Some(settings.flow_control_of(OVERFLOW));
+        }
+        let answers = !settings.has(flag::LISTEN_MODE);
+        self.0 = Some(Reception {
+            length: count,
+            bytes: data[begin..DATA_BYTES].to_vec(),
+            sequence: 1,
+            received_in_block: 0,
+            until: answers.then(|| now + OTHER_SIDE),
+            last: None,
+        });
+        answers.then(|| settings.flow_control_of(GO_ON))
+    }
+
+    /// Gives the data of a flow control frame at the end of a block.
+    pub(super) fn take_consecutive(
+        &mut self,
+        data: &[u8],
+        length: usize,
+        settings: &Settings,
+        now: Instant,
+        events: &mut Vec<Event>,
+    ) -> Option<Vec<u8>> {
+        let reception = self.0.as_mut()?;
+        if let Some(least) = settings.least_received_gap() {
+            if reception.last.is_some_and(|last| now - last < least) {
+                return None;
+            }
+            reception.last = Some(now);
+        }
+        reception.until = None;
+        let begin = settings.address_bytes() + 1;
+        let left = reception.length - reception.bytes.len();
+        // Only the last may be shorter than 8 bytes.
+        if length < DATA_BYTES && left > DATA_BYTES - begin {
+            return None;
+        }
+        if data[begin - 1] & 0x0F != reception.sequence {
+            self.0 = None;
+            events.push(Event::ReceivingFailed(Errno::ILSEQ));
+            return None;
+        }
+        reception.sequence = (reception.sequence + 1) % 16;
+        let end = length.min(begin + left).max(begin);
+        reception.bytes.extend(&data[begin..end]);
+        if reception.bytes.len() >= reception.length {
+            let message = self.0.take().map(|reception| reception.bytes);
+            let is_right = !settings.checks_padding() || settings.is_padded_right(data, length, end);
+            events.push(match message {
+                Some(message) if is_right => Event::Received(message),
+                _ => Event::ReceivingFailed(Errno::BADMSG),
+            });
+            return None;
+        }
+        reception.received_in_block = reception.received_in_block.wrapping_add(1);
+        let block_size = settings.block_size();
+        if block_size == 0 || reception.received_in_block < block_size {
+            reception.until = Some(now + OTHER_SIDE);
+            return None;
+        }
+        if settings.has(flag::LISTEN_MODE) {
+            return None;
+        }
+        (reception.received_in_block, reception.last) = (0, None);
+        reception.until = Some(now + OTHER_SIDE);
+        Some(settings.flow_control_of(GO_ON))
+    }
+}

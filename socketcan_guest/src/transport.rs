@@ -1,0 +1,326 @@
+//! Sockets of the transport protocol, `CAN_ISOTP`: their addresses, and the calls that send and wait.
+//!
+//! One message is sent at a time. A call that comes meanwhile waits, as does one that wants to know how it ended
+//! (`CAN_ISOTP_WAIT_TX_DONE`); messages that are written natively, those of 16 bytes, wait in the guest's queue. A guest that closes
+//! the socket or ends does not cut a message off. The kernel lets `close` wait for it; here the next socket of the same channel
+//! waits instead.
+//!
+//! Source: Linux 6.1 `net/can/isotp.c` (`isotp_bind`, `isotp_sendmsg`, `isotp_release`).
+
+use crate::abi::{self, u32_at};
+use crate::caller::Caller;
+use crate::isotp::{Event, Identifiers, IsoTp, LONGEST_PDU};
+use crate::notification::{Answer, Notification};
+use crate::socket::{GuestSocket, Kind, Note};
+use crate::supervisor::{Supervisor, wall_clock_ns};
+use rustix::io::Errno;
+use std::collections::VecDeque;
+use std::os::fd::BorrowedFd;
+use std::time::Instant;
+
+/// Bytes of an address with both identifiers: `CAN_REQUIRED_SIZE(struct sockaddr_can, can_addr.tp)`.
+pub(crate) const ADDRESS_BYTES: usize = 16;
+/// Frames that are sent one after the other where there is no gap between them, so that others have their turn.
+const BURST: usize = 16;
+
+/// A call that sends: which one, and what it returns when all is well.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SendingCall {
+    pub(crate) id: u64,
+    pub(crate) value: i64,
+    /// Whether it may wait for the message before it.
+    pub(crate) may_wait: bool,
+}
+
+/// What a transport socket has beside its protocol.
+#[derive(Debug, Default)]
+pub(crate) struct Transport {
+    pub(crate) protocol: IsoTp,
+    /// Messages that wait for the one that is being sent, and whose calls wait with them; native ones have none.
+    waiting: VecDeque<(Option<SendingCall>, Vec<u8>)>,
+    /// The call that waits for the end of the message that is being sent.
+    at_the_end: Option<SendingCall>,
+}
+
+impl Transport {
+    /// Whether it is in the middle of a message, or has one that waits.
+    fn has_more_to_send(&self) -> bool {
+        self.protocol.is_sending() || !self.waiting.is_empty()
+    }
+
+    /// The call that is told of an error: the one that waits for the end, or the next, whose message is not sent then.
+    fn take_call_for_an_error(&mut self) -> Option<SendingCall> {
+        let next = self.waiting.front().and_then(|(call, _)| *call).filter(|_| self.at_the_end.is_none());
+        if next.is_some() {
+            self.waiting.pop_front();
+        }
+        self.at_the_end.take().or(next)
+    }
+
+    /// The address of the channel: family, interface, both identifiers.
+    pub(crate) fn address(&self, interface: u32) -> [u8; ADDRESS_BYTES] {
+        let mut address = [0; ADDRESS_BYTES];
+        address[..abi::ADDRESS_BYTES].copy_from_slice(&abi::address(interface));
+        if let Some(Identifiers { sent, received }) = self.protocol.identifiers() {
+            address[8..12].copy_from_slice(&received.to_ne_bytes());
+            address[12..].copy_from_slice(&sent.to_ne_bytes());
+        }
+        address
+    }
+}
+
+impl Supervisor {
+    fn transport(&mut self, inode: u64) -> Option<&mut Transport> {
+        self.sockets.get_mut(&inode)?.transport_mut()
+    }
+
+    /// `bind` of a transport socket: to an interface and two identifiers.
+    pub(crate) fn bind_transport(&mut self, notification: &Notification, inode: u64) -> Answer {
+        if notification.int(2) < ADDRESS_BYTES as i32 {
+            return Errno::INVAL.into();
+        }
+        let caller = Caller::new(notification.thread);
+        let address: [u8; ADDRESS_BYTES] = match caller.read_array(notification.arguments[1]) {
+            Ok(address) => address,
+            Err(error) => return error.into(),
+        };
+        let Some(interface) = abi::interface_of(&address) else { return Errno::INVAL.into() };
+        let wanted = Identifiers { received: u32_at(&address, 8), sent: u32_at(&address, 12) };
+        let known = self.interfaces.iter().find(|known| known.index == interface);
+        let (is_interface, is_down) = (known.is_some(), known.is_some_and(|known| !known.is_up));
+        let Some(transport) = self.transport(inode) else { return Answer::Continue };
+        let protocol = &mut transport.protocol;
+        let bound = protocol.check(wanted).and_then(|()| match interface {
+            0 => Err(Errno::NODEV),
+            _ => protocol.bind(wanted, is_interface),
+        });
+        if let Err(error) = bound {
+            return error.into();
+        }
+        if let Some(socket) = self.sockets.get_mut(&inode) {
+            socket.interface = Some(interface);
+        }
+        if is_down {
+            self.tell_error(inode, interface, Errno::NETDOWN);
+        }
+        Answer::Value(0)
+    }
+
+    /// Sends a message for a call, which may have to wait.
+    pub(crate) fn send_transport(
+        &mut self,
+        inode: u64,
+        end: BorrowedFd<'_>,
+        message: Vec<u8>,
+        call: SendingCall,
+    ) -> Answer {
+        let Some(transport) = self.transport(inode) else { return Errno::BADF.into() };
+        if transport.protocol.identifiers().is_none() {
+            return Errno::ADDRNOTAVAIL.into();
+        }
+        let is_busy = transport.has_more_to_send();
+        if is_busy && !call.may_wait {
+            return Errno::AGAIN.into();
+        }
+        if is_busy || call.may_wait && self.is_behind_another(inode) {
+            self.wait_to_send(inode, Some(call), message);
+            return Answer::Deferred;
+        }
+        // An error that nobody has read is told to whoever sends next.
+        let has_length = (1..=LONGEST_PDU).contains(&message.len());
+        let error =
+            self.sockets.get_mut(&inode).filter(|_| has_length).and_then(|socket| socket.take_error(end));
+        error.map_or_else(|| self.start_for(inode, &message, call), Answer::Error)
+    }
+
+    /// Sends a message that was written natively, after those that wait.
+    pub(crate) fn send_transport_natively(&mut self, inode: u64, message: &[u8]) -> Result<(), Errno> {
+        let transport = self.transport(inode).ok_or(Errno::BADF)?;
+        if transport.has_more_to_send() || self.is_behind_another(inode) {
+            self.wait_to_send(inode, None, message.to_vec());
+            return Ok(());
+        }
+        self.start_transport(inode, message)
+    }
+
+    fn wait_to_send(&mut self, inode: u64, call: Option<SendingCall>, message: Vec<u8>) {
+        if let Some(transport) = self.transport(inode) {
+            transport.waiting.push_back((call, message));
+        }
+        self.watch_socket(inode, false);
+    }
+
+    /// Sockets of the same channel.
+    fn others_of_channel(&self, inode: u64) -> impl Iterator<Item = (u64, &GuestSocket, &Transport)> {
+        let channel =
+            |socket: &GuestSocket| Some((socket.interface?, socket.transport()?.protocol.identifiers()?));
+        let own = self.sockets.get(&inode).and_then(channel);
+        let others = self
+            .sockets
+            .iter()
+            .filter(move |(other, socket)| **other != inode && own.is_some() && channel(socket) == own);
+        others.filter_map(|(inode, socket)| Some((*inode, socket, socket.transport()?)))
+    }
+
+    /// Whether a socket of the same channel that its guest has closed is in the middle of a message.
+    fn is_behind_another(&self, inode: u64) -> bool {
+        self.others_of_channel(inode)
+            .any(|(_, socket, transport)| transport.protocol.is_sending() && socket.has_hung_up())
+    }
+
+    fn start_for(&mut self, inode: u64, message: &[u8], call: SendingCall) -> Answer {
+        if let Err(error) = self.start_transport(inode, message) {
+            return error.into();
+        }
+        match self.transport(inode) {
+            Some(transport) if transport.protocol.is_sending() && transport.protocol.waits_for_the_end() => {
+                transport.at_the_end = Some(call);
+                Answer::Deferred
+            }
+            _ => Answer::Value(call.value),
+        }
+    }
+
+    /// Sends the first or only frame of a message. What the guest writes natively is left in its queue until the last is sent.
+    pub(crate) fn start_transport(&mut self, inode: u64, message: &[u8]) -> Result<(), Errno> {
+        let interface = self.sockets.get(&inode).and_then(|socket| socket.interface).unwrap_or(0);
+        let transport = self.transport(inode).ok_or(Errno::BADF)?;
+        let frame = transport.protocol.start(message, Instant::now())?;
+        let is_long = transport.protocol.is_sending();
+        if is_long {
+            // Before the frame: its answer may end the message at once.
+            self.watch_socket(inode, false);
+        }
+        let sent = self.send_frame(inode, interface, &frame);
+        if sent.is_err() {
+            self.transport(inode).ok_or(Errno::BADF)?.protocol.give_up();
+            self.watch_socket(inode, true);
+        }
+        sent
+    }
+
+    /// Sends the consecutive frames that are due, and ends what has waited too long.
+    pub(crate) fn advance_transport(&mut self, inode: u64, now: Instant) {
+        let Some(socket) = self.sockets.get(&inode) else { return };
+        let (Some(interface), Kind::Transport(_)) = (socket.interface, &socket.kind) else { return };
+        let (mut events, mut has_sent) = (Vec::new(), false);
+        for _ in 0..BURST {
+            let due = self.transport(inode).and_then(|transport| transport.protocol.take_due(now));
+            let Some((frame, before)) = due else { break };
+            has_sent = true;
+            if self.send_frame(inode, interface, &frame).is_err()
+                && let Some(transport) = self.transport(inode)
+            {
+                transport.protocol.put_back(before, now, &mut events);
+            }
+        }
+        let Some(transport) = self.transport(inode) else { return };
+        transport.protocol.advance(now, &mut events);
+        if has_sent || !events.is_empty() {
+            self.carry_out_transport(inode, events);
+        }
+    }
+
+    /// Does what a frame or the time has brought about, and goes on with what waited for it.
+    pub(crate) fn carry_out_transport(&mut self, inode: u64, events: Vec<Event>) {
+        let interface = self.sockets.get(&inode).and_then(|socket| socket.interface).unwrap_or(0);
+        for event in events {
+            match event {
+                // As the kernel's: what the interface does not take is lost.
+                Event::Reply(frame) => {
+                    let _ = self.send_frame(inode, interface, &frame);
+                }
+                Event::Received(message) => {
+                    let note = Note::new(interface, wall_clock_ns());
+                    if let Some(socket) = self.sockets.get_mut(&inode) {
+                        socket.deliver(&message, note);
+                    }
+                    self.serve_waiting(inode);
+                }
+                Event::ReceivingFailed(error) => self.tell_error(inode, interface, error),
+                Event::SendingFailed(error) => {
+                    let told = self.transport(inode).and_then(Transport::take_call_for_an_error);
+                    match told {
+                        Some(call) => _ = self.listener.answer(call.id, Answer::Error(error)),
+                        None => self.tell_error(inode, interface, error),
+                    }
+                }
+            }
+        }
+        self.go_on_transport(inode);
+    }
+
+    /// Answers who waited for the end of a message, and sends the next one.
+    fn go_on_transport(&mut self, inode: u64) {
+        while let Some(transport) = self.transport(inode).filter(|transport| !transport.protocol.is_sending())
+        {
+            let done = transport.at_the_end.take();
+            if let Some(call) = done {
+                self.listener.answer(call.id, Answer::Value(call.value));
+            }
+            if self.is_behind_another(inode) {
+                break;
+            }
+            let next = self.transport(inode).and_then(|transport| transport.waiting.pop_front());
+            let Some((call, message)) = next else { break };
+            match call {
+                None => {
+                    let sent = self.start_transport(inode, &message);
+                    self.note_native(inode, &message, sent);
+                }
+                // A signal may have ended it.
+                Some(call) if self.listener.is_alive(call.id) => {
+                    let answer = self.start_for(inode, &message, call);
+                    self.listener.answer(call.id, answer);
+                }
+                Some(_) => {}
+            }
+        }
+        let has_more = self.transport(inode).is_some_and(|transport| transport.has_more_to_send());
+        self.watch_socket(inode, !has_more);
+        if !has_more {
+            let others =
+                self.others_of_channel(inode).filter(|(_, _, transport)| !transport.waiting.is_empty());
+            for other in others.map(|(other, ..)| other).collect::<Vec<_>>() {
+                self.go_on_transport(other);
+            }
+        }
+    }
+
+    /// A signal has ended calls: who waits for the end of a message takes the message back with it, as the kernel has it.
+    pub(crate) fn forget_dead_senders(&mut self) {
+        let mut ended = Vec::new();
+        for (inode, socket) in &mut self.sockets {
+            let Some(transport) = socket.transport_mut() else { continue };
+            transport.waiting.retain(|(call, _)| call.is_none_or(|call| self.listener.is_alive(call.id)));
+            if transport.at_the_end.is_some_and(|call| !self.listener.is_alive(call.id)) {
+                transport.at_the_end = None;
+                transport.protocol.give_up();
+                ended.push(*inode);
+            }
+        }
+        ended.into_iter().for_each(|inode| self.go_on_transport(inode));
+    }
+}
+
+impl GuestSocket {
+    /// Its transport protocol, if it has one.
+    pub(crate) fn transport(&self) -> Option<&Transport> {
+        match &self.kind {
+            Kind::Transport(transport) => Some(transport),
+            Kind::Raw(_) | Kind::Bcm(_) => None,
+        }
+    }
+
+    fn transport_mut(&mut self) -> Option<&mut Transport> {
+        match &mut self.kind {
+            Kind::Transport(transport) => Some(transport),
+            Kind::Raw(_) | Kind::Bcm(_) => None,
+        }
+    }
+
+    /// Whether it is in the middle of a message, or has one that waits.
+    pub(crate) fn has_more_to_send(&self) -> bool {
+        self.transport().is_some_and(Transport::has_more_to_send)
+    }
+}
