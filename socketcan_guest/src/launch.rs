@@ -182,7 +182,9 @@ fn serve(
     supervisor.watch_child(end.as_fd())?;
     loop {
         if supervisor.turn()? {
-            return child.wait();
+            let status = child.wait()?;
+            supervisor.finish(|| signals.is_over())?;
+            return Ok(status);
         }
         let a_bus_went = std::mem::take(&mut supervisor.a_bus_went);
         if signals.terminated.swap(false, Ordering::Relaxed) || (ends_with_bus && a_bus_went) {

@@ -27,6 +27,8 @@ const A_TURN: usize = 32;
 const EVENTS_A_TURN: usize = 64;
 /// Longest sleep: a bus that has gone is looked for, and calls that died while they waited are forgotten.
 const LONGEST_SLEEP: Duration = Duration::from_millis(100);
+/// How long a bus that takes nothing is waited for when the program has ended.
+const LAST_PATIENCE: Duration = Duration::from_secs(1);
 /// Different texts that are told; a guest must not be able to fill a disk.
 const MOST_TEXTS: usize = 200;
 
@@ -363,6 +365,32 @@ impl Supervisor {
             left += socket.waiting.len();
         }
         self.waiting_calls = left;
+    }
+
+    /// The child has ended: what the guests wrote goes out first, and messages whose guests have ended; for those the transport
+    /// protocol itself has an end.
+    ///
+    /// # Errors
+    /// As [`Supervisor::turn`].
+    pub(crate) fn finish(&mut self, is_over: impl Fn() -> bool) -> io::Result<()> {
+        let until = Instant::now() + LAST_PATIENCE;
+        loop {
+            for inode in self.sockets.keys().copied().collect::<Vec<_>>() {
+                self.take_all_from(inode);
+            }
+            let held = self.sockets.values().any(|socket| socket.held.is_some());
+            let sending =
+                self.sockets.values().any(|socket| socket.has_more_to_send() && socket.has_hung_up());
+            if held && !sending && Instant::now() >= until {
+                self.refused_late += 1;
+                self.tell("a bus takes no more frames; what was written last is dropped");
+                return Ok(());
+            }
+            if !held && !sending || is_over() {
+                return Ok(());
+            }
+            self.turn_for(LONGEST_SLEEP)?;
+        }
     }
 
     /// What is to be said at the end: nothing when all went as the kernel's interface would.
