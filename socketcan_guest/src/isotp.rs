@@ -161,8 +161,8 @@ impl IsoTp {
         self.sender = Sender::default();
     }
 
-    /// The consecutive frame that is due, which counts as sent: the other side may answer it before the interface has returned. What
-    /// comes with it takes it back by [`IsoTp::put_back`].
+    /// The consecutive frame that is due, which counts as sent: the other side may answer it before the interface has
+    /// returned. What comes with it takes it back by [`IsoTp::put_back`].
     pub(crate) fn take_due(&mut self, now: Instant) -> Option<(FrameBytes, Progress)> {
         let id = self.identifiers?.sent;
         self.sender.take_due(&self.settings, now).map(|(data, before)| (frame(id, &data), before))

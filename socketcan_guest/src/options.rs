@@ -1,4 +1,5 @@
-//! `setsockopt` and `getsockopt`: those of `CAN_RAW` and `CAN_ISOTP`, and those of all sockets that a Unix socket answers differently.
+//! `setsockopt` and `getsockopt`: those of `CAN_RAW` and `CAN_ISOTP`, and those of all sockets that a Unix socket answers
+//! differently.
 
 use crate::abi::{SOL_CAN_ISOTP, SOL_CAN_RAW};
 use crate::caller::Caller;

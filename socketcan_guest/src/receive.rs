@@ -251,7 +251,8 @@ fn sender(socket: &GuestSocket, message: &Message) -> Vec<u8> {
     address
 }
 
-/// What a call returns that has put so many bytes into the guest's buffer; with `MSG_TRUNC` the transport protocol tells the whole.
+/// What a call returns that has put so many bytes into the guest's buffer; with `MSG_TRUNC` the transport protocol tells the
+/// whole.
 fn told_length(socket: &GuestSocket, flags: i32, length: usize, message: &Message) -> usize {
     let whole = flags & libc::MSG_TRUNC != 0 && socket.transport().is_some();
     if whole { message.bytes.len() } else { length }

@@ -280,8 +280,8 @@ impl Supervisor {
         }
     }
 
-    /// Takes what a guest has written natively, a few messages, so that others have their turn; true when there may be more. A frame
-    /// for which the bus has no room is held, and with it the guest, whose queue to us fills.
+    /// Takes what a guest has written natively, a few messages, so that others have their turn; true when there may be more. A
+    /// frame for which the bus has no room is held, and with it the guest, whose queue to us fills.
     pub(crate) fn take_from(&mut self, inode: u64) -> bool {
         for _ in 0..BATCH {
             let Some(socket) = self.sockets.get(&inode).filter(|socket| socket.held.is_none()) else {

@@ -107,7 +107,8 @@ pub(crate) fn make(
     Ok((socket, theirs))
 }
 
-/// How many bytes this kernel accounts to a message in a queue of Unix sockets: data, head, rounding. Tried out once for each length.
+/// How many bytes this kernel accounts to a message in a queue of Unix sockets: data, head, rounding. Tried out once for each
+/// length.
 pub(crate) struct Accounts {
     pair: (OwnedFd, OwnedFd),
     known: RefCell<BTreeMap<usize, usize>>,

@@ -187,8 +187,8 @@ impl Supervisor {
         }
     }
 
-    /// The guest's socket that a call's first argument stands for, and a copy of the descriptor; `None` when it is none of ours. What
-    /// the guest wrote natively before the call goes first.
+    /// The guest's socket that a call's first argument stands for, and a copy of the descriptor; `None` when it is none of
+    /// ours. What the guest wrote natively before the call goes first.
     pub(crate) fn guest_socket(&mut self, notification: &Notification) -> Option<(u64, OwnedFd)> {
         let found = self.find_socket(notification)?;
         self.take_all_from(found.0);

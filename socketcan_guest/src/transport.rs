@@ -1,9 +1,9 @@
 //! Sockets of the transport protocol, `CAN_ISOTP`: their addresses, and the calls that send and wait.
 //!
 //! One message is sent at a time. A call that comes meanwhile waits, as does one that wants to know how it ended
-//! (`CAN_ISOTP_WAIT_TX_DONE`); messages that are written natively, those of 16 bytes, wait in the guest's queue. A guest that closes
-//! the socket or ends does not cut a message off. The kernel lets `close` wait for it; here the next socket of the same channel
-//! waits instead.
+//! (`CAN_ISOTP_WAIT_TX_DONE`); messages that are written natively, those of 16 bytes, wait in the guest's queue. A guest that
+//! closes the socket or ends does not cut a message off. The kernel lets `close` wait for it; here the next socket of the same
+//! channel waits instead.
 //!
 //! Source: Linux 6.1 `net/can/isotp.c` (`isotp_bind`, `isotp_sendmsg`, `isotp_release`).
 

@@ -211,8 +211,8 @@ fn for_everybody() -> (TempDir, PathBuf) {
     (folder, bench)
 }
 
-/// What a program writes natively right before its end is still in its queue then, where `bench can` has no priority above it. It was
-/// lost: of 10 times 200 frames 656 reached the bus.
+/// What a program writes natively right before its end is still in its queue then, where `bench can` has no priority above it.
+/// It was lost: of 10 times 200 frames 656 reached the bus.
 #[test]
 fn what_was_written_last_reaches_the_bus_when_the_program_has_ended() {
     let (folder, bench) = for_everybody();

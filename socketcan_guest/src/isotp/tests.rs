@@ -1,4 +1,5 @@
-//! The protocol against itself and against frames by hand; against the kernel's own it is held by `tests/tests/socketcan_answers.rs`.
+//! The protocol against itself and against frames by hand; against the kernel's own it is held by
+//! `tests/tests/socketcan_answers.rs`.
 
 use super::*;
 
