@@ -55,6 +55,15 @@ fn the_tracked_files_are_tidy() {
     assert!(complaints.is_empty(), "{} complaint(s):\n{}", complaints.len(), complaints.join("\n"));
 }
 
+/// The Python distribution is built from its own folder, so that its licence texts stand there too.
+#[test]
+fn the_python_distribution_carries_the_licence_texts() {
+    for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        let read = |folder: &str| fs::read_to_string(root().join(folder).join(name)).unwrap();
+        assert_eq!(read("python"), read("."), "copy {name} into python/");
+    }
+}
+
 #[test]
 fn documents_name_only_scripts_that_exist() {
     let (files, _) = tracked();
