@@ -16,7 +16,7 @@ cargo_fuzz_version=0.13.2
 
 install_tools() {
     install_strace && install_can_utils && install_go && install_musl && install_valgrind && install_python && install_dask &&
-        install_hil && install_arm && install_qemu_arm && install_gdb && install_browser && install_machines
+        install_hil && install_python_can_tests && install_arm && install_qemu_arm && install_gdb && install_browser && install_machines
 }
 
 apt_updated=no
@@ -186,22 +186,26 @@ install_mdf4() { install_requirements mdf4 "$(dirname "${BASH_SOURCE[0]}")/../di
 # The client of a Dask cluster, which scripts/campaign hands parts out with.
 install_dask() { install_requirements dask "$(dirname "${BASH_SOURCE[0]}")/../campaign/dask/requirements.txt"; }
 
-# airbench-hil from python/, with labwired, and python-can's own tests, which only its source distribution holds.
+# airbench-hil from python/, with labwired, for scripts/mcu.
 install_hil() {
     local python stamp="$tools/hil/installed"
     python="$(dirname "${BASH_SOURCE[0]}")/../python"
     cat "$python/pyproject.toml" "$python/requirements.txt" | cmp -s - "$stamp" && return
-    make_venv hil --requirement "$python/requirements.txt" --editable "$python[mcu]" && install_python_can_tests "$python" &&
+    make_venv hil --requirement "$python/requirements.txt" --editable "$python[mcu]" &&
         cat "$python/pyproject.toml" "$python/requirements.txt" >"$stamp"
 }
 
+# python-can's own tests, which only its source distribution holds.
 install_python_can_tests() {
     local version
-    version=$(sed -n 's/^python-can==//p' "$1/requirements.txt")
+    version=$(sed -n 's/^python-can==//p' "$(dirname "${BASH_SOURCE[0]}")/../python/requirements.txt")
+    [ "$(cat "$tools/python-can/version" 2>/dev/null)" = "$version" ] && return
+    install_uv || return 1
     rm -rf "$tools/python-can" && mkdir -p "$tools/python-can" &&
         "$tools/uv/bin/python" -m pip download --quiet --disable-pip-version-check --no-deps --no-binary python-can \
             --dest "$tools/python-can" "python-can==$version" &&
-        tar -xz -C "$tools/python-can" --strip-components 1 --wildcards -f "$tools/python-can"/python_can-*.tar.gz '*/test'
+        tar -xz -C "$tools/python-can" --strip-components 1 --wildcards -f "$tools/python-can"/python_can-*.tar.gz '*/test' &&
+        echo "$version" >"$tools/python-can/version"
 }
 
 # The compiler of tests/firmware's boards and its C library: 85 MB to download, 8 s. Unpacked for root too, and for two
