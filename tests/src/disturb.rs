@@ -15,15 +15,20 @@ use rustix::time::{ClockId, Timespec, clock_gettime, clock_settime};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-const RUN_S: u64 = 4;
+/// Rows of the rig from which on a run is long enough; it goes on until the disturbance is over, however busy the machine is.
+const ROWS: usize = 4000;
+/// The end of a run that nobody interrupts.
+const LONGEST_RUN_S: u64 = 120;
 /// A process stands still for so long.
 const STOP: Duration = Duration::from_millis(5);
 /// Another program takes the CPU for so long, and so often.
 const HOG: Duration = Duration::from_millis(8);
 const HOGS: u32 = 3;
-/// The wall clock is ahead by so much, for so long.
+/// The wall clock is ahead by so much, until the rig has recorded so many rows more, and for so long after them: whoever records
+/// also looks at the clock, and a step back that comes before the look leaves no trace.
 const STEP_S: i64 = 3;
-const STEP_HOLDS: Duration = Duration::from_millis(700);
+const STEP_ROWS: usize = 500;
+const STEP_HOLDS: Duration = Duration::from_millis(200);
 /// Where the rig's loop is pinned, and so where the hog goes.
 const RIG_CPU: usize = 0;
 
@@ -86,14 +91,15 @@ pub fn run(disturbance: Disturbance, after: Duration) -> Named {
         .emulator(Pace::Real)
         .bus(scene.url() + wire)
         .out(&out)
-        .with(&format!("--full-timing --cpu {RIG_CPU} --seconds {RUN_S}"))
+        .with(&format!("--full-timing --cpu {RIG_CPU} --seconds {LONGEST_RUN_S}"))
         .start();
     let controller = scene.controller(Pace::Real).out(&out).with("--full-timing --repeat").start();
     scene.wait_for_rows("run", 1000);
     std::thread::sleep(after);
     inject(disturbance, &scene, &emulator, &controller);
-    // At the end of the time the rig says farewell, which the lossy wire may lose: then the controllers end by its silence.
-    let _ = emulator.wait().expect_code(0);
+    scene.wait_for_rows("run", ROWS);
+    // The rig says farewell, which the lossy wire may lose: then the controllers end by its silence.
+    let _ = emulator.interrupt();
     let _ = controller.wait();
     name_cause(&out)
 }
@@ -110,7 +116,7 @@ fn inject(disturbance: Disturbance, scene: &Scene, emulator: &Running, controlle
             std::thread::sleep(Duration::from_millis(1500));
             drop(listener);
         }
-        Disturbance::ClockStep => step_the_clock(),
+        Disturbance::ClockStep => step_the_clock(scene),
     }
 }
 
@@ -137,13 +143,14 @@ fn hog() {
 }
 
 /// Sets the wall clock ahead and back again, by the monotonic clock, so that it shows the right time afterwards.
-fn step_the_clock() {
+fn step_the_clock(scene: &Scene) {
     let ahead = |seconds: i64| {
         let now = clock_gettime(ClockId::Realtime);
         let then = Timespec { tv_sec: now.tv_sec + seconds, tv_nsec: now.tv_nsec };
         clock_settime(ClockId::Realtime, then).expect("root may set the clock");
     };
     ahead(STEP_S);
+    scene.wait_for_more_rows("run", STEP_ROWS);
     std::thread::sleep(STEP_HOLDS);
     ahead(-STEP_S);
 }
