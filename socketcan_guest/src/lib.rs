@@ -93,7 +93,8 @@ pub enum GuestError {
     /// The descriptors and the memory of other processes may not be looked at.
     #[error(
         "the CAN sockets of a program cannot be found: pidfd_getfd(2) or process_vm_readv(2): {0}; a container forbids it: allow \
-         it, as docker run --cap-add SYS_PTRACE does, or --security-opt seccomp=unconfined; Linux 5.6 or later is needed"
+         it, as docker run --cap-add SYS_PTRACE does, or --security-opt seccomp=unconfined, or systemd-nspawn \
+         --system-call-filter=pidfd_getfd; Linux 5.6 or later is needed"
     )]
     Looking(io::Error),
     /// The program cannot be started.

@@ -5,6 +5,7 @@ use rustix::process::Signal;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use system_tests::binaries::workspace;
 use system_tests::process::{Ended, Running};
 use system_tests::scene::{SHORT, Scene};
 use system_tests::socketcan::{self, built, expected, guest};
@@ -106,4 +107,48 @@ fn a_listener_is_told_that_the_bus_went_down_as_on_vcan() {
     let recorded = fs::read_to_string(expected().join("can-utils/down")).unwrap();
     assert!(recorded.starts_with("read: Network is down\ncandump 1\n"), "{recorded}");
     let _ = ended.expect_code(1).expect_said(&["read: Network is down", "vcan0 is down"]);
+}
+
+/// The page's table of system calls against the filter and the tests: every call that is answered stands in it, and every row
+/// names what tests it.
+#[test]
+fn the_table_of_system_calls_names_every_call_and_tests_that_exist() {
+    let read = |path: &str| fs::read_to_string(workspace().join(path)).unwrap();
+    let page = read("docs/socketcan-without-kernel.md");
+    let table = page.split("## System calls").nth(1).unwrap().split("*answers*").next().unwrap();
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .filter(|line| line.starts_with("| ") && !line.starts_with("| call"))
+        .map(|line| line.trim_matches('|').split(" | ").map(str::trim).collect())
+        .collect();
+    assert!(rows.len() > 10 && rows.iter().all(|row| row.len() == 3), "{rows:?}");
+    let quoted =
+        |cell: &str| -> Vec<String> { cell.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+
+    let filter = read("socketcan_guest/src/filter.rs");
+    let program = filter.split("pub(crate) fn install").next().unwrap();
+    let named: Vec<String> = rows.iter().flat_map(|row| quoted(row[0])).collect();
+    for call in program.split("libc::SYS_").skip(1) {
+        let call = call.split(|c: char| !c.is_alphanumeric()).next().unwrap().trim_end_matches('4');
+        assert!(named.iter().any(|name| name == call), "{call} is answered and stands in no row");
+    }
+
+    let answers = read("tests/expected/socketcan/answers.txt");
+    let headings: Vec<&str> = answers.lines().filter_map(|line| line.strip_prefix("# ")).collect();
+    let tests =
+        ["answers", "hostile", "programs"].map(|name| read(&format!("tests/tests/socketcan_{name}.rs")));
+    let exists = |name: &str| {
+        headings.contains(&name)
+            || ["can-utils", "isotp"].iter().any(|folder| expected().join(folder).join(name).is_file())
+            || workspace().join("socketcan_guest/src").join(name).is_file()
+            || tests.iter().any(|text| text.contains(&format!("fn {name}()")))
+    };
+    let tested: Vec<String> = rows.iter().flat_map(|row| quoted(row[2])).collect();
+    assert!(rows.iter().all(|row| !quoted(row[2]).is_empty()), "a row names no test: {rows:?}");
+    for name in &tested {
+        assert!(exists(name), "{name} is no heading, case, file or test");
+    }
+    for heading in headings {
+        assert!(tested.iter().any(|name| name == heading), "no row names the answers of {heading}");
+    }
 }
