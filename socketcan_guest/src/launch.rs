@@ -12,7 +12,7 @@ use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, Resource, Signal, getrlimit, kill_process, pidfd_open, setrlimit};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::process::ExitStatusExt;
@@ -87,7 +87,7 @@ pub fn run(
         return Err(GuestError::Looking(error.into()));
     }
     let (report, reports) = channel();
-    let command = guest.command.to_vec();
+    let (command, name) = (guest.command.to_vec(), guest.command[0].clone());
     let starter = thread::spawn(move || start(&command, &report)).thread().clone();
     let listener = match reports.recv() {
         Ok(Started::Listening(listener)) => listener,
@@ -97,7 +97,7 @@ pub fn run(
         }
     };
     let mut supervisor = Supervisor::new(listener, interfaces).map_err(GuestError::System)?;
-    let mut child = serve_the_start(&mut supervisor, &reports)?;
+    let mut child = serve_the_start(&mut supervisor, &reports, &name)?;
     raise_limit_of_files();
     started();
     let status =
@@ -123,7 +123,8 @@ fn wait_for_hosts(
         };
         let path = missing.bus.path().display().to_string();
         if Instant::now() >= until {
-            return Err(GuestError::NoHost { name: missing.name.clone(), path });
+            let waited_s = patience.as_secs();
+            return Err(GuestError::NoHost { name: missing.name.clone(), path, waited_s });
         }
         if signals.is_over() {
             return Ok(false);
@@ -148,16 +149,21 @@ fn start(command: &[OsString], report: &Sender<Started>) {
 }
 
 /// Answers the starting thread until the program runs.
-fn serve_the_start(supervisor: &mut Supervisor, reports: &Receiver<Started>) -> Result<Child, GuestError> {
+fn serve_the_start(
+    supervisor: &mut Supervisor,
+    reports: &Receiver<Started>,
+    name: &OsStr,
+) -> Result<Child, GuestError> {
+    let failed = |error| GuestError::Command { name: name.into(), error };
     loop {
         supervisor.turn_for(LOOK_EVERY).map_err(GuestError::System)?;
         match reports.try_recv() {
             Ok(Started::Program(Ok(child))) => return Ok(child),
-            Ok(Started::Program(Err(error))) => return Err(GuestError::Command(error)),
+            Ok(Started::Program(Err(error))) => return Err(failed(error)),
             Ok(Started::Listening(_)) => {}
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => {
-                return Err(GuestError::Command(io::Error::other("the thread that starts it has ended")));
+                return Err(failed(io::Error::other("the thread that starts it has ended")));
             }
         }
     }

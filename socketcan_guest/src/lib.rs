@@ -79,13 +79,16 @@ pub enum GuestError {
     TooMany(usize),
     /// Nobody hosts the bus.
     #[error(
-        "{name}: no host at unix://{path}; start 'emulator run' or 'emulator bus' on it, or let --pair open a bus of its own"
+        "{name}: no host at unix://{path} for {waited_s} s (--wait-s); 'scripts/run --bus unix://{path}' hosts it, as do \
+         'emulator run' and 'emulator bus'; scripts/run alone has a bus of its own; --pair opens one without a rig"
     )]
     NoHost {
         /// The interface.
         name: String,
         /// Where its bus was looked for.
         path: String,
+        /// And for how long.
+        waited_s: u64,
     },
     /// The kernel or a container refuses the filter.
     #[error("{}", refused(.0))]
@@ -98,8 +101,13 @@ pub enum GuestError {
     )]
     Looking(io::Error),
     /// The program cannot be started.
-    #[error("cannot start the command: {0}")]
-    Command(io::Error),
+    #[error("cannot start the command {}: {error}", name.display())]
+    Command {
+        /// Its first word.
+        name: OsString,
+        /// What the system says.
+        error: io::Error,
+    },
     /// The system is out of something.
     #[error("{0}")]
     System(io::Error),
