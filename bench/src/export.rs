@@ -1,8 +1,9 @@
-//! What a run put on the bus, in the files that other tools read: CSV, MDF4, ASC, BLF.
+//! What a run put on the bus and recorded, in the files that other tools read: CSV, MDF4, MCAP, ASC, BLF.
 //!
 //! ```text
 //!   bus.log ─► recorded_log.rs ─┬─► signals.rs (rig.dbc) ─┬─► table.rs   CSV
-//!                               │                         └─► mdf4.rs    MDF4
+//!                               │                         ├─► mdf4.rs    MDF4
+//!                               │                         └─► mcap.rs    MCAP ◄── run_table.rs ◄── measurement.csv …
 //!                               └─► frames ── python-can ───► foreign.rs ASC, BLF
 //! ```
 //!
@@ -11,7 +12,9 @@
 
 pub mod cli;
 mod foreign;
+mod mcap;
 mod mdf4;
+mod run_table;
 mod signals;
 mod table;
 
@@ -66,6 +69,7 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
     let part = part_of(out);
     let done = match to {
         Format::Csv | Format::Mdf4 => as_signals(&part, &log, *to, *every_ms),
+        Format::Mcap => as_recording(&part, &log),
         Format::Asc | Format::Blf => as_frames(&part, &log, *to, arguments.python.as_deref()),
     };
     let renamed = done.and_then(|reported| {
@@ -93,15 +97,9 @@ fn as_signals(
     format: Format,
     every_ms: Option<u32>,
 ) -> Result<Told, ExportError> {
-    let signals = Signals::of(log);
-    for (left_out, what) in signals.left_out.iter().zip(LEFT_OUT).filter(|(left_out, _)| left_out.frames > 0)
-    {
-        let file = log.file.display();
-        warn(&format!("{file}:{}: {} frames {what} are left out", left_out.first_line, left_out.frames));
-    }
+    let signals = signals_of(log, "are left out");
     let frames: usize = signals.courses.iter().map(|course| course.frames.len()).sum();
     let channels: usize = signals.courses.iter().map(|course| course.spec.signals.len()).sum();
-    let origin = if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" };
     let origin_ns = log.origin_ns();
     let written = |error: &dyn std::fmt::Display| FileError::write(part, error);
     let rows = if format == Format::Csv {
@@ -122,8 +120,44 @@ fn as_signals(
         mdf4::write(path, &signals, origin_ns).map_err(|error| written(&error))?;
         format!(" in {} groups", signals.courses.len())
     };
-    let reported = format!("{channels} signals of {frames} frames{rows}; time counts from {origin}");
+    let reported = format!("{channels} signals of {frames} frames{rows}; time counts from {}", origin(log));
     Ok((reported, Exit::Good))
+}
+
+/// The signals of a log; tells on standard error which frames hold none.
+fn signals_of(log: &RecordedLog, consequence: &str) -> Signals {
+    let signals = Signals::of(log);
+    for (left_out, what) in signals.left_out.iter().zip(LEFT_OUT).filter(|(left_out, _)| left_out.frames > 0)
+    {
+        let (file, line, frames) = (log.file.display(), left_out.first_line, left_out.frames);
+        warn(&format!("{file}:{line}: {frames} frames {what} {consequence}"));
+    }
+    signals
+}
+
+fn origin(log: &RecordedLog) -> &'static str {
+    if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" }
+}
+
+fn as_recording(part: &Path, log: &RecordedLog) -> Result<Told, ExportError> {
+    let signals = signals_of(log, "are in /can alone");
+    let mcap::Written { channels, messages } = mcap::write(part, log, &signals, run_folder(log))?;
+    Ok((format!("{messages} messages of {channels} channels"), Exit::Good))
+}
+
+/// The folder whose tables share the log's time; tells on standard error when nothing says how they do.
+fn run_folder(log: &RecordedLog) -> Option<&Path> {
+    let folder = log.file.parent()?;
+    if log.cycle_zero_ns.is_some() {
+        return Some(folder);
+    }
+    if folder.join("measurement.csv").exists() {
+        let folder = folder.display();
+        warn(&format!(
+            "{folder}: no summary.json says when cycle 0 of this log was: the tables are left out"
+        ));
+    }
+    None
 }
 
 fn as_frames(

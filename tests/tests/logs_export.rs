@@ -1,5 +1,5 @@
-//! A run's log in the files of other tools: CSV against the run's own tables, MDF4 as asammdf reads it, ASC and BLF as
-//! python-can reads them; what is no log is refused by line and column.
+//! A run's log in the files of other tools: CSV against the run's own tables, MDF4 as asammdf reads it, MCAP as Foxglove's reader
+//! does, ASC and BLF as python-can reads them; what is no log is refused by line and column.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -17,7 +17,8 @@ fn run_folder() -> PathBuf {
     static RUN: OnceLock<Scene> = OnceLock::new();
     let scene = RUN.get_or_init(|| {
         let scene = Scene::new(SHORT);
-        let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
+        let folder = scene.path("emulator");
+        let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep).out(&folder));
         scene
     });
     scene.path("emulator")
@@ -133,6 +134,108 @@ fn asammdf_reads_the_same_values_units_and_times_from_the_mdf4() {
     for (name, unit) in [("DriveSensors.position_m", "m"), ("LoadSensors.force_n", "N"), ("Tick.cycle", "")] {
         assert_eq!(channels[name]["unit"], unit, "{name}");
     }
+}
+
+/// Channels of an MCAP as PyPI's `mcap` reads them.
+fn mcap_channels(file: &Path) -> Value {
+    let read: Value = serde_json::from_str(&run_script("read_mcap.py", &[file])).expect("JSON");
+    assert_eq!(read["sorted"], true, "messages are in the order of time");
+    read
+}
+
+fn list<'a>(channel: &'a Value, key: &str) -> &'a Vec<Value> {
+    channel[key].as_array().unwrap_or_else(|| panic!("{key} of {channel}"))
+}
+
+#[test]
+fn an_mcap_holds_every_value_of_the_tables_at_the_time_of_its_row() {
+    let folder = run_folder();
+    let out = folder.join("tables.mcap");
+    let _ = export(&folder, "mcap", &out, &[]).expect_code(0);
+    let read = mcap_channels(&out);
+    let zero_ns: u64 = read["metadata"]["airbench"]["cycle_zero_ns"]
+        .as_str()
+        .and_then(|ns| ns.parse().ok())
+        .expect("a time");
+    for (topic, file) in [
+        ("/measurement", "measurement.csv"),
+        ("/truth", "truth.csv"),
+        ("/controller/drive", "controller-drive.csv"),
+        ("/controller/load", "controller-load.csv"),
+    ] {
+        let channel = &read["channels"][topic];
+        let (times, messages) = (list(channel, "times_ns"), list(channel, "messages"));
+        let mut table =
+            csv::ReaderBuilder::new().comment(Some(b'#')).from_path(folder.join(file)).expect(file);
+        let names = table.headers().expect("a head").clone();
+        let rows: Vec<_> = table.records().map(|row| row.expect("a row")).collect();
+        assert!(rows.len() > 1000 && rows.len() == messages.len() && rows.len() == times.len(), "{file}");
+        for ((row, time), message) in rows.iter().zip(times).zip(messages) {
+            let time_s: f64 = row[0].parse().expect("a time");
+            assert_eq!(time.as_u64(), Some(zero_ns + (time_s * 1e3).round() as u64 * 1_000_000), "{file}");
+            let mut values = 0;
+            for (name, cell) in names.iter().zip(row).filter(|(_, cell)| !cell.is_empty()) {
+                values += 1;
+                let (value, schema) = (&message[name], &channel["schema"]["properties"][name]);
+                if name.ends_with("_chain") {
+                    assert_eq!((value.as_str(), &schema["type"]), (Some(cell), &"string".into()), "{name}");
+                } else {
+                    let expected: f64 = cell.parse().expect("a number");
+                    assert_eq!(value.as_f64(), Some(expected), "{file}: {name} at {time_s} s");
+                    assert_eq!(schema["type"], "number", "{name}");
+                }
+            }
+            assert_eq!(message.as_object().map(serde_json::Map::len), Some(values), "{file}: nothing else");
+        }
+    }
+    let properties = &read["channels"]["/measurement"]["schema"]["properties"];
+    for (column, unit) in [("drive_position_m", "m"), ("load_force_N", "N"), ("load_pressure_b_Pa", "Pa")] {
+        assert_eq!(properties[column]["unit"], unit, "{column}");
+    }
+    assert!(properties["drive_valve"].get("unit").is_none(), "an opening is a plain number");
+}
+
+#[test]
+fn an_mcap_holds_each_frame_as_it_was_and_its_signals() {
+    let folder = run_folder();
+    let (out, csv) = (folder.join("frames.mcap"), folder.join("for-mcap.csv"));
+    let _ = export(&folder.join("bus.log"), "mcap", &out, &[]).expect_code(0);
+    let _ = export(&folder, "csv", &csv, &[]).expect_code(0);
+    let read = mcap_channels(&out);
+    let frames = &read["channels"]["/can"];
+    let log = fs::read_to_string(folder.join("bus.log")).expect("the log");
+    assert_eq!(log.lines().count(), list(frames, "messages").len());
+    for ((line, time), message) in log.lines().zip(list(frames, "times_ns")).zip(list(frames, "messages")) {
+        let ns = time.as_u64().expect("a time");
+        let stamp = format!("({:010}.{:06})", ns / 1_000_000_000, ns % 1_000_000_000 / 1000);
+        let (interface, frame) = (&message["interface"], &message["frame"]);
+        let told = [interface, frame].map(|text| text.as_str().expect("a text"));
+        assert_eq!(line, [&stamp, told[0], told[1]].join(" "));
+        let id = u64::from_str_radix(told[1].split('#').next().expect("a number"), 16).expect("hexadecimal");
+        assert_eq!(message["id"].as_u64(), Some(id));
+    }
+    for (name, column) in columns(&csv).iter().filter(|(name, _)| *name != "time_s") {
+        let (message, signal) = name.split_once('.').expect("a frame and a signal");
+        let channel = &read["channels"][format!("/can/{message}")];
+        let told: Vec<_> = list(channel, "messages").iter().map(|message| message[signal].as_f64()).collect();
+        let expected: Vec<_> = column.iter().filter(|value| value.is_some()).copied().collect();
+        assert!(told == expected, "{name}");
+    }
+}
+
+#[test]
+fn an_mcap_of_a_log_alone_has_no_tables_and_says_which_frames_are_no_signals() {
+    let scene = Scene::new(SHORT);
+    let (log, out) = (scene.write("foreign.log", FOREIGN), scene.path("foreign.mcap"));
+    let said = export(&log, "mcap", &out, &[]).expect_code(0);
+    let _ = said.expect_said(&["foreign.log:2: 4 frames that rig.dbc does not know are in /can alone"]);
+    let read = mcap_channels(&out);
+    let topics: Vec<_> = read["channels"].as_object().expect("channels").keys().collect();
+    assert_eq!(topics, ["/can", "/can/DriveSensors"]);
+    let told: Vec<_> =
+        list(&read["channels"]["/can"], "messages").iter().map(|message| message["frame"].as_str()).collect();
+    let expected: Vec<_> = FOREIGN.lines().map(|line| line.split(' ').nth(2)).collect();
+    assert_eq!(told, expected);
 }
 
 #[test]

@@ -10,6 +10,8 @@ pub enum Format {
     Csv,
     /// Decoded signals with their units, a group for each frame; read by asammdf and others.
     Mdf4,
+    /// Everything of a run, tables and bus, as JSON with schemas; read by Foxglove and PlotJuggler.
+    Mcap,
     /// Frames as Vector's text log; written by python-can.
     Asc,
     /// Frames as Vector's binary log; written by python-can.

@@ -78,7 +78,7 @@ fn data_type(signal: &SignalSpec) -> DataType {
 }
 
 /// What a signal means, with the names of its states.
-fn comment(signal: &SignalSpec) -> String {
+pub(super) fn comment(signal: &SignalSpec) -> String {
     let states: Vec<_> =
         signal.values.iter().enumerate().map(|(raw, name)| format!("{raw} {name}")).collect();
     if states.is_empty() {
