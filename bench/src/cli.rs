@@ -71,7 +71,7 @@ pub enum Command {
     CheckController(Box<ConformanceArguments>),
     /// Print the table of ratios of a latency report, in Markdown.
     LatencyTable(LatencyTableArguments),
-    /// Write a log of the bus as CSV, MDF4, ASC or BLF, or a whole run as MCAP.
+    /// Write a log of the bus as CSV, MDF4, ASC or BLF, or a whole run as MCAP or a trace.
     Export(ExportArguments),
     /// Put a recorded log back on a bus by absolute time, and tell its timing error.
     Replay(ReplayArguments),

@@ -4,6 +4,7 @@
 //!   bus.log ─► recorded_log.rs ─┬─► signals.rs (rig.dbc) ─┬─► table.rs   CSV
 //!                               │                         ├─► mdf4.rs    MDF4
 //!                               │                         └─► mcap.rs    MCAP ◄── run_table.rs ◄── measurement.csv …
+//!                               ├─► frames ─────────────────► trace.rs   trace ◄── *-timing.csv, faults.csv
 //!                               └─► frames ── python-can ───► foreign.rs ASC, BLF
 //! ```
 //!
@@ -17,6 +18,7 @@ mod mdf4;
 mod run_table;
 mod signals;
 mod table;
+mod trace;
 
 use crate::recorded_log::{RecordedLog, RecordedLogError};
 use crate::{say, warn};
@@ -70,6 +72,7 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
     let done = match to {
         Format::Csv | Format::Mdf4 => as_signals(&part, &log, *to, *every_ms),
         Format::Mcap => as_recording(&part, &log),
+        Format::Trace => as_trace(&part, &log),
         Format::Asc | Format::Blf => as_frames(&part, &log, *to, arguments.python.as_deref()),
     };
     let renamed = done.and_then(|reported| {
@@ -143,6 +146,15 @@ fn as_recording(part: &Path, log: &RecordedLog) -> Result<Told, ExportError> {
     let signals = signals_of(log, "are in /can alone");
     let mcap::Written { channels, messages } = mcap::write(part, log, &signals, run_folder(log))?;
     Ok((format!("{messages} messages of {channels} channels"), Exit::Good))
+}
+
+fn as_trace(part: &Path, log: &RecordedLog) -> Result<Told, ExportError> {
+    let trace::Written { frames, cycles, faults } = trace::write(part, log, run_folder(log))?;
+    if cycles == 0 {
+        warn("no cycles: their timing is recorded in real time, by --full-timing of emulator and controller");
+    }
+    let reported = format!("{frames} frames, {cycles} cycles, {faults} marks of faults");
+    Ok((reported, Exit::Good))
 }
 
 /// The folder whose tables share the log's time; tells on standard error when nothing says how they do.

@@ -43,6 +43,7 @@ mod live_parameters;
 mod lockstep;
 mod logs_export;
 mod logs_replay;
+mod logs_trace;
 mod loss;
 mod malformed;
 mod modelled_wire;

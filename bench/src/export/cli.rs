@@ -12,6 +12,8 @@ pub enum Format {
     Mdf4,
     /// Everything of a run, tables and bus, as JSON with schemas; read by Foxglove and PlotJuggler.
     Mcap,
+    /// Cycles with their stages, frames and faults on one time axis, as Chrome's JSON; read by Perfetto.
+    Trace,
     /// Frames as Vector's text log; written by python-can.
     Asc,
     /// Frames as Vector's binary log; written by python-can.
