@@ -10,7 +10,7 @@ python_packages=(
     asammdf==8.8.28 fmpy==0.3.32 numpy==2.4.6 pandas==3.1.1 python-can==4.6.1
     pyxcp==0.29.20 pya2ldb==1.0.355 # clients of XCP
     mcap==1.6.0 # Foxglove's reader of MCAP
-    prometheus-client==0.26.0 # reads /metrics
+    prometheus-client==0.26.0 promql-parser==0.12.0 # read /metrics, and the dashboard's questions to it
 )
 uv_version=0.13.9
 cargo_fuzz_version=0.13.2

@@ -2,6 +2,7 @@
 
 use rustix::process::Signal;
 use serde_json::{Value, json as value};
+use std::ffi::OsStr;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -125,23 +126,59 @@ fn a_run_is_told_by_description_state_history_events_and_metrics() {
     {
         assert!(families.iter().any(|family| family == name), "{name}: {families:?}");
     }
+    expect_dashboard_of(page);
     watched.end();
+}
+
+/// Holds Grafana's dashboard against the metrics of a run under way.
+fn expect_dashboard_of(page: &LivePage) {
+    // These have no line before enough was measured or heard.
+    let late = ["wake_up_seconds{quantile=\"0.999\"}", "round_trip_seconds{quantile=\"0.999\"}"];
+    let late = late.iter().chain(&["load_force_set_point_n ", "drive_control_error_m "]);
+    let is_there = |text: &str| late.clone().all(|name| text.contains(&format!("\nairbench_{name}")));
+    let mut metrics = String::new();
+    wait_until("all metrics", || {
+        metrics = page.get("/metrics").body;
+        is_there(&metrics)
+    });
+    let judge = |metrics: &str| -> Value {
+        let script = workspace().join("tests/python/dashboard_metrics.py");
+        let dashboard = workspace().join("docs/examples/grafana/airbench.json");
+        let told = python_reads(&[script.as_os_str(), dashboard.as_os_str()], metrics);
+        serde_json::from_str(&told).expect("JSON")
+    };
+    let judged = judge(&metrics);
+    assert!(judged["expressions"].as_u64() > Some(30), "{judged}");
+    assert_eq!((&judged["unknown"], &judged["units"]), (&value!([]), &value!([])));
+
+    // A name or a label that is not served is found.
+    let without = metrics
+        .replace("airbench_overruns_total ", "airbench_overran_total ")
+        .replace("=\"0.999\"", "=\"0.998\"");
+    let missed = judge(&without)["unknown"].to_string();
+    let expected = ["airbench_overruns_total", "airbench_wake_up_seconds{quantile=0.999}"];
+    assert!(expected.iter().all(|name| missed.contains(name)), "{missed}");
 }
 
 /// Names of the metric families, as the parser of Prometheus' own Python client reads them.
 fn parse_with_prometheus_client(text: &str) -> Vec<String> {
     let script = "import sys; from prometheus_client.parser import text_string_to_metric_families as families\n\
                   print('\\n'.join(family.name for family in families(sys.stdin.read())))";
+    python_reads(&["-c".as_ref(), script.as_ref()], text).lines().map(str::to_owned).collect()
+}
+
+/// What python prints, given a text on its standard input.
+fn python_reads(arguments: &[&OsStr], text: &str) -> String {
     let mut child = Command::new(python())
-        .args(["-c", script])
+        .args(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
         .expect("python starts");
     child.stdin.take().expect("a pipe").write_all(text.as_bytes()).expect("it reads");
     let output = child.wait_with_output().expect("it ends");
-    assert!(output.status.success(), "Prometheus' client refuses it:\n{text}");
-    String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
+    assert!(output.status.success(), "python refuses it:\n{text}");
+    String::from_utf8(output.stdout).expect("UTF-8")
 }
 
 #[test]
