@@ -1,0 +1,411 @@
+"""The rig and what controls it, for a test: `with Rig(...) as rig`."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal
+
+import can
+from cantools.database.can import Database
+
+from airbench_hil import faults as fault_files
+from airbench_hil import peer, programs
+from airbench_hil.controllers import Answering, Controller, Law, Python, StrPath
+from airbench_hil.conditions import seconds
+from airbench_hil.errors import BOUND_BROKEN, GOOD, INTERRUPTED, PARTNER_FAILED, AirbenchError, NotAnswered, ProgramFailed, RigEnded
+from airbench_hil.expectations import Expectations
+from airbench_hil.faults import Fault
+from airbench_hil.links import Ended, Link, Lockstep, RealTime
+from airbench_hil.people import People
+from airbench_hil.processes import Processes
+from airbench_hil.run import Run
+from airbench_hil.signals import Names, Seen, database
+
+Pace = Literal["lockstep", "real"]
+#: A debugger may hold a cycle as long as this, s.
+_A_DAY_S = 86400
+_FAREWELL_S, _LEAVING_S = 10.0, 2.0
+
+
+class Rig(Expectations, People):
+    """The emulated rig on an embedded bus of its own, with what controls it.
+
+    Used as a context manager: programs start on entering, and none is left on leaving, however this process ends. In lockstep time advances
+    inside `expect`, `wait_for`, `never`, `stable_for`, `run_for`, `finish` alone, and two runs of a test leave the same bytes; in real time
+    it goes on by itself. Times are the rig's, in s.
+    """
+
+    def __init__(
+        self,
+        experiment: StrPath | Mapping[str, Any] | None = None,
+        *,
+        pace: Pace = "lockstep",
+        controller: Controller | Law | Sequence[Controller | Law] | None = None,
+        faults: StrPath | Sequence[Fault | Mapping[str, Any]] = (),
+        setup: Mapping[str, Any] | None = None,
+        seconds: float | None = None,
+        seed: int = 1,
+        sealed: StrPath | None = None,
+        rig_file: StrPath | None = None,
+        out: StrPath | None = None,
+        binaries: StrPath | None = None,
+        bus_options: str = "",
+        emulator_options: Sequence[str] = (),
+        answer_s: float = 5.0,
+        summarise: bool = True,
+    ) -> None:
+        """Nothing is started yet.
+
+        :param experiment: name of a shipped one, a file, or its tables; None: the rig alone, for controllers that need none.
+        :param pace: "lockstep", simulated time, or "real".
+        :param controller: `Own`, `Process`, `Elf`, a function from `Sensors` to an opening, or several; None: nobody.
+        :param faults: planned faults, or a script's file.
+        :param setup: keys of the experiment's `[rig]` in place of its own, such as {"carriage_position_m": 0.15}.
+        :param seconds: end after this much of the rig's time, s.
+        :param seed: of the sensors' noise and of faults with chance in them.
+        :param sealed: a file of hidden effects.
+        :param rig_file: the plant's numbers; None: the shipped rig.toml.
+        :param out: the run's folder; None: a new one in ./runs.
+        :param binaries: folder of the programs; None: `programs.program` looks for them.
+        :param bus_options: of the bus's URL, such as "loss=0.01&seed=3" or "bitrate=1000000".
+        :param emulator_options: more options of `emulator run`.
+        :param answer_s: wall time that a controller has for a cycle in lockstep, s. The test itself may take a day.
+        :param summarise: join, judge and draw the run at its end (`bench summary`).
+        :raises ValueError: an argument that cannot be meant.
+        """
+        if pace not in ("lockstep", "real"):
+            raise ValueError(f"pace '{pace}': \"lockstep\" or \"real\"")
+        self.pace: Pace = pace
+        self._experiment, self._faults, self._setup = experiment, faults, dict(setup or {})
+        asked = controller if isinstance(controller, (list, tuple)) else [] if controller is None else [controller]
+        self.controllers: list[Controller] = [Python(each) if callable(each) else each for each in asked]
+        self._seconds, self._seed, self._sealed = seconds, seed, sealed
+        self.rig_file = Path(rig_file).resolve() if rig_file else programs.file("rig.toml")
+        self._out, self._binaries, self._bus_options = out, binaries, bus_options
+        self._emulator_options, self._answer_s, self._summarise = list(emulator_options), answer_s, summarise
+        self.names = Names(database())
+        self.seen = Seen(self.names)
+        self.experiment_file: Path | None = None
+        self._processes: Processes | None = None
+        self._link: Link | None = None
+        self._killed: set[str] = set()
+        self._run: Run | None = None
+        self._over = self._quit_asked = False
+        self.failures: list[AssertionError] = []
+        """Expectations that failed, in their order."""
+        self._init_people()
+
+    # What is asked of it while it runs.
+
+    @property
+    def time(self) -> float:
+        """The rig's time, s: of the cycle whose sensors came last."""
+        return self._link.now_s if self._link else 0.0
+
+    @property
+    def cycle(self) -> int:
+        """Number of the cycle whose sensors came last; a cycle has 1 ms."""
+        return self._link.cycle if self._link else 0
+
+    @property
+    def database(self) -> Database:
+        """rig.dbc as cantools has it."""
+        return self.names.dbc
+
+    @property
+    def url(self) -> str:
+        """The bus, for other programs: unix:///PATH."""
+        return f"unix://{self.bus_path}"
+
+    def program(self, name: str) -> Path:
+        """A program of airbench, where this rig takes it from. Raises ProgramNotFound."""
+        return programs.program(name, self._binaries)
+
+    def listen(self, **options: Any) -> can.BusABC:
+        """Another node of the bus, as python-can has it; it hears all frames, and no cycle waits for it."""
+        return can.Bus(interface="airbench", channel=self.url, **options)
+
+    def kill(self, name: str, number: int = signal.SIGKILL) -> None:
+        """Ends a program ("controller", "process", …) with a signal, as a crash would: that it ended is no error then.
+
+        :raises ValueError: no such program runs.
+        """
+        processes = self._running()
+        if not processes.running(name):
+            raise ValueError(f"no program '{name}' runs; there is {', '.join(processes.pids)}")
+        self._killed.add(name)
+        processes.signal(name, number)
+        processes.wait([name], _FAREWELL_S)
+
+    # Beginning.
+
+    def __enter__(self) -> Rig:
+        self.start()
+        return self
+
+    def start(self) -> None:
+        """Starts the programs, and waits for the first cycle.
+
+        :raises ProgramFailed: one of them ended, such as with exit code 2 for bad input.
+        :raises ProgramNotFound: one of them is nowhere.
+        """
+        if self._processes:
+            raise ValueError("a rig is started once; make another")
+        emulator = self.program("emulator")
+        self.folder = _folder(self._out, self._experiment)
+        output = self.folder / "programs"
+        shutil.rmtree(output, ignore_errors=True)
+        output.mkdir(parents=True)
+        private = Path(tempfile.mkdtemp(prefix="airbench-rig-", dir=_private_parent()))
+        self.bus_path, self._telemetry = private / "bus0", private / "telemetry"
+        self._processes = Processes(private, output)
+        try:
+            self._write_files()
+            started = [each for controller in self.controllers for each in controller.programs(self)]
+            self._processes.start("emulator", [str(emulator), *self._emulator_words()])
+            self._wait_for(self.bus_path)
+            for each in started:
+                self._processes.start(*each)
+            self._connect()
+        except BaseException:
+            self._processes.close(0.0)
+            raise
+
+    def _write_files(self) -> None:
+        tables = self._experiment if isinstance(self._experiment, Mapping) else None
+        if self._experiment is not None and tables is None:
+            self.experiment_file = programs.experiment(self._experiment)  # type: ignore[arg-type]
+        if self._setup or tables is not None:
+            if tables is None:
+                text = self.experiment_file.read_text(encoding="utf-8") if self.experiment_file else "title = \"rig\"\n"
+                tables = tomllib.loads(text)
+            whole = {**tables, "rig": {**tables.get("rig", {}), **self._setup}}
+            self.experiment_file = self.folder / "experiment.toml"
+            self.experiment_file.write_text(fault_files.toml(whole), encoding="utf-8")
+        self._fault_file: Path | None = None
+        if isinstance(self._faults, (str, os.PathLike)):
+            self._fault_file = Path(self._faults)
+        elif self._faults:
+            self._fault_file = self.folder / "faults.toml"
+            self._fault_file.write_text(fault_files.script(self._faults, self._seed), encoding="utf-8")
+
+    def _emulator_words(self) -> list[str]:
+        options = f"?{self._bus_options}" if self._bus_options else ""
+        words = ["run", "--bus", self.url + options, "--rig", str(self.rig_file), "--out", str(self.folder), "--pace", self.pace]
+        words += ["--seed", str(self._seed), "--console", "--telemetry", str(self._telemetry)]
+        for option, value in (("--experiment", self.experiment_file), ("--faults", self._fault_file), ("--sealed", self._sealed)):
+            words += [option, str(value)] if value else []
+        words += ["--seconds", str(self._seconds)] if self._seconds is not None else []
+        if self.pace == "lockstep":
+            members = 1 + sum(controller.members for controller in self.controllers)
+            words += ["--members", str(members), "--lockstep-timeout", str(_A_DAY_S)]
+            words += [word for each in self.controllers if each.echo for word in ("--lockstep-echo", each.echo)]
+            words += ["--join-timeout", str(self._join_s())]
+        return words + self._emulator_options
+
+    def _join_s(self) -> int:
+        """Wall time for all to join, s: a debugger at reset may take as long as it likes."""
+        return _A_DAY_S if any(getattr(each, "gdb", None) is not None for each in self.controllers) else 60
+
+    def _wait_for(self, path: Path) -> None:
+        until = time.monotonic() + 30.0
+        while not path.exists():
+            self._look()
+            if time.monotonic() > until:
+                raise AirbenchError("the emulator has opened no bus within 30 s")
+            time.sleep(0.002)
+
+    def _connect(self) -> None:
+        laws = [Answering(each, self.names) for each in self.controllers if isinstance(each, Python)]
+        bus = peer.Peer(str(self.bus_path))
+        try:
+            if self.pace == "lockstep":
+                self._link = Lockstep(bus, self.seen, laws, self._look, self._answer_s, self._join_s())
+            else:
+                self._link = RealTime(bus, self.seen, laws, self._look, 30.0)
+        except Ended as ended:
+            raise self._why_ended(str(ended)) from None
+
+    # While it runs.
+
+    def _running(self) -> Processes:
+        if not self._processes:
+            raise RigEnded("the rig has not been started: with Rig(...) as rig")
+        if self._over:
+            raise RigEnded("the run is over")
+        return self._processes
+
+    def _look(self) -> None:
+        """Raises ProgramFailed when a program has ended that should not have."""
+        processes = self._running()
+        processes.look()
+        for name, code in processes.ended.items():
+            # Who is done may end; but nobody before the first cycle, and the emulator that ended shows on the bus.
+            if self._link is None or self._is_failure(name, code):
+                raise ProgramFailed(name, code, processes.said(name), self.folder)
+
+    def _is_failure(self, name: str, code: int) -> bool:
+        if code in (GOOD, BOUND_BROKEN) or name in self._killed:
+            return False
+        # "The rig ended before the experiment was done": as it was asked to.
+        early = self._quit_asked or self._seconds is not None
+        return not (early and code == PARTNER_FAILED and name != "emulator" and self._running().ended.get("emulator") == GOOD)
+
+    def _advance(self) -> None:
+        """One cycle further. Raises RigEnded at the end of the run, ProgramFailed when a program has failed."""
+        self._running()
+        assert self._link
+        try:
+            self._link.advance()
+        except Ended as ended:
+            raise self._why_ended(str(ended)) from None
+        except NotAnswered as late:
+            gone = [f"{name} has ended with exit code {code}" for name, code in self._running().ended.items()]
+            raise NotAnswered("; ".join([str(late), *gone, f"run folder: {self.folder}"])) from None
+        if self._link.cycle % 100 == 0:
+            self._look()
+
+    def _catch_up(self) -> None:
+        self._running()
+        assert self._link
+        try:
+            self._link.catch_up()
+        except Ended as ended:
+            raise self._why_ended(str(ended)) from None
+
+    def _send(self, raw_id: int, data: bytes) -> None:
+        self._running()
+        assert self._link
+        try:
+            self._link.send(raw_id, data)
+        except Ended as ended:
+            raise self._why_ended(str(ended)) from None
+        self.seen.take(raw_id, data, len(data), self.time)
+
+    def _why_ended(self, why: str) -> AirbenchError:
+        processes = self._running()
+        processes.wait(["emulator"], _FAREWELL_S)
+        try:
+            self._look()
+        except ProgramFailed as failed:
+            return failed
+        try:
+            why = str(Run(self.folder).ended_because) or why
+        except (OSError, ValueError):
+            pass  # it left no summary; what the bus said is all there is
+        return RigEnded(f"the run ended after {self.time:.3f} s: {why}")
+
+    # Its end.
+
+    def finish(self, within: str | float = "1000 s") -> Run:
+        """Runs to the end of the experiment, or to `seconds`, and gives the run.
+
+        Where nobody says done (a Python function, a `Process` or `Elf` without `says_done`) and `seconds` was not given, that is now.
+
+        :raises ExpectationFailed: it did not end within that time of the rig.
+        :raises ProgramFailed: a program failed.
+        """
+        if self._run:
+            return self._run
+        if self._seconds is None and not any(each.says_done for each in self.controllers):
+            return self.end()
+        self._run_out(within)
+        return self._close(raising=True)
+
+    def end(self) -> Run:
+        """Ends the run now, with everything saved, and gives it. Raises ProgramFailed as `finish` does."""
+        if self._run:
+            return self._run
+        self._quit()
+        return self._close(raising=True)
+
+    def _quit(self) -> None:
+        self._quit_asked = True
+        try:
+            self.console("quit")
+            while True:
+                self._advance()
+        except (AirbenchError, peer.BusError):
+            pass  # it has ended, which is what was asked
+
+    def _run_out(self, within: str | float) -> None:
+        began_s = self.time
+        until_s = began_s + seconds(within)
+        try:
+            while self.time < until_s:
+                self._advance()
+        except RigEnded:
+            return
+        failure = self.failure(f"expected the run to end within {seconds(within):g} s", "it did not", [], began_s)
+        self.failures.append(failure)
+        raise failure
+
+    def _close(self, raising: bool) -> Run:
+        processes = self._running()
+        if self._link:
+            self._link.close()
+        processes.wait(["emulator"], _FAREWELL_S)
+        processes.wait(list(processes.pids), _LEAVING_S)
+        self._exit_codes = dict(processes.ended)
+        # A foreign program that knows no end is ended.
+        processes.close(_LEAVING_S)
+        failed = [(name, code) for name, code in self._exit_codes.items() if self._is_failure(name, code)]
+        self._over = True
+        if raising and failed:
+            name, code = failed[0]
+            raise ProgramFailed(name, code, processes.said(name), self.folder)
+        if self._summarise and (self.folder / "summary.json").exists():
+            self._sum_up(raising)
+        self._run = Run(self.folder, self._exit_codes)
+        return self._run
+
+    def _sum_up(self, raising: bool) -> None:
+        done = subprocess.run(
+            [self.program("bench"), "summary", self.folder], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
+        )
+        (self.folder / "programs/summary.txt").write_text(done.stdout + done.stderr)
+        if raising and done.returncode not in (GOOD, BOUND_BROKEN, INTERRUPTED):
+            raise ProgramFailed("bench summary", done.returncode, done.stderr or done.stdout, self.folder)
+
+    def close(self) -> None:
+        """Ends the run if it goes on, and everything that runs. To close twice does nothing."""
+        if not self._processes:
+            return
+        try:
+            if not self._over:
+                self._quit()
+                self._close(raising=False)
+        except (AirbenchError, OSError, ValueError):
+            pass  # the folder has what could be saved
+        finally:
+            self._over = True
+            self._processes.close(0.0)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+def _private_parent() -> str | None:
+    """Where sockets lie: a short path, since one of a socket has 107 bytes at most."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    return runtime if os.path.isabs(runtime) and os.access(runtime, os.W_OK) else None
+
+
+def _folder(out: StrPath | None, experiment: StrPath | Mapping[str, Any] | None) -> Path:
+    if out is not None:
+        folder = Path(out).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+    title = "rig" if experiment is None else experiment.get("title", "rig") if isinstance(experiment, Mapping) else Path(experiment).stem
+    runs = Path("runs").resolve()
+    runs.mkdir(exist_ok=True)
+    return Path(tempfile.mkdtemp(prefix=time.strftime(f"%Y%m%d-%H%M%S-{title}-"), dir=runs))
