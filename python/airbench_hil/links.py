@@ -40,6 +40,9 @@ class Link:
     def catch_up(self) -> None:
         """To the newest cycle, where time goes on by itself. Raises Ended."""
 
+    def silence(self) -> None:
+        """Python controllers answer no more."""
+
     def send(self, raw_id: int, data: bytes) -> None:
         """Sends a frame, which acts in the next cycle. Raises Ended."""
         raise NotImplementedError
@@ -61,7 +64,7 @@ class Lockstep(Link):
         :param answer_s: wall time that the others have for a cycle, s.
         :param join_s: wall time that they have to join, s.
         """
-        self._bus, self._seen, self._laws, self._look, self._answer_s = bus, seen, laws, look, answer_s
+        self._bus, self._seen, self._laws, self._look, self._answer_s = bus, seen, list(laws), look, answer_s
         self._began = False
         bus.join("test")
         self._until_go(join_s)
@@ -110,6 +113,9 @@ class Lockstep(Link):
             self._bus.send(raw_id, data)
         except peer.BusError as error:
             raise Ended(str(error)) from error
+
+    def silence(self) -> None:
+        self._laws.clear()
 
     def close(self) -> None:
         self._bus.close()
@@ -203,6 +209,9 @@ class RealTime(Link):
             self._bus.send(raw_id, data)
         except peer.BusError as error:
             raise Ended(str(error)) from error
+
+    def silence(self) -> None:
+        self._laws = {}
 
     def close(self) -> None:
         self._bus.hang_up()

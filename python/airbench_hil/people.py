@@ -23,6 +23,9 @@ class People:
     def _init_people(self) -> None:
         self._hands = {"carriage": 0.0, "load_eye": 0.0}
 
+    def _check_runs(self) -> None:
+        raise NotImplementedError
+
     def _send(self, raw_id: int, data: bytes) -> None:
         raise NotImplementedError
 
@@ -44,6 +47,7 @@ class People:
 
         :raises Refused: it does not obey.
         """
+        self._check_runs()
         return console.command(self._telemetry, line)
 
     def emergency_stop(self, by: Literal["console", "rig"] = "console") -> None:

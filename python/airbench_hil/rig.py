@@ -329,13 +329,20 @@ class Rig(Expectations, People):
         return self._close(raising=True)
 
     def _quit(self) -> None:
-        self._quit_asked = True
+        """Ends the run at the console, or by SIGTERM where it stands: both save everything."""
+        processes, self._quit_asked = self._running(), True
+        if self._link:
+            self._link.silence()
         try:
             self.console("quit")
             while True:
                 self._advance()
-        except (AirbenchError, peer.BusError):
-            pass  # it has ended, which is what was asked
+        except (AirbenchError, peer.BusError) as ended:
+            if not isinstance(ended, RigEnded) and processes.running("emulator"):
+                processes.signal("emulator", signal.SIGTERM)
+
+    def _check_runs(self) -> None:
+        self._running()
 
     def _run_out(self, within: str | float) -> None:
         began_s = self.time
@@ -354,7 +361,7 @@ class Rig(Expectations, People):
         if self._link:
             self._link.close()
         processes.wait(["emulator"], _FAREWELL_S)
-        processes.wait(list(processes.pids), _LEAVING_S)
+        processes.wait(list(processes.pids), _LEAVING_S if raising else 0.3)
         self._exit_codes = dict(processes.ended)
         # A foreign program that knows no end is ended.
         processes.close(_LEAVING_S)

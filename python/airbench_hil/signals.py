@@ -115,6 +115,10 @@ class Names:
         unknown = set(values) - {each.name for each in message.signals}
         if unknown:
             raise ValueError(f"{name} has no {', '.join(sorted(unknown))}; it has {', '.join(s.name for s in message.signals)}")
+        for each in message.signals:
+            word, words = values.get(each.name), [str(word) for word in (each.choices or {}).values()]
+            if isinstance(word, str) and word not in words:
+                raise ValueError(f"{name}.{each.name} is never '{word}': {', '.join(words) or 'it has no words'}")
         whole = {each.name: values.get(each.name, 0) for each in message.signals}
         try:
             data = message.encode(whole, strict=True)
