@@ -51,6 +51,8 @@ class Started(NamedTuple):
     words: list[str]
     env: dict[str, str] | None = None
     cwd: Path | None = None
+    guest: bool = False
+    """It runs under `bench can`."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ class Process:
         if self.can:
             words = [str(rig.program("bench")), "can", "--bus", rig.url, "--", *words]
         env = {**os.environ, **self.env} if self.env else None
-        return [Started(self.name, words, env, Path(self.cwd) if self.cwd else None)]
+        return [Started(self.name, words, env, Path(self.cwd) if self.cwd else None, self.can)]
 
 
 @dataclass(frozen=True)

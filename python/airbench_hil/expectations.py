@@ -91,6 +91,7 @@ class Expectations:
 
         :raises ExpectationFailed: it did not hold within that time.
         """
+        __tracebackhide__ = True  # of pytest: a failure is shown where the test expects
         watch, began_s = self._watch(test), self.time
         until_s = began_s + seconds(within) - _HALF_S
         try:
@@ -104,6 +105,7 @@ class Expectations:
 
     def wait_for(self, test: Test, timeout: Duration = "60 s") -> float:
         """As `expect`, for what a test only needs to go on: a state of the rig, a phase of the experiment."""
+        __tracebackhide__ = True
         return self.expect(test, within=timeout)
 
     def never(self, test: Test, during: Duration) -> None:
@@ -111,6 +113,7 @@ class Expectations:
 
         :raises ExpectationFailed: it did, or the run ended before.
         """
+        __tracebackhide__ = True
         self._hold(test, seconds(during), wanted=False, what="never")
 
     def always(self, test: Test, during: Duration) -> None:
@@ -118,9 +121,11 @@ class Expectations:
 
         :raises ExpectationFailed: it did not, or the run ended before.
         """
+        __tracebackhide__ = True
         self._hold(test, seconds(during), wanted=True, what="always")
 
     def _hold(self, test: Test, during_s: float, wanted: bool, what: str) -> None:
+        __tracebackhide__ = True
         watch, began_s = self._watch(test), self.time
         until_s = began_s + during_s - _HALF_S
         title = f"expected {what} for {during_s:g} s: {_text(test)}"
@@ -144,6 +149,7 @@ class Expectations:
         :returns: the rig's time at which the stable part began, s.
         :raises ExpectationFailed: there was no such part.
         """
+        __tracebackhide__ = True
         wanted_s, began_s = seconds(duration), self.time
         until_s = began_s + seconds(within) - _HALF_S
         title = f"expected within {seconds(within):g} s, stable for {wanted_s:g} s: {_text(what)}"
@@ -197,6 +203,7 @@ class Expectations:
         return parse(text, self.names)
 
     def _fail(self, title: str, test: Test, began_s: float, why: str) -> NoReturn:
+        __tracebackhide__ = True
         signals: list[Signal] = []
         if isinstance(test, str):
             signals = [self.names.signal(test)] if test in self.names.signals else self._condition(test).signals

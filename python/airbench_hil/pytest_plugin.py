@@ -5,6 +5,8 @@ Loaded by its entry point (`pytest11`), with pytest-xdist or without; `docs/pyte
 
 from __future__ import annotations
 
+import base64
+import ctypes
 import fcntl
 import os
 import re
@@ -172,8 +174,6 @@ class Bus:
 
 
 def _die_with_parent() -> None:
-    import ctypes
-
     ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)
 
 
@@ -242,7 +242,10 @@ def _attach(config: pytest.Config, report: pytest.TestReport, rig: Rig) -> None:
 
     attached = getattr(report, "extras", [])
     for key, path in _left(rig):
-        attached.append(extras.svg(path.read_text(), name=key) if path.suffix == ".svg" else extras.url(path.as_uri(), name=key))
+        if path.suffix == ".svg":
+            attached.append(extras.svg(base64.b64encode(path.read_bytes()).decode(), name=key))
+        else:
+            attached.append(extras.url(path.as_uri(), name=key))
     report.extras = attached  # type: ignore[attr-defined]
 
 

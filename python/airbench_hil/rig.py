@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 import time
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
@@ -24,6 +24,7 @@ from airbench_hil.conditions import seconds
 from airbench_hil.errors import BOUND_BROKEN, GOOD, INTERRUPTED, PARTNER_FAILED, AirbenchError, NotAnswered, ProgramFailed, RigEnded
 from airbench_hil.expectations import Expectations
 from airbench_hil.faults import Fault
+from airbench_hil.guests import Readiness
 from airbench_hil.links import Ended, Link, Lockstep, RealTime
 from airbench_hil.people import People
 from airbench_hil.processes import Processes
@@ -33,6 +34,10 @@ from airbench_hil.signals import Names, Seen, database
 Pace = Literal["lockstep", "real"]
 #: A debugger may hold a cycle as long as this, s.
 _A_DAY_S = 86400
+#: Wall time that programs have to come to the bus, s.
+_JOIN_S = 60
+#: ... and a program under `bench can` until it waits for frames; then it is taken for ready, s.
+_GUEST_S = 10.0
 _FAREWELL_S, _LEAVING_S = 10.0, 2.0
 
 
@@ -172,9 +177,12 @@ class Rig(Expectations, People):
             self._write_files()
             started = [each for controller in self.controllers for each in controller.programs(self)]
             self._processes.start("emulator", [str(emulator), *self._emulator_words()])
-            self._wait_for(self.bus_path)
+            self._wait(self.bus_path.exists, "the emulator's bus")
             for each in started:
-                self._processes.start(*each)
+                self._processes.start(each.name, each.words, each.env, each.cwd)
+            for each in started:
+                if each.guest and self.pace == "lockstep":
+                    self._wait_for_guest(each.name)
             self._connect()
         except BaseException:
             self._processes.close(0.0)
@@ -214,15 +222,23 @@ class Rig(Expectations, People):
 
     def _join_s(self) -> int:
         """Wall time for all to join, s: a debugger at reset may take as long as it likes."""
-        return _A_DAY_S if any(getattr(each, "gdb", None) is not None for each in self.controllers) else 60
+        return _A_DAY_S if any(getattr(each, "gdb", None) is not None for each in self.controllers) else _JOIN_S
 
-    def _wait_for(self, path: Path) -> None:
-        until = time.monotonic() + 30.0
-        while not path.exists():
+    def _wait(self, there: Callable[[], bool], what: str) -> None:
+        until = time.monotonic() + _JOIN_S
+        while not there():
             self._look()
             if time.monotonic() > until:
-                raise AirbenchError("the emulator has opened no bus within 30 s")
+                raise AirbenchError(f"{what} is not there within {_JOIN_S} s")
             time.sleep(0.002)
+
+    def _wait_for_guest(self, name: str) -> None:
+        assert self._processes
+        ready = Readiness(self._processes.pids[name])
+        until = time.monotonic() + _GUEST_S
+        while not ready.look() and time.monotonic() < until:
+            self._look()
+            time.sleep(0.005)
 
     def _connect(self) -> None:
         laws = [Answering(each, self.names) for each in self.controllers if isinstance(each, Python)]
@@ -231,7 +247,7 @@ class Rig(Expectations, People):
             if self.pace == "lockstep":
                 self._link = Lockstep(bus, self.seen, laws, self._look, self._answer_s, self._join_s())
             else:
-                self._link = RealTime(bus, self.seen, laws, self._look, 30.0)
+                self._link = RealTime(bus, self.seen, laws, self._look, _JOIN_S)
         except Ended as ended:
             raise self._why_ended(str(ended)) from None
 
