@@ -9,11 +9,14 @@ loses nothing however slow it is; stamps are simulated time from 0, in seconds. 
 one that does not read for a second (it starts, or is between two sessions) has what came put by, one cycle a second.
 """
 
+from __future__ import annotations
+
 import collections
 import stat
 import threading
 import time
 from os import stat as status_of
+from typing import Any
 
 import can
 
@@ -28,13 +31,13 @@ class AirbenchBus(can.BusABC):
 
     def __init__(
         self,
-        channel=None,
-        can_filters=None,
-        receive_own_messages=False,
-        member=None,
-        connect_timeout=10.0,
-        **kwargs,
-    ):
+        channel: str | None = None,
+        can_filters: can.typechecking.CanFilters | None = None,
+        receive_own_messages: bool = False,
+        member: str | None = None,
+        connect_timeout: float = 10.0,
+        **kwargs: Any,
+    ) -> None:
         """Connects to the bus at `channel`, a path or unix:///PATH.
 
         :param can_filters: as of every python-can bus; frames that none lets in are no messages, but are read.
@@ -61,12 +64,12 @@ class AirbenchBus(can.BusABC):
             raise can.CanInitializationError(str(error)) from error
         self.channel_info = f"airbench {path}"
         # What was sent and has not come back: the host does not say whose a frame is.
-        self._own = collections.deque() if receive_own_messages else None
+        self._own: collections.deque[tuple[int, int, bytes]] | None = collections.deque() if receive_own_messages else None
         self._own_lock, self._sending = threading.Lock(), threading.Lock()
         self._member, self._now_s = member, 0.0
-        self._pending = collections.deque()
-        self._let_in = None
-        self._gone = None
+        self._pending: collections.deque[tuple[peer.Frame, bool]] = collections.deque()
+        self._let_in: list[tuple[int, int, bool | None]] | None = None
+        self._gone: str | None = None
         self._lock = threading.Lock()
         self._last_read = time.monotonic()
         self._can_protocol = can.CanProtocol.CAN_20
@@ -74,13 +77,13 @@ class AirbenchBus(can.BusABC):
         if member:
             threading.Thread(target=self._keep_alive, daemon=True).start()
 
-    def fileno(self):
+    def fileno(self) -> int:
         """A descriptor that is readable when a frame waits; that of a member would not tell of frames that were put by."""
         if self._member:
             raise NotImplementedError("a member of the barrier has no descriptor to wait on")
         return self._peer.fileno()
 
-    def _apply_filters(self, filters):
+    def _apply_filters(self, filters: can.typechecking.CanFilters | None) -> None:
         self._let_in = None if not filters else [
             (
                 each["can_id"] & each["can_mask"],
@@ -90,7 +93,7 @@ class AirbenchBus(can.BusABC):
             for each in filters
         ]
 
-    def _wanted(self, raw_id):
+    def _wanted(self, raw_id: int) -> bool:
         if self._let_in is None:
             return True
         extended = bool(raw_id & peer.EXTENDED)
@@ -100,7 +103,7 @@ class AirbenchBus(can.BusABC):
             for wanted, mask, of_extended in self._let_in
         )
 
-    def _recv_internal(self, timeout):
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         until = None if timeout is None else time.monotonic() + timeout
         with self._lock:
             # A bus that is never silent must not keep whoever has waited long enough.
@@ -114,7 +117,7 @@ class AirbenchBus(can.BusABC):
                     return self._message(frame, own), True
         return None, True
 
-    def _next(self, timeout_s):
+    def _next(self, timeout_s: float | None) -> tuple[peer.Frame | None, bool]:
         """The next frame and whether it is an own one; None when none comes. A cycle that is over is said to be done."""
         if self._gone:
             raise can.CanOperationError(self._gone)
@@ -138,7 +141,7 @@ class AirbenchBus(can.BusABC):
             self._sender.forget()
         return packet, self._is_own(packet)
 
-    def _is_own(self, frame):
+    def _is_own(self, frame: peer.Frame) -> bool:
         sent = (frame.raw_id, frame.length, frame.data)
         with self._own_lock:
             if not self._own or sent not in self._own:
@@ -148,7 +151,7 @@ class AirbenchBus(can.BusABC):
                 pass
         return True
 
-    def _keep_alive(self):
+    def _keep_alive(self) -> None:
         """Reads up to the end of a cycle whenever nobody has read for a while."""
         while not self._is_shutdown and not self._gone:
             time.sleep(_PATIENCE_S / 4)
@@ -157,12 +160,12 @@ class AirbenchBus(can.BusABC):
                     continue
                 try:
                     while (came := self._next(0.0))[0] is not None:
-                        self._pending.append(came)
+                        self._pending.append((came[0], came[1]))
                 except can.CanOperationError:
                     return
                 self._last_read = time.monotonic()
 
-    def _message(self, frame, own):
+    def _message(self, frame: peer.Frame, own: bool) -> can.Message:
         remote = bool(frame.raw_id & peer.REMOTE)
         extended = bool(frame.raw_id & peer.EXTENDED)
         return can.Message(
@@ -177,7 +180,7 @@ class AirbenchBus(can.BusABC):
             data=None if remote else frame.data,
         )
 
-    def send(self, msg, timeout=None):
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Sends a message; waits for room in the host's queue for `timeout`, without end if None.
 
         :raises CanOperationError: the bus is gone, the time is over, or the message is one of CAN FD.
@@ -188,24 +191,24 @@ class AirbenchBus(can.BusABC):
         raw_id |= msg.is_extended_id * peer.EXTENDED | msg.is_remote_frame * peer.REMOTE | msg.is_error_frame * peer.ERROR
         data = b"" if msg.is_remote_frame else bytes(msg.data)
         own = peer.Frame(raw_id, data.ljust(min(msg.dlc, 8), b"\0"), msg.dlc, self._now_s)
-        comes_back = self._own is not None and not self._member
+        comes_back = None if self._member else self._own
         with self._sending:
-            if comes_back:
+            if comes_back is not None:
                 # Before it goes: the one who reads may be faster.
                 with self._own_lock:
-                    self._own.append((own.raw_id, own.length, own.data))
+                    comes_back.append((own.raw_id, own.length, own.data))
             try:
                 self._sender.send(raw_id, data, msg.dlc, timeout)
             except (peer.BusError, TimeoutError) as error:
-                if comes_back:
+                if comes_back is not None:
                     with self._own_lock:
-                        self._own.pop()
+                        comes_back.pop()
                 raise can.CanOperationError(str(error)) from error
             if self._own is not None and self._member:
                 # In the barrier a second connection would be a second controller.
                 self._pending.append((own, True))
 
-    def shutdown(self):
+    def shutdown(self) -> None:
         """Leaves the bus; to do so twice does nothing."""
         if self._is_shutdown:
             return
@@ -217,12 +220,16 @@ class AirbenchBus(can.BusABC):
             self._sender.close()
 
     @property
-    def state(self):
-        """Always active: this bus has no error counters of its own."""
+    def state(self) -> can.BusState:
+        """Always active: this bus has no error counters of its own. It cannot be set."""
         return can.BusState.ACTIVE
 
+    @state.setter
+    def state(self, new_state: can.BusState) -> None:
+        raise NotImplementedError("the embedded bus has no states")
+
     @staticmethod
-    def _detect_available_configs():
+    def _detect_available_configs() -> list[can.typechecking.AutoDetectedConfig]:
         path = peer.default_path()
         try:
             there = stat.S_ISSOCK(status_of(path).st_mode)

@@ -136,7 +136,7 @@ class _Compiler(ast.NodeTransformer):
         if isinstance(node.value, str):
             raise self.wrong(f"the word '{node.value}' is compared with no signal that has words")
         if not isinstance(node.value, (int, float)):
-            raise self.wrong(f"'{node.value}' is no number")
+            raise self.wrong(f"{node.value!r} is no number")
         return node
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:

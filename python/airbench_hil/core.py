@@ -1,8 +1,11 @@
 """A microcontroller in the emulator labwired: its CAN controller at a wire of 1 Mbit/s, its time in the caller's hands."""
 
+from __future__ import annotations
+
 import tempfile
 from importlib import resources
 from pathlib import Path
+from typing import TypedDict
 
 import labwired
 
@@ -17,20 +20,29 @@ _RF0R, _FIFO_MASK, _FIFO_DEPTH = 0x0C, 3, 3
 # What the core's exceptions are called (DDI 0337, table 5-1). Number 1, reset, is the firmware's word for the end of main.
 _EXCEPTIONS = {2: "NMI", 3: "HardFault", 4: "MemManage", 5: "BusFault", 6: "UsageFault", 11: "SVCall", 14: "PendSV", 15: "SysTick"}
 
-CHIPS = {"stm32f103": {"bus": "bxcan1", "can_base": 0x40006400, "hz": 8_000_000}}
+
+class Chip(TypedDict):
+    """What is known of a microcontroller beside its chip file."""
+
+    bus: str
+    can_base: int
+    hz: int
+
+
+CHIPS: dict[str, Chip] = {"stm32f103": {"bus": "bxcan1", "can_base": 0x40006400, "hz": 8_000_000}}
 
 
 class CoreStopped(Exception):
     """The emulator cannot go on: an instruction or an access that the chip does not have; or the firmware says that it stopped."""
 
 
-def wire_ns(raw_id, length):
+def wire_ns(raw_id: int, length: int) -> int:
     """Time of a frame on the wire up to the next one, ns, without stuff bits: data and 47 bits, 67 with 29-bit identifiers."""
     data = 0 if raw_id & peer.REMOTE else 8 * min(length, 8)
     return ((67 if raw_id & peer.EXTENDED else 47) + data) * _NS_A_BIT
 
 
-def system_file(chip, folder):
+def system_file(chip: str, folder: str) -> Path:
     """Writes what labwired wants to know of a chip into the folder, and gives the path of the file that it reads first."""
     text = resources.files("airbench_hil").joinpath(f"chips/{chip}.yaml").read_text()
     Path(folder, "chip.yaml").write_text(text)
@@ -42,7 +54,7 @@ def system_file(chip, folder):
 class Core:
     """One ELF on one chip, from reset on."""
 
-    def __init__(self, elf, chip):
+    def __init__(self, elf: str, chip: str) -> None:
         """Raises ValueError for an unknown chip, OSError or ValueError for an ELF that cannot be loaded."""
         if chip not in CHIPS:
             raise ValueError(f"chip '{chip}' is unknown; there is: {', '.join(sorted(CHIPS))}")
@@ -53,15 +65,15 @@ class Core:
         self.why_refused = ""
         self._record = self._symbol("fault_record")
 
-    def close(self):
+    def close(self) -> None:
         """Nothing runs that had to be ended."""
 
     @property
-    def cycles(self):
+    def cycles(self) -> int:
         """Clocks since reset."""
-        return self.sim.cycles
+        return int(self.sim.cycles)
 
-    def run_ns(self, duration_ns):
+    def run_ns(self, duration_ns: int) -> None:
         """Runs for that time of its own. Raises CoreStopped."""
         if duration_ns == 0:
             return
@@ -69,7 +81,7 @@ class Core:
         if stop.kind != "reached":
             raise CoreStopped(f"{stop.kind} at {self.sim.cycles} clocks, pc {stop.pc}")
 
-    def hear(self, frame):
+    def hear(self, frame: peer.Frame) -> None:
         """A frame that comes to its end on the wire. What the chip does not take is counted."""
         if frame.raw_id & peer.ERROR:
             return
@@ -92,7 +104,7 @@ class Core:
                 self.refused += 1
                 self.why_refused = str(refused)
 
-    def said(self):
+    def said(self) -> list[tuple[int, list[int], int]]:
         """Frames that it has sent since the last call, in its order: (raw_id, data, clocks since reset)."""
         flags = {"extended": peer.EXTENDED, "remote": peer.REMOTE}
         return [
@@ -101,7 +113,7 @@ class Core:
             if (payload := each["payload"])["direction"] == "tx"
         ]
 
-    def millisecond(self, frames):
+    def millisecond(self, frames: list[peer.Frame]) -> list[tuple[int, list[int], int]]:
         """Runs 1 ms in which these frames come, one after the other as on a wire; gives what it sent.
 
         Raises CoreStopped.
@@ -117,16 +129,16 @@ class Core:
         self.check()
         return self.said()
 
-    def check(self):
+    def check(self) -> None:
         """Raises CoreStopped when the ELF has a `fault_record`, two words, and the first is not 0: an exception's number, its pc."""
         exception = self.word(self._record) if self._record else 0
         if exception == 1:
             raise CoreStopped("its main has returned")
         if exception:
             name = _EXCEPTIONS.get(exception, f"interrupt {exception - 16}" if exception > 15 else f"exception {exception}")
-            raise CoreStopped(f"{name}, pc {self.word(self._record + 4):#010x}")
+            raise CoreStopped(f"{name}, pc {self.word((self._record or 0) + 4):#010x}")
 
-    def stack(self):
+    def stack(self) -> tuple[int, int] | None:
         """Bytes of the stack that were used, and its size; None when the ELF has none between `stack_begin` and `stack_end`."""
         begin, end = self._symbol("stack_begin"), self._symbol("stack_end")
         if begin is None or end is None:
@@ -136,13 +148,14 @@ class Core:
             free += 4
         return end - begin - free, end - begin
 
-    def _symbol(self, name):
+    def _symbol(self, name: str) -> int | None:
         """Its address; None when the ELF has none of that name."""
         try:
-            return self.sim.symbol(name)
+            found: int | None = self.sim.symbol(name)
+            return found
         except (KeyError, ValueError):
             return None
 
-    def word(self, address):
+    def word(self, address: int) -> int:
         """Four bytes of its memory."""
-        return self.sim.read_u32(address)
+        return int(self.sim.read_u32(address))

@@ -7,11 +7,14 @@ One instruction is one clock, as in the other class: a run gives the same bytes 
 While the core stands, the member is not done and the rig waits: `emulator run --lockstep-timeout` says how long.
 """
 
+from __future__ import annotations
+
 import select
 import socket
 import struct
 import sys
 import tempfile
+from typing import Any
 
 import labwired
 
@@ -35,26 +38,27 @@ _TARGET = (
 class DebugCore(core.Core):
     """A core that stops where a debugger says."""
 
-    def __init__(self, elf, chip, port):
+    def __init__(self, elf: str, chip: str, port: int) -> None:
         """Listens on 127.0.0.1 at `port`; raises what Core raises, and ValueError when the port cannot be had."""
         super().__init__(elf, chip)
         with tempfile.TemporaryDirectory(prefix="airbench-mcu-") as folder:
             self.machine = labwired.Machine(str(elf), str(core.system_file(chip, folder)))
-        self._clocks, self._sent = 0, []
+        self._clocks = 0
+        self._sent: list[tuple[int, list[int], int]] = []
         self.server = GdbServer(self.machine, port)
 
     @property
-    def cycles(self):
+    def cycles(self) -> int:
         """Clocks since reset."""
         return self._clocks
 
-    def _read(self, register):
-        return struct.unpack("<I", bytes(self.machine.read_memory(self._can + register, 4)))[0]
+    def _read(self, register: int) -> int:
+        return int.from_bytes(bytes(self.machine.read_memory(self._can + register, 4)), "little")
 
-    def _write(self, register, word):
+    def _write(self, register: int, word: int) -> None:
         self.machine.write_memory(self._can + register, list(struct.pack("<I", word)))
 
-    def run_ns(self, duration_ns):
+    def run_ns(self, duration_ns: int) -> None:
         """Runs for that time of its own; stands still as long as a debugger wants."""
         left = duration_ns * core.CHIPS[self.chip]["hz"] // 1_000_000_000
         self.server.look()
@@ -69,7 +73,7 @@ class DebugCore(core.Core):
                 if flags & done:
                     self._take(mailbox)
 
-    def _take(self, mailbox):
+    def _take(self, mailbox: int) -> None:
         registers = self.machine.read_memory(self._can + _MAILBOX + 16 * mailbox, 16)
         identifier, length, low, high = struct.unpack("<4I", bytes(registers))
         raw_id = identifier >> 3 | peer.EXTENDED if identifier & 4 else identifier >> 21
@@ -77,7 +81,7 @@ class DebugCore(core.Core):
         self._sent.append((raw_id | (peer.REMOTE if identifier & 2 else 0), list(data), self._clocks))
         self._write(_TSR, _ALL_FLAGS)
 
-    def hear(self, frame):
+    def hear(self, frame: peer.Frame) -> None:
         """A frame that comes to its end on the wire. What the chip does not take is counted."""
         waiting = self._read(_RF0R) & 3
         if frame.raw_id & peer.ERROR:
@@ -109,16 +113,16 @@ class DebugCore(core.Core):
         if self._read(_RF0R) & 3 == waiting:
             self.not_taken += 1
 
-    def said(self):
+    def said(self) -> list[tuple[int, list[int], int]]:
         """Frames that it has sent since the last call."""
         sent, self._sent = self._sent, []
         return sent
 
-    def word(self, address):
+    def word(self, address: int) -> int:
         """Four bytes of its memory."""
-        return struct.unpack("<I", bytes(self.machine.read_memory(address, 4)))[0]
+        return int.from_bytes(bytes(self.machine.read_memory(address, 4)), "little")
 
-    def close(self):
+    def close(self) -> None:
         """Tells the debugger that the program has ended."""
         self.server.close()
 
@@ -126,21 +130,23 @@ class DebugCore(core.Core):
 class GdbServer:
     """The part of GDB's remote serial protocol that one halted or running core needs."""
 
-    def __init__(self, machine, port):
+    def __init__(self, machine: Any, port: int) -> None:
         self._machine = machine
         try:
             listener = socket.create_server(("127.0.0.1", port))
         except (OSError, OverflowError) as error:
             raise ValueError(f"--gdb {port}: {error}") from error
-        self.port = listener.getsockname()[1]
+        self.port: int = listener.getsockname()[1]
         print(f"mcu: halted at reset; gdb-multiarch ELF -ex 'target remote :{self.port}'", file=sys.stderr, flush=True)
-        self._socket, _ = listener.accept()
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection, _ = listener.accept()
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         listener.close()
-        self._bytes, self._breakpoints = b"", set()
+        self._socket: socket.socket | None = connection
+        self._bytes = b""
+        self._breakpoints: set[int] = set()
         self._halted, self._step = True, False
 
-    def look(self):
+    def look(self) -> None:
         """Whether the debugger has interrupted the core meanwhile."""
         if self._socket and not self._halted and select.select([self._socket], [], [], 0)[0]:
             got = self._more()
@@ -150,7 +156,7 @@ class GdbServer:
                 self._halted = True
                 self._reply("S02")
 
-    def before(self, pc):
+    def before(self, pc: int) -> bool:
         """Called before an instruction; returns when it may go, and says whether the next one has to be asked for."""
         if self._socket is None:
             return False
@@ -163,7 +169,7 @@ class GdbServer:
             return True
         return bool(self._breakpoints)
 
-    def _serve(self):
+    def _serve(self) -> None:
         while self._socket and self._halted:
             packet = self._packet()
             if packet is None:
@@ -173,7 +179,7 @@ class GdbServer:
             if answer is not None:
                 self._reply(answer)
 
-    def _packet(self):
+    def _packet(self) -> str | None:
         while True:
             begin, end = self._bytes.find(b"$"), self._bytes.find(b"#")
             if 0 <= begin < end and len(self._bytes) >= end + 3:
@@ -185,24 +191,24 @@ class GdbServer:
                 return None
             self._bytes += got
 
-    def _more(self):
+    def _more(self) -> bytes:
         """What the debugger has sent; nothing when it is gone, killed too."""
         try:
-            return self._socket.recv(4096)
+            return self._socket.recv(4096) if self._socket else b""
         except OSError:
             return b""
 
-    def _reply(self, text):
+    def _reply(self, text: str) -> None:
         self._write(f"${text}#{sum(text.encode()) & 0xFF:02x}".encode())
 
-    def _write(self, packet):
+    def _write(self, packet: bytes) -> None:
         try:
             if self._socket:
                 self._socket.sendall(packet)
         except OSError:
             self._leave()
 
-    def _answer(self, packet):
+    def _answer(self, packet: str) -> str | None:
         kind, rest = packet[:1], packet[1:]
         try:
             if packet.startswith("qSupported"):
@@ -222,7 +228,7 @@ class GdbServer:
         except (ValueError, OverflowError, RuntimeError, OSError):
             return "E01"
 
-    def _state(self, kind, rest):
+    def _state(self, kind: str, rest: str) -> str:
         """Registers, memory and breakpoints."""
         if kind == "?":
             return "S05"
@@ -247,17 +253,17 @@ class GdbServer:
             return "OK"
         return "OK" if kind == "H" else ""
 
-    def _register(self, number):
+    def _register(self, number: int) -> str:
         value = self._machine.get_pc() & ~1 if number == 15 else self._machine.read_register(number)
         return struct.pack("<I", value & 0xFFFFFFFF).hex()
 
-    def _leave(self):
+    def _leave(self) -> None:
         if self._socket:
             self._socket.close()
         self._socket, self._halted, self._step = None, False, False
         self._breakpoints.clear()
 
-    def close(self):
+    def close(self) -> None:
         """The program has ended."""
         if self._socket:
             self._reply("W00")

@@ -2,19 +2,25 @@
 it sends in that time acts in k + 1. Its time is the bus's time.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import signal
 import sys
 import time
+from typing import TYPE_CHECKING, Any
 
 from airbench_hil import peer
+
+if TYPE_CHECKING:
+    from airbench_hil.core import Core
 
 # Exit codes: protocol/src/exit.rs.
 BAD_INPUT, BUS_FAILED, LOCKSTEP_TIMEOUT, INTERRUPTED = 2, 3, 4, 130
 
 
-def _arguments(words, prog):
+def _arguments(words: list[str] | None, prog: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog=prog,
         description="Runs the ELF of a microcontroller in labwired as a controller in lockstep with the rig: 1 ms of the core "
@@ -36,12 +42,12 @@ def _arguments(words, prog):
     return parser.parse_args(words)
 
 
-def _fail(code, text):
+def _fail(code: int, text: object) -> int:
     print(f"mcu: {text}", file=sys.stderr)
     return code
 
 
-def _report(core, sums, began):
+def _report(core: Core, sums: dict[str, int], began: float) -> dict[str, Any]:
     stack = core.stack()
     return {
         "cycles": sums["cycles"],
@@ -58,7 +64,7 @@ def _report(core, sums, began):
     }
 
 
-def _lockstep(core, bus, boot_ms, sums):
+def _lockstep(core: Core, bus: peer.Peer, boot_ms: int, sums: dict[str, int]) -> None:
     """The run, until the bus ends."""
     clocks_a_ms = core.cycles // boot_ms
     for cycle, frames in peer.cycles(bus):
@@ -77,7 +83,7 @@ def _lockstep(core, bus, boot_ms, sums):
             raise RuntimeError(f"cycle {cycle}: the core is at {core.cycles} clocks: its time is not the bus's")
 
 
-def main(words=None, prog="scripts/mcu"):
+def main(words: list[str] | None = None, prog: str = "scripts/mcu") -> int:
     """The program; gives its exit code."""
     asked = _arguments(words, prog)
     try:
@@ -141,7 +147,7 @@ def main(words=None, prog="scripts/mcu"):
     return code
 
 
-def entry():
+def entry() -> None:
     """The program as it is installed."""
     sys.exit(main(prog="airbench-mcu"))
 

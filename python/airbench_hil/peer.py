@@ -7,13 +7,16 @@ Packets of 32 bytes belong to the lockstep barrier (protocol/src/bus/control.rs)
                          + 2 pad  u32 LE
 """
 
+from __future__ import annotations
+
 import os
 import select
 import socket
 import struct
 import tempfile
 import time
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000
 LONGEST_NAME = 20
@@ -53,14 +56,14 @@ class Go(NamedTuple):
     members: int
 
 
-def default_path():
+def default_path() -> str:
     """Where this user's programs look for the bus (docs/specification/bus.md, Buses)."""
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     folder = os.path.join(runtime, "airbench") if os.path.isabs(runtime) else None
     return os.path.join(folder or os.path.join(tempfile.gettempdir(), f"airbench-{os.getuid()}"), "bus0")
 
 
-def path_of(url):
+def path_of(url: object) -> str:
     """The socket of `unix:///PATH`, of a bare absolute path, or of None for the default bus. Raises ValueError for others."""
     if not url:
         return default_path()
@@ -72,7 +75,7 @@ def path_of(url):
     return path
 
 
-def check_name(name):
+def check_name(name: str) -> bytes:
     """A member's name as the bus carries it. Raises ValueError unless it has 1 to 20 bytes."""
     encoded = name.encode()
     if not 0 < len(encoded) <= LONGEST_NAME:
@@ -83,7 +86,7 @@ def check_name(name):
 class Peer:
     """A node of the bus. What it sends, it does not hear; all others do."""
 
-    def __init__(self, path, patience_s=10.0):
+    def __init__(self, path: str, patience_s: float = 10.0) -> None:
         """Connects, waiting `patience_s` for a host that is only just starting. Raises BusError."""
         self.path = path
         self.socket = self._connected(path, patience_s)
@@ -94,7 +97,7 @@ class Peer:
         self._writable.register(self.socket, select.POLLOUT)
 
     @staticmethod
-    def _connected(path, patience_s):
+    def _connected(path: str, patience_s: float) -> socket.socket:
         until = time.monotonic() + patience_s
         while True:
             peer = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -110,22 +113,22 @@ class Peer:
                 peer.close()
                 raise BusError(f"no bus at {path}: {error}") from error
 
-    def fileno(self):
+    def fileno(self) -> int:
         """The descriptor, readable when a packet waits or the host is gone."""
         return self.socket.fileno()
 
-    def hang_up(self):
+    def hang_up(self) -> None:
         """Ends the connection: whoever waits in `receive`, in another thread too, gets BusError."""
         try:
             self.socket.shutdown(socket.SHUT_RDWR)
         except OSError:
             pass  # it has ended already
 
-    def close(self):
+    def close(self) -> None:
         """Leaves the bus."""
         self.socket.close()
 
-    def forget(self):
+    def forget(self) -> None:
         """Drops what waits, for a connection that only sends: the host would count it as lost."""
         try:
             while self.socket.recv(_ROOM, socket.MSG_DONTWAIT):
@@ -133,19 +136,19 @@ class Peer:
         except OSError:
             pass  # nothing waits; whether the host is gone the next to send or receive learns
 
-    def send(self, raw_id, data, length=None, timeout_s=None):
+    def send(self, raw_id: int, data: bytes, length: int | None = None, timeout_s: float | None = None) -> None:
         """Sends a frame; waits for room in the host's queue for `timeout_s`, None: without end. Raises BusError, TimeoutError."""
         self._send(_FRAME.pack(raw_id, len(data) if length is None else length, bytes(data)), timeout_s)
 
-    def join(self, name):
+    def join(self, name: str) -> None:
         """Joins the lockstep barrier as a controller of that name. Raises ValueError as `check_name` does."""
         self._send(_CONTROL.pack(_MAGIC, _JOIN_AS_MEMBER, 0, 0, check_name(name)))
 
-    def done(self, cycle):
+    def done(self, cycle: int) -> None:
         """Says that all frames of the cycle are sent."""
         self._send(_CONTROL.pack(_MAGIC, _DONE, 0, cycle, b""))
 
-    def _send(self, packet, timeout_s=None):
+    def _send(self, packet: bytes, timeout_s: float | None = None) -> None:
         try:
             if timeout_s is not None and not self._writable.poll(max(0.0, timeout_s) * 1000):
                 raise TimeoutError("the bus takes no frames")
@@ -155,7 +158,7 @@ class Peer:
                 raise
             raise BusError(f"the bus at {self.path} is gone: {error}") from error
 
-    def receive(self, timeout_s=None):
+    def receive(self, timeout_s: float | None = None) -> Frame | Go | None:
         """The next Frame or Go; None when none comes in `timeout_s`. Raises BusError when the host is gone, LockstepTimeout."""
         until = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
@@ -166,7 +169,7 @@ class Peer:
             if packet is not None:
                 return packet
 
-    def _packet(self):
+    def _packet(self) -> Frame | Go | None:
         try:
             bytes_, ancillary, _, _ = self.socket.recvmsg(_ROOM, 64)
         except OSError as error:
@@ -184,21 +187,21 @@ class Peer:
         return Go(cycle, members) if kind == _GO else None
 
 
-def _stamp_s(ancillary):
+def _stamp_s(ancillary: list[tuple[int, int, Any]]) -> float:
     for level, kind, value in ancillary:
         if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS:
             seconds, nanoseconds = _TIMESPEC.unpack(value[: _TIMESPEC.size])
-            return seconds + nanoseconds * 1e-9
+            return float(seconds + nanoseconds * 1e-9)
     return time.time()
 
 
-def cycles(peer):
+def cycles(peer: Peer) -> Iterator[tuple[int, list[Frame]]]:
     """Takes part in the barrier: yields (cycle, frames) and says done when asked for the next. Ends when the host is gone.
 
     A peer that has joined and is not done within 5 s of wall time ends the run of all. Raises LockstepTimeout, and BusError for a
     bus without a barrier, where frames come and no cycle ends.
     """
-    frames = []
+    frames: list[Frame] = []
     while True:
         if len(frames) > _TOO_MANY:
             raise BusError(f"{len(frames)} frames and no end of a cycle: the bus at {peer.path} has no lockstep barrier")
@@ -206,6 +209,8 @@ def cycles(peer):
             packet = peer.receive()
             if isinstance(packet, Frame):
                 frames.append(packet)
+                continue
+            if packet is None:
                 continue
             yield packet.cycle, frames
             frames = []

@@ -19,7 +19,7 @@ from cantools.database.can import Database
 
 from airbench_hil import faults as fault_files
 from airbench_hil import peer, programs
-from airbench_hil.controllers import Answering, Controller, Law, Python, StrPath
+from airbench_hil.controllers import Answering, Controller, Elf, Law, Own, Process, Python, StrPath
 from airbench_hil.conditions import seconds
 from airbench_hil.errors import BOUND_BROKEN, GOOD, INTERRUPTED, PARTNER_FAILED, AirbenchError, NotAnswered, ProgramFailed, RigEnded
 from airbench_hil.expectations import Expectations
@@ -91,8 +91,7 @@ class Rig(Expectations, People):
             raise ValueError(f"pace '{pace}': \"lockstep\" or \"real\"")
         self.pace: Pace = pace
         self._experiment, self._faults, self._setup = experiment, faults, dict(setup or {})
-        asked = controller if isinstance(controller, (list, tuple)) else [] if controller is None else [controller]
-        self.controllers: list[Controller] = [Python(each) if callable(each) else each for each in asked]
+        self.controllers: list[Controller] = _controllers(controller)
         self._seconds, self._seed, self._sealed = seconds, seed, sealed
         self.rig_file = Path(rig_file).resolve() if rig_file else programs.file("rig.toml")
         self._out, self._binaries, self._bus_options = out, binaries, bus_options
@@ -415,6 +414,16 @@ class Rig(Expectations, People):
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
+
+
+def _controllers(asked: Controller | Law | Sequence[Controller | Law] | None) -> list[Controller]:
+    if asked is None:
+        return []
+    every: Sequence[Controller | Law] = asked if isinstance(asked, Sequence) else [asked]
+    for each in every:
+        if not isinstance(each, (Own, Process, Elf, Python)) and not callable(each):
+            raise ValueError(f"controller {each!r}: Own, Process, Elf, or a function from Sensors to an opening")
+    return [each if isinstance(each, (Own, Process, Elf, Python)) else Python(each) for each in every]
 
 
 def _private_parent() -> str | None:
