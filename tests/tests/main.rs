@@ -51,6 +51,7 @@ mod noise;
 mod own_algorithm;
 mod partner_faults;
 mod python_can;
+mod python_rig;
 mod report_files;
 mod sealed;
 mod sensor_loss;

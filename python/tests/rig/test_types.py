@@ -12,9 +12,8 @@ def check(*words, cwd):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_mypy_finds_nothing_for_the_oldest_and_the_newest_python(tmp_path):
-    for version in ("3.11", "3.13"):
-        check("mypy", "--strict", "--python-version", version, "--cache-dir", tmp_path, "airbench_hil", cwd=programs.PACKAGE.parent)
+def test_mypy_finds_nothing(tmp_path):
+    check("mypy", "--strict", "--cache-dir", tmp_path, "airbench_hil", cwd=programs.PACKAGE.parent)
 
 
 def test_pyright_finds_nothing():

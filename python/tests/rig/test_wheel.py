@@ -1,0 +1,66 @@
+"""The wheel in a new environment without a compiler, and the page "Your first test in ten minutes" as a reader follows it there."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT, emulator
+
+PAGE = ROOT / "docs/first-test.md"
+TOOLS = Path(sys.prefix).parent
+
+
+def uv(*words):
+    """uv without the network: what it installs, scripts/tools.sh has fetched."""
+    environment = {**os.environ, "UV_CACHE_DIR": str(TOOLS / "uv/cache"), "UV_OFFLINE": "1"}
+    done = subprocess.run([TOOLS / "uv/bin/uv", *words], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory):
+    """A folder with the wheel's environment in `venv` and the files of the page."""
+    folder = tmp_path_factory.mktemp("first")
+    built = subprocess.run(
+        [ROOT / "scripts/wheel", "--bin", emulator().parent, "--out", folder], capture_output=True, text=True,
+        env={**os.environ, "tools": str(TOOLS), "UV_OFFLINE": "1"},
+    )
+    assert built.returncode == 0, built.stderr
+    [wheel] = folder.glob("*.whl")
+    assert re.fullmatch(r"airbench_hil-[\d.]+-py3-none-manylinux_2_\d+_\w+\.whl", wheel.name)
+    uv("venv", "--quiet", "--python", sys.executable, folder / "venv")
+    uv("pip", "install", "--quiet", "--python", folder / "venv/bin/python", "--constraint", ROOT / "python/requirements.txt",
+       f"{wheel}[pandas]", "pytest")
+    for name, text in re.findall(r"`(test_\w+\.py)`:\n\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL):
+        (folder / name).write_text(text)
+    return folder
+
+
+def run(folder, *words):
+    """pytest there, with nothing of ours or of the system's in the environment."""
+    environment = {"PATH": str(folder / "venv/bin"), "HOME": str(folder), "AIRBENCH_PYTEST_LOCK": str(folder / "lock")}
+    done = subprocess.run([folder / "venv/bin/python", "-m", "pytest", *words], cwd=folder, env=environment, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_the_ten_lines_pass_from_the_wheel_without_a_compiler(environment):
+    code, said = run(environment, "test_first.py")
+    assert code == 0 and "1 passed" in said, said
+
+
+def test_the_pages_own_controller_fails_as_it_says_and_passes_with_the_gain_that_it_says(environment):
+    code, said = run(environment, "test_mine.py")
+    assert code == 1, said
+    shown = re.search(r"```\n(E .*?)\n        …", PAGE.read_text(), re.DOTALL)[1]
+    assert shown in said, said
+    mine = environment / "test_mine.py"
+    text = mine.read_text()
+    gain = re.search(r"With `(GAIN = [\d.]+)` the test passes", PAGE.read_text())[1]
+    mine.write_text(text.replace("GAIN = 2.0", gain))
+    code, said = run(environment, "--junitxml=junit.xml", "--airbench-traceability=report")
+    assert code == 0 and "3 passed" in said, said
+    assert '<property name="requirement" value="REQ-1"' in (environment / "junit.xml").read_text()
+    assert "| REQ-1 |  | passed |" in (environment / "report/requirements.md").read_text()

@@ -1,0 +1,55 @@
+//! `airbench-hil` as tests in Python use it: its own tests, and the suite of `docs/examples/pytest` on two workers.
+
+use std::process::Command;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::firmware;
+use system_tests::foreign_python::{of, tools_path};
+use system_tests::process::{Ended, Running};
+use system_tests::turn;
+
+/// pytest on two workers in the environment of `python/`, with the programs as they ship.
+fn pytest() -> Command {
+    let programs = [Program::Emulator, Program::Controller, Program::Bench];
+    let [emulator, ..] = programs.map(|program| executable(program, Build::Shipped));
+    let mut pytest = Command::new(of("hil"));
+    pytest.args(["-m", "pytest", "-n", "2", "-p", "no:cacheprovider", "--color=no"]);
+    pytest.env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder")).env("PATH", tools_path());
+    pytest
+}
+
+fn expect_all_passed(ended: Ended, least: usize) {
+    let ended = ended.expect_code(0);
+    let last = ended.stdout.lines().last().expect("pytest says how it ended");
+    eprintln!("{last}");
+    assert!(!["failed", "skipped", "xfailed", "error"].iter().any(|word| last.contains(word)), "{last}");
+    let passed = last.split_whitespace().find_map(|word| word.parse::<usize>().ok());
+    assert!(passed >= Some(least), "{last}");
+}
+
+#[test]
+fn the_rig_for_python_its_plugin_and_its_wheel_do_what_they_say() {
+    // Some of them are in real time.
+    let _machine = turn::take();
+    let _ = [Program::Discrepancy, Program::Campaign].map(|program| executable(program, Build::Shipped));
+    let mut tests = pytest();
+    tests.arg(workspace().join("python/tests/rig"));
+    expect_all_passed(Running::start("pytest", &mut tests).wait(), 50);
+}
+
+#[test]
+fn the_example_suite_holds_our_controller_and_the_firmware_against_their_requirements() {
+    let _machine = turn::take();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    firmware::build(&folder.path().join("firmware"), &[]);
+    let mut suite = pytest();
+    suite.current_dir(workspace().join("docs/examples/pytest")).env("AIRBENCH_FIRMWARE", folder.path().join("firmware"));
+    for (option, place) in [("runs", "runs"), ("traceability", "traceability")] {
+        suite.arg(format!("--airbench-{option}={}", folder.path().join(place).display()));
+    }
+    expect_all_passed(Running::start("pytest", &mut suite).wait(), 39);
+    let table = folder.path().join("traceability/requirements.md");
+    let table = std::fs::read_to_string(table).expect("the table of requirements");
+    let rows = table.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| requirement"));
+    let open: Vec<_> = rows.filter(|row| !row.contains("| passed |")).collect();
+    assert!(open.is_empty() && table.contains("27 requirements: 27 passed"), "{open:?}");
+}
