@@ -38,6 +38,8 @@ _A_DAY_S = 86400
 _JOIN_S = 60
 #: ... and a program under `bench can` until it waits for frames; then it is taken for ready, s.
 _GUEST_S = 10.0
+#: Bytes of a folder in which a folder with a socket has a place.
+_LONGEST = 70
 _FAREWELL_S, _LEAVING_S = 10.0, 2.0
 
 
@@ -169,7 +171,7 @@ class Rig(Expectations, People):
         output = self.folder / "programs"
         shutil.rmtree(output, ignore_errors=True)
         output.mkdir(parents=True)
-        private = Path(tempfile.mkdtemp(prefix="airbench-rig-", dir=_private_parent()))
+        private = _private_folder()
         self.bus_path, self._telemetry = private / "bus0", private / "telemetry"
         self._processes = Processes(private, output)
         try:
@@ -426,10 +428,11 @@ def _controllers(asked: Controller | Law | Sequence[Controller | Law] | None) ->
     return [each if isinstance(each, (Own, Process, Elf, Python)) else Python(each) for each in every]
 
 
-def _private_parent() -> str | None:
-    """Where sockets lie: a short path, since one of a socket has 107 bytes at most."""
+def _private_folder() -> Path:
+    """A folder for sockets, whose paths have 107 bytes at most: where a long one is set for temporary files, /tmp."""
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
-    return runtime if os.path.isabs(runtime) and os.access(runtime, os.W_OK) else None
+    places = [runtime if os.path.isabs(runtime) and os.access(runtime, os.W_OK) else tempfile.gettempdir(), "/tmp"]
+    return Path(tempfile.mkdtemp(prefix="airbench-rig-", dir=next((each for each in places if len(each) <= _LONGEST), "/tmp")))
 
 
 def _folder(out: StrPath | None, experiment: StrPath | Mapping[str, Any] | None) -> Path:

@@ -18,9 +18,10 @@ fn pytest() -> Command {
 }
 
 fn expect_all_passed(ended: Ended, least: usize) {
+    // pytest reports on standard output.
+    eprint!("{}", ended.stdout);
     let ended = ended.expect_code(0);
     let last = ended.stdout.lines().last().expect("pytest says how it ended");
-    eprintln!("{last}");
     assert!(!["failed", "skipped", "xfailed", "error"].iter().any(|word| last.contains(word)), "{last}");
     let passed = last.split_whitespace().find_map(|word| word.parse::<usize>().ok());
     assert!(passed >= Some(least), "{last}");

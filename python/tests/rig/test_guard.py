@@ -2,9 +2,11 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -50,13 +52,14 @@ def gone(mark, private, timeout_s=60.0):
         if time.monotonic() > until:
             return False
         time.sleep(0.02)
+    private.rmdir()
     return True
 
 
 def start(tmp_path, pace, number, shell=False):
     """A victim, its mark, and the folder of its sockets."""
-    mark, private = f"AIRBENCH_TEST_MARK={tmp_path}-{number}", tmp_path / f"private-{number}"
-    private.mkdir()
+    # Of a path that is short enough for sockets.
+    mark, private = f"AIRBENCH_TEST_MARK={tmp_path}-{number}", Path(tempfile.mkdtemp(prefix="ab-"))
     text = _VICTIM.replace("PATH", str(programs.PACKAGE.parent)).replace("PACE", pace).replace("OUT", str(tmp_path / f"out-{number}"))
     if shell:
         # Of a real rig with a program that leaves a grandchild behind.
@@ -117,3 +120,5 @@ def test_a_guard_that_is_killed_takes_its_programs_along(tmp_path):
     while processes_with(mark):
         assert time.monotonic() < left, processes_with(mark)
         time.sleep(0.02)
+    # Who would have removed the bus's folder is gone.
+    shutil.rmtree(private)

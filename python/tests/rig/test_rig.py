@@ -1,6 +1,7 @@
 """A rig in a test: in lockstep and in real time, with each kind of controller, and what is said when something fails."""
 
 import filecmp
+import json
 import re
 import time
 
@@ -182,6 +183,14 @@ def test_a_python_controllers_own_exception_reaches_the_test_and_so_does_a_bad_o
         with Rig(controller=lambda _: opening, out=tmp_path / "bad") as rig:  # noqa: B023
             with pytest.raises(ValueError, match="cycle 0.*-1 to 1 are allowed"):
                 rig.run_for("1 s")
+
+
+def test_an_elf_runs_in_lockstep_with_the_test(elf, tmp_path):
+    with Rig(controller=airbench_hil.Elf(elf), out=tmp_path / "run") as rig:
+        rig.run_for("20 ms")
+        run = rig.end()
+    # 10 ms before the first cycle, and one for each; the last turn is everybody's.
+    assert json.loads((tmp_path / "run/mcu.json").read_text())["core_clocks"] == 8000 * (10 + run.figures["cycles"])
 
 
 def test_a_foreign_program_takes_part_by_its_echo(tmp_path):

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from conftest import ROOT, emulator
 
 PAGE = ROOT / "docs/first-test.md"
@@ -20,10 +19,8 @@ def uv(*words):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.fixture(scope="module")
-def environment(tmp_path_factory):
-    """A folder with the wheel's environment in `venv` and the files of the page."""
-    folder = tmp_path_factory.mktemp("first")
+def environment(folder):
+    """Puts the wheel's environment into the folder's `venv`, and the files of the page."""
     built = subprocess.run(
         [ROOT / "scripts/wheel", "--bin", emulator().parent, "--out", folder], capture_output=True, text=True,
         env={**os.environ, "tools": str(TOOLS), "UV_OFFLINE": "1"},
@@ -36,7 +33,6 @@ def environment(tmp_path_factory):
        f"{wheel}[pandas]", "pytest")
     for name, text in re.findall(r"`(test_\w+\.py)`:\n\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL):
         (folder / name).write_text(text)
-    return folder
 
 
 def run(folder, *words):
@@ -46,21 +42,18 @@ def run(folder, *words):
     return done.returncode, done.stdout + done.stderr
 
 
-def test_the_ten_lines_pass_from_the_wheel_without_a_compiler(environment):
-    code, said = run(environment, "test_first.py")
-    assert code == 0 and "1 passed" in said, said
-
-
-def test_the_pages_own_controller_fails_as_it_says_and_passes_with_the_gain_that_it_says(environment):
-    code, said = run(environment, "test_mine.py")
+def test_from_the_wheel_without_a_compiler_the_page_goes_as_it_says(tmp_path):
+    environment(tmp_path)
+    code, said = run(tmp_path, "test_mine.py")
     assert code == 1, said
     shown = re.search(r"```\n(E .*?)\n        …", PAGE.read_text(), re.DOTALL)[1]
     assert shown in said, said
-    mine = environment / "test_mine.py"
+    mine = tmp_path / "test_mine.py"
     text = mine.read_text()
     gain = re.search(r"With `(GAIN = [\d.]+)` the test passes", PAGE.read_text())[1]
     mine.write_text(text.replace("GAIN = 2.0", gain))
-    code, said = run(environment, "--junitxml=junit.xml", "--airbench-traceability=report")
+    # With the ten lines of test_first.py.
+    code, said = run(tmp_path, "--junitxml=junit.xml", "--airbench-traceability=report")
     assert code == 0 and "3 passed" in said, said
-    assert '<property name="requirement" value="REQ-1"' in (environment / "junit.xml").read_text()
-    assert "| REQ-1 |  | passed |" in (environment / "report/requirements.md").read_text()
+    assert '<property name="requirement" value="REQ-1"' in (tmp_path / "junit.xml").read_text()
+    assert "| REQ-1 |  | passed |" in (tmp_path / "report/requirements.md").read_text()
