@@ -47,7 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--airbench-bin", metavar="DIR", help="folder of airbench's programs (default: see docs/pytest.md)")
     group.addoption("--airbench-runs", metavar="DIR", help="where run folders go (default: a temporary folder of the session)")
     group.addoption(
-        "--airbench-keep", choices=("failed", "all"), help="run folders that are kept of those below --airbench-runs (default: all)"
+        "--airbench-keep", choices=("failed", "all"), help="which run folders are kept (default: all)"
     )
     group.addoption("--airbench-traceability", metavar="DIR", help="write requirements.md, needs.json and requirements.sdoc into DIR")
     for key, text in {
