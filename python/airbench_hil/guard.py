@@ -30,8 +30,10 @@ _GRACE_S = 3.0
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
-def _dies_with_guard() -> None:
+def _dies_with_guard(guard: int) -> None:
     _libc.prctl(_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != guard:
+        os._exit(1)  # it was killed before this was said
     for each in (signal.SIGINT, signal.SIGHUP, signal.SIGPIPE):
         signal.signal(each, signal.SIG_DFL)
 
@@ -54,12 +56,12 @@ class Guard:
 
     def start(self, asked: Dict[str, Any]) -> None:
         """Starts a program with its output in files."""
-        name = asked["name"]
+        name, guard = asked["name"], os.getpid()
         try:
             with open(asked["out"], "ab") as out, open(asked["err"], "ab") as err:
                 child = subprocess.Popen(
                     asked["words"], stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=asked["env"], cwd=asked["cwd"],
-                    preexec_fn=_dies_with_guard, start_new_session=True,
+                    preexec_fn=lambda: _dies_with_guard(guard), start_new_session=True,
                 )
         except OSError as error:
             self.say({"failed": name, "why": f"{error.strerror}: {asked['words'][0]}"})

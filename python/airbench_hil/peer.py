@@ -162,16 +162,22 @@ class Peer:
         """The next Frame or Go; None when none comes in `timeout_s`. Raises BusError when the host is gone, LockstepTimeout."""
         until = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
-            left = None if until is None else max(0.0, until - time.monotonic())
-            if not self._poll.poll(None if left is None else left * 1000):
-                return None
-            packet = self._packet()
+            try:
+                # Packets come in groups: most of them wait already.
+                packet = self._packet()
+            except BlockingIOError:
+                left = None if until is None else max(0.0, until - time.monotonic())
+                if not self._poll.poll(None if left is None else left * 1000):
+                    return None
+                continue
             if packet is not None:
                 return packet
 
     def _packet(self) -> Frame | Go | None:
         try:
-            bytes_, ancillary, _, _ = self.socket.recvmsg(_ROOM, 64)
+            bytes_, ancillary, _, _ = self.socket.recvmsg(_ROOM, 64, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            raise
         except OSError as error:
             raise BusError(f"the bus at {self.path} is gone: {error}") from error
         if not bytes_:
