@@ -8,6 +8,7 @@ import select
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from typing import Any
 from airbench_hil.errors import AirbenchError, ProgramFailed
 
 _SAID_LINES = 20
+#: Bytes of a folder in which a folder with a socket has a place.
+_LONGEST = 70
 
 
 class Processes:
@@ -128,3 +131,10 @@ class Processes:
         elif "over" in event:
             self._over = True
         return event
+
+
+def private_folder() -> Path:
+    """A folder for sockets, whose paths have 107 bytes at most: where a long one is set for temporary files, /tmp."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    places = [runtime if os.path.isabs(runtime) and os.access(runtime, os.W_OK) else tempfile.gettempdir(), "/tmp"]
+    return Path(tempfile.mkdtemp(prefix="airbench-rig-", dir=next((each for each in places if len(each) <= _LONGEST), "/tmp")))

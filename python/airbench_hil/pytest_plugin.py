@@ -6,13 +6,10 @@ Loaded by its entry point (`pytest11`), with pytest-xdist or without; `docs/pyte
 from __future__ import annotations
 
 import base64
-import ctypes
 import fcntl
 import os
 import re
 import shutil
-import signal
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Generator, Iterator
@@ -24,6 +21,7 @@ import pytest
 
 from airbench_hil import programs
 from airbench_hil.errors import AirbenchError
+from airbench_hil.processes import Processes, private_folder
 from airbench_hil.rig import Pace, Rig
 from airbench_hil.traceability import Traceability, known_requirements
 
@@ -31,7 +29,6 @@ REQUIREMENT, REAL_TIME = "requirement", "airbench_realtime"
 #: The property of a test that holds a requirement's identifier, in JUnit files too.
 PROPERTY = "requirement"
 _RIGS = pytest.StashKey[list[Rig]]()
-_BUSES = pytest.StashKey[list["Bus"]]()
 _KNOWN = pytest.StashKey["dict[str, str] | None"]()
 _TRACE = pytest.StashKey[Traceability]()
 _LOCK_VARIABLE = "AIRBENCH_PYTEST_LOCK"
@@ -140,19 +137,18 @@ def airbench_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 class Bus:
     """A bus without a rig, hosted by `emulator bus`."""
 
-    def __init__(self, path: Path, log: Path, emulator: Path) -> None:
-        """Starts the host. Raises AirbenchError."""
-        self.path, self.log = path, log
+    def __init__(self, output: Path, emulator: Path) -> None:
+        """Starts the host; what it says goes to `output`. Raises AirbenchError."""
+        private = private_folder()
+        self.path = private / "bus0"
         self._open: list[can.BusABC] = []
-        with log.open("wb") as said:
-            self._host = subprocess.Popen(
-                [emulator, "bus", "--bus", self.url], stdin=subprocess.DEVNULL, stdout=said, stderr=said,
-                preexec_fn=_die_with_parent,
-            )
+        self._processes = Processes(private, output)
+        self._processes.start("bus", [str(emulator), "bus", "--bus", self.url])
         until = time.monotonic() + 30.0
-        while not path.exists():
-            if self._host.poll() is not None or time.monotonic() > until:
-                raise AirbenchError(f"emulator bus: {log.read_text(errors='replace')}")
+        while not self.path.exists():
+            if not self._processes.running("bus") or time.monotonic() > until:
+                self.close()
+                raise AirbenchError(f"emulator bus: {self._processes.said('bus')}")
             time.sleep(0.002)
 
     @property
@@ -169,26 +165,15 @@ class Bus:
         """Closes the nodes and ends the host."""
         for node in self._open:
             node.shutdown()
-        self._host.send_signal(signal.SIGINT)
-        self._host.wait(30)
-
-
-def _die_with_parent() -> None:
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)
+        self._processes.close(3.0)
 
 
 @pytest.fixture
 def airbench_bus(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bus]:
     """An embedded bus without a rig: `airbench_bus.connect()` is a can.Bus, `airbench_bus.url` for programs."""
-    private = Path(tempfile.mkdtemp(prefix="airbench-rig-"))
-    log = tmp_path_factory.mktemp("bus") / "bus.txt"
-    try:
-        bus = Bus(private / "bus0", log, programs.program("emulator", setting(request.config, "bin") or None))
-        request.node.stash.setdefault(_BUSES, []).append(bus)
-        yield bus
-        bus.close()
-    finally:
-        shutil.rmtree(private, ignore_errors=True)
+    bus = Bus(tmp_path_factory.mktemp("bus"), programs.program("emulator", setting(request.config, "bin") or None))
+    yield bus
+    bus.close()
 
 
 def _run_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, number: int) -> Path:

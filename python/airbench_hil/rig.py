@@ -27,7 +27,7 @@ from airbench_hil.faults import Fault
 from airbench_hil.guests import Readiness
 from airbench_hil.links import Ended, Link, Lockstep, RealTime
 from airbench_hil.people import People
-from airbench_hil.processes import Processes
+from airbench_hil.processes import Processes, private_folder
 from airbench_hil.run import Run
 from airbench_hil.signals import Names, Seen, database
 
@@ -38,8 +38,6 @@ _A_DAY_S = 86400
 _JOIN_S = 60
 #: ... and a program under `bench can` until it waits for frames; then it is taken for ready, s.
 _GUEST_S = 10.0
-#: Bytes of a folder in which a folder with a socket has a place.
-_LONGEST = 70
 _FAREWELL_S, _LEAVING_S = 10.0, 2.0
 
 
@@ -171,7 +169,7 @@ class Rig(Expectations, People):
         output = self.folder / "programs"
         shutil.rmtree(output, ignore_errors=True)
         output.mkdir(parents=True)
-        private = _private_folder()
+        private = private_folder()
         self.bus_path, self._telemetry = private / "bus0", private / "telemetry"
         self._processes = Processes(private, output)
         try:
@@ -426,13 +424,6 @@ def _controllers(asked: Controller | Law | Sequence[Controller | Law] | None) ->
         if not isinstance(each, (Own, Process, Elf, Python)) and not callable(each):
             raise ValueError(f"controller {each!r}: Own, Process, Elf, or a function from Sensors to an opening")
     return [each if isinstance(each, (Own, Process, Elf, Python)) else Python(each) for each in every]
-
-
-def _private_folder() -> Path:
-    """A folder for sockets, whose paths have 107 bytes at most: where a long one is set for temporary files, /tmp."""
-    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
-    places = [runtime if os.path.isabs(runtime) and os.access(runtime, os.W_OK) else tempfile.gettempdir(), "/tmp"]
-    return Path(tempfile.mkdtemp(prefix="airbench-rig-", dir=next((each for each in places if len(each) <= _LONGEST), "/tmp")))
 
 
 def _folder(out: StrPath | None, experiment: StrPath | Mapping[str, Any] | None) -> Path:
