@@ -239,6 +239,31 @@ fn an_mcap_of_a_log_alone_has_no_tables_and_says_which_frames_are_no_signals() {
 }
 
 #[test]
+fn an_mcap_takes_no_table_that_is_none_or_whose_time_nobody_tells() {
+    let scene = Scene::new(SHORT);
+    let folder = scene.path("copied");
+    fs::create_dir(&folder).expect("a folder");
+    let copy = |name: &str| fs::copy(run_folder().join(name), folder.join(name)).expect("a file of the run");
+    let _ = ["bus.log", "measurement.csv", "summary.json"].map(copy);
+    let out = scene.path("copied.mcap");
+    let table = folder.join("measurement.csv");
+    let text = fs::read_to_string(&table).expect("the table");
+    let broken = text.replacen("\n0.004,", "\n0.004,x", 1);
+    assert_ne!(broken, text);
+    fs::write(&table, broken).expect("the table");
+    let _ = export(&folder, "mcap", &out, &[]).expect_code(2).expect_said(&["measurement.csv", "line 7: 'x"]);
+    let left: Vec<_> = fs::read_dir(scene.path("")).expect("the scene").flatten().collect();
+    assert!(left.iter().all(|file| !file.file_name().to_string_lossy().starts_with("copied.")), "{left:?}");
+
+    fs::remove_file(folder.join("summary.json")).expect("it was there");
+    let said = export(&folder, "mcap", &out, &[]).expect_code(0);
+    let _ = said.expect_said(&["no summary.json says when cycle 0", "the tables are left out"]);
+    let read = mcap_channels(&out);
+    assert!(read["channels"].as_object().expect("channels").keys().all(|topic| topic.starts_with("/can")));
+    assert_eq!(read["metadata"], serde_json::json!({}));
+}
+
+#[test]
 fn an_mdf4_begins_when_its_log_does() {
     let scene = Scene::new(SHORT);
     let log = scene.write("dated.log", "(1700000000.000250) a 160#0100\n(1700000000.000500) a 160#0200\n");

@@ -1,6 +1,6 @@
 //! A table of a run's folder, read row by row: `time_s` is its first column, and a comment line begins with `#`.
 //!
-//! The numbers of a name's end are its unit (`drive_position_m`); a column of words is known by its name.
+//! The end of a column's name is its unit (`drive_position_m`); a column of words is known by its name.
 
 use crate::warn;
 use runlog::run_folder::FileError;
