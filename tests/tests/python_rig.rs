@@ -13,7 +13,9 @@ fn pytest() -> Command {
     let [emulator, ..] = programs.map(|program| executable(program, Build::Shipped));
     let mut pytest = Command::new(of("hil"));
     pytest.args(["-m", "pytest", "-n", "2", "-p", "no:cacheprovider", "--color=no"]);
-    pytest.env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder")).env("PATH", tools_path());
+    pytest
+        .env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder"))
+        .env("PATH", tools_path());
     pytest
 }
 
@@ -43,7 +45,9 @@ fn the_example_suite_holds_our_controller_and_the_firmware_against_their_require
     let folder = tempfile::tempdir().expect("a temporary folder");
     firmware::build(&folder.path().join("firmware"), &[]);
     let mut suite = pytest();
-    suite.current_dir(workspace().join("docs/examples/pytest")).env("AIRBENCH_FIRMWARE", folder.path().join("firmware"));
+    suite
+        .current_dir(workspace().join("docs/examples/pytest"))
+        .env("AIRBENCH_FIRMWARE", folder.path().join("firmware"));
     for (option, place) in [("runs", "runs"), ("traceability", "traceability")] {
         suite.arg(format!("--airbench-{option}={}", folder.path().join(place).display()));
     }
