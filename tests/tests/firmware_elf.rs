@@ -58,7 +58,7 @@ fn scene(more: &str) -> Scene {
 fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
     let run = || {
         let scene = scene("");
-        let options = format!("--members 1 --seconds {ONE_REPETITION_S}");
+        let options = format!("--members 1 --join-timeout 300 --seconds {ONE_REPETITION_S}");
         let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
         let mcu = mcu(&scene);
         let _ = emulator.wait().expect_code(0);
@@ -132,7 +132,11 @@ fn noise_does_not_move_it_and_sensor_loss_and_the_emergency_stop_shut_its_valve_
         fault("name = \"bus-loss\"\nat = \"bus.DriveSensors\"", &LOSS),
     ];
     let script = scene.write("faults.toml", &faults.concat());
-    let options = format!("--members 2 --seconds {} --faults {}", END as f64 * 1e-3, script.display());
+    let options = format!(
+        "--members 2 --join-timeout 300 --seconds {} --faults {}",
+        END as f64 * 1e-3,
+        script.display()
+    );
     let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
     let mcu = mcu(&scene);
     let release = EmergencyStop { reason: EmergencyStopReason::Operator, release: true };
@@ -231,7 +235,7 @@ fn the_check_of_controllers_passes_it() {
 fn gdb_stops_the_core_while_the_rig_waits_and_the_run_is_the_same_to_the_byte() {
     let run = |gdb: bool| {
         let scene = scene("");
-        let options = "--members 1 --seconds 0.3 --lockstep-timeout 300";
+        let options = "--members 1 --seconds 0.3 --join-timeout 300 --lockstep-timeout 300";
         let emulator = scene.emulator(Pace::Lockstep).with(options).start();
         let mut command = mcu_command(&scene);
         let mut mcu = Running::start("mcu", if gdb { command.args(["--gdb", "0"]) } else { &mut command });
@@ -340,7 +344,8 @@ fn a_fault_and_the_end_of_main_are_told_and_no_silence() {
         ("loop_run", BX_LR, "the core stopped: its main has returned"),
     ] {
         let scene = scene("");
-        let emulator = scene.emulator(Pace::Lockstep).with("--members 1 --seconds 0.3").start();
+        let emulator =
+            scene.emulator(Pace::Lockstep).with("--members 1 --seconds 0.3 --join-timeout 300").start();
         let mut command = Command::new(workspace().join("scripts/mcu"));
         command.arg("--elf").arg(patched(&scene.path(""), function, instruction));
         let _ = Running::start("mcu", command.args(["--bus", &scene.url()]))
