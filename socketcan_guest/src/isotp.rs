@@ -3,11 +3,11 @@
 //! ```text
 //!   message of at most 7 bytes   single frame
 //!   longer                       first frame ──►
-//!                                            ◄── flow control: go on, wait or overflow; block size, gap STmin
-//!                                consecutive frames, a gap apart ──►
+//!                                            ◄── flow control: continue, wait or overflow; block size, STmin
+//!                                consecutive frames, STmin apart ──►
 //!                                            ◄── flow control after each block …
 //!
-//!   sender    idle ── start ──► awaits flow control ── go on ──► sends ── last frame ──► idle
+//!   sender    idle ── start ──► awaits flow control ── continue ► sends ── last frame ──► idle
 //!                                       ▲                          │
 //!                                       └──── end of a block ──────┘          no flow control for 1 s: ECOMM
 //!   receiver  idle ── first frame ──► awaits consecutive frames ── last ──► idle      none for 1 s: ETIMEDOUT

@@ -6,7 +6,7 @@ use rustix::io::Errno;
 use std::time::Instant;
 
 /// Statuses of our flow control frames.
-const GO_ON: u8 = 0;
+const CONTINUE_TO_SEND: u8 = 0;
 const OVERFLOW: u8 = 2;
 
 /// A message of which the first frame is there.
@@ -103,7 +103,7 @@ impl Receiver {
             until: answers.then(|| now + OTHER_SIDE),
             last: None,
         });
-        answers.then(|| settings.flow_control_of(GO_ON))
+        answers.then(|| settings.flow_control_of(CONTINUE_TO_SEND))
     }
 
     /// Gives the data of a flow control frame at the end of a block.
@@ -157,6 +157,6 @@ impl Receiver {
         }
         (reception.received_in_block, reception.last) = (0, None);
         reception.until = Some(now + OTHER_SIDE);
-        Some(settings.flow_control_of(GO_ON))
+        Some(settings.flow_control_of(CONTINUE_TO_SEND))
     }
 }

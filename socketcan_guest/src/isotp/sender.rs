@@ -16,7 +16,7 @@ const FLOW_CONTROL_BYTES: usize = 3;
 enum State {
     #[default]
     Idle,
-    /// For a flow control frame, until then; the first one says how big blocks are, and gaps.
+    /// For a flow control frame, until then; the first one says how big blocks are, and STmin.
     Awaits { is_first: bool, until: Instant },
     /// The next consecutive frame is due, and must be taken until then.
     Sends { due: Instant, until: Instant },
@@ -37,7 +37,7 @@ pub(crate) struct Progress {
 #[derive(Debug, Default)]
 pub(super) struct Sender {
     message: Vec<u8>,
-    gap: Duration,
+    st_min: Duration,
     /// Frames of a block, 0 without blocks.
     block_size: u8,
     progress: Progress,
@@ -75,8 +75,8 @@ impl Sender {
         let sent = DATA_BYTES - settings.address_bytes() - head.len();
         self.message = message.to_vec();
         let state = if settings.has(flag::CF_BROADCAST) {
-            self.gap = settings.gap_of_a_broadcast();
-            State::Sends { due: now + self.gap, until: now + self.gap + INTERFACE }
+            self.st_min = settings.st_min_of_a_broadcast();
+            State::Sends { due: now + self.st_min, until: now + self.st_min + INTERFACE }
         } else {
             State::Awaits { is_first: true, until: now + OTHER_SIDE }
         };
@@ -99,7 +99,7 @@ impl Sender {
         } else if self.block_size > 0 && sent_in_block >= self.block_size {
             State::Awaits { is_first: false, until: now + OTHER_SIDE }
         } else {
-            State::Sends { due: now + self.gap, until: now + self.gap + INTERFACE }
+            State::Sends { due: now + self.st_min, until: now + self.st_min + INTERFACE }
         };
         self.progress = Progress { state, sent, sequence: (sequence + 1) % 16, sent_in_block };
         Some((settings.data_of(&[kind::CONSECUTIVE | sequence], payload), before))
@@ -130,7 +130,7 @@ impl Sender {
         }
         if is_first {
             self.block_size = data[at + 1];
-            self.gap = settings.gap(data[at + 2]);
+            self.st_min = settings.st_min(data[at + 2]);
         }
         match data[at] & 0x0F {
             0 => {

@@ -161,8 +161,8 @@ impl Settings {
         self.flow_control[0]
     }
 
-    /// The gap before each consecutive frame, by the other side's STmin.
-    pub(super) fn gap(&self, stmin: u8) -> Duration {
+    /// The time before each consecutive frame, by the other side's STmin.
+    pub(super) fn st_min(&self, stmin: u8) -> Duration {
         let asked = match stmin {
             _ if self.has(flag::FORCE_TXSTMIN) => Duration::from_nanos(self.sent_gap_ns.into()),
             0..=0x7F => Duration::from_millis(stmin.into()),
@@ -173,7 +173,7 @@ impl Settings {
     }
 
     /// The same of a broadcast, to which nobody answers.
-    pub(super) fn gap_of_a_broadcast(&self) -> Duration {
+    pub(super) fn st_min_of_a_broadcast(&self) -> Duration {
         let forced = self.has(flag::FORCE_TXSTMIN);
         Duration::from_nanos(if forced { self.sent_gap_ns } else { self.frame_time_ns }.into())
     }

@@ -122,3 +122,92 @@ fn malformed_frames_are_answered_as_the_kernel_does() {
     let wrong_number = with(&[0x22, 1, 2, 3, 4, 5, 6, 7]);
     assert_eq!(take(&mut other, &wrong_number, now), [Event::ReceivingFailed(Errno::ILSEQ)]);
 }
+
+/// An end with these flags, frame time, and forced STmin in both directions, ns.
+fn timed_end(identifiers: Identifiers, flags: u32, frame_time_ns: u32, st_min_ns: u32) -> IsoTp {
+    let mut end = IsoTp::default();
+    let options = [&flags.to_ne_bytes()[..], &frame_time_ns.to_ne_bytes(), &[0, 0xAA, 0xAA, 0]].concat();
+    end.set(1, &options).unwrap();
+    end.set(3, &st_min_ns.to_ne_bytes()).unwrap();
+    end.set(4, &st_min_ns.to_ne_bytes()).unwrap();
+    end.bind(identifiers, true).unwrap();
+    end
+}
+
+#[test]
+fn the_time_between_consecutive_frames_is_forced_stmin_and_frame_time() {
+    // The first consecutive frame comes at once, the second one STmin after it.
+    for (flags, frame_time_ns, expected_us) in [
+        (0, 0, 20_050),
+        (0, u32::MAX, 20_000),
+        (0, 300_000, 20_300),
+        (flag::FORCE_TXSTMIN, 0, 7_050),
+        (flag::FORCE_TXSTMIN, u32::MAX, 7_000),
+    ] {
+        let mut one = timed_end(ONE, flags, frame_time_ns, 7_000_000);
+        let (_, _, took) = carry(&mut one, &mut end(OTHER, 0, 0, [0, 20]), &[1; 20]);
+        assert_eq!(took, Duration::from_micros(expected_us), "flags {flags:#x}, frame time {frame_time_ns}");
+    }
+}
+
+#[test]
+fn consecutive_frames_that_come_too_early_do_not_count() {
+    let (now, at) = (Instant::now(), Duration::from_millis);
+    let mut other = timed_end(OTHER, flag::FORCE_RXSTMIN, 0, 5_000_000);
+    let with = |data: &[u8]| frame(OTHER.received, data);
+    assert_eq!(take(&mut other, &with(&[0x10, 20, 1, 2, 3, 4, 5, 6]), now).len(), 1);
+    assert_eq!(take(&mut other, &with(&[0x21, 7, 8, 9, 10, 11, 12, 13]), now + at(1)), []);
+    let last = with(&[0x22, 14, 15, 16, 17, 18, 19, 20]);
+    assert_eq!(take(&mut other, &last, now + at(5)), []);
+    assert_eq!(take(&mut other, &last, now + at(6)), [Event::Received((1..=20).collect())]);
+}
+
+#[test]
+fn a_listener_hears_a_message_and_says_nothing() {
+    let now = Instant::now();
+    let mut other = end(OTHER, flag::LISTEN_MODE, 0, [1, 0]);
+    let with = |data: &[u8]| frame(OTHER.received, data);
+    assert_eq!(take(&mut other, &with(&[0x10, 20, 1, 2, 3, 4, 5, 6]), now), []);
+    assert_eq!(other.due(), None);
+    assert_eq!(take(&mut other, &with(&[0x21, 7, 8, 9, 10, 11, 12, 13]), now), []);
+    let last = with(&[0x22, 14, 15, 16, 17, 18, 19, 20]);
+    assert_eq!(take(&mut other, &last, now), [Event::Received((1..=20).collect())]);
+}
+
+#[test]
+fn half_duplex_hears_no_message_while_it_sends_and_no_flow_control_while_it_receives() {
+    let now = Instant::now();
+    let with = |data: &[u8]| frame(ONE.received, data);
+    for (flags, heard) in [(flag::HALF_DUPLEX, 0), (0, 1)] {
+        let mut one = end(ONE, flags, 0, [0, 0]);
+        let _ = one.start(&[1; 20], now).unwrap();
+        assert_eq!(take(&mut one, &with(&[2, 1, 2]), now).len(), heard);
+        assert!(one.is_sending());
+    }
+    for (flags, is_due_now) in [(flag::HALF_DUPLEX, false), (0, true)] {
+        let mut one = end(ONE, flags, 0, [0, 0]);
+        assert_eq!(take(&mut one, &with(&[0x10, 20, 1, 2, 3, 4, 5, 6]), now).len(), 1);
+        let _ = one.start(&[1; 20], now).unwrap();
+        let _ = take(&mut one, &with(&[0x30, 0, 0]), now);
+        assert_eq!(one.take_due(now).is_some(), is_due_now);
+    }
+}
+
+#[test]
+fn identifiers_of_29_bits_are_told_from_those_of_11() {
+    let (low, high) = (0x18DA_F110 | EXTENDED_FLAG, 0x18DA_10F1 | EXTENDED_FLAG);
+    let one = Identifiers { sent: low, received: high };
+    let (mut one, mut other) =
+        (end(one, 0, 0, [0, 0]), end(Identifiers { sent: high, received: low }, 0, 0, [0, 0]));
+    assert_eq!(carry(&mut one, &mut other, &[7; 30]).0, [7; 30]);
+    let now = Instant::now();
+    let short = Identifiers { sent: 0x7E0, received: 0x110 };
+    let long = Identifiers { sent: 0x7E0, received: 0x110 | EXTENDED_FLAG };
+    for (identifiers, other) in [(short, long.received), (long, short.received)] {
+        let mut end = end(identifiers, 0, 0, [0, 0]);
+        assert_eq!(take(&mut end, &frame(other, &[1, 9]), now), []);
+        assert_eq!(take(&mut end, &frame(identifiers.received, &[1, 9]), now), [Event::Received(vec![9])]);
+    }
+    let beyond = Identifiers { sent: 0x2000_0000 | EXTENDED_FLAG, received: 0x7E8 };
+    assert_eq!(IsoTp::default().check(beyond), Err(Errno::INVAL));
+}
