@@ -22,9 +22,15 @@ def ticks(path):
         return [float(line.split()[0][1:-1]) for line in file if line.split()[2].startswith(f"{TICK}#")]
 
 
+def unwrapped(count, bits, estimate):
+    """The number nearest to an estimate whose low bits are the count."""
+    return count + round((estimate - count) / (1 << bits)) * (1 << bits)
+
+
 def answers(path):
-    """Seconds of the bus and the three counters, without their overflows."""
-    before, wrapped = {}, dict.fromkeys(PLACES, 0)
+    """Seconds of the bus and the three counters, without their overflows. The short ones, of 0.5 s and 65 s, may overflow several
+    times between two answers; the core's, of 275 s, tells how often."""
+    before = None
     with open(path, encoding="ascii") as file:
         for line in file:
             stamp, _, frame = line.split()
@@ -32,12 +38,13 @@ def answers(path):
             if identifier != CLOCK:
                 continue
             data = bytes.fromhex(data)
-            counts = {}
-            for name, (begin, end) in PLACES.items():
-                count = int.from_bytes(data[begin:end], "little")
-                wrapped[name] += (count < before.get(name, 0)) << 8 * (end - begin)
-                before[name] = count
-                counts[name] = count + wrapped[name]
+            counts = {name: int.from_bytes(data[begin:end], "little") for name, (begin, end) in PLACES.items()}
+            if before is not None:
+                passed_s = (counts["core"] - before["core"]) % (1 << 32) / NOMINAL["core"]
+                for name, (begin, end) in PLACES.items():
+                    estimate = before[name] + passed_s * NOMINAL[name]
+                    counts[name] = unwrapped(counts[name], 8 * (end - begin), estimate)
+            before = counts
             yield float(stamp[1:-1]), counts
 
 
