@@ -189,6 +189,8 @@ fn serve(
     loop {
         if supervisor.turn()? {
             let status = child.wait()?;
+            // What a person had to say to the program is done with; Ctrl-C now means this process.
+            signals.interrupted.store(false, Ordering::Relaxed);
             supervisor.finish(|| signals.is_over())?;
             return Ok(status);
         }

@@ -271,24 +271,26 @@ impl Supervisor {
         }
     }
 
-    /// Takes what a guest has written natively, all of it.
-    pub(crate) fn take_all_from(&mut self, inode: u64) {
-        for _ in 0..BATCHES {
-            if !self.take_from(inode) {
-                return;
-            }
-        }
+    /// Takes what a guest has written natively, all of it; true when it writes on and on.
+    pub(crate) fn take_all_from(&mut self, inode: u64) -> bool {
+        (0..BATCHES).all(|_| self.take_from(inode))
     }
 
     /// Takes what a guest has written natively, a few messages, so that others have their turn; true when there may be more. A
     /// frame for which the bus has no room is held, and with it the guest, whose queue to us fills.
     pub(crate) fn take_from(&mut self, inode: u64) -> bool {
         for _ in 0..BATCH {
-            let Some(socket) = self.sockets.get(&inode).filter(|socket| socket.held.is_none()) else {
+            let Some(socket) = self.sockets.get(&inode).filter(|socket| socket.takes_more()) else {
                 return false;
             };
-            let mut bytes = [0_u8; LONGEST_OTHER];
-            match recv(socket.as_fd(), &mut bytes, RecvFlags::DONTWAIT) {
+            let (mut short, mut long) = ([0_u8; LONGEST_OTHER], Vec::new());
+            let bytes = if socket.transport().is_some() {
+                long.resize(LONGEST_MESSAGE, 0);
+                &mut long[..]
+            } else {
+                &mut short[..]
+            };
+            match recv(socket.as_fd(), &mut *bytes, RecvFlags::DONTWAIT) {
                 // A guest that closes it with frames unread is told of first, and once.
                 Err(Errno::INTR | Errno::CONNRESET) => {}
                 Err(Errno::AGAIN) => return false,
@@ -315,11 +317,17 @@ impl Supervisor {
             Err(Errno::NOBUFS) => {
                 let socket = self.sockets.get_mut(&inode).expect("it has sent");
                 let interface = socket.interface.unwrap_or(0);
-                socket.held = bytes.try_into().ok();
+                match socket.transport_mut() {
+                    Some(transport) => transport.put_back(bytes),
+                    None => socket.held = Some(bytes.try_into().expect("a frame")),
+                }
                 self.watch_socket(inode, false);
                 let known = self.interfaces.iter().position(|known| known.index == interface);
                 let place = known.expect("its bus has no room");
-                self.interfaces[place].waiting.push(inode);
+                let waiting = &mut self.interfaces[place].waiting;
+                if !waiting.contains(&inode) {
+                    waiting.push(inode);
+                }
                 self.watch_bus(place);
             }
             Err(error) => {
@@ -337,8 +345,10 @@ impl Supervisor {
     /// The bus has room again: what was held goes on.
     pub(crate) fn release_held(&mut self, place: usize) {
         for inode in std::mem::take(&mut self.interfaces[place].waiting) {
-            let held = self.sockets.get_mut(&inode).and_then(|socket| socket.held.take());
-            if let Some(frame) = held {
+            let Some(socket) = self.sockets.get_mut(&inode) else { continue };
+            if socket.transport().is_some() {
+                self.go_on_transport(inode);
+            } else if let Some(frame) = socket.held.take() {
                 self.send_native(inode, &frame);
                 if self.sockets.get(&inode).is_some_and(|socket| socket.held.is_none()) {
                     self.watch_socket(inode, true);

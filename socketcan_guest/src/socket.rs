@@ -27,6 +27,8 @@ use std::rc::Rc;
 
 /// Notes that are kept without looking at how many are still of use.
 const FEW_NOTES: usize = 64;
+/// Messages of a queue that are counted when they are dropped; whoever writes on and on is not counted for ever.
+const MOST_UNREAD: usize = 10_000;
 
 /// What is known of a message in a guest's queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -210,6 +212,25 @@ impl GuestSocket {
             Kind::Raw(options) => Some(options),
             Kind::Bcm(_) | Kind::Transport(_) => None,
         }
+    }
+
+    /// Whether what its guest writes is taken now.
+    pub(crate) fn takes_more(&self) -> bool {
+        self.held.is_none() && !self.transport().is_some_and(Transport::is_full)
+    }
+
+    /// Forgets what its guest has written and no bus has taken; gives how many messages that are, up to some ten thousand.
+    pub(crate) fn forget_unsent(&mut self) -> u64 {
+        let mut forgotten = u64::from(self.held.take().is_some());
+        if let Some(transport) = self.transport_mut() {
+            forgotten += u64::from(transport.protocol.is_sending()) + transport.forget_native() as u64;
+            transport.protocol.give_up();
+        }
+        let unread = (0..MOST_UNREAD).take_while(|_| {
+            let read = recv(&self.end, &mut [0_u8; 1], RecvFlags::DONTWAIT | RecvFlags::TRUNC);
+            read.is_ok_and(|(_, length)| length > 0)
+        });
+        forgotten + unread.count() as u64
     }
 
     /// Whether the guests have closed it.

@@ -11,6 +11,7 @@ use crate::notification::{Answer, Listener, Notification};
 use crate::receive::WaitingCall;
 use crate::send::From;
 use crate::socket::{Accounts, GuestSocket, Kind, Note};
+use crate::transport::Transport;
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 use rustix::io::Errno;
 use rustix::time::{ClockId, clock_gettime};
@@ -29,6 +30,8 @@ const EVENTS_A_TURN: usize = 64;
 const LONGEST_SLEEP: Duration = Duration::from_millis(100);
 /// How long a bus that takes nothing is waited for when the program has ended.
 const LAST_PATIENCE: Duration = Duration::from_secs(1);
+/// And how long messages of the transport protocol that have not begun.
+const QUEUE_PATIENCE: Duration = Duration::from_secs(10);
 /// Different texts that are told; a guest must not be able to fill a disk.
 const MOST_TEXTS: usize = 200;
 
@@ -93,7 +96,8 @@ impl Supervisor {
     /// Wakes the loop when this process has ended.
     pub(crate) fn watch_child(&self, child: BorrowedFd<'_>) -> io::Result<()> {
         let data = epoll::EventData::new_u64(CHILD);
-        Ok(epoll::add(&self.epoll, child, data, epoll::EventFlags::IN)?)
+        // Once: the descriptor of a process that has ended stays readable.
+        Ok(epoll::add(&self.epoll, child, data, epoll::EventFlags::IN | epoll::EventFlags::ONESHOT)?)
     }
 
     /// Waits for something to do, and does it. True when the child has ended.
@@ -367,29 +371,50 @@ impl Supervisor {
         self.waiting_calls = left;
     }
 
-    /// The child has ended: what the guests wrote goes out first, and messages whose guests have ended; for those the transport
-    /// protocol itself has an end.
+    /// The child has ended: what the guests wrote goes out first, and messages whose guests have ended. The transport protocol
+    /// has an end for the one that is being sent; those behind it have [`QUEUE_PATIENCE`]. What is dropped is counted and told.
     ///
     /// # Errors
     /// As [`Supervisor::turn`].
     pub(crate) fn finish(&mut self, is_over: impl Fn() -> bool) -> io::Result<()> {
-        let until = Instant::now() + LAST_PATIENCE;
+        let began = Instant::now();
         loop {
+            let mut is_held = false;
             for inode in self.sockets.keys().copied().collect::<Vec<_>>() {
-                self.take_all_from(inode);
+                is_held |= self.take_all_from(inode);
             }
-            let held = self.sockets.values().any(|socket| socket.held.is_some());
-            let sending =
-                self.sockets.values().any(|socket| socket.has_more_to_send() && socket.has_hung_up());
-            if held && !sending && Instant::now() >= until {
-                self.refused_late += 1;
-                self.tell("a bus takes no more frames; what was written last is dropped");
+            is_held |= self.interfaces.iter().any(|interface| !interface.waiting.is_empty());
+            let mut closed = self.sockets.values().filter(|socket| socket.has_hung_up());
+            let is_queued = closed.clone().any(GuestSocket::has_more_to_send);
+            let is_sending = closed
+                .any(|socket| socket.transport().is_some_and(|transport| transport.protocol.is_sending()));
+            if !is_held && !is_queued {
                 return Ok(());
             }
-            if !held && !sending || is_over() {
+            let waited = began.elapsed();
+            let is_late = waited >= QUEUE_PATIENCE || is_held && waited >= LAST_PATIENCE;
+            if is_over() || is_late && !is_sending {
+                self.drop_unsent();
                 return Ok(());
+            }
+            if waited >= QUEUE_PATIENCE {
+                let transports = self.sockets.values_mut().filter_map(GuestSocket::transport_mut);
+                let dropped = transports.map(Transport::forget_native).sum::<usize>();
+                self.count_dropped(dropped as u64);
             }
             self.turn_for(LONGEST_SLEEP)?;
+        }
+    }
+
+    fn drop_unsent(&mut self) {
+        let dropped = self.sockets.values_mut().map(GuestSocket::forget_unsent).sum();
+        self.count_dropped(dropped);
+    }
+
+    fn count_dropped(&mut self, messages: u64) {
+        if messages > 0 {
+            self.refused_late += messages;
+            self.tell("the program has ended and a bus does not take what was written last; it is dropped");
         }
     }
 

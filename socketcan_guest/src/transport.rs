@@ -1,9 +1,9 @@
 //! Sockets of the transport protocol, `CAN_ISOTP`: their addresses, and the calls that send and wait.
 //!
 //! One message is sent at a time. A call that comes meanwhile waits, as does one that wants to know how it ended
-//! (`CAN_ISOTP_WAIT_TX_DONE`); messages that are written natively, those of 16 bytes, wait in the guest's queue. A guest that
-//! closes the socket or ends does not cut a message off. The kernel lets `close` wait for it; here the next socket of the same
-//! channel waits instead.
+//! (`CAN_ISOTP_WAIT_TX_DONE`); messages that are written natively, those of 8 and 16 bytes, wait in the guest's queue and, some
+//! hundred of them, here. A guest that closes the socket or ends does not cut a message off. The kernel lets `close` wait for
+//! it; here the next socket of the same channel waits instead. What waits behind it is sent as long as somebody answers.
 //!
 //! Source: Linux 6.1 `net/can/isotp.c` (`isotp_bind`, `isotp_sendmsg`, `isotp_release`).
 
@@ -14,7 +14,7 @@ use crate::notification::{Answer, Notification};
 use crate::socket::{GuestSocket, Kind, Note};
 use crate::supervisor::{Supervisor, wall_clock_ns};
 use rustix::io::Errno;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::os::fd::BorrowedFd;
 use std::time::Instant;
 
@@ -22,6 +22,8 @@ use std::time::Instant;
 pub(crate) const ADDRESS_BYTES: usize = 16;
 /// Frames that are sent one after the other where there is no gap between them, so that others have their turn.
 const BURST: usize = 16;
+/// Messages of a socket that wait here, about as many as its own queue holds; what is written beyond them stays in that queue.
+const MOST_WAITING: usize = 300;
 
 /// A call that sends: which one, and what it returns when all is well.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +48,23 @@ impl Transport {
     /// Whether it is in the middle of a message, or has one that waits.
     fn has_more_to_send(&self) -> bool {
         self.protocol.is_sending() || !self.waiting.is_empty()
+    }
+
+    /// Whether no more messages may wait.
+    pub(crate) fn is_full(&self) -> bool {
+        self.waiting.len() >= MOST_WAITING
+    }
+
+    /// Forgets the messages that wait and were written natively; gives their number.
+    pub(crate) fn forget_native(&mut self) -> usize {
+        let before = self.waiting.len();
+        self.waiting.retain(|(call, _)| call.is_some());
+        before - self.waiting.len()
+    }
+
+    /// A message for which the bus had no room is the next one again.
+    pub(crate) fn put_back(&mut self, message: &[u8]) {
+        self.waiting.push_front((None, message.to_vec()));
     }
 
     /// The call that is told of an error: the one that waits for the end, or the next, whose message is not sent then.
@@ -114,15 +133,16 @@ impl Supervisor {
         message: Vec<u8>,
         call: SendingCall,
     ) -> Answer {
+        // A call that a signal ended comes again by itself; the message that it took back must not be sent as well.
+        self.forget_dead_senders();
         let Some(transport) = self.transport(inode) else { return Errno::BADF.into() };
         if transport.protocol.identifiers().is_none() {
             return Errno::ADDRNOTAVAIL.into();
         }
-        let is_busy = transport.has_more_to_send();
-        if is_busy && !call.may_wait {
-            return Errno::AGAIN.into();
-        }
-        if is_busy || call.may_wait && self.is_behind_another(inode) {
+        if transport.has_more_to_send() || self.is_behind_another(inode) {
+            if !call.may_wait {
+                return Errno::AGAIN.into();
+            }
             self.wait_to_send(inode, Some(call), message);
             return Answer::Deferred;
         }
@@ -244,14 +264,42 @@ impl Supervisor {
                         Some(call) => _ = self.listener.answer(call.id, Answer::Error(error)),
                         None => self.tell_error(inode, interface, error),
                     }
+                    if error == Errno::COMM {
+                        self.forget_what_nobody_answers(inode);
+                    }
                 }
             }
         }
         self.go_on_transport(inode);
     }
 
-    /// Answers who waited for the end of a message, and sends the next one.
-    fn go_on_transport(&mut self, inode: u64) {
+    /// Behind a closed socket each message to nobody would hold up the channel, and the end of this process, for a second.
+    fn forget_what_nobody_answers(&mut self, inode: u64) {
+        let Some(socket) = self.sockets.get_mut(&inode).filter(|socket| socket.has_hung_up()) else { return };
+        let forgotten = socket.forget_unsent();
+        if forgotten > 0 {
+            self.refused_late += forgotten;
+            self.tell("nobody answers an ISO-TP message of a closed socket; those behind it are dropped");
+        }
+    }
+
+    /// Answers who waited for the end of a message, and sends the next one; when there is none, of another socket of the channel.
+    pub(crate) fn go_on_transport(&mut self, inode: u64) {
+        let mut left = BTreeSet::from([inode]);
+        while let Some(inode) = left.pop_first() {
+            self.send_next(inode);
+            let has_more = self.transport(inode).is_some_and(|transport| transport.has_more_to_send());
+            self.watch_socket(inode, !has_more);
+            if !has_more {
+                let others = self.others_of_channel(inode);
+                left.extend(
+                    others.filter(|(_, _, other)| !other.waiting.is_empty()).map(|(other, ..)| other),
+                );
+            }
+        }
+    }
+
+    fn send_next(&mut self, inode: u64) {
         while let Some(transport) = self.transport(inode).filter(|transport| !transport.protocol.is_sending())
         {
             let done = transport.at_the_end.take();
@@ -267,6 +315,9 @@ impl Supervisor {
                 None => {
                     let sent = self.start_transport(inode, &message);
                     self.note_native(inode, &message, sent);
+                    if sent == Err(Errno::NOBUFS) {
+                        break;
+                    }
                 }
                 // A signal may have ended it.
                 Some(call) if self.listener.is_alive(call.id) => {
@@ -276,15 +327,6 @@ impl Supervisor {
                 Some(_) => {}
             }
         }
-        let has_more = self.transport(inode).is_some_and(|transport| transport.has_more_to_send());
-        self.watch_socket(inode, !has_more);
-        if !has_more {
-            let others =
-                self.others_of_channel(inode).filter(|(_, _, transport)| !transport.waiting.is_empty());
-            for other in others.map(|(other, ..)| other).collect::<Vec<_>>() {
-                self.go_on_transport(other);
-            }
-        }
     }
 
     /// A signal has ended calls: who waits for the end of a message takes the message back with it, as the kernel has it.
@@ -292,10 +334,16 @@ impl Supervisor {
         let mut ended = Vec::new();
         for (inode, socket) in &mut self.sockets {
             let Some(transport) = socket.transport_mut() else { continue };
+            let waited = transport.waiting.len();
             transport.waiting.retain(|(call, _)| call.is_none_or(|call| self.listener.is_alive(call.id)));
+            let mut has_ended = transport.waiting.len() < waited;
             if transport.at_the_end.is_some_and(|call| !self.listener.is_alive(call.id)) {
                 transport.at_the_end = None;
                 transport.protocol.give_up();
+                has_ended = true;
+            }
+            // Also one that only waited: its socket may be closed by now, and is looked at again.
+            if has_ended {
                 ended.push(*inode);
             }
         }
@@ -312,7 +360,7 @@ impl GuestSocket {
         }
     }
 
-    fn transport_mut(&mut self) -> Option<&mut Transport> {
+    pub(crate) fn transport_mut(&mut self) -> Option<&mut Transport> {
         match &mut self.kind {
             Kind::Transport(transport) => Some(transport),
             Kind::Raw(_) | Kind::Bcm(_) => None,

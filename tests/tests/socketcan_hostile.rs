@@ -2,10 +2,11 @@
 //! lost is counted where it is lost.
 
 use rustix::process::Signal;
-use std::time::Duration;
+use std::fs;
+use std::time::{Duration, Instant};
 use system_tests::foreign_python::python;
 use system_tests::launch::Pace;
-use system_tests::peer::Packet;
+use system_tests::peer::{Packet, Peer};
 use system_tests::process::{PATIENCE, Running, wait_until};
 use system_tests::records::{count, json};
 use system_tests::scene::{RESTLESS, SHORT, Scene};
@@ -138,4 +139,142 @@ fn a_bus_that_stands_still_refuses_with_enobufs_holds_native_senders_and_loses_n
     running.type_line("go");
     let _ = running.wait().expect_code(0);
     assert_eq!(peer.receive(Duration::from_millis(100)), None);
+}
+
+/// Fills the bus, and then writes ISO-TP messages of 8 and 16 bytes, which are native: a broadcast, so that nobody need answer.
+const TRANSPORT_SENDER: &str = "
+import errno, os, socket, struct, sys
+raw = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+raw.bind(('vcan0',))
+can = socket.socket(socket.PF_CAN, socket.SOCK_DGRAM, socket.CAN_ISOTP)
+can.setsockopt(106, 1, struct.pack('IIBBBB', 0x1000, 0, 0, 0, 0, 0))
+can.bind(('vcan0', 0x7E8, 0x7E0))
+print('ready', flush=True)
+sys.stdin.readline()
+try:
+    while True:
+        raw.sendto(struct.pack('=IB3x8s', 0x7F7, 8, bytes(8)), ('vcan0',))
+except OSError as refused:
+    print('refused with', errno.errorcode[refused.errno], flush=True)
+for number in range(40):
+    os.write(can.fileno(), bytes([number]) * (8 if number % 3 == 0 else 16))
+can.getsockname()
+print('written', flush=True)
+sys.stdin.readline()
+os.write(can.fileno(), bytes([40]) * 8)
+";
+
+/// The next message of a broadcast sender at a peer; frames of others are passed over.
+fn next_message(peer: &Peer) -> Option<Vec<u8>> {
+    let (mut message, mut length) = (Vec::new(), 0);
+    loop {
+        let Some(Packet::Frame(frame)) = peer.receive(PATIENCE) else { return None };
+        match (frame.standard_id(), frame.data()) {
+            (Some(0x7E0), [0x10, bytes, data @ ..]) => {
+                assert!(message.is_empty(), "a message in the middle of another: {message:?}, {frame:?}");
+                (length, message) = (usize::from(*bytes), data.to_vec());
+            }
+            (Some(0x7E0), [_, data @ ..]) => message.extend(data),
+            _ => {}
+        }
+        if length > 0 && message.len() >= length {
+            message.truncate(length);
+            return Some(message);
+        }
+    }
+}
+
+/// Ticks of a second in `/proc`, on every Linux of x86 and ARM.
+const USER_HZ: f64 = 100.0;
+
+/// Seconds of a processor that a process has used.
+fn used_s(process: u32) -> f64 {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap();
+    let fields: Vec<_> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
+    // utime and stime, the 14th and 15th of all fields.
+    let ticks: f64 = fields[11..13].iter().map(|ticks| ticks.parse::<f64>().unwrap()).sum();
+    ticks / USER_HZ
+}
+
+#[test]
+fn a_bus_that_stands_still_holds_native_messages_of_the_transport_protocol_and_loses_none() {
+    let scene = Scene::new(SHORT);
+    let host = scene.bus_host("");
+    let peer = scene.peer();
+    let python = python();
+    let command = [python.as_os_str(), "-c".as_ref(), TRANSPORT_SENDER.as_ref()];
+    let mut running = Running::start("sender", &mut guest(&scene, "", &command));
+    wait_until("the sender", || running.stdout().contains("ready"));
+    host.stop();
+    running.type_line("go");
+    wait_until("the messages to be written", || running.stdout().contains("written"));
+    assert!(running.stdout().contains("refused with ENOBUFS"), "{}", running.stdout());
+    // It waits for the bus and does not ask it again and again.
+    let (began, used_before_s) = (Instant::now(), used_s(running.number()));
+    std::thread::sleep(Duration::from_millis(500));
+    let (used_now_s, passed_s) = (used_s(running.number()) - used_before_s, began.elapsed().as_secs_f64());
+    assert!(used_now_s < 0.1 * passed_s, "{used_now_s} s of a processor in {passed_s} s");
+    host.signal(Signal::CONT);
+    let expected = |number: u8| vec![number; if number.is_multiple_of(3) { 8 } else { 16 }];
+    for number in 0..40 {
+        assert_eq!(next_message(&peer), Some(expected(number)), "{}", running.stderr());
+    }
+    // It listens to its guest again, and notices its end.
+    running.type_line("go");
+    assert_eq!(next_message(&peer), Some(vec![40; 8]), "{}", running.stderr());
+    let ended = running.wait().expect_code(0);
+    assert!(!ended.stderr.contains("dropped"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_sender_that_is_killed_while_it_waits_leaves_no_socket_behind() {
+    let scene = Scene::new(SHORT);
+    // Nobody answers the first, whose channel the second waits for.
+    let line = "echo ready; read go; for n in 1 2 3; do \
+                isotpsend -s 12$n -d 32$n -D 20 vcan0; isotpsend -s 12$n -d 32$n -D 20 vcan0 & sleep 0.3; kill -KILL $!; wait; \
+                done; echo done; read go";
+    let mut running = shell(&scene, "--pair", line);
+    let open = |running: &Running| fs::read_dir(format!("/proc/{}/fd", running.number())).unwrap().count();
+    wait_until("the shell", || running.stdout().contains("ready"));
+    let before = open(&running);
+    running.type_line("go");
+    wait_until("the senders", || running.stdout().contains("done"));
+    wait_until("their sockets to be closed", || open(&running) == before);
+    running.type_line("go");
+    let _ = running.wait().expect_code(0);
+}
+
+/// Writes as many ISO-TP messages to nobody as it can, and ends.
+const QUEUER: &str = "
+import os, socket
+can = socket.socket(socket.PF_CAN, socket.SOCK_DGRAM, socket.CAN_ISOTP)
+can.bind(('vcan0', 0x7E8, 0x7E0))
+can.setblocking(False)
+accepted = 0
+for _ in range(4):
+    try:
+        while True:
+            os.write(can.fileno(), bytes(16))
+            accepted += 1
+    except BlockingIOError:
+        can.getsockname()
+print('accepted', accepted)
+";
+
+#[test]
+fn it_ends_soon_after_a_program_that_left_hundreds_of_messages_to_nobody() {
+    let scene = Scene::new(SHORT);
+    let python = python();
+    let command = [python.as_os_str(), "-c".as_ref(), QUEUER.as_ref()];
+    // One after the other they would take a second each, longer than a test waits.
+    let ended = Running::start("sender", &mut guest(&scene, "--pair", &command)).wait().expect_code(0);
+    let number = |text: &str, before: &str| -> Option<usize> {
+        text.split(before).nth(1)?.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+    };
+    let accepted = number(&ended.stdout, "accepted ").expect("a number");
+    assert!(accepted > 300, "its own queue and more: {accepted}");
+    let told = ended.stderr.lines().find(|line| line.contains("accepted and dropped")).expect("it is told");
+    let dropped = number(told, "bench can: ").expect("a number");
+    // All but those that were begun, one a second.
+    assert!(dropped < accepted && dropped > accepted - 20, "{dropped} of {accepted}");
 }
