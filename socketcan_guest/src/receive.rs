@@ -167,11 +167,11 @@ impl Supervisor {
     /// Answers the call when there is a message; `EAGAIN` when there is none.
     fn try_to_receive(&mut self, notification: &Notification, inode: u64, end: BorrowedFd<'_>) -> Answer {
         let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
-        let flags = notification.int(if notification.call == libc::SYS_recvmmsg {
-            3
-        } else {
-            flags_at(notification)
-        });
+        let mut flags = notification.int(flags_at(notification));
+        if notification.call == libc::SYS_recvmmsg {
+            // The kernel keeps it to itself: `do_recvmmsg`.
+            flags &= !libc::MSG_WAITFORONE;
+        }
         if let Some(transport) = socket.transport() {
             if flags & !TRANSPORT_FLAGS != 0 {
                 return Errno::INVAL.into();
