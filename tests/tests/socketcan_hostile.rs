@@ -234,7 +234,11 @@ fn a_sender_that_is_killed_while_it_waits_leaves_no_socket_behind() {
                 isotpsend -s 12$n -d 32$n -D 20 vcan0; isotpsend -s 12$n -d 32$n -D 20 vcan0 & sleep 0.3; kill -KILL $!; wait; \
                 done; echo done; read go";
     let mut running = shell(&scene, "--pair", line);
-    let open = |running: &Running| fs::read_dir(format!("/proc/{}/fd", running.number())).unwrap().count();
+    let open = |running: &Running| {
+        let links = fs::read_dir(format!("/proc/{}/fd", running.number())).unwrap().flatten();
+        let files = links.filter_map(|link| fs::read_link(link.path()).ok());
+        files.filter(|file| file.to_string_lossy().starts_with("socket:")).count()
+    };
     wait_until("the shell", || running.stdout().contains("ready"));
     let before = open(&running);
     running.type_line("go");
@@ -277,4 +281,36 @@ fn it_ends_soon_after_a_program_that_left_hundreds_of_messages_to_nobody() {
     let dropped = number(told, "bench can: ").expect("a number");
     // All but those that were begun, one a second.
     assert!(dropped < accepted && dropped > accepted - 20, "{dropped} of {accepted}");
+}
+
+/// Closes a socket in the middle of a message to nobody; another of the channel must not break into it.
+const HURRIED: &str = "
+import ctypes, errno, os, socket
+def channel():
+    can = socket.socket(socket.PF_CAN, socket.SOCK_DGRAM, socket.CAN_ISOTP)
+    can.bind(('vcan0', 0x7E8, 0x7E0))
+    can.setblocking(False)
+    return can
+first = channel()
+os.write(first.fileno(), bytes(20))
+first.close()
+second = channel()
+try:
+    print('second', os.write(second.fileno(), bytes(20)))
+except BlockingIOError:
+    print('second waits its turn')
+libc = ctypes.CDLL(None, use_errno=True)
+headers = bytes(64)
+print('sendmmsg of none', libc.sendmmsg(second.fileno(), headers, 0, 0))
+libc.recvmmsg(second.fileno(), headers, 1, 0x10000 | socket.MSG_DONTWAIT, None)
+print('recvmmsg for one', errno.errorcode[ctypes.get_errno()])
+";
+
+#[test]
+fn a_sender_that_does_not_wait_leaves_the_message_of_a_closed_socket_whole() {
+    let scene = Scene::new(SHORT);
+    let python = python();
+    let command = [python.as_os_str(), "-c".as_ref(), HURRIED.as_ref()];
+    let ended = Running::start("senders", &mut guest(&scene, "--pair", &command)).wait().expect_code(0);
+    ended.expect_printed(&["second waits its turn", "sendmmsg of none 0", "recvmmsg for one EAGAIN"]);
 }
