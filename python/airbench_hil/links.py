@@ -9,6 +9,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from airbench_hil import peer
 from airbench_hil.controllers import Answering
@@ -24,6 +25,12 @@ _LOOK_S = 0.2
 
 class Ended(Exception):
     """The bus has ended, and the run with it."""
+
+
+class _Raised(NamedTuple):
+    """What a Python controller raised."""
+
+    error: BaseException
 
 
 class Link:
@@ -127,9 +134,9 @@ class RealTime(Link):
     def __init__(self, bus: peer.Peer, seen: Seen, laws: Sequence[Answering], look: Callable[[], None], join_s: float) -> None:
         """Waits for the rig's first tick for that time, s."""
         self._bus, self._seen, self._laws, self._look = bus, seen, {law.sensors_id: law for law in laws}, look
-        self._came: deque[tuple[int, peer.Frame] | BaseException] = deque()
+        self._came: deque[tuple[int, peer.Frame] | _Raised | BaseException] = deque()
         self._some = threading.Condition()
-        self._known = False
+        self._known = self._silent = False
         self._newest_wall_s = time.monotonic()
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -141,7 +148,9 @@ class RealTime(Link):
             self._look()
             if self._came and isinstance(self._came[0], BaseException):
                 raise Ended(str(self._came[0]))
-        self.catch_up()
+        # What a controller has raised already is for the test's first call.
+        while self._came and isinstance(self._came[0], tuple) and not isinstance(self._came[0], _Raised):
+            self._take()
 
     def _read(self) -> None:
         cycle = 0
@@ -156,15 +165,21 @@ class RealTime(Link):
                 elif packet.raw_id in (0x120, 0x121):
                     cycle += ((word >> _ALIVE_SHIFT) - cycle) & 0xF
                 law = self._laws.get(packet.raw_id)
-                answer = law.answer(word, cycle) if law and self._known else None
+                answer, raised = None, None
+                try:
+                    answer = law.answer(word, cycle) if law and self._known else None
+                except BaseException as error:  # noqa: BLE001 - it is the test's, and the rig goes on
+                    raised, self._laws = _Raised(error), {}
                 if answer is not None:
                     self._bus.send(*answer)
                 with self._some:
                     self._came.append((cycle, packet))
+                    if raised is not None:
+                        self._came.append(raised)
                     if answer is not None:
                         self._came.append((cycle, peer.Frame(answer[0], answer[1], len(answer[1]))))
                     self._some.notify()
-        except BaseException as error:  # noqa: BLE001 - it is the test's: an end of the bus, or what a Python controller raised
+        except BaseException as error:  # noqa: BLE001 - it is the test's, an end of the bus above all
             with self._some:
                 self._came.append(error)
                 self._some.notify()
@@ -181,6 +196,10 @@ class RealTime(Link):
                 raise Ended(str(came)) from came
             raise came
         self._came.popleft()
+        if isinstance(came, _Raised):
+            if self._silent:
+                return False
+            raise came.error
         cycle, frame = came
         new = cycle > self.cycle
         self.cycle = max(cycle, self.cycle)
@@ -211,7 +230,7 @@ class RealTime(Link):
             raise Ended(str(error)) from error
 
     def silence(self) -> None:
-        self._laws = {}
+        self._laws, self._silent = {}, True
 
     def close(self) -> None:
         self._bus.hang_up()

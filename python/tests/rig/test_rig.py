@@ -185,6 +185,19 @@ def test_a_python_controllers_own_exception_reaches_the_test_and_so_does_a_bad_o
                 rig.run_for("1 s")
 
 
+@pytest.mark.parametrize("asked", [lambda rig: rig.run_for("60 s"), lambda rig: (time.sleep(0.5), rig.end())], ids=["run_for", "end"])
+def test_in_real_time_a_controllers_exception_reaches_the_test_and_the_run_is_saved(tmp_path, asked):
+    def raising(sensors):
+        if sensors.cycle > 50:
+            raise KeyError("mine")
+        return 0.0
+
+    with Rig(pace="real", controller=raising, emulator_options=["--no-realtime"], out=tmp_path) as rig:
+        with pytest.raises(KeyError, match="mine"):
+            asked(rig)
+    assert airbench_hil.Run(tmp_path).ended_because == "ended at the console"
+
+
 def test_an_elf_runs_in_lockstep_with_the_test(elf, tmp_path):
     with Rig(controller=airbench_hil.Elf(elf), out=tmp_path / "run") as rig:
         rig.run_for("20 ms")
@@ -211,15 +224,31 @@ def test_a_controller_that_hangs_is_named_and_one_that_crashes_too(tmp_path):
             rig.run_for("1 s")
     program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "sys.exit('I broke')"))
     with Rig(controller=Process(["{python}", program, "{path}"]), out=tmp_path / "crashes") as rig:
-        # Exit code 1 is that of a broken bound: it is the echo that is missing.
-        with pytest.raises(NotAnswered, match="process has ended with exit code 1"):
-            rig._answer_s = rig._link._answer_s = 1.0
+        # Exit code 1 is that of a broken bound only for airbench's own controller.
+        with pytest.raises(ProgramFailed, match="process ended with exit code 1:\nI broke"):
+            rig.run_for("1 s")
+    program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "print('I left', file=sys.stderr); sys.exit()"))
+    with Rig(controller=Process(["{python}", program, "{path}"]), answer_s=1.0, out=tmp_path / "leaves") as rig:
+        with pytest.raises(NotAnswered, match="process has ended with exit code 0:\nI left"):
             rig.run_for("1 s")
     program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "os.abort()"))
     with Rig(controller=Process(["{python}", program, "{path}"]), out=tmp_path / "aborts") as rig:
         with pytest.raises(ProgramFailed, match="ended by signal 6") as failed:
             rig.run_for("1 s")
         assert failed.value.exit_code == -6
+
+
+def test_a_foreign_program_that_dies_in_real_time_fails_the_test_and_one_that_ends_with_the_bus_does_not(tmp_path):
+    program = tmp_path / "foreign.py"
+    real = {"pace": "real", "emulator_options": ["--no-realtime"]}
+    program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "raise ValueError('I broke')"))
+    with Rig(controller=Process(["{python}", program, "{path}"]), out=tmp_path / "dies", **real) as rig:
+        with pytest.raises(ProgramFailed, match="ValueError: I broke"):
+            rig.never("RigStatus.emergency_stop == 1", during="60 s")
+    program.write_text(_FOREIGN + "raise ConnectionError('no bus any more')\n")
+    with Rig(controller=Process(["{python}", program, "{path}"]), out=tmp_path / "ends", **real) as rig:
+        rig.wait_for("count(DriveValveCommand) > 0")
+        assert rig.end().exit_codes == {"emulator": 0, "process": 1}
 
 
 _FOREIGN = """
