@@ -32,6 +32,8 @@ _ALLOWED = (
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": abs, "min": min, "max": max, "near": lambda value, wanted, tolerance: abs(value - wanted) <= tolerance,
 }
+#: How many arguments each takes, at least and at most.
+_ARGUMENTS = {"abs": (1, 1), "min": (2, 99), "max": (2, 99), "near": (3, 3)}
 _PAST, _MESSAGE = ("rose", "fell", "changed"), ("age", "count")
 
 
@@ -69,13 +71,15 @@ class Watch:
 
     def holds(self) -> bool:
         """Whether it holds now; to be asked once a cycle."""
-        self._now = [self._part(code) for _, code in self.condition.parts]
+        # A part may name those before it: edges of edges.
+        for index, (_, code) in enumerate(self.condition.parts):
+            self._now[index] = self._part(code)
         try:
             return bool(eval(self.condition.code, self._globals))  # noqa: S307 - compiled of checked nodes alone
         except (_Unseen, ZeroDivisionError):
             return False
         finally:
-            self._before = self._now
+            self._before = list(self._now)
 
     def _part(self, code: CodeType) -> Any:
         try:
@@ -98,7 +102,9 @@ class Watch:
 
     def _past(self, index: int) -> bool:
         kind, before, now = self.condition.parts[index][0], self._before[index], self._now[index]
-        if before is None or now is None:
+        if now is None:
+            raise _Unseen
+        if before is None:
             return False
         if kind == "changed":
             return bool(before != now)
@@ -162,6 +168,9 @@ class _Compiler(ast.NodeTransformer):
         if node.keywords or name not in (*_FUNCTIONS, *_PAST, *_MESSAGE):
             raise self.wrong(f"there is {', '.join((*_FUNCTIONS, *_PAST, *_MESSAGE))}, and no other function")
         if name in _FUNCTIONS:
+            least, most = _ARGUMENTS[name]
+            if not least <= len(node.args) <= most:
+                raise self.wrong(f"{name} takes {least if least == most else f'{least} or more'} argument{'s' * (most > 1)}")
             return ast.Call(ast.Name(name, ast.Load()), [self.visit(each) for each in node.args], [])
         if len(node.args) != 1:
             raise self.wrong(f"{name} takes one argument")

@@ -20,6 +20,7 @@ def test_it_positions_within_the_bounds(firmware_rig):
     # The set-point comes every 10 ms; what the sensors show then is independent of what the firmware believes.
     error = "DriveSensors.position - DriveChainValues.position_set_point"
     rig.always(f"not changed(DriveChainValues.position_set_point) or abs({error}) < 0.004", during="3 s")
+    assert len({place for _, place in rig.course("DriveChainValues.position_set_point", "3 s")}) > 200, "so many were looked at"
     run = rig.finish()
     position = run.measurement.set_index("time_s")["drive_position_m"]
     for end, place in ((4.0, 0.4), (8.0, 0.1)):

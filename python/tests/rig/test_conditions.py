@@ -62,7 +62,8 @@ def test_numbers_words_and_logic(bus):
 
 
 def test_what_has_not_come_does_not_hold_and_its_negation_neither(bus):
-    for text in ("LoadSensors.position >= 0", "not LoadSensors.position >= 0"):
+    edges = [f"not {edge}(LoadSensors.position > 0)" for edge in ("rose", "fell", "changed")]
+    for text in ("LoadSensors.position >= 0", "not LoadSensors.position >= 0", *edges):
         assert not bus.watch(text).holds(), text
 
 
@@ -73,6 +74,15 @@ def test_edges_are_those_between_two_looks(bus):
     for linked, wanted in [(1, (0, 0, 0)), (0, (0, 1, 1)), (0, (0, 0, 0)), (1, (1, 0, 1)), (1, (0, 0, 0))]:
         bus.frame("RigStatus", linked=linked)
         assert tuple(map(int, (rose.holds(), fell.holds(), changed.holds()))) == wanted
+
+
+def test_an_edge_of_an_edge_is_one_too(bus):
+    bus.frame("RigStatus", linked=0)
+    watch, came = bus.watch("rose(changed(RigStatus.linked))"), []
+    for linked in (0, 0, 1, 0, 0, 1):
+        bus.frame("RigStatus", linked=linked)
+        came.append(watch.holds())
+    assert came == [False, False, True, False, False, True]
 
 
 def test_the_age_of_a_message_is_the_rigs_time_since_it(bus):
@@ -98,6 +108,9 @@ def test_the_age_of_a_message_is_the_rigs_time_since_it(bus):
     ("(lambda: 1)()", "no other function"),
     ("DriveSensors.position.real > 1", "Message.signal"),
     ("age(DriveSensor) > 1", "no message"),
+    ("near(DriveSensors.position, 0.3)", "near takes 3 arguments"),
+    ("min(DriveSensors.position) > 1", "min takes 2 or more arguments"),
+    ("abs() > 1", "abs takes 1 argument"),
 ])
 def test_what_cannot_be_meant_is_refused_with_what_can(bus, text, words):
     with pytest.raises(SignalUnknown, match=words):
