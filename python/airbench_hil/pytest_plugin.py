@@ -12,6 +12,7 @@ import re
 import shutil
 import tempfile
 import time
+import zlib
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
@@ -78,9 +79,12 @@ def requirements_of(item: pytest.Item) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Writes requirements to the tests' properties, and puts tests in real time last, all of one xdist group."""
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> Generator[None]:
+    """Writes requirements to the tests' properties, and puts tests in real time last, all of one xdist group.
+
+    The group is given before pytest-xdist looks for it, the order after all others have theirs.
+    """
     known = config.stash[_KNOWN]
     for item in items:
         named = requirements_of(item)
@@ -90,6 +94,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         item.user_properties.extend((PROPERTY, each) for each in named)
         if item.get_closest_marker(REAL_TIME):
             item.add_marker(pytest.mark.xdist_group("airbench-realtime"))
+    yield
     items.sort(key=lambda item: item.get_closest_marker(REAL_TIME) is not None)
 
 
@@ -177,11 +182,14 @@ def airbench_bus(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 
 
 def _run_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, number: int) -> Path:
-    name = re.sub(r"[^\w.-]+", "-", request.node.nodeid.rpartition("/")[2]).strip("-")[:120]
+    # A name of its own for each test: what does not show in it, or is cut off, is told apart by a checksum.
+    whole = request.node.nodeid.replace("::", "-")
+    name = re.sub(r"[^\w.-]+", "-", whole).strip("-")[:120]
+    name = name if name == whole else f"{name}-{zlib.crc32(request.node.nodeid.encode()):08x}"
     name = f"{name}-{number + 1}" if number else name
     where = setting(request.config, "runs")
     if not where:
-        return tmp_path_factory.mktemp(name[:40], numbered=True)
+        return tmp_path_factory.mktemp(name[:40], numbered=True)  # the number keeps them apart
     folder = request.config.rootpath / where / name
     # Of an earlier session: pictures of failures that are none any more.
     shutil.rmtree(folder, ignore_errors=True)
@@ -194,13 +202,14 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """What a failed test leaves becomes part of its report: properties for JUnit, a section, extras for pytest-html."""
     rigs = item.stash.get(_RIGS, [])
-    if call.excinfo is not None and call.when == "call":
+    broke = call.excinfo is not None and call.when != "teardown" and not call.excinfo.errisinstance(pytest.skip.Exception)
+    if broke:
         for rig in rigs:
             rig.close()
             for key, path in _left(rig):
                 item.user_properties.append((f"airbench_{key}", str(path)))
     report = yield
-    if report.failed and call.when == "call":
+    if report.failed and broke:
         for rig in rigs:
             report.sections.append(("airbench", "\n".join(f"{key}: {path}" for key, path in _left(rig))))
             _attach(item.config, report, rig)
@@ -253,11 +262,11 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     """Writes the traceability files."""
     config = session.config
     where = setting(config, "traceability")
-    if where and not hasattr(config, "workerinput"):
+    if where and not hasattr(config, "workerinput") and not config.option.collectonly:
         config.stash[_TRACE].write(config.rootpath / where, config.stash[_KNOWN])
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Names the traceability files, and run folders of failed tests."""
-    if where := setting(config, "traceability"):
+    """Names the traceability files."""
+    if (where := setting(config, "traceability")) and not config.option.collectonly:
         terminalreporter.write_line(f"airbench: requirements in {config.rootpath / where / 'requirements.md'}")

@@ -33,11 +33,13 @@ class Traceability:
     def __init__(self) -> None:
         #: Requirement to test to verdict.
         self.verdicts: dict[str, dict[str, str]] = {}
+        self._named: dict[str, list[str]] = {}
 
     def take(self, report: pytest.TestReport) -> None:
         """A report of a phase of a test: one that failed anywhere has failed."""
         named = [str(value) for key, value in report.user_properties if key == "requirement"]
-        for requirement in named:
+        # The report of a worker that crashed has no properties; that of the test's setup had them.
+        for requirement in self._named.setdefault(report.nodeid, named) if named else self._named.get(report.nodeid, []):
             tests = self.verdicts.setdefault(requirement, {})
             before = tests.get(report.nodeid)
             if report.failed:
@@ -66,8 +68,8 @@ class Traceability:
         lines = ["| requirement | text | verdict | tests |", "|---|---|---|---|"]
         for requirement, text in every.items():
             tests = self.verdicts.get(requirement, {})
-            cell = "<br>".join(f"`{test}` {verdict}" for test, verdict in tests.items()) or "none"
-            lines.append(f"| {requirement} | {text.replace('|', chr(92) + '|')} | {self.verdict(requirement)} | {cell} |")
+            cell = "<br>".join(f"`{_cell(test)}` {verdict}" for test, verdict in tests.items()) or "none"
+            lines.append(f"| {requirement} | {_cell(text)} | {self.verdict(requirement)} | {cell} |")
         counts = {verdict: sum(self.verdict(each) == verdict for each in every) for verdict in (PASSED, FAILED, SKIPPED, UNTESTED)}
         total = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
         return "\n".join([*lines, "", f"{len(every)} requirements: {total}", ""])
@@ -99,6 +101,10 @@ class Traceability:
                 f"STATEMENT: >>>\n{text or requirement}\n<<<\nCOMMENT: >>>\n{comment}\n<<<\n"
             )
         return "\n".join(blocks)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def _test_ids(verdicts: Mapping[str, Mapping[str, str]]) -> dict[str, str]:

@@ -106,6 +106,77 @@ def test_last_failed_runs_it_alone_and_only_folders_of_failures_are_kept_if_aske
     suite.runpytest_subprocess("--lf", timeout=120).assert_outcomes(failed=1)
 
 
+def test_a_test_that_fails_before_it_begins_keeps_its_folder_and_a_skipped_one_does_not(suite):
+    suite.makepyfile(test_setup="""
+import pytest
+
+@pytest.fixture
+def reached(airbench_rig):
+    airbench_rig(controller=lambda _: 0.0).expect("DriveSensors.position > 9", within="2 ms")
+
+def test_it(reached):
+    pass
+
+def test_no_board(airbench_rig):
+    airbench_rig(controller=lambda _: 0.0)
+    pytest.skip("no board")
+""")
+    result = run(suite, "--airbench-keep=failed", "test_setup.py")
+    result.assert_outcomes(errors=1, skipped=1)
+    result.stdout.fnmatch_lines(["run: *runs/test_setup.py-test_it"])
+    folder = suite.path / "runs/test_setup.py-test_it"
+    assert [path.name for path in (suite.path / "runs").iterdir()] == [folder.name] and (folder / "picture.svg").exists()
+
+
+def test_each_test_has_a_folder_of_its_own(suite):
+    text = """
+import pytest
+
+@pytest.mark.parametrize("what", ["a/b", "c/b", "a b", "a?b", "x" * 200 + "1", "x" * 200 + "2"])
+def test_it(airbench_rig, what):
+    airbench_rig(controller=lambda _: 0.0).run_for("1 ms")
+"""
+    for folder in ("one", "two"):
+        suite.mkpydir(folder).joinpath("test_same.py").write_text(text)
+    run(suite, "one", "two").assert_outcomes(passed=12)
+    assert len(list((suite.path / "runs").iterdir())) == 12
+
+
+def test_a_requirement_whose_test_crashed_its_worker_has_failed(suite):
+    suite.makepyfile(test_crash="""
+import os, pytest
+
+@pytest.mark.requirement("REQ-1")
+def test_good():
+    pass
+
+@pytest.mark.requirement("REQ-1")
+@pytest.mark.parametrize("a", ["b|c"])
+def test_crash(a):
+    os._exit(1)
+""")
+    run(suite, "--collect-only", "--airbench-traceability=trace", "test_crash.py")
+    assert not (suite.path / "trace").exists()
+    run(suite, "-n", "1", "--airbench-traceability=trace", "test_crash.py").assert_outcomes(passed=1, failed=1)
+    table = (suite.path / "trace/requirements.md").read_text()
+    [row] = [line for line in table.splitlines() if line.startswith("| REQ-1")]
+    cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:-1]]
+    assert cells[2] == "failed" and r"test_crash[b\|c]` failed" in cells[3], row
+
+
+def test_tests_in_real_time_are_one_group_of_xdist(suite):
+    suite.makepyfile(test_group="""
+import os, pytest
+
+@pytest.mark.airbench_realtime
+@pytest.mark.parametrize("n", range(6))
+def test_it(n):
+    open(f"worker-{os.environ['PYTEST_XDIST_WORKER']}", "w").close()
+""")
+    run(suite, "-n", "2", "--dist", "loadgroup", "test_group.py").assert_outcomes(passed=6)
+    assert len(list(suite.path.glob("worker-*"))) == 1
+
+
 def test_a_requirement_that_there_is_not_and_an_unmarked_test_in_real_time_are_errors(suite):
     suite.makepyfile(test_wrong='import pytest\n@pytest.mark.requirement("REQ-9")\ndef test_it(): pass\n')
     result = run(suite, "test_wrong.py")
