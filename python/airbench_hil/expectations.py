@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, Union
@@ -25,6 +26,35 @@ _SHOWN_S = 2.0
 _HALF_S = 0.5e-3
 
 
+class _Band:
+    """The longest course of a signal up to now that stays within a tolerance peak to peak."""
+
+    def __init__(self, tolerance: float) -> None:
+        self._tolerance = tolerance
+        self._times: deque[float] = deque()
+        # Times and values, the first of them the least and the most of the course; each is followed by those that replace it.
+        self._least: deque[tuple[float, float]] = deque()
+        self._most: deque[tuple[float, float]] = deque()
+
+    def take(self, time_s: float, value: float | None) -> float | None:
+        """Since when the course goes, s; None without a value."""
+        if value is None:
+            return None
+        self._times.append(time_s)
+        while self._least and self._least[-1][1] >= value:
+            self._least.pop()
+        while self._most and self._most[-1][1] <= value:
+            self._most.pop()
+        self._least.append((time_s, value))
+        self._most.append((time_s, value))
+        while self._most[0][1] - self._least[0][1] > self._tolerance:
+            begun_s = self._times.popleft()
+            for extremes in (self._least, self._most):
+                if extremes[0][0] <= begun_s:
+                    extremes.popleft()
+        return self._times[0]
+
+
 class Expectations:
     """The part of `Rig` that looks at signals. Durations are seconds or text such as "4 s", "250 ms"; all are the rig's time."""
 
@@ -34,8 +64,8 @@ class Expectations:
     failures: list[AssertionError]
 
     @property
-    def time(self) -> float:
-        """The rig's time, s."""
+    def _now_s(self) -> float:
+        """The rig's time in the cycle that is looked at, s; `time` goes on to the newest one."""
         raise NotImplementedError
 
     def _advance(self) -> None:
@@ -72,19 +102,19 @@ class Expectations:
     def course(self, signal: str, last: Duration = "2 s") -> list[tuple[float, float]]:
         """Times, s, and values of a signal over the last seconds, 20 at most."""
         self._catch_up()
-        return self.seen.course(self.names.signal(signal), self.time - seconds(last), self.time)
+        return self.seen.course(self.names.signal(signal), self._now_s - seconds(last), self._now_s)
 
     def run_for(self, duration: Duration) -> None:
         """Lets the rig run for that time. Raises RigEnded when the run ends before."""
         self._catch_up()
-        until_s = self.time + seconds(duration) - _HALF_S
-        while self.time < until_s:
+        until_s = self._now_s + seconds(duration) - _HALF_S
+        while self._now_s < until_s:
             self._advance()
 
     def run_until(self, time_s: Duration) -> None:
         """Lets the rig run until that time of its own."""
         self._catch_up()
-        self.run_for(max(0.0, seconds(time_s) - self.time))
+        self.run_for(max(0.0, seconds(time_s) - self._now_s))
 
     def expect(self, test: Test, within: Duration = 0.0) -> float:
         """Waits until the condition holds, and gives the rig's time then, s; without `within` it has to hold now.
@@ -92,16 +122,16 @@ class Expectations:
         :raises ExpectationFailed: it did not hold within that time.
         """
         __tracebackhide__ = True  # of pytest: a failure is shown where the test expects
-        watch, began_s = self._watch(test), self.time
+        watch, began_s = self._watch(test), self._now_s
         until_s = began_s + seconds(within) - _HALF_S
         try:
             while not watch():
-                if self.time >= until_s:
+                if self._now_s >= until_s:
                     self._fail(f"expected within {seconds(within):g} s: {_text(test)}", test, began_s, "it did not hold")
                 self._advance()
         except RigEnded as ended:
             self._fail(f"expected within {seconds(within):g} s: {_text(test)}", test, began_s, f"it did not hold; {ended}")
-        return self.time
+        return self._now_s
 
     def wait_for(self, test: Test, timeout: Duration = "60 s") -> float:
         """As `expect`, for what a test only needs to go on: a state of the rig, a phase of the experiment."""
@@ -126,14 +156,14 @@ class Expectations:
 
     def _hold(self, test: Test, during_s: float, wanted: bool, what: str) -> None:
         __tracebackhide__ = True
-        watch, began_s = self._watch(test), self.time
+        watch, began_s = self._watch(test), self._now_s
         until_s = began_s + during_s - _HALF_S
         title = f"expected {what} for {during_s:g} s: {_text(test)}"
         try:
             while True:
                 if watch() != wanted:
                     self._fail(title, test, began_s, "it did not hold" if wanted else "it held")
-                if self.time >= until_s:
+                if self._now_s >= until_s:
                     return
                 self._advance()
         except RigEnded as ended:
@@ -150,53 +180,46 @@ class Expectations:
         :raises ExpectationFailed: there was no such part.
         """
         __tracebackhide__ = True
-        wanted_s, began_s = seconds(duration), self.time
+        wanted_s, since = seconds(duration), self._steady(what, tolerance)
+        began_s = self._now_s
         until_s = began_s + seconds(within) - _HALF_S
         title = f"expected within {seconds(within):g} s, stable for {wanted_s:g} s: {_text(what)}"
         title += f" within {tolerance:g} peak to peak" if tolerance is not None else ""
-        keeps = self._stays(what, tolerance)
-        since_s: float | None = None
         try:
             while True:
-                if not keeps():
-                    since_s = None
-                elif since_s is None:
-                    since_s = self.time
-                if since_s is not None and self.time - since_s >= wanted_s - _HALF_S:
+                since_s = since()
+                if since_s is not None and self._now_s - since_s >= wanted_s - _HALF_S:
                     return since_s
-                if self.time >= until_s:
+                if self._now_s >= until_s:
                     self._fail(title, what, began_s, "it did not stay so")
                 self._advance()
         except RigEnded as ended:
             self._fail(title, what, began_s, str(ended))
 
-    def _stays(self, what: Test, tolerance: float | None) -> Callable[[], bool]:
+    def _steady(self, what: Test, tolerance: float | None) -> Callable[[], float | None]:
+        """Since when it has been so without a break, s; None: it is not now. To be asked once a cycle."""
         if tolerance is None:
-            return self._watch(what)
-        if not isinstance(what, str):
-            raise ValueError("a tolerance is for a signal by its name")
-        signal, band = self.names.signal(what), [float("inf"), float("-inf")]
+            watch, began = self._watch(what), deque[float](maxlen=1)
+
+            def held() -> float | None:
+                if not watch():
+                    began.clear()
+                elif not began:
+                    began.append(self._now_s)
+                return began[0] if began else None
+
+            return held
+        if not isinstance(what, str) or not tolerance >= 0:
+            raise ValueError("a tolerance is for a signal by its name, 0 or more in its unit")
+        signal, band = self.names.signal(what), _Band(tolerance)
         self._catch_up()
-
-        def within_band() -> bool:
-            value = self.seen.value(signal)
-            if value is None:
-                return False
-            least, most = min(band[0], value), max(band[1], value)
-            if most - least <= tolerance:
-                band[:] = least, most
-                return True
-            # What breaks the band begins the next one; the cycle of the break is in none.
-            band[:] = value, value
-            return False
-
-        return within_band
+        return lambda: band.take(self._now_s, self.seen.value(signal))
 
     def _watch(self, test: Test) -> Callable[[], bool]:
         self._catch_up()
         if callable(test):
             return lambda: bool(test(self))  # type: ignore[arg-type]
-        watch: Watch = self._condition(test).watch(self.seen, lambda: self.time)
+        watch: Watch = self._condition(test).watch(self.seen, lambda: self._now_s)
         return watch.holds
 
     def _condition(self, text: str) -> Condition:
@@ -213,7 +236,7 @@ class Expectations:
 
     def failure(self, title: str, why: str, signals: Sequence[Signal], began_s: float) -> ExpectationFailed:
         """An exception as a failed expectation raises it: the text, the last seconds of the signals, a picture, the folder."""
-        to_s = self.time
+        to_s = self._now_s
         from_s = max(0.0, to_s - _SHOWN_S)
         ranges = []
         for signal in signals:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 from typing import Any
 
 
@@ -45,11 +46,16 @@ def toml(values: Mapping[str, Any]) -> str:
     return "".join(f"{_key(key)} = {_value(value)}\n" for key, value in values.items())
 
 
+def number(value: float | Real) -> str:
+    """A number as TOML and the rig's console read it, of numpy too."""
+    return repr(int(value)) if isinstance(value, Integral) else repr(float(value))
+
+
 def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, (int, float)):
-        return repr(value)
+    if isinstance(value, Real):
+        return number(value)
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
         return f'"{escaped}"'

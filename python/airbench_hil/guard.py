@@ -27,6 +27,8 @@ from typing import Any, Dict, List
 _SET_PDEATHSIG, _SET_CHILD_SUBREAPER = 1, 36
 #: How long programs have to save what they have when nobody waits for them any more, s.
 _GRACE_S = 3.0
+#: ... and for SIGKILL to have ended them, s.
+_KILL_S = 3.0
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -90,8 +92,8 @@ class Guard:
         for pid in set(self.children) | set(_descendants()):
             try:
                 os.kill(pid, number)
-            except ProcessLookupError:
-                pass
+            except (ProcessLookupError, PermissionError):
+                pass  # it has ended, or became another user's
 
     def end(self, grace_s: float) -> None:
         """Ends all of them."""
@@ -102,7 +104,9 @@ class Guard:
         while time.monotonic() < until and (self.children or _descendants()):
             time.sleep(0.01)
             self.reap()
-        while _descendants():
+        # Not for ever: whoever became another user's, or stands in the kernel, cannot be ended.
+        until = time.monotonic() + _KILL_S
+        while time.monotonic() < until and _descendants():
             self.signal_all(signal.SIGKILL)
             time.sleep(0.005)
             self.reap()
@@ -124,7 +128,10 @@ class Guard:
                 self.start(asked)
             elif asked["do"] == "signal":
                 for pid in [pid for pid, name in self.children.items() if name == asked["name"]]:
-                    os.kill(pid, asked["signal"])
+                    try:
+                        os.kill(pid, asked["signal"])
+                    except (ProcessLookupError, PermissionError):
+                        pass
             else:
                 self.end(asked["grace_s"])
                 self.say({"over": True})
@@ -176,6 +183,8 @@ def main() -> None:
         poll.register(parent_fd, select.POLLIN)
     except ProcessLookupError:
         ended.append(1)
+    except (OSError, AttributeError):
+        pass  # a kernel before 5.3, or one that forbids it: the closed socket tells
     while not ended:
         for at, _ in poll.poll():
             if at == wake_read:

@@ -1,7 +1,7 @@
 """When a program under `bench can` is ready: nobody on the bus can tell, since its connection is made before it starts.
 
 In lockstep the barrier begins when all are connected, and who was not there for the first cycle's sensors never answers them. So its
-system calls are looked at (/proc/PID/syscall): a program that waits for input has opened what it waits on.
+system calls are looked at (/proc/PID/task/*/syscall): a program of which a thread waits for input has opened what it waits on.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Readiness:
         """Whether it has been waiting for input in each of the last looks; to be asked some milliseconds apart."""
         guests = _children(self._bench)
         waiting = _WAITING.get(platform.machine(), set())
-        self._in_a_row = self._in_a_row + 1 if guests and any(_system_call(guest) in waiting for guest in guests) else 0
+        self._in_a_row = self._in_a_row + 1 if guests and any(_system_calls(guest) & waiting for guest in guests) else 0
         return self._in_a_row >= LOOKS
 
 
@@ -48,10 +48,13 @@ def _children(pid: int) -> list[int]:
     return found
 
 
-def _system_call(pid: int) -> int:
-    """Number of the system call in which its main thread waits; -1 when it runs, or may not be looked at."""
-    try:
-        word = Path(f"/proc/{pid}/syscall").read_text().split()[0]
-    except (OSError, IndexError):
-        return -1
-    return int(word) if word.isdigit() else -1
+def _system_calls(pid: int) -> set[int]:
+    """Numbers of the system calls in which its threads wait; a thread that runs, or may not be looked at, has none."""
+    found = set()
+    for file in Path(f"/proc/{pid}/task").glob("*/syscall"):
+        try:
+            word = file.read_text().split()[0]
+        except (OSError, IndexError):
+            continue
+        found |= {int(word)} if word.isdigit() else set()
+    return found

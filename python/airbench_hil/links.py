@@ -18,7 +18,7 @@ from airbench_hil.signals import Seen
 
 CYCLE_S = 1e-3
 _TICK, _TICK_BITS = 0x130, 0xFFFFFFFF
-_ALIVE_SHIFT = 60
+_ALIVE_SHIFT, _ALIVE_MASK = 60, 0xF
 #: How often whoever waits for a cycle looks whether all programs still run, s of wall time.
 _LOOK_S = 0.2
 
@@ -59,6 +59,11 @@ class Link:
         raise NotImplementedError
 
 
+def _sampled(word: int, cycle: int) -> int:
+    """The cycle in which sensors were sampled that came in `cycle`: their alive counter is its last four bits."""
+    return cycle - (cycle - (word >> _ALIVE_SHIFT) & _ALIVE_MASK)
+
+
 class Lockstep(Link):
     """A member of the barrier, which holds the cycle until `advance`."""
 
@@ -80,9 +85,9 @@ class Lockstep(Link):
         latest = self._seen.latest
         for law in self._laws:
             sample = latest.get(law.sensors_id)
-            # Only sensors of this cycle are answered: lost ones are not.
+            # Only sensors that came in this cycle are answered: lost ones are not.
             if sample is not None and sample.time_s == self.now_s:
-                answer = law.answer(sample.word, self.cycle)
+                answer = law.answer(sample.word, _sampled(sample.word, self.cycle))
                 if answer is not None:
                     self.send(*answer)
                     self._seen.take(answer[0], answer[1], len(answer[1]), self.now_s)
@@ -163,11 +168,12 @@ class RealTime(Link):
                 if packet.raw_id == _TICK:
                     cycle, self._known = word & _TICK_BITS, True
                 elif packet.raw_id in (0x120, 0x121):
-                    cycle += ((word >> _ALIVE_SHIFT) - cycle) & 0xF
+                    ahead = (word >> _ALIVE_SHIFT) - cycle & _ALIVE_MASK
+                    cycle += ahead if ahead < 8 else 0  # else they were delayed
                 law = self._laws.get(packet.raw_id)
                 answer, raised = None, None
                 try:
-                    answer = law.answer(word, cycle) if law and self._known else None
+                    answer = law.answer(word, _sampled(word, cycle)) if law and self._known else None
                 except BaseException as error:  # noqa: BLE001 - it is the test's, and the rig goes on
                     raised, self._laws = _Raised(error), {}
                 if answer is not None:
@@ -220,7 +226,8 @@ class RealTime(Link):
                 return
 
     def catch_up(self) -> None:
-        while self._came:
+        # A controller that asks for the rig's time is in the reader's thread.
+        while self._came and threading.current_thread() is not self._thread:
             self._take()
 
     def send(self, raw_id: int, data: bytes) -> None:

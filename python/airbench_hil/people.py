@@ -9,7 +9,7 @@ from typing import Literal
 
 import can
 
-from airbench_hil import console
+from airbench_hil import console, faults
 from airbench_hil.controllers import Axis
 from airbench_hil.signals import Names
 
@@ -111,7 +111,7 @@ class People:
 
         :raises Refused: no such fault, place or number; the text says what is allowed.
         """
-        words = [name, *([at] if at else []), *(f"{key}={value!r}" for key, value in numbers.items())]
+        words = [name, *([at] if at else []), *(f"{key}={faults.number(value)}" for key, value in numbers.items())]
         self.console("fault " + " ".join(words))
 
     def mend(self, name: str, at: str | None = None) -> None:

@@ -53,10 +53,12 @@ class Processes:
             "do": "start", "name": name, "words": words, "env": env, "cwd": str(cwd) if cwd else None,
             "out": str(self.output / f"{name}.txt"), "err": str(self.output / f"{name}.err"),
         })
-        while name not in self.pids:
+        while True:
             event = self._event(10.0)
             if event is None:
                 raise AirbenchError("the guard of the rig's processes does not answer")
+            if event.get("started") == name:
+                return
             if event.get("failed") == name:
                 raise ProgramFailed(name, 127, event["why"])
 
@@ -97,7 +99,11 @@ class Processes:
             pass  # it is gone, and with it all that it started
         self._over = True
         self._socket.close()
-        self._guard.wait()
+        try:
+            self._guard.wait(5.0)
+        except subprocess.TimeoutExpired:
+            self._guard.kill()
+            self._guard.wait()
 
     def said(self, name: str) -> str:
         """The last lines of its standard error."""

@@ -83,7 +83,7 @@ class Rig(Expectations, People):
         :param binaries: folder of the programs; None: `programs.program` looks for them.
         :param bus_options: of the bus's URL, such as "loss=0.01&seed=3" or "bitrate=1000000".
         :param emulator_options: more options of `emulator run`.
-        :param answer_s: wall time that a controller has for a cycle in lockstep, s. The test itself may take a day.
+        :param answer_s: wall time that a controller has for a cycle in lockstep, s. The test itself and a debugger may take a day.
         :param summarise: join, judge and draw the run at its end (`bench summary`).
         :raises ValueError: an argument that cannot be meant.
         """
@@ -115,12 +115,25 @@ class Rig(Expectations, People):
     @property
     def time(self) -> float:
         """The rig's time, s: of the cycle whose sensors came last."""
-        return self._link.now_s if self._link else 0.0
+        self._to_newest()
+        return self._now_s
 
     @property
     def cycle(self) -> int:
         """Number of the cycle whose sensors came last; a cycle has 1 ms."""
+        self._to_newest()
         return self._link.cycle if self._link else 0
+
+    @property
+    def _now_s(self) -> float:
+        return self._link.now_s if self._link else 0.0
+
+    def _to_newest(self) -> None:
+        if self._link and not self._over:
+            try:
+                self._link.catch_up()
+            except Ended:
+                pass  # time stands
 
     @property
     def database(self) -> Database:
@@ -181,6 +194,9 @@ class Rig(Expectations, People):
                 programs_of = controller.programs(self)
                 started += programs_of
                 self._own |= {each.name for each in programs_of} if isinstance(controller, Own) else set()
+            names = ["emulator", *(each.name for each in started)]
+            if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+                raise ValueError(f"several programs are named {', '.join(twice)}: give each a name of its own, Process(name=…), Own(two=True)")
             self._processes.start("emulator", [str(emulator), *self._emulator_words()])
             self._wait(self.bus_path.exists, "the emulator's bus")
             for each in started:
@@ -227,7 +243,10 @@ class Rig(Expectations, People):
 
     def _join_s(self) -> int:
         """Wall time for all to join, s: a debugger at reset may take as long as it likes."""
-        return _A_DAY_S if any(getattr(each, "gdb", None) is not None for each in self.controllers) else _JOIN_S
+        return _A_DAY_S if self._has_debugger() else _JOIN_S
+
+    def _has_debugger(self) -> bool:
+        return any(getattr(each, "gdb", None) is not None for each in self.controllers)
 
     def _wait(self, there: Callable[[], bool], what: str) -> None:
         until = time.monotonic() + _JOIN_S
@@ -250,7 +269,8 @@ class Rig(Expectations, People):
         bus = peer.Peer(str(self.bus_path))
         try:
             if self.pace == "lockstep":
-                self._link = Lockstep(bus, self.seen, laws, self._look, self._answer_s, self._join_s())
+                answer_s = _A_DAY_S if self._has_debugger() else self._answer_s
+                self._link = Lockstep(bus, self.seen, laws, self._look, answer_s, self._join_s())
             else:
                 self._link = RealTime(bus, self.seen, laws, self._look, _JOIN_S)
         except Ended as ended:
@@ -314,7 +334,7 @@ class Rig(Expectations, People):
             self._link.send(raw_id, data)
         except Ended as ended:
             raise self._why_ended(str(ended)) from None
-        self.seen.take(raw_id, data, len(data), self.time)
+        self.seen.take(raw_id, data, len(data), self._now_s)
 
     def _why_ended(self, why: str) -> AirbenchError:
         processes = self._running()
@@ -327,7 +347,7 @@ class Rig(Expectations, People):
             why = str(Run(self.folder).ended_because) or why
         except (OSError, ValueError):
             pass  # it left no summary; what the bus said is all there is
-        return RigEnded(f"the run ended after {self.time:.3f} s: {why}")
+        return RigEnded(f"the run ended after {self._now_s:.3f} s: {why}")
 
     # Its end.
 
@@ -375,10 +395,12 @@ class Rig(Expectations, People):
         self._running()
 
     def _run_out(self, within: str | float) -> None:
-        began_s = self.time
-        until_s = began_s + seconds(within)
+        began_s = self._now_s
         try:
-            while self.time < until_s:
+            self._catch_up()
+            began_s = self._now_s
+            until_s = began_s + seconds(within)
+            while self._now_s < until_s:
                 self._advance()
         except RigEnded:
             return

@@ -2,13 +2,17 @@
 
 import filecmp
 import json
+import random
 import re
+import socket
+import threading
 import time
 
 import can
 import pytest
 
 import airbench_hil
+from airbench_hil.expectations import _Band
 from airbench_hil import ExpectationFailed, Fault, NotAnswered, NotSeen, Own, Process, ProgramFailed, Refused, Rig, RigEnded, programs
 
 AT = {"carriage_position_m": 0.15}
@@ -149,6 +153,7 @@ def test_bad_input_is_the_programs_own_message_and_exit_code(tmp_path):
         ({"experiment": "steps"}, "none of by-hand, damper-load"),
         ({"controller": Own("position-q"), "experiment": "step"}, "position-cascade"),
         ({"controller": Own()}, "runs an experiment"),
+        ({"controller": [Own(), Own()], "experiment": "step"}, "named controller"),
         ({"pace": "fast"}, "lockstep"),
         ({"controller": airbench_hil.Elf("x.elf"), "pace": "real"}, "lockstep only"),
     ]:
@@ -204,6 +209,36 @@ def test_an_elf_runs_in_lockstep_with_the_test(elf, tmp_path):
         run = rig.end()
     # 10 ms before the first cycle, and one for each; the last turn is everybody's.
     assert json.loads((tmp_path / "run/mcu.json").read_text())["core_clocks"] == 8000 * (10 + run.figures["cycles"])
+
+
+def test_a_debugger_may_hold_an_elf_longer_than_a_controller_may_think(elf, tmp_path):
+    resumed, said = threading.Event(), tmp_path / "run/programs/mcu.err"
+
+    def debugger():
+        until = time.monotonic() + 60
+        while not (said.exists() and (port := re.search(r"target remote :(\d+)", said.read_text()))):
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        with socket.create_connection(("127.0.0.1", int(port[1]))) as gdb:
+            gdb.sendall(b"$c#63")
+            time.sleep(0.3)
+            gdb.sendall(b"\x03")
+            while b"#" not in gdb.recv(100):
+                pass
+            time.sleep(1.0)
+            gdb.sendall(b"+$c#63")
+            resumed.set()
+            gdb.recv(100)
+
+    thread = threading.Thread(target=debugger)
+    thread.start()
+    with Rig(controller=airbench_hil.Elf(elf, gdb=0), answer_s=0.4, out=tmp_path / "run") as rig:
+        while not resumed.is_set() and thread.is_alive():
+            rig.run_for("1 ms")
+        rig.run_for("1 ms")
+        assert resumed.is_set()
+        rig.end()
+    thread.join()
 
 
 def test_a_foreign_program_takes_part_by_its_echo(tmp_path):
@@ -292,6 +327,55 @@ def test_real_time_passes_by_itself_and_a_function_answers_in_it(tmp_path):
         assert rig.time - before > 0.2
         run = rig.end()
     assert run.figures["cycles"] >= 1000 * before
+
+
+def test_in_real_time_expectations_begin_at_the_newest_cycle(tmp_path):
+    with Rig(pace="real", controller=lambda _: 0.0, emulator_options=["--no-realtime"], out=tmp_path) as rig:
+        before = rig.time
+        time.sleep(0.5)
+        assert rig.time - before > 0.3
+        before = rig.time
+        time.sleep(0.5)
+        assert rig.stable_for("DriveSensors.position", "0.2 s", tolerance=1.0, within="0.3 s") - before > 0.3
+        rig.end()
+
+
+def test_the_longest_steady_course_is_found_whatever_came_before():
+    chance, band, course = random.Random(5), _Band(1.0), []
+    for time_s in range(500):
+        course.append(chance.gauss(0.0, 0.4))
+        steady = [at for at in range(time_s + 1) if max(course[at:]) - min(course[at:]) <= 1.0]
+        assert band.take(time_s, course[-1]) == steady[0]
+    assert band.take(500, None) is None
+
+
+@pytest.mark.parametrize("pace", ["lockstep", "real"])
+def test_a_python_controller_answers_delayed_sensors_as_what_they_are(tmp_path, pace):
+    sampled = []
+
+    def law(sensors):
+        sampled.append(sensors.cycle)
+        return 0.0
+
+    delayed = [Fault("bus-delay", "bus.DriveSensors", from_s=0.05, numbers={"delay_ms": 3})]
+    with Rig(pace=pace, controller=law, faults=delayed, emulator_options=["--no-realtime"], out=tmp_path) as rig:
+        rig.run_for("0.3 s")
+        run = rig.end()
+    # Cycle 49 comes in time, cycle 50 three cycles later; nobody answers twice.
+    assert sampled == sorted(set(sampled)) and sampled[-1] < run.figures["cycles"] - 2
+    echoes = [rig.database.decode_message("DriveValveCommand", each.data)["echo"] for each in run.messages() if each.arbitration_id == 0x110]
+    assert echoes == sampled[: len(echoes)] and len(echoes) > 200
+
+
+def test_numbers_of_numpy_are_numbers(tmp_path):
+    numpy = pytest.importorskip("numpy")
+    planned = Fault("bus-delay", "bus.DriveSensors", from_s=numpy.float64(0.01), numbers={"delay_ms": numpy.int64(1)})
+    setup = {"carriage_position_m": numpy.float32(0.25)}
+    with Rig(controller=to_300_mm, setup=setup, faults=[planned], out=tmp_path) as rig:
+        rig.fault("position-sensor-offset", "drive", offset_m=numpy.float64(0.01))
+        rig.fault("bus-delay", "bus.DriveValveCommand", delay_ms=numpy.int64(2))
+        rig.run_for("20 ms")
+        rig.end()
 
 
 def test_without_a_program_the_message_says_where_it_was_looked_for_and_what_to_do(tmp_path, monkeypatch):
