@@ -123,7 +123,12 @@ def test_corrupted_commands_are_refused(moving):
 def test_a_controller_that_falls_silent_has_its_valve_shut(moving):
     rig = moving()
     rig.fault("bus-off", "drive-controller")
+    silent = rig.time
     rig.expect("RigStatus.drive_stale == 1", within="35 ms")  # 20 cycles, and up to 10 ms to the next RigStatus
+    rig.run_for("50 ms")
+    spool = rig.end().truth.set_index("time_s")["drive_spool"].abs()
+    assert spool[silent : silent + 0.018].min() > 0.05, "it is open to the last"
+    assert spool[silent + 0.030 :].max() < 0.01, "the spool follows within 10 ms"
 
 
 @requirement("FLT-BUS-3")

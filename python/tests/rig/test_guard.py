@@ -1,9 +1,11 @@
 """Nothing is left of a rig when the interpreter that asked for it is killed, at whatever moment."""
 
+import json
 import os
 import random
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -13,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from airbench_hil import programs
+from airbench_hil.guests import Readiness
 
 # What a killed test might have been doing, again and again; its processes carry MARK in their environment.
 _VICTIM = """
@@ -122,3 +125,32 @@ def test_a_guard_that_is_killed_takes_its_programs_along(tmp_path):
         time.sleep(0.02)
     # Who would have removed the bus's folder is gone.
     shutil.rmtree(private)
+
+
+def test_a_guard_whose_kernel_has_no_pidfd_open_is_told_by_its_socket(tmp_path):
+    ours, theirs = socket.socketpair()
+    (tmp_path / "private").mkdir()
+    code = f"import os, runpy; del os.pidfd_open; runpy.run_path({str(programs.PACKAGE / 'guard.py')!r}, run_name='__main__')"
+    words = [sys.executable, "-I", "-S", "-c", code, str(theirs.fileno()), str(os.getpid()), str(tmp_path / "private")]
+    guard = subprocess.Popen(words, pass_fds=[theirs.fileno()])
+    theirs.close()
+    asked = {"do": "start", "name": "one", "words": ["sleep", "1000"], "env": None, "cwd": None, "out": "/dev/null", "err": "/dev/null"}
+    ours.sendall(json.dumps(asked).encode() + b"\n")
+    pid = json.loads(ours.recv(1000))["pid"]
+    ours.close()
+    assert guard.wait(60) == 0
+    assert not Path(f"/proc/{pid}").exists() and not (tmp_path / "private").exists()
+
+
+def test_a_guest_that_waits_for_input_in_another_thread_is_ready():
+    code = "import os, threading, time; threading.Thread(target=os.read, args=(0, 1), daemon=True).start(); time.sleep(1000)"
+    starts = "import subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
+    bench = subprocess.Popen([sys.executable, "-c", starts, code], stdin=subprocess.PIPE, start_new_session=True)
+    try:
+        ready, until = Readiness(bench.pid), time.monotonic() + 60
+        while not ready.look():
+            assert time.monotonic() < until
+            time.sleep(0.005)
+    finally:
+        os.killpg(bench.pid, signal.SIGKILL)
+        bench.communicate()

@@ -12,8 +12,9 @@ import can
 import pytest
 
 import airbench_hil
-from airbench_hil.expectations import _Band
 from airbench_hil import ExpectationFailed, Fault, NotAnswered, NotSeen, Own, Process, ProgramFailed, Refused, Rig, RigEnded, programs
+from airbench_hil.expectations import _Band
+from airbench_hil.run import unit_of
 
 AT = {"carriage_position_m": 0.15}
 
@@ -365,6 +366,14 @@ def test_a_python_controller_answers_delayed_sensors_as_what_they_are(tmp_path, 
     assert sampled == sorted(set(sampled)) and sampled[-1] < run.figures["cycles"] - 2
     echoes = [rig.database.decode_message("DriveValveCommand", each.data)["echo"] for each in run.messages() if each.arbitration_id == 0x110]
     assert echoes == sampled[: len(echoes)] and len(echoes) > 200
+
+
+def test_units_are_those_of_the_names_endings():
+    units = {
+        "a_m_per_s2": "m/s^2", "flow_m3_per_s": "m^3/s", "a_m_per_s": "m/s", "gain_per_s": "1/s", "delay_ms": "ms", "time_s": "s",
+        "drive_valve": "1",
+    }
+    assert {name: unit_of(name) for name in units} == units
 
 
 def test_numbers_of_numpy_are_numbers(tmp_path):
