@@ -12,6 +12,7 @@
 //! `bench/docs/logs.md`.
 
 pub mod cli;
+mod controllers;
 mod foreign;
 mod mcap;
 mod mdf4;

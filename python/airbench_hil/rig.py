@@ -83,7 +83,7 @@ class Rig(Expectations, People):
         :param binaries: folder of the programs; None: `programs.program` looks for them.
         :param bus_options: of the bus's URL, such as "loss=0.01&seed=3" or "bitrate=1000000".
         :param emulator_options: more options of `emulator run`.
-        :param answer_s: wall time that a controller has for a cycle in lockstep, s. The test itself and a debugger may take a day.
+        :param answer_s: wall time that a controller has for a cycle in lockstep, s. The test and a debugger may take a day.
         :param summarise: join, judge and draw the run at its end (`bench summary`).
         :raises ValueError: an argument that cannot be meant.
         """
@@ -196,7 +196,8 @@ class Rig(Expectations, People):
                 self._own |= {each.name for each in programs_of} if isinstance(controller, Own) else set()
             names = ["emulator", *(each.name for each in started)]
             if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-                raise ValueError(f"several programs are named {', '.join(twice)}: give each a name of its own, Process(name=…), Own(two=True)")
+                why = "give each a name of its own, Process(name=…), Own(two=True)"
+                raise ValueError(f"several programs are named {', '.join(twice)}: {why}")
             self._processes.start("emulator", [str(emulator), *self._emulator_words()])
             self._wait(self.bus_path.exists, "the emulator's bus")
             for each in started:

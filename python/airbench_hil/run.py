@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 #: Endings of names in tables, and their units; the longest that fits counts.
 _UNITS = {
     "_m_per_s2": "m/s^2", "_m_per_s": "m/s", "_m3_per_s": "m^3/s", "_N_per_s": "N/s", "_per_s": "1/s", "_kg_per_s": "kg/s",
-    "_m": "m", "_N": "N", "_Pa": "Pa", "_s": "s", "_kg": "kg", "_K": "K", "_m3": "m^3", "_W": "W", "_J": "J", "_ns": "ns", "_us": "us", "_ms": "ms", "_n": "N", "_pa": "Pa", "_ratio": "1",
+    "_m": "m", "_N": "N", "_Pa": "Pa", "_s": "s", "_kg": "kg", "_K": "K",
+    "_m3": "m^3", "_W": "W", "_J": "J", "_ns": "ns", "_us": "us", "_ms": "ms", "_n": "N", "_pa": "Pa", "_ratio": "1",
 }
 
 

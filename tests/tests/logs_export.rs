@@ -264,6 +264,21 @@ fn an_mcap_takes_no_table_that_is_none_or_whose_time_nobody_tells() {
 }
 
 #[test]
+fn an_mcap_takes_no_table_of_a_controller_of_an_earlier_run() {
+    let scene = Scene::new(SHORT);
+    let folder = scene.path("copied");
+    fs::create_dir(&folder).expect("a folder");
+    let copy = |name: &str| fs::copy(run_folder().join(name), folder.join(name)).expect("a file of the run");
+    let _ = ["bus.log", "summary.json", "controller-drive.csv", "controller-load.csv"].map(copy);
+    fs::write(folder.join("controller-drive.json"), "{}").expect("a report");
+    let out = scene.path("copied.mcap");
+    let said = export(&folder, "mcap", &out, &[]).expect_code(0);
+    let _ = said.expect_said(&["controller-load.csv: left out"]);
+    let channels = &mcap_channels(&out)["channels"];
+    assert!(channels["/controller/drive"].is_object() && channels["/controller/load"].is_null());
+}
+
+#[test]
 fn an_mdf4_begins_when_its_log_does() {
     let scene = Scene::new(SHORT);
     let log = scene.write("dated.log", "(1700000000.000250) a 160#0100\n(1700000000.000500) a 160#0200\n");

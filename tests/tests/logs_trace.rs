@@ -172,6 +172,10 @@ fn a_trace_holds_every_cycle_with_its_stages_every_frame_and_every_fault() {
         assert_eq!((&mark["name"], &mark["s"]), (&format!("valve-stuck drive: {what}").into(), &"g".into()));
         assert!(same(mark["ts"].as_f64().expect("a time"), time_s * 1e6 + trace.cycle_zero_us), "{mark}");
     }
+
+    fs::remove_file(folder.join("controller.json")).expect("the report");
+    let said = export(&folder, &out).expect_said(&["controller-timing.csv: left out"]);
+    assert!(said.stdout.contains(&format!("{} cycles, 2 marks", rig.len())), "{}", said.stdout);
 }
 
 #[test]

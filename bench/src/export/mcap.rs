@@ -10,6 +10,7 @@
 //! Source: MCAP 1 [mcap.dev/spec], by the crate `mcap`; the `mcap` of PyPI reads the same values (a test holds both together).
 
 use super::ExportError;
+use super::controllers;
 use super::mdf4::comment;
 use super::run_table::{RunTable, holds_words, unit};
 use super::signals::{Course, Signals};
@@ -88,6 +89,11 @@ pub(super) fn write(
     }
     let mut sources = Vec::new();
     for (name, topic) in TABLES {
+        if let (Some(folder), Some(axis)) = (folder, topic.strip_prefix("/controller/"))
+            && !controllers::has_axis(folder, axis)?
+        {
+            continue;
+        }
         if let Some(table) = folder.map(|folder| RunTable::open(&folder.join(name))).transpose()?.flatten() {
             sources.push((topic.to_owned(), Source::Table { table, origin_ns: log.origin_ns() }));
         }

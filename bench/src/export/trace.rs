@@ -13,6 +13,7 @@
 //! Source: "Trace Event Format", Google 2016: X is a slice, i an instant, M metadata.
 
 use super::ExportError;
+use super::controllers;
 use super::run_table::RunTable;
 use crate::recorded_log::RecordedLog;
 use crate::warn;
@@ -127,12 +128,12 @@ fn processes(folder: &Path) -> Result<Vec<Process>, FileError> {
     let mut processes = Vec::new();
     for table in [RIG_TABLE].iter().chain(&CONTROLLER_TABLES) {
         let path = folder.join(table);
-        if !path.exists() {
+        let is_rig = *table == RIG_TABLE;
+        let name = if is_rig { "rig" } else { table.trim_end_matches("-timing.csv") };
+        if !path.exists() || !is_rig && !controllers::has_process(folder, name) {
             continue;
         }
         let rows = timing::read(&read_text(&path)?).map_err(|error| FileError::read(&path, error))?;
-        let is_rig = *table == RIG_TABLE;
-        let name = if is_rig { "rig" } else { table.trim_end_matches("-timing.csv") };
         let pid = if is_rig { RIG } else { RIG + 1 + processes.len() as u32 };
         processes.push(Process { name: name.to_owned(), pid, sends_first: is_rig, rows });
     }

@@ -134,7 +134,8 @@ def test_a_guard_whose_kernel_has_no_pidfd_open_is_told_by_its_socket(tmp_path):
     words = [sys.executable, "-I", "-S", "-c", code, str(theirs.fileno()), str(os.getpid()), str(tmp_path / "private")]
     guard = subprocess.Popen(words, pass_fds=[theirs.fileno()])
     theirs.close()
-    asked = {"do": "start", "name": "one", "words": ["sleep", "1000"], "env": None, "cwd": None, "out": "/dev/null", "err": "/dev/null"}
+    files = {"out": "/dev/null", "err": "/dev/null"}
+    asked = {"do": "start", "name": "one", "words": ["sleep", "1000"], "env": None, "cwd": None, **files}
     ours.sendall(json.dumps(asked).encode() + b"\n")
     pid = json.loads(ours.recv(1000))["pid"]
     ours.close()

@@ -191,7 +191,7 @@ def test_a_python_controllers_own_exception_reaches_the_test_and_so_does_a_bad_o
                 rig.run_for("1 s")
 
 
-@pytest.mark.parametrize("asked", [lambda rig: rig.run_for("60 s"), lambda rig: (time.sleep(0.5), rig.end())], ids=["run_for", "end"])
+@pytest.mark.parametrize("asked", [lambda rig: rig.run_for("60 s"), lambda rig: (time.sleep(0.5), rig.end())], ids=["run", "end"])
 def test_in_real_time_a_controllers_exception_reaches_the_test_and_the_run_is_saved(tmp_path, asked):
     def raising(sensors):
         if sensors.cycle > 50:
@@ -263,7 +263,7 @@ def test_a_controller_that_hangs_is_named_and_one_that_crashes_too(tmp_path):
         # Exit code 1 is that of a broken bound only for airbench's own controller.
         with pytest.raises(ProgramFailed, match="process ended with exit code 1:\nI broke"):
             rig.run_for("1 s")
-    program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "print('I left', file=sys.stderr); sys.exit()"))
+    program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "os.write(2, b'I left'); sys.exit()"))
     with Rig(controller=Process(["{python}", program, "{path}"]), answer_s=1.0, out=tmp_path / "leaves") as rig:
         with pytest.raises(NotAnswered, match="process has ended with exit code 0:\nI left"):
             rig.run_for("1 s")
@@ -364,7 +364,8 @@ def test_a_python_controller_answers_delayed_sensors_as_what_they_are(tmp_path, 
         run = rig.end()
     # Cycle 49 comes in time, cycle 50 three cycles later; nobody answers twice.
     assert sampled == sorted(set(sampled)) and sampled[-1] < run.figures["cycles"] - 2
-    echoes = [rig.database.decode_message("DriveValveCommand", each.data)["echo"] for each in run.messages() if each.arbitration_id == 0x110]
+    commands = [each.data for each in run.messages() if each.arbitration_id == 0x110]
+    echoes = [rig.database.decode_message("DriveValveCommand", data)["echo"] for data in commands]
     assert echoes == sampled[: len(echoes)] and len(echoes) > 200
 
 
