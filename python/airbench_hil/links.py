@@ -36,6 +36,7 @@ class _Raised(NamedTuple):
 class Link:
     """A connection to the rig whose time advances by `advance` alone."""
 
+    _bus: peer.Peer
     cycle: int = 0
     now_s: float = 0.0
     """The rig's time, s."""
@@ -52,7 +53,10 @@ class Link:
 
     def send(self, raw_id: int, data: bytes) -> None:
         """Sends a frame, which acts in the next cycle. Raises Ended."""
-        raise NotImplementedError
+        try:
+            self._bus.send(raw_id, data)
+        except peer.BusError as error:
+            raise Ended(str(error)) from error
 
     def close(self) -> None:
         """Leaves the bus."""
@@ -60,7 +64,10 @@ class Link:
 
 
 def _sampled(word: int, cycle: int) -> int:
-    """The cycle in which sensors were sampled that came in `cycle`: their alive counter is its last four bits."""
+    """The cycle in which sensors were sampled that came in `cycle`: their alive counter is its last four bits.
+
+    Frames that are older than 15 cycles, as when the rig skips cycles while a fault delays them, count as a multiple of 16 too new.
+    """
     return cycle - (cycle - (word >> _ALIVE_SHIFT) & _ALIVE_MASK)
 
 
@@ -119,12 +126,6 @@ class Lockstep(Link):
                 waited_s += _LOOK_S
                 if waited_s >= patience_s:
                     raise NotAnswered(f"a controller has not answered cycle {self.cycle} within {patience_s:g} s of wall time")
-
-    def send(self, raw_id: int, data: bytes) -> None:
-        try:
-            self._bus.send(raw_id, data)
-        except peer.BusError as error:
-            raise Ended(str(error)) from error
 
     def silence(self) -> None:
         self._laws.clear()
@@ -229,12 +230,6 @@ class RealTime(Link):
         # A controller that asks for the rig's time is in the reader's thread.
         while self._came and threading.current_thread() is not self._thread:
             self._take()
-
-    def send(self, raw_id: int, data: bytes) -> None:
-        try:
-            self._bus.send(raw_id, data)
-        except peer.BusError as error:
-            raise Ended(str(error)) from error
 
     def silence(self) -> None:
         self._laws, self._silent = {}, True

@@ -73,12 +73,7 @@ def experiment(name: str | os.PathLike[str]) -> Path:
 
     :raises ValueError: there is none.
     """
-    if Path(name).suffix == ".toml" and Path(name).is_file():
-        return Path(name).resolve()
-    shipped = file("experiments")
-    if (shipped / f"{name}.toml").is_file():
-        return shipped / f"{name}.toml"
-    raise ValueError(f"experiment '{name}': no such file, and none of {', '.join(sorted(p.stem for p in shipped.glob('*.toml')))}")
+    return _shipped("experiment", name, file("experiments"))
 
 
 def axis_program(name: str | os.PathLike[str]) -> Path:
@@ -86,9 +81,12 @@ def axis_program(name: str | os.PathLike[str]) -> Path:
 
     :raises ValueError: there is none.
     """
+    return _shipped("program", name, file("programs"))
+
+
+def _shipped(kind: str, name: str | os.PathLike[str], folder: Path) -> Path:
     if Path(name).suffix == ".toml" and Path(name).is_file():
         return Path(name).resolve()
-    shipped = file("programs")
-    if (shipped / f"{name}.toml").is_file():
-        return shipped / f"{name}.toml"
-    raise ValueError(f"program '{name}': no such file, and none of {', '.join(sorted(p.stem for p in shipped.glob('*.toml')))}")
+    if (folder / f"{name}.toml").is_file():
+        return folder / f"{name}.toml"
+    raise ValueError(f"{kind} '{name}': no such file, and none of {', '.join(sorted(p.stem for p in folder.glob('*.toml')))}")
