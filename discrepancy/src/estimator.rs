@@ -21,8 +21,8 @@ use serde::Serialize;
 pub(crate) struct Options {
     /// Most accepted steps.
     pub(crate) steps: usize,
-    /// Fall of the loss in a step below which the fit has converged. The loss is minus twice a log-likelihood, so that 1 is one
-    /// standard error of a parameter squared; the bounds are below what decides between two models.
+    /// Fall of the loss in a step below which the fit has converged. The loss is minus twice a log-likelihood, so that a
+    /// parameter off by one standard error costs 1; the tolerances are below what decides between two models.
     pub(crate) converged: f64,
     /// Fractions of the step that are tried, longest first.
     pub(crate) fractions: &'static [f64],
