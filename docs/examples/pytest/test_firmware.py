@@ -13,6 +13,12 @@ def experiment_of(rig):
     rig.wait_for("DriveSensors.position > 0.2", timeout="3 s")
 
 
+def jump(rig, signal, least):
+    """When the signal first changed by so much from one cycle to the next, in the last 30 ms, s."""
+    course = rig.course(signal, "30 ms")
+    return next(time for (_, before), (time, now) in zip(course, course[1:], strict=False) if abs(now - before) > least)
+
+
 @requirement("POS-1", "POS-4", "TIM-1")
 def test_it_positions_within_the_bounds(firmware_rig):
     rig = firmware_rig()
@@ -29,6 +35,16 @@ def test_it_positions_within_the_bounds(firmware_rig):
     commands = run.summary["drive_commands"]
     assert commands["accepted"] == run.figures["cycles"]
     assert all(commands[what] == 0 for what in ("lost", "late", "duplicate", "breaks", "refused_stale")), commands
+
+
+@requirement("TIM-3")
+def test_a_command_answers_the_position_of_its_own_cycle(firmware_rig):
+    rig = firmware_rig()
+    experiment_of(rig)
+    rig.fault("position-sensor-offset", "drive", offset_m=0.01)
+    rig.run_for("20 ms")
+    shown, answered = jump(rig, "DriveSensors.position", 0.005), jump(rig, "DriveValveCommand.opening", 0.1)
+    assert answered == shown, "the sensors jump in this cycle, s"
 
 
 @requirement("STOP-1")
