@@ -12,6 +12,7 @@ FILES = {
     "protocol/rig.dbc": "data/rig.dbc",
     "controller/experiments": "data/experiments",
     "controller/programs": "data/programs",
+    "campaign/campaigns": "data/campaigns",
 }
 
 

@@ -6,9 +6,11 @@
     assert run.figures["position_error_dynamic_m"] < 0.004
 """
 
+from airbench_hil.campaigns import Campaign, campaign
 from airbench_hil.controllers import Elf, Own, Process, Python, Sensors
 from airbench_hil.errors import (
     AirbenchError,
+    BadRecords,
     ExpectationFailed,
     NotAnswered,
     NotSeen,
@@ -19,12 +21,14 @@ from airbench_hil.errors import (
     SignalUnknown,
 )
 from airbench_hil.faults import Fault
+from airbench_hil.report import Effect, Gap, Number, Report, close
 from airbench_hil.rig import Rig
 from airbench_hil.run import Run
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "AirbenchError", "Elf", "ExpectationFailed", "Fault", "NotAnswered", "NotSeen", "Own", "Process", "ProgramFailed",
-    "ProgramNotFound", "Python", "Refused", "Rig", "RigEnded", "Run", "Sensors", "SignalUnknown",
+    "AirbenchError", "BadRecords", "Campaign", "Effect", "Elf", "ExpectationFailed", "Fault", "Gap", "NotAnswered", "NotSeen", "Number",
+    "Own", "Process", "ProgramFailed", "ProgramNotFound", "Python", "Refused", "Report", "Rig", "RigEnded", "Run", "Sensors",
+    "SignalUnknown", "campaign", "close",
 ]

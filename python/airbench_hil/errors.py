@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from airbench_hil.report import Report
 
 #: Exit codes of all programs (protocol/src/exit.rs).
 GOOD, BOUND_BROKEN, BAD_INPUT, PARTNER_FAILED, LOCKSTEP_TIMEOUT, INTERRUPTED = 0, 1, 2, 3, 4, 130
@@ -29,6 +33,17 @@ class ProgramFailed(AirbenchError):
         where = f"\nrun folder: {folder}" if folder else ""
         super().__init__(f"{program} {how}:\n{said or '(it said nothing)'}{where}")
         self.program, self.exit_code, self.said, self.folder = program, exit_code, said, folder
+
+
+class BadRecords(ProgramFailed):
+    """`discrepancy close` cannot use a record; the text says which, where, and what to change.
+
+    :ivar report: the `Report`, whose verdict is "bad-data".
+    """
+
+    def __init__(self, failed: ProgramFailed, report: Report) -> None:
+        super().__init__(failed.program, failed.exit_code, failed.said, failed.folder)
+        self.report = report
 
 
 class RigEnded(AirbenchError):

@@ -18,6 +18,7 @@ _FILES = {
     "rig.dbc": ("data/rig.dbc", "protocol/rig.dbc"),
     "experiments": ("data/experiments", "controller/experiments"),
     "programs": ("data/programs", "controller/programs"),
+    "campaigns": ("data/campaigns", "campaign/campaigns"),
 }
 
 
@@ -55,7 +56,7 @@ def program(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
 
 
 def file(name: str) -> Path:
-    """A file or folder of the rig: "rig.toml", "rig.dbc", "experiments" or "programs".
+    """A file or folder of the rig: "rig.toml", "rig.dbc", "experiments", "programs" or "campaigns".
 
     :raises ProgramNotFound: neither the package nor a checkout has it.
     """
@@ -82,6 +83,14 @@ def axis_program(name: str | os.PathLike[str]) -> Path:
     :raises ValueError: there is none.
     """
     return _shipped("program", name, file("programs"))
+
+
+def campaign(name: str | os.PathLike[str]) -> Path:
+    """The file of a campaign, by the name of a shipped one or by its path.
+
+    :raises ValueError: there is none.
+    """
+    return _shipped("campaign", name, file("campaigns"))
 
 
 def _shipped(kind: str, name: str | os.PathLike[str], folder: Path) -> Path:

@@ -6,7 +6,6 @@ import os
 import shutil
 import signal
 import subprocess
-import tempfile
 import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +17,7 @@ import can
 from cantools.database.can import Database
 
 from airbench_hil import faults as fault_files
-from airbench_hil import peer, programs
+from airbench_hil import peer, programs, tasks
 from airbench_hil.controllers import Answering, Controller, Elf, Law, Own, Process, Python, StrPath
 from airbench_hil.conditions import seconds
 from airbench_hil.errors import BOUND_BROKEN, GOOD, INTERRUPTED, PARTNER_FAILED, AirbenchError, NotAnswered, ProgramFailed, RigEnded
@@ -180,7 +179,7 @@ class Rig(Expectations, People):
         if self._processes:
             raise ValueError("a rig is started once; make another")
         emulator = self.program("emulator")
-        self.folder = _folder(self._out, self._experiment)
+        self.folder = tasks.folder(self._out, _title(self._experiment))
         output = self.folder / "programs"
         shutil.rmtree(output, ignore_errors=True)
         output.mkdir(parents=True)
@@ -464,12 +463,7 @@ def _controllers(asked: Controller | Law | Sequence[Controller | Law] | None) ->
     return [each if isinstance(each, (Own, Process, Elf, Python)) else Python(each) for each in every]
 
 
-def _folder(out: StrPath | None, experiment: StrPath | Mapping[str, Any] | None) -> Path:
-    if out is not None:
-        folder = Path(out).resolve()
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
-    title = "rig" if experiment is None else experiment.get("title", "rig") if isinstance(experiment, Mapping) else Path(experiment).stem
-    runs = Path("runs").resolve()
-    runs.mkdir(exist_ok=True)
-    return Path(tempfile.mkdtemp(prefix=time.strftime(f"%Y%m%d-%H%M%S-{title}-"), dir=runs))
+def _title(experiment: StrPath | Mapping[str, Any] | None) -> str:
+    if isinstance(experiment, Mapping):
+        return str(experiment.get("title", "rig"))
+    return "rig" if experiment is None else Path(experiment).stem

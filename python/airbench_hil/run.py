@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from functools import cached_property
 from html import escape
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,13 +80,7 @@ class Run:
 
         :raises ImportError: pandas is not installed: pip install 'airbench-hil[pandas]'
         """
-        try:
-            import pandas
-        except ImportError as missing:
-            raise ImportError(f"{missing}: pip install 'airbench-hil[pandas]'") from missing
-        frame: pandas.DataFrame = pandas.read_csv(self.folder / name, comment="#")
-        frame.attrs["units"] = {column: unit_of(str(column)) for column in frame.columns}
-        return frame
+        return read_table(self.folder / name)
 
     def messages(self) -> list[can.Message]:
         """Every frame of bus.log, as python-can reads it; stamps in s, of simulated time from 0 in lockstep."""
@@ -105,6 +100,26 @@ class Run:
         rows = "".join(f"<tr><td>{escape(key)}</td><td>{value:.6g}</td></tr>" for key, value in self.figures.items())
         drawing = self.picture.read_text(encoding="utf-8") if self.picture else ""
         return f"<p>{escape(str(self.folder))}: {escape(self.ended_because)}</p>{drawing}<table>{rows}</table>"
+
+
+def read_table(path: Path) -> pandas.DataFrame:
+    """A CSV file as a frame; `attrs["units"]` has the unit of each column, `attrs["comments"]` the lines before the head."""
+    module = import_pandas()
+    with path.open(encoding="utf-8") as file:
+        comments = [line.rstrip("\n") for line in takewhile(lambda line: line.startswith("#"), file)]
+    frame: pandas.DataFrame = module.read_csv(path, comment="#")
+    frame.attrs["units"] = {column: unit_of(str(column)) for column in frame.columns}
+    frame.attrs["comments"] = comments
+    return frame
+
+
+def import_pandas() -> Any:
+    """The module. Raises ImportError, which says how to install it."""
+    try:
+        import pandas
+    except ImportError as missing:
+        raise ImportError(f"{missing}: pip install 'airbench-hil[pandas]'") from missing
+    return pandas
 
 
 def _is_number(value: Any) -> bool:

@@ -12,7 +12,7 @@ fn pytest() -> Command {
     let programs = [Program::Emulator, Program::Controller, Program::Bench];
     let [emulator, ..] = programs.map(|program| executable(program, Build::Shipped));
     let mut pytest = Command::new(of("hil"));
-    pytest.args(["-m", "pytest", "-n", "2", "-p", "no:cacheprovider", "--color=no"]);
+    pytest.args(["-m", "pytest", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider", "--color=no"]);
     pytest
         .env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder"))
         .env("PATH", tools_path());
@@ -36,7 +36,7 @@ fn the_rig_for_python_its_plugin_and_its_wheel_do_what_they_say() {
     let _ = [Program::Discrepancy, Program::Campaign].map(|program| executable(program, Build::Shipped));
     let mut tests = pytest();
     tests.arg(workspace().join("python/tests/rig"));
-    expect_all_passed(Running::start("pytest", &mut tests).wait(), 60);
+    expect_all_passed(Running::start("pytest", &mut tests).wait(), 70);
 }
 
 #[test]
