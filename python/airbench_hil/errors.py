@@ -73,6 +73,9 @@ class ExpectationFailed(AssertionError):
     :ivar picture: an SVG of these seconds; None where nothing could be drawn.
     """
 
+    #: Robot Framework shows the text alone.
+    ROBOT_SUPPRESS_NAME = True
+
     def __init__(self, text: str, folder: Path, picture: Path | None) -> None:
         super().__init__(text)
         self.folder, self.picture = folder, picture
