@@ -22,6 +22,13 @@ pub fn line_of(text: &str, offset: usize) -> usize {
     1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|byte| **byte == b'\n').count()
 }
 
+/// Column of a byte of a text in its line, in characters from 1.
+#[must_use]
+pub fn column_of(text: &str, offset: usize) -> usize {
+    let before = text.get(..offset.min(text.len())).unwrap_or_default();
+    1 + before.rsplit('\n').next().map_or(0, |line| line.chars().count())
+}
+
 /// A part of a text as it is written, on one line and cut to a readable length.
 #[must_use]
 pub fn written(text: &str, span: Range<usize>) -> String {

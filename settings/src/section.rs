@@ -4,7 +4,7 @@
 //! those that were asked for.
 
 use crate::parameters::Parameter;
-use crate::{line_of, number, written};
+use crate::{column_of, line_of, number, written};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -19,6 +19,7 @@ pub struct Source<'a> {
     text: &'a str,
     file: &'a Path,
     root: Spanned<DeTable<'a>>,
+    columns: bool,
 }
 
 impl<'a> Source<'a> {
@@ -29,7 +30,25 @@ impl<'a> Source<'a> {
     pub fn parse(text: &'a str, file: &'a Path) -> Result<Self, SettingsError> {
         let root =
             DeTable::parse(text).map_err(|error| SettingsError(format!("{}: {error}", file.display())))?;
-        Ok(Self { text, file, root })
+        Ok(Self { text, file, root, columns: false })
+    }
+
+    /// The same, with messages that name the column after the line.
+    #[must_use]
+    pub fn with_columns(self) -> Self {
+        Self { columns: true, ..self }
+    }
+
+    /// The whole text.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        self.text
+    }
+
+    /// An error at a byte of the file.
+    #[must_use]
+    pub fn wrong_from(&self, at: usize, message: &str) -> SettingsError {
+        self.error_at(at, message)
     }
 
     /// The whole file.
@@ -42,8 +61,20 @@ impl<'a> Source<'a> {
         line_of(self.text, at)
     }
 
-    fn error_at(&self, line: usize, message: &str) -> SettingsError {
-        SettingsError(format!("{}:{line}: {message}", self.file.display()))
+    fn error_at(&self, at: usize, message: &str) -> SettingsError {
+        let (file, line) = (self.file.display(), self.line(at));
+        SettingsError(if self.columns {
+            format!("{file}:{line}:{}: {message}", column_of(self.text, at))
+        } else {
+            format!("{file}:{line}: {message}")
+        })
+    }
+
+    /// Where the text of a value begins: behind its quote where it is written as it reads, else at the value.
+    fn start_of_text(&self, value: &Spanned<DeValue<'_>>, text: &str) -> usize {
+        let span = value.span();
+        let raw = self.text.get(span.clone()).unwrap_or_default();
+        span.start + raw.find(text).filter(|_| !text.is_empty()).unwrap_or(0)
     }
 }
 
@@ -54,6 +85,8 @@ pub struct Text {
     pub text: String,
     /// Line in the file, from 1.
     pub line: usize,
+    /// Byte of the file at which it begins; that of its value where it has escapes.
+    pub at: usize,
 }
 
 /// One table of a [`Source`].
@@ -66,6 +99,57 @@ pub struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
+    /// Its keys, in the order of the file. To ask is not to allow them.
+    #[must_use]
+    pub fn keys(&self) -> Vec<String> {
+        let mut keys: Vec<_> = self.table.keys().collect();
+        keys.sort_by_key(|key| key.span().start);
+        keys.into_iter().map(|key| key.get_ref().to_string()).collect()
+    }
+
+    /// The numbers listed under `key`, or the one that stands there; none when it is absent.
+    ///
+    /// # Errors
+    /// No finite number, and no list of them.
+    pub fn numbers(&mut self, key: &str) -> Result<Vec<f64>, SettingsError> {
+        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
+        let finite =
+            |value: &Spanned<DeValue<'_>>| number(value.get_ref()).filter(|number| number.is_finite());
+        let all = match value.get_ref().as_array() {
+            Some(list) => list.iter().map(finite).collect(),
+            None => finite(value).map(|number| vec![number]),
+        };
+        all.ok_or_else(|| self.not_allowed(value, key, "a finite number, or a list of them"))
+    }
+
+    /// Whether `key` is set to true; false when it is absent.
+    ///
+    /// # Errors
+    /// Neither true nor false.
+    pub fn flag(&mut self, key: &str) -> Result<bool, SettingsError> {
+        let Some(value) = self.value(key) else { return Ok(false) };
+        value.get_ref().as_bool().ok_or_else(|| self.not_allowed(value, key, "true or false"))
+    }
+
+    /// The texts listed under `key`; none when it is absent.
+    ///
+    /// # Errors
+    /// No list of texts.
+    pub fn texts(&mut self, key: &str) -> Result<Vec<String>, SettingsError> {
+        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
+        let list = value.get_ref().as_array();
+        let texts =
+            list.and_then(|list| list.iter().map(|item| item.get_ref().as_str().map(String::from)).collect());
+        texts.ok_or_else(|| self.not_allowed(value, key, "a list of texts"))
+    }
+
+    /// Byte of the file at which the value under `key` begins; that of the table when it is absent.
+    #[must_use]
+    pub fn at(&self, key: &str) -> usize {
+        let found = self.table.iter().find(|(name, _)| name.get_ref() == key);
+        found.map_or(self.at, |(_, value)| value.span().start)
+    }
+
     /// Whether the key is there. To ask is not to allow it.
     #[must_use]
     pub fn has(&self, key: &str) -> bool {
@@ -143,7 +227,11 @@ impl<'a> Section<'a> {
     pub fn text(&mut self, key: &str) -> Result<Option<Text>, SettingsError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         match value.get_ref().as_str() {
-            Some(text) => Ok(Some(Text { text: text.into(), line: self.source.line(value.span().start) })),
+            Some(text) => Ok(Some(Text {
+                text: text.into(),
+                line: self.source.line(value.span().start),
+                at: self.source.start_of_text(value, text),
+            })),
             None => Err(self.not_allowed(value, key, "a text in quotes")),
         }
     }
@@ -237,16 +325,18 @@ impl<'a> Section<'a> {
     pub fn finish(&self) -> Result<(), SettingsError> {
         let unknown = |name: &&Spanned<_>| !self.asked.iter().any(|asked| name.get_ref() == asked);
         let Some(name) = self.table.keys().find(unknown) else { return Ok(()) };
-        let line = self.source.line(name.span().start);
         let path = self.path_of(name.get_ref());
-        Err(self.source.error_at(line, &format!("unknown key {path}; allowed is {}", self.asked.join(", "))))
+        Err(self.source.error_at(
+            name.span().start,
+            &format!("unknown key {path}; allowed is {}", self.asked.join(", ")),
+        ))
     }
 
     /// An error of the whole table.
     #[must_use]
     pub fn wrong(&self, message: &str) -> SettingsError {
         let dot = if self.path.is_empty() { "" } else { "." };
-        self.source.error_at(self.line(), &format!("{}{dot}{message}", self.path))
+        self.source.error_at(self.at, &format!("{}{dot}{message}", self.path))
     }
 
     /// An error of the value under `key`, which begins with that key.
@@ -270,7 +360,7 @@ impl<'a> Section<'a> {
     }
 
     fn reported(&self, value: &Spanned<DeValue<'_>>, message: &str) -> SettingsError {
-        self.source.error_at(self.source.line(value.span().start), &self.path_of(message))
+        self.source.error_at(value.span().start, &self.path_of(message))
     }
 
     fn path_of(&self, key: &str) -> String {
@@ -286,8 +376,7 @@ impl<'a> Section<'a> {
 
     fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>) -> Result<Self, SettingsError> {
         let Some(table) = value.get_ref().as_table() else {
-            let line = self.source.line(value.span().start);
-            return Err(self.source.error_at(line, &format!("{path} must be a table")));
+            return Err(self.source.error_at(value.span().start, &format!("{path} must be a table")));
         };
         Ok(Self { source: self.source, path, table, at: value.span().start, asked: Vec::new() })
     }
@@ -296,6 +385,23 @@ impl<'a> Section<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_column_is_that_of_the_character_within_the_text() {
+        let text = "a = 1\n\"ä\" = \"x + y\"\nc = \"\"\"\n  z\"\"\"\nd = [1, 2.5]\ne = [1, inf]";
+        let source = Source::parse(text, Path::new("f.toml")).map(Source::with_columns).expect("TOML");
+        let mut section = source.root();
+        assert_eq!(section.keys(), ["a", "ä", "c", "d", "e"]);
+        let place = |text: Text, offset: usize| source.wrong_from(text.at + offset, "no").to_string();
+        let first = section.text("ä").expect("a text").expect("there");
+        assert_eq!(place(first, 4), "f.toml:2:12: no");
+        let second = section.text("c").expect("a text").expect("there");
+        assert_eq!(place(second, 2), "f.toml:4:3: no");
+        assert_eq!(section.numbers("d"), Ok(vec![1.0, 2.5]));
+        assert_eq!((section.numbers("a"), section.numbers("none")), (Ok(vec![1.0]), Ok(vec![])));
+        let message = section.numbers("e").unwrap_err().to_string();
+        assert!(message.starts_with("f.toml:6:5: e = [1, inf]; allowed is a finite number"), "{message}");
+    }
 
     #[test]
     fn a_whole_number_has_no_fraction_and_no_sign() {

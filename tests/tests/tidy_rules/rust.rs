@@ -46,6 +46,7 @@ const ROOMS: [&str; 24] = [
     "socketcan-guest",
     "bench",
     "records",
+    "model",
     "discrepancy",
     "campaign",
     "system-tests",
@@ -53,6 +54,7 @@ const ROOMS: [&str; 24] = [
 /// Which of them each room may depend on, tests included.
 const KNOWS: &[(&str, &[&str])] = &[
     ("settings", &[]),
+    ("model", &["settings"]),
     ("protocol", &[]),
     ("realtime", &[]),
     ("runlog", &["protocol", "realtime"]),
@@ -89,7 +91,17 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("records", &["protocol", "runlog", "plant"]),
     (
         "discrepancy",
-        &["records", "protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "pagekit"],
+        &[
+            "records",
+            "model",
+            "protocol",
+            "realtime",
+            "runlog",
+            "plant",
+            "axis-control",
+            "rehearsal",
+            "pagekit",
+        ],
     ),
     (
         "campaign",
@@ -107,7 +119,8 @@ const KNOWS: &[(&str, &[&str])] = &[
     ),
 ];
 /// What a room may depend on in its tests alone: a controller needs a plant there.
-const IN_TESTS: &[(&str, &str)] = &[("algorithms", "plant"), ("axis", "plant"), ("controller", "plant")];
+const IN_TESTS: &[(&str, &str)] =
+    &[("algorithms", "plant"), ("axis", "plant"), ("controller", "plant"), ("model", "realtime")];
 
 /// House-style: who knows whom.
 pub(super) const CRATE_EDGES: Rule = Rule {
@@ -248,7 +261,7 @@ pub(super) const EFFECTS: Rule = Rule {
 /// Units that a name may end with, before a statistic.
 const UNITS: &[&str] = &[
     "m", "mm", "m2", "m3", "s", "ms", "us", "ns", "n", "pa", "bar", "kg", "k", "j", "w", "hz", "rad", "deg",
-    "percent", "kib", "counts", "per_s", "per_s2", "per_h", "per_m", "per_n", "per_pa", "per_kg",
+    "percent", "kib", "counts", "si", "per_s", "per_s2", "per_h", "per_m", "per_n", "per_pa", "per_kg",
 ];
 /// Statistics that may follow the unit.
 const STATISTICS: &[&str] = &["min", "max", "mean", "rms", "p50", "p90", "p99", "p999", "p9999"];

@@ -1,0 +1,227 @@
+//! From expressions to tapes, with suspects in their places.
+//!
+//! ```text
+//!   equation of its file ──► + the suspects that are switched on, in their order ──► tape of rates, outputs, memories
+//! ```
+
+use crate::expression::{Binary, Kind, Place, Wrong};
+use crate::file::{Change, Model, State, Target};
+use crate::names::{DEEPEST_CHAIN, Symbol, chain, function, name_of, resolve};
+use crate::tape::{Builder, Code, Leaves, Register, Tape};
+use std::collections::HashMap;
+
+/// The tapes of a model with some suspects.
+#[derive(Clone, Debug)]
+pub(crate) struct Tapes {
+    pub(crate) rates: Tape,
+    pub(crate) outputs: Tape,
+    pub(crate) updates: Tape,
+    /// States and memories that are there, in the order of the tapes' results.
+    pub(crate) states: Vec<usize>,
+    pub(crate) memories: Vec<usize>,
+}
+
+fn leaves(model: &Model) -> Leaves {
+    Leaves {
+        inputs: model.inputs.len(),
+        states: model.states.len(),
+        parameters: model.parameters.len(),
+        memories: model.memories.len(),
+    }
+}
+
+/// The tapes with these suspects.
+pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
+    let is_there = |suspect: Option<usize>| suspect.is_none_or(|suspect| suspects.contains(&suspect));
+    let states: Vec<usize> =
+        (0..model.states.len()).filter(|index| is_there(model.states[*index].suspect)).collect();
+    let memories: Vec<usize> =
+        (0..model.memories.len()).filter(|index| is_there(model.memories[*index].suspect)).collect();
+    let curves = || model.tables.iter().map(|table| table.curve.clone()).collect();
+    let mut compiler = Compiler::new(model, suspects);
+    let rates = states.iter().map(|state| compiler.rate(*state)).collect::<Result<Vec<_>, _>>()?;
+    let rates = compiler.builder.tape(&rates, curves());
+    let mut compiler = Compiler::new(model, suspects);
+    let outputs = (0..model.outputs.len()).map(|output| compiler.symbol(Symbol::Output(output), 0));
+    let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
+    let outputs = compiler.builder.tape(&outputs, curves());
+    let mut compiler = Compiler::new(model, suspects);
+    let updates = memories.iter().map(|index| {
+        let memory = &model.memories[*index];
+        compiler.node(memory.update.root, Scope { suspect: memory.suspect, before: None })
+    });
+    let updates = updates.collect::<Result<Vec<_>, _>>()?;
+    let updates = compiler.builder.tape(&updates, curves());
+    Ok(Tapes { rates, outputs, updates, states, memories })
+}
+
+/// Where an expression stands: the suspect whose own names it may use, and the value that its place has without it.
+#[derive(Clone, Copy)]
+struct Scope {
+    suspect: Option<usize>,
+    before: Option<(Target, Register)>,
+}
+
+struct Compiler<'a> {
+    model: &'a Model,
+    suspects: &'a [usize],
+    builder: Builder,
+    known: HashMap<Symbol, Register>,
+    /// Symbols that are being computed: one that comes again depends on itself.
+    open: Vec<Symbol>,
+}
+
+impl<'a> Compiler<'a> {
+    fn new(model: &'a Model, suspects: &'a [usize]) -> Self {
+        let builder = Builder::new(leaves(model));
+        Self { model, suspects, builder, known: HashMap::new(), open: Vec::new() }
+    }
+
+    fn rate(&mut self, state: usize) -> Result<Register, Wrong> {
+        let model = self.model;
+        let State { derivative, suspect, .. } = &model.states[state];
+        let base = self.node(derivative.root, Scope { suspect: *suspect, before: None })?;
+        self.changed(Target::State(state), base)
+    }
+
+    /// A value with the suspects at its place.
+    fn changed(&mut self, target: Target, base: Register) -> Result<Register, Wrong> {
+        let mut value = base;
+        for index in self.suspects {
+            let suspect = &self.model.suspects[*index];
+            if suspect.target != target {
+                continue;
+            }
+            let scope = Scope { suspect: Some(*index), before: Some((target, value)) };
+            let change = self.node(suspect.expression.root, scope)?;
+            value = match suspect.change {
+                Change::Add => self.builder.push(Code::Add, &[value, change]),
+                Change::Multiply => self.builder.push(Code::Multiply, &[value, change]),
+                Change::Replace => change,
+            };
+        }
+        Ok(value)
+    }
+
+    fn symbol(&mut self, symbol: Symbol, at: usize) -> Result<Register, Wrong> {
+        let leaves = self.builder.leaves();
+        if let Some(register) = self.known.get(&symbol) {
+            return Ok(*register);
+        }
+        if let Some(first) = self.open.iter().position(|open| *open == symbol) {
+            let circle: Vec<&str> =
+                self.open[first..].iter().map(|open| name_of(self.model, *open)).collect();
+            return Err(Wrong::new(
+                at,
+                format!("{} depends on itself by way of {}", circle[0], circle.join(", ")),
+            ));
+        }
+        if self.open.len() >= DEEPEST_CHAIN {
+            return Err(Wrong::new(at, chain()));
+        }
+        self.open.push(symbol);
+        let register = match symbol {
+            Symbol::Time => 0,
+            Symbol::Pi => self.builder.constant(core::f64::consts::PI),
+            Symbol::Input(index) => self.changed(Target::Input(index), leaves.input(index))?,
+            Symbol::State(index) => leaves.state(index),
+            Symbol::Parameter(index) => leaves.parameter(index),
+            Symbol::Memory(index) => leaves.memory(index),
+            Symbol::Definition(index) => {
+                let definition = &self.model.definitions[index];
+                let scope = Scope { suspect: definition.suspect, before: None };
+                let base = self.node(definition.value.root, scope)?;
+                self.changed(Target::Definition(index), base)?
+            }
+            Symbol::Output(index) => {
+                let base =
+                    self.node(self.model.outputs[index].value.root, Scope { suspect: None, before: None })?;
+                self.changed(Target::Output(index), base)?
+            }
+        };
+        self.open.pop();
+        self.known.insert(symbol, register);
+        Ok(register)
+    }
+
+    fn node(&mut self, place: Place, scope: Scope) -> Result<Register, Wrong> {
+        let node = self.model.nodes.get(place).clone();
+        Ok(match node.kind {
+            Kind::Number(value, _) => self.builder.constant(value),
+            Kind::Name(name) => {
+                if let Some((target, before)) = scope.before
+                    && !matches!(target, Target::State(_))
+                    && self.model.target_name(target) == name
+                {
+                    return Ok(before);
+                }
+                let symbol = resolve(self.model, &name, scope.suspect, node.at)?;
+                self.symbol(symbol, node.at)?
+            }
+            Kind::Negation(inner) => {
+                let inner = self.node(inner, scope)?;
+                self.builder.push(Code::Negate, &[inner])
+            }
+            Kind::Binary(Binary::Power, base, exponent) if self.is_two(exponent) => {
+                let base = self.node(base, scope)?;
+                self.builder.push(Code::Multiply, &[base, base])
+            }
+            Kind::Binary(operator, left, right) => {
+                let operands = [self.node(left, scope)?, self.node(right, scope)?];
+                self.builder.push(code_of(operator), &operands)
+            }
+            Kind::Call(name, arguments) => self.call(&name, &arguments, node.at, scope)?,
+        })
+    }
+
+    fn is_two(&self, place: Place) -> bool {
+        matches!(self.model.nodes.get(place).kind, Kind::Number(2.0, None))
+    }
+
+    fn call(&mut self, name: &str, arguments: &[Place], at: usize, scope: Scope) -> Result<Register, Wrong> {
+        if name == "delay" {
+            let Kind::Name(input) = &self.model.nodes.get(arguments[0]).kind else {
+                return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
+            };
+            let input = self.model.inputs.iter().position(|one| one.name == *input);
+            let Some(input) = input else {
+                return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
+            };
+            let earlier = self.node(arguments[1], scope)?;
+            return Ok(self.builder.push(Code::Delayed(input as u16), &[earlier]));
+        }
+        let operands =
+            arguments.iter().map(|argument| self.node(*argument, scope)).collect::<Result<Vec<_>, _>>()?;
+        if let Some(table) = self.model.tables.iter().position(|table| table.name == name) {
+            return Ok(self.builder.push(Code::Table(table as u16), &operands));
+        }
+        if name == "not" {
+            let zero = self.builder.constant(0.0);
+            return Ok(self.builder.push(Code::Equal, &[operands[0], zero]));
+        }
+        let (code, _) = function(name).ok_or_else(|| Wrong::new(at, format!("'{name}' is no function")))?;
+        if matches!(code, Code::Min | Code::Max) {
+            let [first, rest @ ..] = operands.as_slice() else {
+                unreachable!("the number of arguments was checked")
+            };
+            return Ok(rest.iter().fold(*first, |left, right| self.builder.push(code, &[left, *right])));
+        }
+        Ok(self.builder.push(code, &operands))
+    }
+}
+
+fn code_of(operator: Binary) -> Code {
+    match operator {
+        Binary::Add => Code::Add,
+        Binary::Subtract => Code::Subtract,
+        Binary::Multiply => Code::Multiply,
+        Binary::Divide => Code::Divide,
+        Binary::Power => Code::Power,
+        Binary::Less => Code::Less,
+        Binary::LessOrEqual => Code::LessOrEqual,
+        Binary::Equal => Code::Equal,
+        Binary::NotEqual => Code::NotEqual,
+        Binary::And => Code::And,
+        Binary::Or => Code::Or,
+    }
+}

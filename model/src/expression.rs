@@ -1,0 +1,384 @@
+//! Expressions: a text becomes a tree, or is refused at the byte where it goes wrong.
+//!
+//! ```text
+//!   or        or        lowest
+//!   and       and
+//!   compare   < <= > >= == !=
+//!   sum       + -
+//!   product   * /
+//!   negation  -
+//!   power     ^         right to left, above negation: -x^2 is -(x^2)
+//!   atom      1.5e3   10[mm]   name   function(a, b)   (…)
+//! ```
+//! A truth is a number: 0 is false, any other true, and a comparison gives 1 or 0. A number has no dimension unless a unit in
+//! square brackets follows it.
+
+use crate::units::Unit;
+
+/// Most nodes of all expressions of a file.
+pub const MOST_NODES: usize = 10_000;
+/// Deepest nesting of an expression.
+pub const DEEPEST: usize = 64;
+
+/// A node in the list of all nodes of a file.
+pub(crate) type Place = u32;
+
+/// What a node computes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Kind {
+    /// A number in SI with its unit, if it has one.
+    Number(f64, Option<Unit>),
+    Name(String),
+    Negation(Place),
+    Binary(Binary, Place, Place),
+    Call(String, Vec<Place>),
+}
+
+/// Operators between two operands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Less,
+    LessOrEqual,
+    Equal,
+    NotEqual,
+    And,
+    Or,
+}
+
+/// A node and the byte of the file at which it stands.
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    pub(crate) kind: Kind,
+    pub(crate) at: usize,
+    pub(crate) depth: usize,
+}
+
+/// All nodes of a file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Nodes(Vec<Node>);
+
+/// What is no expression: at which byte of the file, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Wrong {
+    pub(crate) at: usize,
+    pub(crate) why: String,
+}
+
+impl Wrong {
+    pub(crate) fn new(at: usize, why: impl Into<String>) -> Self {
+        Self { at, why: why.into() }
+    }
+}
+
+impl Nodes {
+    pub(crate) fn get(&self, place: Place) -> &Node {
+        &self.0[place as usize]
+    }
+
+    fn push(&mut self, kind: Kind, at: usize) -> Result<Place, Wrong> {
+        let below: &[Place] = match &kind {
+            Kind::Number(..) | Kind::Name(_) => &[],
+            Kind::Negation(inner) => &[*inner],
+            Kind::Binary(_, left, right) => &[*left, *right],
+            Kind::Call(_, arguments) => arguments,
+        };
+        let depth = 1 + below.iter().map(|place| self.get(*place).depth).max().unwrap_or(0);
+        if depth > DEEPEST {
+            return Err(Wrong::new(
+                at,
+                format!("nested deeper than {DEEPEST}: name a part of it under [define]"),
+            ));
+        }
+        if self.0.len() >= MOST_NODES {
+            return Err(Wrong::new(
+                at,
+                format!("more than {MOST_NODES} numbers, names and operators in this file"),
+            ));
+        }
+        self.0.push(Node { kind, at, depth });
+        Ok(self.0.len() as Place - 1)
+    }
+
+    /// Reads an expression that begins at byte `at` of its file.
+    pub(crate) fn parse(&mut self, text: &str, at: usize) -> Result<Place, Wrong> {
+        let mut parser = Parser { text, begins: at, at: 0, nested: 0, nodes: self };
+        let place = parser.level(0)?;
+        parser.skip_blanks();
+        if parser.at < text.len() {
+            return Err(parser.wrong("an operator is missing here, or a bracket was not opened"));
+        }
+        Ok(place)
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    begins: usize,
+    at: usize,
+    nested: usize,
+    nodes: &'a mut Nodes,
+}
+
+/// Operators by their level, longest first.
+const LEVELS: [&[(&str, Operator)]; 5] = [
+    &[("or", Operator::Plain(Binary::Or))],
+    &[("and", Operator::Plain(Binary::And))],
+    &[
+        ("<=", Operator::Plain(Binary::LessOrEqual)),
+        (">=", Operator::Swapped(Binary::LessOrEqual)),
+        ("==", Operator::Plain(Binary::Equal)),
+        ("!=", Operator::Plain(Binary::NotEqual)),
+        ("<", Operator::Plain(Binary::Less)),
+        (">", Operator::Swapped(Binary::Less)),
+    ],
+    &[("+", Operator::Plain(Binary::Add)), ("-", Operator::Plain(Binary::Subtract))],
+    &[("*", Operator::Plain(Binary::Multiply)), ("/", Operator::Plain(Binary::Divide))],
+];
+
+#[derive(Clone, Copy)]
+enum Operator {
+    Plain(Binary),
+    /// The same with its operands exchanged.
+    Swapped(Binary),
+}
+
+impl Parser<'_> {
+    fn wrong(&self, why: &str) -> Wrong {
+        Wrong::new(self.begins + self.at, why)
+    }
+
+    fn rest(&self) -> &str {
+        &self.text[self.at..]
+    }
+
+    fn skip_blanks(&mut self) {
+        self.at += self.rest().len() - self.rest().trim_start().len();
+    }
+
+    fn take(&mut self, wanted: &str) -> bool {
+        self.skip_blanks();
+        let is_there = self.rest().starts_with(wanted);
+        // A word ends where no letter follows.
+        let goes_on = wanted.starts_with(char::is_alphabetic)
+            && self.rest().get(wanted.len()..).is_some_and(|rest| rest.starts_with(is_of_name));
+        if is_there && !goes_on {
+            self.at += wanted.len();
+        }
+        is_there && !goes_on
+    }
+
+    /// Brackets and signs within each other are bounded before the stack is.
+    fn deeper<T>(&mut self, inner: impl FnOnce(&mut Self) -> Result<T, Wrong>) -> Result<T, Wrong> {
+        self.nested += 1;
+        if self.nested > DEEPEST {
+            return Err(
+                self.wrong(&format!("nested deeper than {DEEPEST}: name a part of it under [define]"))
+            );
+        }
+        let value = inner(self)?;
+        self.nested -= 1;
+        Ok(value)
+    }
+
+    fn level(&mut self, level: usize) -> Result<Place, Wrong> {
+        let Some(operators) = LEVELS.get(level) else { return self.negation() };
+        let mut left = self.level(level + 1)?;
+        loop {
+            self.skip_blanks();
+            let at = self.begins + self.at;
+            let Some((_, operator)) = operators.iter().find(|(sign, _)| self.take(sign)) else {
+                return Ok(left);
+            };
+            let right = self.level(level + 1)?;
+            let kind = match *operator {
+                Operator::Plain(binary) => Kind::Binary(binary, left, right),
+                Operator::Swapped(binary) => Kind::Binary(binary, right, left),
+            };
+            left = self.nodes.push(kind, at)?;
+        }
+    }
+
+    fn negation(&mut self) -> Result<Place, Wrong> {
+        self.skip_blanks();
+        let at = self.begins + self.at;
+        if self.take("-") {
+            let inner = self.deeper(Self::negation)?;
+            return self.nodes.push(Kind::Negation(inner), at);
+        }
+        if self.take("+") {
+            return self.deeper(Self::negation);
+        }
+        let base = self.atom()?;
+        self.skip_blanks();
+        let at = self.begins + self.at;
+        if self.take("^") {
+            let exponent = self.deeper(Self::negation)?;
+            return self.nodes.push(Kind::Binary(Binary::Power, base, exponent), at);
+        }
+        Ok(base)
+    }
+
+    fn atom(&mut self) -> Result<Place, Wrong> {
+        self.skip_blanks();
+        let at = self.begins + self.at;
+        if self.take("(") {
+            let inner = self.deeper(|parser| parser.level(0))?;
+            return if self.take(")") {
+                Ok(inner)
+            } else {
+                Err(self.wrong("a bracket is not closed: ) is missing"))
+            };
+        }
+        let rest = self.rest();
+        let Some(first) = rest.chars().next() else {
+            return Err(self.wrong("the expression ends where a value should stand"));
+        };
+        if first.is_ascii_digit() || first == '.' {
+            return self.number(at);
+        }
+        if !is_of_name(first) {
+            return Err(self.wrong(&format!("'{first}' where a number, a name or a bracket should stand")));
+        }
+        let name: String = rest.chars().take_while(|character| is_of_name(*character)).collect();
+        self.at += name.len();
+        if !self.take("(") {
+            return self.nodes.push(Kind::Name(name), at);
+        }
+        let mut arguments = Vec::new();
+        if !self.take(")") {
+            loop {
+                arguments.push(self.deeper(|parser| parser.level(0))?);
+                if self.take(")") {
+                    break;
+                }
+                if !self.take(",") {
+                    return Err(self.wrong("a comma or ) is missing between the arguments"));
+                }
+            }
+        }
+        self.nodes.push(Kind::Call(name, arguments), at)
+    }
+
+    fn number(&mut self, at: usize) -> Result<Place, Wrong> {
+        let length = number_length(self.rest());
+        let text = &self.rest()[..length];
+        let Some(value) = text.parse::<f64>().ok().filter(|value| value.is_finite()) else {
+            return Err(self.wrong(&format!("'{text}' is no finite number")));
+        };
+        self.at += length;
+        if !self.take("[") {
+            return self.nodes.push(Kind::Number(value, None), at);
+        }
+        let Some(end) = self.rest().find(']') else { return Err(self.wrong("] is missing after a unit")) };
+        let unit = Unit::parse(&self.rest()[..end])
+            .map_err(|error| Wrong::new(self.begins + self.at + error.at, error.why))?;
+        self.at += end + 1;
+        self.nodes.push(Kind::Number(value * unit.factor, Some(unit)), at)
+    }
+}
+
+/// Whether a character may stand in a name.
+pub(crate) fn is_of_name(character: char) -> bool {
+    character.is_alphanumeric() || character == '_'
+}
+
+/// Bytes of the number at the head of a text.
+fn number_length(text: &str) -> usize {
+    let bytes = text.as_bytes();
+    let digits = |from: usize| bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let mut end = digits(0);
+    if bytes.get(end) == Some(&b'.') {
+        end += 1 + digits(end + 1);
+    }
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits((end + 1 + sign).min(bytes.len()));
+        if exponent > 0 {
+            end += 1 + sign + exponent;
+        }
+    }
+    end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tree as a text with all its brackets.
+    fn shown(nodes: &Nodes, place: Place) -> String {
+        match &nodes.get(place).kind {
+            Kind::Number(value, _) => value.to_string(),
+            Kind::Name(name) => name.clone(),
+            Kind::Negation(inner) => format!("(-{})", shown(nodes, *inner)),
+            Kind::Binary(operator, left, right) => {
+                format!("({operator:?} {} {})", shown(nodes, *left), shown(nodes, *right))
+            }
+            Kind::Call(name, arguments) => {
+                let arguments: Vec<_> = arguments.iter().map(|argument| shown(nodes, *argument)).collect();
+                format!("{name}({})", arguments.join(","))
+            }
+        }
+    }
+
+    fn read(text: &str) -> Result<String, Wrong> {
+        let mut nodes = Nodes::default();
+        nodes.parse(text, 0).map(|place| shown(&nodes, place))
+    }
+
+    #[test]
+    fn operators_bind_as_in_a_book() {
+        for (text, tree) in [
+            ("1 - 2 - 3", "(Subtract (Subtract 1 2) 3)"),
+            ("a+b*c", "(Add a (Multiply b c))"),
+            ("-x^2", "(-(Power x 2))"),
+            ("2^-3^2", "(Power 2 (-(Power 3 2)))"),
+            ("a < b and c >= d or e", "(Or (And (Less a b) (LessOrEqual d c)) e)"),
+            ("order * andy", "(Multiply order andy)"),
+            ("if(x > 0, max(a, b), f())", "if(Less 0 x),max(a,b),f())".replace("if(", "if((").as_str()),
+            ("10[mm] + .5e-3", "(Add 0.01 0.0005)"),
+            ("2e", "?"),
+        ] {
+            let expected = if tree == "?" { None } else { Some(tree.to_owned()) };
+            assert_eq!(read(text).ok(), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_reported_at_its_byte() {
+        for (text, at) in [
+            ("", 0),
+            ("a +", 3),
+            ("a ? b", 2),
+            ("(a", 2),
+            ("a)", 1),
+            ("f(a b)", 4),
+            ("3[blub]", 2),
+            ("3[mm", 2),
+            ("1e999", 0),
+            ("a b", 2),
+        ] {
+            assert_eq!(read(text).map_err(|wrong| wrong.at), Err(at), "{text}");
+        }
+    }
+
+    #[test]
+    fn hostile_sizes_are_refused_without_the_stack() {
+        for text in [
+            format!("{}1{}", "(".repeat(100_000), ")".repeat(100_000)),
+            "-".repeat(100_000) + "1",
+            "abs(".repeat(100_000) + "1",
+            vec!["1"; 1_000_000].join("+"),
+            vec!["1"; 100_000].join("^"),
+        ] {
+            let why = read(&text).expect_err("too large").why;
+            assert!(why.contains("deeper than 64"), "{why}");
+        }
+        let flat = format!("max({})", vec!["1"; 20_000].join(","));
+        assert!(read(&flat).expect_err("too many").why.contains("more than 10000"));
+    }
+}

@@ -1,0 +1,299 @@
+//! A model file as data: what its tables hold, in SI, with the places of its expressions.
+
+use crate::check;
+use crate::expression::{Nodes, Place};
+use crate::inputs::Hold;
+use crate::read;
+use crate::tape::Curve;
+use crate::units::{Dimension, Unit};
+use settings::SettingsError;
+use std::path::{Path, PathBuf};
+
+/// A plant as its file describes it.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// What it is called in reports.
+    pub name: String,
+    /// How its records are laid out.
+    pub record: RecordLayout,
+    /// Rows at the head of a held-out record on which its own numbers are fitted; they are not scored.
+    pub start_samples: usize,
+    /// How it is integrated.
+    pub solver: Solver,
+    /// Measured inputs.
+    pub inputs: Vec<Input>,
+    /// Parameters of the model and of its suspects.
+    pub parameters: Vec<Parameter>,
+    /// States of the model and of its suspects.
+    pub states: Vec<State>,
+    /// Values that are kept over a step.
+    pub memories: Vec<Memory>,
+    /// Named parts of equations.
+    pub definitions: Vec<Definition>,
+    /// Measured outputs.
+    pub outputs: Vec<Output>,
+    /// Terms that may be missing.
+    pub suspects: Vec<Suspect>,
+    pub(crate) tables: Vec<Table>,
+    pub(crate) nodes: Nodes,
+    pub(crate) text: String,
+    pub(crate) file: PathBuf,
+}
+
+/// How a text table is laid out, as in a mapping file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordLayout {
+    /// Column of the time.
+    pub time_column: String,
+    /// Seconds in a unit of that column.
+    pub time_unit_s: f64,
+    /// Between the cells.
+    pub separator: String,
+    /// Whether decimals are written with a comma.
+    pub is_decimal_comma: bool,
+    /// What begins a comment line.
+    pub comment: String,
+    /// Lines before the head.
+    pub skip_lines: u64,
+    /// Cells that hold no value, beside empty ones.
+    pub absent: Vec<String>,
+}
+
+/// How equations are integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// Dormand-Prince 5(4) with step control; no step goes over a sample.
+    Adaptive {
+        /// Error of a step over the largest value of its state so far.
+        relative_tolerance: f64,
+    },
+    /// Classical Runge-Kutta of fourth order, with steps that are at most so long and end at samples.
+    Fixed {
+        /// Longest step.
+        step_s: f64,
+    },
+}
+
+/// An expression of the file.
+#[derive(Clone, Debug)]
+pub struct Expression {
+    /// As it is written.
+    pub text: String,
+    pub(crate) root: Place,
+    pub(crate) at: usize,
+}
+
+/// A measured input.
+#[derive(Clone, Debug)]
+pub struct Input {
+    /// Its name in expressions.
+    pub name: String,
+    /// Its column in the record.
+    pub column: String,
+    /// Unit of that column.
+    pub unit: Unit,
+    /// What it does between samples.
+    pub hold: Hold,
+}
+
+/// A number of the model.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Its name in expressions.
+    pub name: String,
+    /// Unit in which it is written.
+    pub unit: Unit,
+    /// Values from which a fit starts, the first that of the model.
+    pub values_si: Vec<f64>,
+    /// Standard deviation of what is known about it.
+    pub tolerance_si: Option<f64>,
+    /// Least and largest value.
+    pub range_si: [f64; 2],
+    /// It is known and not fitted.
+    pub is_fixed: bool,
+    /// Each record has its own.
+    pub is_per_record: bool,
+    /// The suspect that it belongs to.
+    pub suspect: Option<usize>,
+}
+
+/// Where a state begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// Known.
+    Known {
+        /// The value.
+        value_si: f64,
+    },
+    /// Fitted, for each record.
+    Fitted {
+        /// Where the fit starts.
+        guess_si: f64,
+        /// Least and largest value.
+        range_si: [f64; 2],
+    },
+    /// The first sample of an output.
+    Record {
+        /// Which output.
+        output: usize,
+    },
+}
+
+/// A state with its equation.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Its name in expressions.
+    pub name: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// Where it begins.
+    pub start: Start,
+    /// Its rate of change.
+    pub derivative: Expression,
+    /// The suspect that it belongs to.
+    pub suspect: Option<usize>,
+}
+
+/// A value that is kept over a step and renewed at its end.
+#[derive(Clone, Debug)]
+pub struct Memory {
+    /// Its name in expressions.
+    pub name: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// Its value before the first step.
+    pub start_si: f64,
+    /// Its value after a step, from what holds at its end and its own old value.
+    pub update: Expression,
+    /// The suspect that it belongs to.
+    pub suspect: Option<usize>,
+}
+
+/// A named part of equations.
+#[derive(Clone, Debug)]
+pub struct Definition {
+    /// Its name in expressions.
+    pub name: String,
+    /// What it is.
+    pub value: Expression,
+    /// The suspect that it belongs to.
+    pub suspect: Option<usize>,
+}
+
+/// A measured output.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// What it is called.
+    pub name: String,
+    /// Its column in the record.
+    pub column: String,
+    /// Unit of that column.
+    pub unit: Unit,
+    /// What the model says it is.
+    pub value: Expression,
+    /// Standard deviation of the sensor's noise; estimated where it is absent.
+    pub noise_si: Option<f64>,
+    /// Error of the model, or of who simulated the record, that is no term: standard deviation.
+    pub model_error_si: f64,
+}
+
+/// A part of the model that a suspect changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// An input, before anything reads it.
+    Input(usize),
+    /// The equation of a state.
+    State(usize),
+    /// A definition.
+    Definition(usize),
+    /// What a sensor reads.
+    Output(usize),
+}
+
+/// How a suspect changes its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// It is added.
+    Add,
+    /// It is a factor.
+    Multiply,
+    /// It stands instead; the name of its target is the value without it.
+    Replace,
+}
+
+/// A term that may be missing.
+#[derive(Clone, Debug)]
+pub struct Suspect {
+    /// What it is called in reports.
+    pub name: String,
+    /// What it changes.
+    pub target: Target,
+    /// How it changes it.
+    pub change: Change,
+    /// By what.
+    pub expression: Expression,
+    /// Suspects that are known to do the same.
+    pub twins: Vec<String>,
+    /// It is carried to be rejected.
+    pub is_decoy: bool,
+}
+
+/// A curve of the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    pub(crate) name: String,
+    pub(crate) curve: Curve,
+    pub(crate) from: Dimension,
+    pub(crate) to: Dimension,
+}
+
+impl Model {
+    /// Reads a model file and checks its names, its units and its numbers; `file` is for messages.
+    ///
+    /// # Errors
+    /// File, line, column, what stands there and what is allowed.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, SettingsError> {
+        let source = settings::Source::parse(text, file)?.with_columns();
+        let model = read::model(&source, file)?;
+        check::check(&model).map_err(|wrong| source.wrong_from(wrong.at, &wrong.why))?;
+        Ok(model)
+    }
+
+    pub(crate) fn wrong(&self, at: usize, why: &str) -> SettingsError {
+        // The text parsed before.
+        settings::Source::parse(&self.text, &self.file)
+            .map_or_else(|error| error, |source| source.with_columns().wrong_from(at, why))
+    }
+
+    /// File, line and column of an expression.
+    #[must_use]
+    pub fn place_of(&self, expression: &Expression) -> String {
+        let (line, column) =
+            (settings::line_of(&self.text, expression.at), settings::column_of(&self.text, expression.at));
+        format!("{}:{line}:{column}", self.file.display())
+    }
+
+    /// The SI unit of a definition, as it follows from what it is made of.
+    #[must_use]
+    pub fn definition_unit(&self, index: usize) -> Unit {
+        check::definition_unit(self, index)
+    }
+
+    /// What a target is called.
+    #[must_use]
+    pub fn target_name(&self, target: Target) -> &str {
+        match target {
+            Target::Input(index) => &self.inputs[index].name,
+            Target::State(index) => &self.states[index].name,
+            Target::Definition(index) => &self.definitions[index].name,
+            Target::Output(index) => &self.outputs[index].name,
+        }
+    }
+
+    /// Parameters that are read with these suspects, by their index.
+    pub fn parameters_of<'a>(&'a self, suspects: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
+        let is_read =
+            |parameter: &Parameter| parameter.suspect.is_none_or(|suspect| suspects.contains(&suspect));
+        (0..self.parameters.len()).filter(move |index| is_read(&self.parameters[*index]))
+    }
+}

@@ -1,0 +1,94 @@
+//! What names in expressions mean: quantities of the model, and functions.
+
+use crate::expression::Wrong;
+use crate::file::Model;
+use crate::tape::Code;
+
+/// Definitions that stand in each other; with the depth of each it bounds the stack.
+pub(crate) const DEEPEST_CHAIN: usize = 32;
+
+pub(crate) fn chain() -> String {
+    format!("definitions depend on each other more than {DEEPEST_CHAIN} deep: write one of them out")
+}
+
+/// What a name means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Symbol {
+    Time,
+    Pi,
+    Input(usize),
+    State(usize),
+    Parameter(usize),
+    Memory(usize),
+    Definition(usize),
+    Output(usize),
+}
+
+/// A function and the least number of its arguments; `min` and `max` take more.
+pub(crate) fn function(name: &str) -> Option<(Code, usize)> {
+    Some(match name {
+        "abs" => (Code::Abs, 1),
+        "sign" => (Code::Sign, 1),
+        "sqrt" => (Code::Sqrt, 1),
+        "exp" => (Code::Exp, 1),
+        "log" => (Code::Log, 1),
+        "tanh" => (Code::Tanh, 1),
+        "sin" => (Code::Sin, 1),
+        "cos" => (Code::Cos, 1),
+        "atan" => (Code::Atan, 1),
+        "min" => (Code::Min, 2),
+        "max" => (Code::Max, 2),
+        "if" => (Code::Select, 3),
+        _ => return None,
+    })
+}
+
+pub(crate) fn name_of(model: &Model, symbol: Symbol) -> &str {
+    match symbol {
+        Symbol::Time => "t",
+        Symbol::Pi => "pi",
+        Symbol::Input(index) => &model.inputs[index].name,
+        Symbol::State(index) => &model.states[index].name,
+        Symbol::Parameter(index) => &model.parameters[index].name,
+        Symbol::Memory(index) => &model.memories[index].name,
+        Symbol::Definition(index) => &model.definitions[index].name,
+        Symbol::Output(index) => &model.outputs[index].name,
+    }
+}
+
+pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usize) -> Result<Symbol, Wrong> {
+    match name {
+        "t" => return Ok(Symbol::Time),
+        "pi" => return Ok(Symbol::Pi),
+        _ => {}
+    }
+    let seen = |of: Option<usize>| of.is_none() || of == suspect;
+    let find = |mut names: Box<dyn Iterator<Item = (&String, Option<usize>)> + '_>| {
+        names.position(|(other, of)| other == name && seen(of))
+    };
+    let parameters = find(Box::new(model.parameters.iter().map(|one| (&one.name, one.suspect))));
+    let states = find(Box::new(model.states.iter().map(|one| (&one.name, one.suspect))));
+    let memories = find(Box::new(model.memories.iter().map(|one| (&one.name, one.suspect))));
+    let definitions = find(Box::new(model.definitions.iter().map(|one| (&one.name, one.suspect))));
+    let inputs = model.inputs.iter().position(|one| one.name == name);
+    let symbol = inputs
+        .map(Symbol::Input)
+        .or(states.map(Symbol::State))
+        .or(parameters.map(Symbol::Parameter))
+        .or(memories.map(Symbol::Memory))
+        .or(definitions.map(Symbol::Definition));
+    symbol.ok_or_else(|| {
+        let known: Vec<&str> = model
+            .inputs
+            .iter()
+            .map(|one| &one.name)
+            .chain(model.states.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
+            .chain(model.parameters.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
+            .chain(model.memories.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
+            .chain(model.definitions.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
+            .map(String::as_str)
+            .take(30)
+            .collect();
+        Wrong::new(at, format!("'{name}' is unknown here; known are t, pi, {}", known.join(", ")))
+    })
+}

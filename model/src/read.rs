@@ -1,0 +1,421 @@
+//! Reads the tables of a model file.
+
+use crate::expression::{Nodes, is_of_name};
+use crate::file::{
+    Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Solver, Start,
+    State, Suspect, Table, Target,
+};
+use crate::inputs::Hold;
+use crate::tape::Curve;
+use crate::units::{Dimension, Unit};
+use settings::{Section, SettingsError, Source, Text};
+use std::path::Path;
+
+/// Names that expressions have from the start.
+const RESERVED: [&str; 18] = [
+    "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
+    "cos", "atan", "delay",
+];
+/// Most names of each kind.
+const MOST_NAMES: usize = 500;
+
+struct Reader<'a> {
+    source: &'a Source<'a>,
+    nodes: Nodes,
+    model: Model,
+    /// Place names of suspects with what stands there, for when all names are known.
+    starts: Vec<(usize, Text)>,
+}
+
+pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsError> {
+    let mut root = source.root();
+    let stem = file.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy().into_owned());
+    let name = root.text("name")?.map_or(stem, |text| text.text);
+    let record = record(&mut root, source)?;
+    let solver = solver(&mut root)?;
+    let mut start_samples = 0;
+    if let Some(mut held_out) = root.section("held_out")? {
+        start_samples = one_or(&mut held_out, "start_samples", 0.0, [0.0, 1e6])? as usize;
+        held_out.finish()?;
+    }
+    let model = Model {
+        name,
+        record,
+        start_samples,
+        solver,
+        inputs: Vec::new(),
+        parameters: Vec::new(),
+        states: Vec::new(),
+        memories: Vec::new(),
+        definitions: Vec::new(),
+        outputs: Vec::new(),
+        suspects: Vec::new(),
+        tables: Vec::new(),
+        nodes: Nodes::default(),
+        text: source.text().into(),
+        file: file.into(),
+    };
+    let mut reader = Reader { source, nodes: Nodes::default(), model, starts: Vec::new() };
+    reader.tables(&mut root)?;
+    reader.inputs(&mut root)?;
+    reader.members(&mut root, None)?;
+    reader.outputs(&mut root)?;
+    for section in root.sections("suspects")? {
+        reader.suspect(section)?;
+    }
+    if reader.model.outputs.is_empty() {
+        return Err(root.wrong("[outputs] is missing: what of this model is measured?"));
+    }
+    reader.resolve_starts()?;
+    root.finish()?;
+    Ok(Model { nodes: reader.nodes, ..reader.model })
+}
+
+fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, SettingsError> {
+    let mut layout = RecordLayout {
+        time_column: "t_s".into(),
+        time_unit_s: 1.0,
+        separator: ",".into(),
+        is_decimal_comma: false,
+        comment: "#".into(),
+        skip_lines: 0,
+        absent: Vec::new(),
+    };
+    let Some(mut section) = root.section("record")? else { return Ok(layout) };
+    if let Some(column) = section.text("time")? {
+        layout.time_column = column.text;
+    }
+    if section.has("unit") {
+        let unit = unit(&mut section, source)?;
+        if unit.dimension != Dimension::TIME {
+            return Err(section.wrong_at("unit", "unit: no unit of time; allowed is s, ms, us, min, h"));
+        }
+        layout.time_unit_s = unit.factor;
+    }
+    if let Some(separator) = section.text("separator")? {
+        layout.separator = separator.text;
+    }
+    layout.is_decimal_comma = section.choice("decimal", &[(".", false), (",", true)])?;
+    if let Some(comment) = section.text("comment")? {
+        layout.comment = comment.text;
+    }
+    layout.skip_lines = one_or(&mut section, "skip_lines", 0.0, [0.0, 1e6])? as u64;
+    layout.absent = section.texts("absent")?;
+    section.finish()?;
+    Ok(layout)
+}
+
+fn solver(root: &mut Section<'_>) -> Result<Solver, SettingsError> {
+    let Some(mut section) = root.section("solver")? else {
+        return Ok(Solver::Adaptive { relative_tolerance: 1e-6 });
+    };
+    let is_fixed = section.choice("method", &[("adaptive", false), ("fixed", true)])?;
+    let solver = if is_fixed {
+        if !section.has("step_s") {
+            return Err(section.wrong("step_s is missing: the longest step of method = \"fixed\", s"));
+        }
+        Solver::Fixed { step_s: one_or(&mut section, "step_s", 0.0, [1e-12, 1e6])? }
+    } else {
+        let relative_tolerance = one_or(&mut section, "relative_tolerance", 1e-6, [1e-12, 0.1])?;
+        Solver::Adaptive { relative_tolerance }
+    };
+    section.finish()?;
+    Ok(solver)
+}
+
+/// The number under a key, in its range.
+fn one_or(
+    section: &mut Section<'_>,
+    key: &str,
+    default: f64,
+    [least, most]: [f64; 2],
+) -> Result<f64, SettingsError> {
+    match section.numbers(key)?.as_slice() {
+        [] => Ok(default),
+        [one] if (least..=most).contains(one) => Ok(*one),
+        _ => Err(section.wrong_at(key, &format!("{key}: allowed is one number, {least} to {most}"))),
+    }
+}
+
+/// The unit of a section, 1 when it is absent.
+fn unit(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit, SettingsError> {
+    unit_of(section, source, "unit")
+}
+
+fn unit_of(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit, SettingsError> {
+    let Some(text) = section.text(key)? else { return Ok(Unit::one()) };
+    Unit::parse(&text.text).map_err(|error| source.wrong_from(text.at + error.at, &error.why))
+}
+
+/// The range of a section in SI.
+fn range(section: &mut Section<'_>, unit: &Unit) -> Result<[f64; 2], SettingsError> {
+    match section.numbers("range")?.as_slice() {
+        [] => Ok([f64::NEG_INFINITY, f64::INFINITY]),
+        [least, most] if least < most => Ok([least * unit.factor, most * unit.factor]),
+        _ => Err(section.wrong_at("range", "range: allowed is [least, largest]")),
+    }
+}
+
+/// The tables under a key, by their names.
+fn named<'a>(section: &mut Section<'a>, key: &str) -> Result<Vec<(String, Section<'a>)>, SettingsError> {
+    let Some(mut all) = section.section(key)? else { return Ok(Vec::new()) };
+    let mut found = Vec::new();
+    for name in all.keys() {
+        let inner = all.section(&name)?.expect("it is one of the keys");
+        found.push((name, inner));
+    }
+    Ok(found)
+}
+
+impl Reader<'_> {
+    fn expression(&mut self, text: Text) -> Result<Expression, SettingsError> {
+        let root = self.nodes.parse(&text.text, text.at);
+        let root = root.map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))?;
+        Ok(Expression { text: text.text.trim().into(), root, at: text.at })
+    }
+
+    /// A name that is new, is one, and means nothing else.
+    fn is_new(&self, name: &str, suspect: Option<usize>, section: &Section<'_>) -> Result<(), SettingsError> {
+        let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
+        if !begins || !name.chars().all(is_of_name) || name.chars().count() > 64 {
+            let allowed =
+                "a name has letters, digits and _, begins with no digit, and has at most 64 of them";
+            return Err(section.wrong(allowed));
+        }
+        if RESERVED.contains(&name) {
+            return Err(section.wrong("the name has a meaning in expressions: choose another"));
+        }
+        let model = &self.model;
+        let local = |of: Option<usize>| of.is_none() || of == suspect;
+        let taken = model.inputs.iter().any(|input| input.name == name)
+            || model.parameters.iter().any(|one| one.name == name && local(one.suspect))
+            || model.states.iter().any(|one| one.name == name && local(one.suspect))
+            || model.memories.iter().any(|one| one.name == name && local(one.suspect))
+            || model.definitions.iter().any(|one| one.name == name && local(one.suspect))
+            || model.outputs.iter().any(|output| output.name == name)
+            || model.tables.iter().any(|table| table.name == name);
+        if taken {
+            return Err(section.wrong("the name is taken: each stands once in a file"));
+        }
+        let most = [model.inputs.len(), model.parameters.len(), model.states.len(), model.definitions.len()];
+        if most.into_iter().any(|count| count >= MOST_NAMES) {
+            return Err(section.wrong(&format!("more than {MOST_NAMES} of a kind in one file")));
+        }
+        Ok(())
+    }
+
+    fn tables(&mut self, root: &mut Section<'_>) -> Result<(), SettingsError> {
+        for (name, mut section) in named(root, "tables")? {
+            self.is_new(&name, None, &section)?;
+            let from = unit_of(&mut section, self.source, "x_unit")?;
+            let to = unit_of(&mut section, self.source, "y_unit")?;
+            let scaled =
+                |values: Vec<f64>, unit: &Unit| values.iter().map(|value| value * unit.factor).collect();
+            let x: Vec<f64> = scaled(section.numbers("x")?, &from);
+            let y: Vec<f64> = scaled(section.numbers("y")?, &to);
+            if x.len() < 2 || x.len() > 10_000 {
+                return Err(section.wrong_at("x", "x: a table has 2 to 10000 points"));
+            }
+            if x.windows(2).any(|pair| pair[0] >= pair[1]) {
+                return Err(section.wrong_at("x", "x: each point must be larger than the one before"));
+            }
+            if y.len() != x.len() {
+                return Err(
+                    section.wrong_at("y", &format!("y: {} values for {} points of x", y.len(), x.len()))
+                );
+            }
+            section.finish()?;
+            let (from, to) = (from.dimension, to.dimension);
+            self.model.tables.push(Table { name, curve: Curve { x, y }, from, to });
+        }
+        Ok(())
+    }
+
+    fn inputs(&mut self, root: &mut Section<'_>) -> Result<(), SettingsError> {
+        for (name, mut section) in named(root, "inputs")? {
+            self.is_new(&name, None, &section)?;
+            let column = section.text("column")?.map_or_else(|| name.clone(), |text| text.text);
+            let unit = unit(&mut section, self.source)?;
+            let hold = section.choice("hold", &[("zero", Hold::Zero), ("linear", Hold::Linear)])?;
+            section.finish()?;
+            self.model.inputs.push(Input { name, column, unit, hold });
+        }
+        Ok(())
+    }
+
+    /// Parameters, states, memories and definitions, of the model or of a suspect.
+    fn members(&mut self, parent: &mut Section<'_>, suspect: Option<usize>) -> Result<(), SettingsError> {
+        for (name, section) in named(parent, "parameters")? {
+            self.is_new(&name, suspect, &section)?;
+            self.parameter(name, section, suspect)?;
+        }
+        for (name, mut section) in named(parent, "states")? {
+            self.is_new(&name, suspect, &section)?;
+            let unit = unit(&mut section, self.source)?;
+            let start = self.start(&mut section, &unit)?;
+            let derivative =
+                section.needed_text("derivative", "the state's rate of change, an expression")?;
+            let derivative = self.expression(derivative)?;
+            section.finish()?;
+            self.model.states.push(State { name, unit, start, derivative, suspect });
+        }
+        for (name, mut section) in named(parent, "memory")? {
+            self.is_new(&name, suspect, &section)?;
+            let unit = unit(&mut section, self.source)?;
+            let start_si = one_or(&mut section, "start", 0.0, [-1e300, 1e300])? * unit.factor;
+            let update = section.needed_text("update", "its value after a step, an expression")?;
+            let update = self.expression(update)?;
+            section.finish()?;
+            self.model.memories.push(Memory { name, unit, start_si, update, suspect });
+        }
+        let Some(mut section) = parent.section("define")? else { return Ok(()) };
+        for name in section.keys() {
+            let text = section.needed_text(&name, "an expression")?;
+            self.is_new(&name, suspect, &section).map_err(|error| {
+                self.source.wrong_from(text.at, error.to_string().rsplit(": ").next().unwrap_or(""))
+            })?;
+            let value = self.expression(text)?;
+            self.model.definitions.push(Definition { name, value, suspect });
+        }
+        section.finish()
+    }
+
+    fn parameter(
+        &mut self,
+        name: String,
+        mut section: Section<'_>,
+        suspect: Option<usize>,
+    ) -> Result<(), SettingsError> {
+        let unit = unit(&mut section, self.source)?;
+        let values_si: Vec<f64> = section.numbers("value")?.iter().map(|value| value * unit.factor).collect();
+        if values_si.is_empty() || values_si.len() > 8 {
+            return Err(
+                section.wrong_at("value", "value: allowed is a number, or up to 8 from which a fit starts")
+            );
+        }
+        let range_si = range(&mut section, &unit)?;
+        let [least, most] = range_si;
+        if values_si.iter().any(|value| !(least..=most).contains(value)) {
+            return Err(section.wrong_at("value", "value: not within range"));
+        }
+        let tolerance_si = match section.numbers("tolerance")?.as_slice() {
+            [] => None,
+            [one] if *one > 0.0 => Some(one * unit.factor),
+            _ => return Err(section.wrong_at("tolerance", "tolerance: allowed is a number above 0")),
+        };
+        let (is_fixed, is_per_record) = (section.flag("fixed")?, section.flag("per_record")?);
+        if is_fixed && is_per_record {
+            return Err(section
+                .wrong_at("per_record", "per_record: the number is fixed, so that no record has its own"));
+        }
+        section.finish()?;
+        let parameter =
+            Parameter { name, unit, values_si, tolerance_si, range_si, is_fixed, is_per_record, suspect };
+        self.model.parameters.push(parameter);
+        Ok(())
+    }
+
+    fn start(&mut self, section: &mut Section<'_>, unit: &Unit) -> Result<Start, SettingsError> {
+        let range_si = range(section, unit)?;
+        let guess = section.numbers("guess")?;
+        if section.peek("start").is_none() {
+            let value_si = one_or(section, "start", f64::NAN, [-1e300, 1e300])? * unit.factor;
+            if value_si.is_nan() {
+                let allowed = "a number, \"fitted\" with a guess, or the name of an output";
+                return Err(section.wrong(&format!("start is missing: allowed is {allowed}")));
+            }
+            return Ok(Start::Known { value_si });
+        }
+        let text = section.needed_text("start", "")?;
+        if text.text == "fitted" {
+            let [guess] = guess.as_slice() else {
+                return Err(section.wrong("guess is missing: where the fit of the start begins"));
+            };
+            let guess_si = (guess * unit.factor).clamp(range_si[0], range_si[1]);
+            return Ok(Start::Fitted { guess_si, range_si });
+        }
+        // The outputs are read later.
+        self.starts.push((self.model.states.len(), text));
+        Ok(Start::Record { output: usize::MAX })
+    }
+
+    fn resolve_starts(&mut self) -> Result<(), SettingsError> {
+        for (state, text) in &self.starts {
+            let Some(output) = self.model.outputs.iter().position(|output| output.name == text.text) else {
+                let why = format!(
+                    "'{}' is no output; allowed is a number, \"fitted\", or the name of an output",
+                    text.text
+                );
+                return Err(self.source.wrong_from(text.at, &why));
+            };
+            if self.model.outputs[output].unit.dimension != self.model.states[*state].unit.dimension {
+                return Err(self.source.wrong_from(text.at, "the output has another unit than the state"));
+            }
+            self.model.states[*state].start = Start::Record { output };
+        }
+        Ok(())
+    }
+
+    fn outputs(&mut self, root: &mut Section<'_>) -> Result<(), SettingsError> {
+        for (name, mut section) in named(root, "outputs")? {
+            self.is_new(&name, None, &section)?;
+            let column = section.text("column")?.map_or_else(|| name.clone(), |text| text.text);
+            let unit = unit(&mut section, self.source)?;
+            let value = section.needed_text("value", "what the model says it is, an expression")?;
+            let value = self.expression(value)?;
+            let noise = one_or(&mut section, "noise", 0.0, [0.0, 1e300])?;
+            let noise_si = (noise > 0.0).then_some(noise * unit.factor);
+            let model_error_si = one_or(&mut section, "model_error", 0.0, [0.0, 1e300])? * unit.factor;
+            section.finish()?;
+            self.model.outputs.push(Output { name, column, unit, value, noise_si, model_error_si });
+        }
+        Ok(())
+    }
+
+    fn suspect(&mut self, mut section: Section<'_>) -> Result<(), SettingsError> {
+        let index = self.model.suspects.len();
+        let name = section.needed_text("name", "what reports call it")?;
+        if self.model.suspects.iter().any(|other| other.name == name.text) {
+            return Err(section.wrong_at("name", "name: the name is taken by another suspect"));
+        }
+        let target =
+            section.needed_text("place", "the input, state, definition or output that it changes")?;
+        let target = self.target(&target)?;
+        self.members(&mut section, Some(index))?;
+        let mut found = None;
+        for (key, change) in
+            [("add", Change::Add), ("multiply", Change::Multiply), ("replace", Change::Replace)]
+        {
+            let Some(text) = section.text(key)? else { continue };
+            if found.is_some() {
+                return Err(
+                    section.wrong_at(key, &format!("{key}: a suspect has one of add, multiply, replace"))
+                );
+            }
+            found = Some((change, self.expression(text)?));
+        }
+        let Some((change, expression)) = found else {
+            return Err(
+                section.wrong("one of add, multiply, replace is missing: what the suspect does at its place")
+            );
+        };
+        let (twins, is_decoy) = (section.texts("twins")?, section.flag("decoy")?);
+        section.finish()?;
+        self.model.suspects.push(Suspect { name: name.text, target, change, expression, twins, is_decoy });
+        Ok(())
+    }
+
+    fn target(&self, text: &Text) -> Result<Target, SettingsError> {
+        let model = &self.model;
+        let name = &text.text;
+        let input = model.inputs.iter().position(|one| one.name == *name).map(Target::Input);
+        let states = model.states.iter().position(|one| one.suspect.is_none() && one.name == *name);
+        let defined = model.definitions.iter().position(|one| one.suspect.is_none() && one.name == *name);
+        let output = model.outputs.iter().position(|one| one.name == *name).map(Target::Output);
+        let all = input.or(states.map(Target::State)).or(defined.map(Target::Definition)).or(output);
+        all.ok_or_else(|| {
+            let why = format!("'{name}' is no input, state, definition or output of this model");
+            self.source.wrong_from(text.at, &why)
+        })
+    }
+}

@@ -1,0 +1,158 @@
+//! Model files that are accepted, and those that are refused with line and column.
+
+use crate::{read, refused};
+use model::{Change, Hold, Solver, Start, Target};
+
+const TANK: &str = r#"# A tank with a leak.
+name = "Tank"
+
+[record]
+time = "t_ms"
+unit = "ms"
+
+[inputs.pump]
+column = "pump_V"
+unit = "V"
+
+[parameters]
+gain = { unit = "mm/(V s)", value = 5.0, range = [0, 100] }
+outflow = { unit = "m^0.5/s", value = 0.01, tolerance = 0.002 }
+
+[states.level]
+unit = "mm"
+start = "level_mm"
+derivative = "gain*pump - outflow*sqrt(max(level, 0))"
+
+[outputs.level_mm]
+unit = "mm"
+value = "level"
+noise = 0.5
+
+[[suspects]]
+name = "leak"
+place = "level"
+add = "-rate*level"
+parameters.rate = { unit = "1/h", value = [1, 10] }
+"#;
+
+#[test]
+fn a_file_is_read_in_si() {
+    let model = read(TANK);
+    assert_eq!((model.name.as_str(), model.record.time_unit_s), ("Tank", 1e-3));
+    assert_eq!((model.inputs[0].hold, model.inputs[0].column.as_str()), (Hold::Zero, "pump_V"));
+    let names: Vec<_> = model.parameters.iter().map(|one| (one.name.as_str(), one.suspect)).collect();
+    assert_eq!(names, [("gain", None), ("outflow", None), ("rate", Some(0))]);
+    assert_eq!(model.parameters[0].values_si, [5e-3]);
+    assert_eq!(model.parameters[0].range_si, [0.0, 0.1]);
+    assert_eq!(model.parameters[1].tolerance_si, Some(0.002));
+    assert_eq!(model.parameters[2].values_si, [1.0 / 3600.0, 10.0 / 3600.0]);
+    assert_eq!(model.states[0].start, Start::Record { output: 0 });
+    assert_eq!(model.outputs[0].noise_si, Some(0.5e-3));
+    assert_eq!((model.suspects[0].target, model.suspects[0].change), (Target::State(0), Change::Add));
+    assert_eq!(model.solver, Solver::Adaptive { relative_tolerance: 1e-6 });
+    assert_eq!(model.parameters_of(&[]).collect::<Vec<_>>(), [0, 1]);
+}
+
+#[test]
+fn an_error_has_line_and_column_and_says_what_is_allowed() {
+    let mut wrong = Vec::new();
+    for (from, to, message) in [
+        (
+            "gain*pump",
+            "gian*pump",
+            "model.toml:19:15: 'gian' is unknown here; known are t, pi, pump, level, gain, outflow",
+        ),
+        ("sqrt(max(level, 0))", "level", "model.toml:19:25: sum of a value in m s^-1 and one in m^1.5 s^-1"),
+        (
+            "gain*pump - outflow*sqrt(max(level, 0))",
+            "gain",
+            "model.toml:19:15: the rate of level is in m s^-1, and this is in",
+        ),
+        ("derivative = ", "derivatif = ", "states.level.derivative is missing"),
+        ("max(level, 0)", "max(level)", "model.toml:19:40: max has 1 arguments; it takes 2 or more"),
+        ("max(level, 0)", "maxi(level, 0)", "model.toml:19:40: 'maxi' is no function"),
+        ("max(level, 0)", "max(level, 0", "model.toml:19:53: a comma or ) is missing"),
+        ("mm/(V s)", "mm/(V sx)", "model.toml:13:24: 'sx' is no unit"),
+        (
+            "value = 5.0, range = [0, 100]",
+            "value = 500.0, range = [0, 100]",
+            "model.toml:13:37: parameters.gain.value: not within range",
+        ),
+        ("start = \"level_mm\"", "start = \"height\"", "model.toml:18:10: 'height' is no output"),
+        ("start = \"level_mm\"", "", "model.toml:16:1: states.level.start is missing"),
+        (
+            "place = \"level\"",
+            "place = \"levle\"",
+            "model.toml:28:10: 'levle' is no input, state, definition or output",
+        ),
+        ("add = ", "addd = ", "suspects[1].one of add, multiply, replace is missing"),
+        ("-rate*level", "-rate", "leak is in m s^-1, and this is in s^-1"),
+        ("noise = 0.5", "noise = -1", "model.toml:24:9: outputs.level_mm.noise: allowed is one number"),
+        ("noise = 0.5", "nose = 0.5", "model.toml:24:1: unknown key outputs.level_mm.nose; allowed is"),
+        ("[inputs.pump]", "[inputs.level]", "states.level.the name is taken"),
+        ("[inputs.pump]", "[inputs.sqrt]", "the name has a meaning in expressions"),
+        ("unit = \"ms\"", "unit = \"m\"", "no unit of time"),
+        ("[outputs.level_mm]", "[output.level_mm]", "[outputs] is missing"),
+    ] {
+        assert!(TANK.contains(from), "{from}");
+        let found = refused(&TANK.replacen(from, to, 1));
+        if !found.contains(message) || !found.starts_with("model.toml:") {
+            wrong.push(format!("{from} -> {to}\n  {found}\n  {message}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+fn with_output(lines: &str, value: &str) -> String {
+    format!("{lines}\n[outputs.y]\nvalue = \"{value}\"\n")
+}
+
+#[test]
+fn hostile_files_are_refused_with_line_and_column() {
+    let terms = vec!["t/1[s]"; 1_000_000].join("+");
+    let brackets = format!("{}1{}", "(".repeat(5000), ")".repeat(5000));
+    let mut chain = String::from("[define]\na0 = \"1\"\n");
+    (1..400).for_each(|index| chain += &format!("a{index} = \"a{} + 1\"\n", index - 1));
+    for (text, message) in [
+        (with_output("", &terms), "nested deeper than 64"),
+        (with_output("", &brackets), "nested deeper than 64"),
+        (
+            with_output("[tables.f]\nx = [1]\ny = [2]", "f(1)"),
+            "model.toml:2:5: tables.f.x: a table has 2 to 10000 points",
+        ),
+        (with_output("[tables.f]\nx = [1, 1]\ny = [2, 3]", "f(1)"), "larger than the one before"),
+        (with_output("[tables.f]\nx = [1, nan]\ny = [2, 3]", "f(1)"), "a finite number"),
+        (with_output("[define]\na = \"b\"\nb = \"a\"", "a"), "depends on itself"),
+        (with_output(&chain, "a399"), "more than 32 deep"),
+        (with_output("", "1e400"), "no finite number"),
+        (with_output("", "delay(1, 2)"), "delay takes a value in s"),
+        (with_output("[parameters.p]\nvalue = [1,2,3,4,5,6,7,8,9]", "p"), "up to 8"),
+    ] {
+        let found = refused(&text);
+        assert!(found.contains(message), "{found}\n  {message}");
+        let mut place = found.split(':').skip(1);
+        assert!(place.next().is_some_and(|line| line.parse::<usize>().is_ok()), "{found}");
+        assert!(place.next().is_some_and(|column| column.parse::<usize>().is_ok()), "{found}");
+    }
+}
+
+#[test]
+fn suspects_that_depend_on_each_other_in_a_circle_are_refused() {
+    let text = "[define]\na = \"1\"\nb = \"a\"\n[outputs.y]\nvalue = \"b\"\n\
+                [[suspects]]\nname = \"back\"\nplace = \"a\"\nadd = \"b\"\n";
+    assert!(
+        refused(text).starts_with("model.toml:9:8: b depends on itself by way of b, a"),
+        "{}",
+        refused(text)
+    );
+}
+
+#[test]
+fn what_belongs_to_a_suspect_is_unknown_elsewhere() {
+    let text = "[parameters.p]\nvalue = 1\n[outputs.y]\nvalue = \"p\"\n\
+                [[suspects]]\nname = \"one\"\nplace = \"y\"\nadd = \"q\"\nparameters.q = { value = 1 }\n\
+                [[suspects]]\nname = \"two\"\nplace = \"y\"\nadd = \"q\"\nparameters.r = { value = 1 }\n";
+    assert!(refused(text).contains("'q' is unknown here; known are t, pi, p, r"), "{}", refused(text));
+    let model = read(&text.replace("parameters.r", "parameters.q"));
+    assert_eq!(model.parameters.len(), 3);
+}

@@ -1,0 +1,45 @@
+//! The integration tests of `model`, one executable; its allocator counts.
+
+mod files;
+mod integration;
+
+#[global_allocator]
+static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;
+
+use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start};
+use std::path::Path;
+
+pub(crate) fn read(text: &str) -> Model {
+    Model::parse(text, Path::new("model.toml")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+pub(crate) fn refused(text: &str) -> String {
+    Model::parse(text, Path::new("model.toml")).expect_err(text).to_string()
+}
+
+/// First values of a model's parameters, states and memories.
+pub(crate) fn first_values(model: &Model) -> [Vec<f64>; 3] {
+    let start = |start: Start| match start {
+        Start::Known { value_si } | Start::Fitted { guess_si: value_si, .. } => value_si,
+        Start::Record { .. } => 0.0,
+    };
+    [
+        model.parameters.iter().map(|parameter| parameter.values_si[0]).collect(),
+        model.states.iter().map(|state| start(state.start)).collect(),
+        model.memories.iter().map(|memory| memory.start_si).collect(),
+    ]
+}
+
+/// Values and derivatives of all outputs, row by row.
+pub(crate) fn simulated(
+    program: &Program,
+    directions: &[Direction],
+    inputs: &Inputs<'_>,
+    values: &[Vec<f64>; 3],
+) -> Result<Vec<(f64, Vec<f64>)>, Failure> {
+    let mut all = Vec::new();
+    let values = [&values[0][..], &values[1], &values[2]];
+    Simulator::new(program, directions)
+        .run(inputs, values, |_, _, value, slope| all.push((value, slope.to_vec())))?;
+    Ok(all)
+}
