@@ -99,6 +99,11 @@ class Expectations:
         self._catch_up()
         return self.seen.message(name)
 
+    def messages(self, name: str | None = None, last: Duration = "2 s") -> list[can.Message]:
+        """Frames of that name, or all, of the last seconds, 20 at most, as python-can has them; stamped with the rig's time, s."""
+        self._catch_up()
+        return self.seen.messages(name, self._now_s - seconds(last), self._now_s)
+
     def course(self, signal: str, last: Duration = "2 s") -> list[tuple[float, float]]:
         """Times, s, and values of a signal over the last seconds, 20 at most."""
         self._catch_up()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
@@ -40,6 +41,8 @@ def file(record: Record, place: Path) -> Path:
     if hasattr(given, "to_dataframe"):
         frame = given.to_dataframe(time_from_zero=True, use_interpolation=False)
         frame.index.name = "time_s"
+        # As `Run.mdf` puts it there.
+        comments = re.findall(r"^(?:<TX>)?(# \w+=.*?)(?:</TX>)?$", given.header.comment, re.MULTILINE)
     elif hasattr(given, "to_csv") and hasattr(given, "columns"):
         frame, comments = given, given.attrs.get("comments", ())
     else:

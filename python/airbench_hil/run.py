@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Mapping
 from functools import cached_property
@@ -14,6 +15,7 @@ import can
 
 if TYPE_CHECKING:
     import pandas
+    from asammdf import MDF
 
 #: Endings of names in tables, and their units; the longest that fits counts.
 _UNITS = {
@@ -87,6 +89,19 @@ class Run:
         with can.LogReader(self.folder / "bus.log") as reader:
             return list(reader)
 
+    def mdf(self) -> MDF:
+        """The run as an MDF of asammdf, times in s from cycle 0, in memory: `mdf().save("run.mf4")` writes it.
+
+        Frames of the bus are `DriveSensors.position_m`, a group for each message; columns of measurement.csv keep their names, those of other
+        tables are `truth.drive_position_m`. Every channel has its unit.
+
+        :raises ImportError: asammdf is not installed: pip install 'airbench-hil[mdf]'
+        :raises ProgramFailed: `bench export` failed.
+        """
+        from airbench_hil import mdf
+
+        return mdf.of(self.folder)
+
     @property
     def picture(self) -> Path | None:
         """The run's picture, SVG, if it was summed up."""
@@ -115,11 +130,18 @@ def read_table(path: Path) -> pandas.DataFrame:
 
 def import_pandas() -> Any:
     """The module. Raises ImportError, which says how to install it."""
+    return imported("pandas", "pandas")
+
+
+def imported(module: str, extra: str) -> Any:
+    """A module that airbench-hil[extra] brings.
+
+    :raises ImportError: it is not installed; the text says how to.
+    """
     try:
-        import pandas
+        return importlib.import_module(module)
     except ImportError as missing:
-        raise ImportError(f"{missing}: pip install 'airbench-hil[pandas]'") from missing
-    return pandas
+        raise ImportError(f"{missing}: pip install 'airbench-hil[{extra}]'") from missing
 
 
 def _is_number(value: Any) -> bool:

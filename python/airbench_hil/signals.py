@@ -199,6 +199,12 @@ class Seen:
         kept = self.kept.get(signal.frame_id, ())
         return [(each.time_s, signal.of(each.word)) for each in kept if from_s <= each.time_s <= to_s]
 
+    def messages(self, name: str | None, from_s: float, to_s: float) -> list[can.Message]:
+        """Frames of that name, or all, that came between these times, s, in their order."""
+        wanted = list(self.kept) if name is None else [self.names.message(name).frame_id]
+        came = ((each, frame_id) for frame_id in wanted for each in self.kept.get(frame_id, ()) if from_s <= each.time_s <= to_s)
+        return [_as_python_can(frame_id, each) for each, frame_id in sorted(came, key=lambda pair: (pair[0].time_s, pair[1]))]
+
     def message(self, name: str) -> can.Message:
         """The newest frame of that name as python-can has it; its stamp is the rig's time, s.
 
@@ -208,5 +214,13 @@ class Seen:
         sample = self.latest.get(frame_id)
         if sample is None:
             raise NotSeen(f"{name}: no such frame has come yet")
-        data = sample.word.to_bytes(8, "little")[: min(sample.length, 8)]
-        return can.Message(timestamp=sample.time_s, arbitration_id=frame_id, data=data, dlc=sample.length, is_extended_id=False)
+        return _as_python_can(frame_id, sample)
+
+
+def _as_python_can(raw_id: int, sample: Sample) -> can.Message:
+    data = sample.word.to_bytes(8, "little")[: min(sample.length, 8)]
+    extended, remote = bool(raw_id & 0x80000000), bool(raw_id & 0x40000000)
+    return can.Message(
+        timestamp=sample.time_s, arbitration_id=raw_id & 0x1FFFFFFF, data=b"" if remote else data, dlc=sample.length,
+        is_extended_id=extended, is_remote_frame=remote, is_error_frame=bool(raw_id & 0x20000000),
+    )

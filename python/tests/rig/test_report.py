@@ -73,7 +73,7 @@ def test_the_extended_model_runs_as_a_rig(report, tmp_path):
         assert rig.finish().figures["cycles"] == 100
 
 
-def test_a_run_and_a_frame_are_the_same_record(runs, tmp_path):
+def test_a_run_a_frame_and_an_mdf_are_the_same_record(runs, tmp_path):
     pandas = pytest.importorskip("pandas")
     run, _ = runs
     frame = run.measurement
@@ -83,6 +83,10 @@ def test_a_run_and_a_frame_are_the_same_record(runs, tmp_path):
     pandas.testing.assert_frame_equal(pandas.read_csv(written, comment="#"), frame, rtol=0, atol=0)
     by_index = records.file(frame.set_index("time_s"), tmp_path / "index")
     assert by_index.read_text().split("\n")[1:] == written.read_text().split("\n")[1:]
+    written_mdf = records.file(run.mdf().filter(list(frame.columns[1:])), tmp_path / "mdf")
+    assert written_mdf.read_text().startswith("# linked=false added_mass_kg=0\ntime_s,")
+    read = pandas.read_csv(written_mdf, comment="#")[list(frame.columns)]
+    pandas.testing.assert_frame_equal(read, frame, rtol=0, atol=0, check_dtype=False)
     with pytest.raises(ValueError, match="neither a column nor an index time_s; it has drive_valve"):
         records.file(frame[["drive_valve"]], tmp_path / "no-time")
     with pytest.raises(ValueError, match="record 3: a file, a Run"):

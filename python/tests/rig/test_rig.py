@@ -5,6 +5,7 @@ import json
 import random
 import re
 import socket
+import sys
 import threading
 import time
 
@@ -366,6 +367,53 @@ def test_a_python_controller_answers_delayed_sensors_as_what_they_are(tmp_path):
     commands = [each.data for each in run.messages() if each.arbitration_id == 0x110]
     echoes = [rig.database.decode_message("DriveValveCommand", data)["echo"] for data in commands]
     assert echoes == sampled[: len(echoes)] and len(echoes) > 200
+
+
+def test_frames_go_in_and_out_as_python_can_and_cantools_have_them(tmp_path):
+    with Rig(controller=to_300_mm, setup=AT, out=tmp_path) as rig:
+        rig.run_for("0.1 s")
+        stop = rig.database.get_message_by_name("ConsoleEmergencyStop")
+        data = stop.encode({each.name: {"reason": "operator"}.get(each.name, 0) for each in stop.signals})
+        rig.send(can.Message(arbitration_id=stop.frame_id, data=data, is_extended_id=False))
+        rig.expect("RigStatus.emergency_stop == 1", within="20 ms")
+        sensors = rig.messages("DriveSensors", last="20 ms")
+        assert [round(each.timestamp * 1000) for each in sensors] == list(range(rig.cycle - 20, rig.cycle + 1))
+        decoded = rig.database.decode_message(sensors[-1].arbitration_id, sensors[-1].data)
+        assert decoded["position"] == pytest.approx(rig.read("DriveSensors.position"))
+        every = rig.messages(last="20 s")
+        assert [each.timestamp for each in every] == sorted(each.timestamp for each in every)
+        rig.send(can.Message(arbitration_id=0x1ABCDEF, data=b"mine"))
+        [foreign] = [each for each in rig.messages() if each.is_extended_id]
+        assert (foreign.arbitration_id, bytes(foreign.data), foreign.dlc) == (0x1ABCDEF, b"mine", 4)
+        run = rig.end()
+    # What the test saw of the rig is what the log has, in the same order of each identifier.
+    log = [bytes(each.data) for each in run.messages() if each.arbitration_id == 0x120]
+    mine = [bytes(each.data) for each in every if each.arbitration_id == 0x120]
+    assert len(mine) > 100 and mine == log[: len(mine)]
+
+
+def test_a_run_is_an_mdf_of_asammdf_with_units(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    with Rig(controller=to_300_mm, setup=AT, seconds=0.2, out=tmp_path / "run") as rig:
+        run = rig.finish()
+    mdf = run.mdf()
+    position = mdf.get("drive_position_m")
+    assert position.unit == "m" and list(position.samples) == list(run.measurement["drive_position_m"])
+    assert list(mdf.get("truth.drive_position_m").samples) == list(run.truth["drive_position_m"])
+    on_the_bus = mdf.get("DriveSensors.position_m")
+    assert on_the_bus.unit == "m" and on_the_bus.samples == pytest.approx(position.samples, abs=1e-9)
+    mdf.save(tmp_path / "run.mf4")
+    with asammdf.MDF(tmp_path / "run.mf4") as saved:
+        assert "drive_pressure_a_Pa" in saved.channels_db and "linked=false" in saved.header.comment
+
+
+def test_what_is_not_installed_says_how_to_install_it(tmp_path, monkeypatch):
+    with Rig(controller=to_300_mm, seconds=0.01, out=tmp_path) as rig:
+        run = rig.finish()
+    for module, ask, extra in (("pandas", lambda: run.truth, "pandas"), ("asammdf", run.mdf, "mdf")):
+        monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(ImportError, match=rf"{module}.*: pip install 'airbench-hil\[{extra}\]'"):
+            ask()
 
 
 def test_units_are_those_of_the_names_endings():
