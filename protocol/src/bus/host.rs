@@ -9,11 +9,12 @@
 mod closing;
 mod faulty;
 mod modelled;
+mod peer;
 
 use super::BusError;
 use super::control::{Control, Kind, Role};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
-use super::packets::{self, Inbox, Outbox, Wait};
+use super::packets::{self, Inbox, Wait};
 use super::timed::{CYCLE_NS, Reported, TimedWire};
 use super::unix_link;
 use super::url::{BusUrl, WireOptions};
@@ -22,8 +23,8 @@ use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
 use crate::response_time;
 use crate::socket_file::SocketFile;
 use crate::wire_time::WireEvent;
-use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
-use rustix::net::SendFlags;
+use peer::{Peer, Sent};
+use rustix::event::{Timespec, epoll};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
@@ -37,6 +38,11 @@ pub use super::host_report::{FramesById, HostReport, PeerReport};
 
 /// Wall time after which the barrier is broken by a member that is not done (bus.md, Lockstep), if nothing else is asked for.
 pub const BARRIER_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Wall time that a cycle takes at least in which a foreign controller had nothing to answer: it may still act on what it has read.
+const UNANSWERED_CYCLE: Duration = Duration::from_millis(1);
+/// How often the host looks whether such a controller has read what reached it.
+const UNREAD_LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000 };
 
 /// Queue of a peer in bytes of the kernel's accounting, some 750 for each frame: about half a second of the whole bus.
 const PEER_QUEUE_BYTES: usize = 2 << 20;
@@ -54,12 +60,6 @@ const TIMER: u64 = u64::MAX - 2;
 const GONE: PeerId = u64::MAX - 3;
 /// A node that is a fault of the wire.
 const BABBLER: PeerId = u64::MAX - 4;
-
-struct Peer {
-    socket: OwnedFd,
-    report: usize,
-    outbox: Outbox,
-}
 
 /// A packet from the rig that lives in the host's process.
 pub(super) enum FromRig {
@@ -97,16 +97,6 @@ pub struct Host {
     /// Peers that went, by their place in the report, with what had passed the wire by then.
     gone: Vec<(usize, FramesById)>,
     closing: bool,
-}
-
-/// What became of a packet for a peer.
-enum Sent {
-    /// Its queue took it.
-    Delivered,
-    /// Its queue was full.
-    Dropped,
-    /// It takes no more, and is removed when its end is read.
-    Gone,
 }
 
 impl Host {
@@ -174,7 +164,9 @@ impl Host {
     /// Waits for packets, at most for `patience`, and carries them on.
     pub(super) fn turn(&mut self, patience: Timespec) -> io::Result<()> {
         let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
-        let mut events = wait(&self.epoll, &mut room, self.faults_patience(patience))?;
+        let patience = self.faults_patience(patience);
+        let patience = if self.waits_for_readers() { patience.min(UNREAD_LOOK) } else { patience };
+        let mut events = wait(&self.epoll, &mut room, patience)?;
         if self.barrier.is_none() {
             self.advance_faults(self.began.elapsed().as_nanos() as u64);
         }
@@ -261,7 +253,7 @@ impl Host {
             let _ = packets::enable_stamps(socket.as_fd(), false);
             timed.join(id, Reported::Peer(self.report.peers.len()));
         }
-        self.peers.insert(id, Peer { socket, report: self.report.peers.len(), outbox: Outbox::new() });
+        self.peers.insert(id, Peer::new(socket, self.report.peers.len()));
         let before_it_came = self.report.on_wire.clone();
         self.report.peers.push(PeerReport { name: process, before_it_came, ..PeerReport::default() });
     }
@@ -392,7 +384,9 @@ impl Host {
 
     fn advance_barrier(&mut self) {
         let connected = self.peers.len() + usize::from(self.for_rig.is_some());
-        while let Some(release) = self.barrier.as_mut().and_then(|barrier| barrier.release(connected)) {
+        while !self.waits_for_readers()
+            && let Some(release) = self.barrier.as_mut().and_then(|barrier| barrier.release(connected))
+        {
             self.carry_out(release);
             self.waiting_since = Instant::now();
         }
@@ -405,6 +399,20 @@ impl Host {
             self.tell(peer, Control::named(Kind::TimedOut, 0, &name));
         }
         self.waiting_since = Instant::now();
+    }
+
+    /// Whether a foreign controller that has nothing to answer may not have seen yet what this cycle brought it. One that reads
+    /// nothing for the barrier's time-out is waited for no more, until it has read everything.
+    fn waits_for_readers(&mut self) -> bool {
+        let Some(barrier) = &self.barrier else { return false };
+        let waited = self.waiting_since.elapsed();
+        let mut waits = false;
+        for peer in barrier.unanswering() {
+            let peer = peer.and_then(|id| self.peers.get_mut(&id));
+            waits |= waited < UNANSWERED_CYCLE
+                || peer.is_some_and(|peer| peer.may_yet_read(waited < self.barrier_timeout));
+        }
+        waits
     }
 
     fn carry_out(&mut self, release: Release) {
@@ -430,40 +438,6 @@ impl Host {
         } else if let Some(peer) = self.peers.get_mut(&id) {
             peer.post(&control.to_bytes());
             peer.flush();
-        }
-    }
-}
-
-impl Peer {
-    /// Sends without blocking.
-    fn send(&self, bytes: &[u8]) -> Sent {
-        match rustix::net::send(&self.socket, bytes, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
-            Ok(_) => Sent::Delivered,
-            Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => Sent::Gone,
-            Err(_) => Sent::Dropped,
-        }
-    }
-
-    /// Adds a packet that must not be lost.
-    fn post(&mut self, bytes: &[u8]) {
-        if self.outbox.is_full() {
-            self.flush();
-        }
-        self.outbox.push(bytes);
-    }
-
-    /// Sends what was posted, waiting for room for as long as a member has to be done.
-    fn flush(&mut self) {
-        if self.outbox.is_empty() {
-            return;
-        }
-        while let Err(error) = self.outbox.flush(self.socket.as_fd()) {
-            let timeout = Timespec { tv_sec: BARRIER_TIMEOUT.as_secs() as i64, tv_nsec: 0 };
-            let full = error.kind() == io::ErrorKind::WouldBlock;
-            if !full || poll(&mut [PollFd::new(&self.socket, PollFlags::OUT)], Some(&timeout)) == Ok(0) {
-                // A member that is gone, or that does not read: the barrier's time-out names it.
-                self.outbox.clear();
-            }
         }
     }
 }

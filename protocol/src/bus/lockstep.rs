@@ -14,7 +14,8 @@
 //! Frames of one release are sorted by identifier, then by the sender's name, then by the order of posting: the log
 //! does not depend on which process was faster, nor on how many processes the controllers are. A foreign controller
 //! knows nothing of this: it counts as done when a command on its identifier echoes the cycle, or when the sensors that it
-//! would answer were lost on the way to it: it cannot answer what it never saw.
+//! would answer were lost on the way to it: it cannot answer what it never saw. Such a cycle is not released before it has read
+//! what did reach it ([`Barrier::unanswering`]): else simulated time would run away from it.
 //!
 //! This file decides; [`super::host`] reads, writes and keeps the time.
 
@@ -69,6 +70,8 @@ struct Stranger {
     /// Who has echoed a cycle before; `None` until somebody does.
     peer: Option<PeerId>,
     done: bool,
+    /// Done without an answer: the sensors of this cycle were lost.
+    lost: bool,
 }
 
 impl Stranger {
@@ -97,7 +100,7 @@ pub(super) struct Barrier {
 
 impl Barrier {
     pub(super) fn new(config: BarrierConfig) -> Self {
-        let stranger = |command_id| Stranger { command_id, peer: None, done: false };
+        let stranger = |command_id| Stranger { command_id, peer: None, done: false, lost: false };
         Self {
             expected: config.members,
             phase: Phase::Gathering,
@@ -184,7 +187,7 @@ impl Barrier {
             _ => return,
         };
         if u64::from(echo) == u64::from(self.cycle) % ECHO_RANGE {
-            (stranger.peer, stranger.done) = (Some(from), true);
+            (stranger.peer, stranger.done, stranger.lost) = (Some(from), true, false);
         }
     }
 
@@ -197,6 +200,7 @@ impl Barrier {
         }
         for stranger in self.strangers.iter_mut().filter(|stranger| stranger.answers(frame)) {
             let reached = at.is_some_and(|at| stranger.peer.is_some_and(|peer| peer != at));
+            stranger.lost |= !reached && !stranger.done;
             stranger.done |= !reached;
         }
     }
@@ -225,6 +229,12 @@ impl Barrier {
         })
     }
 
+    /// Where the members' turn is over: the foreign controllers that had nothing to answer, as far as they are known.
+    pub(super) fn unanswering(&self) -> impl Iterator<Item = Option<PeerId>> {
+        let over = self.phase == Phase::MembersAct && self.waits_for().is_none();
+        self.strangers.iter().filter(move |stranger| over && stranger.lost).map(|stranger| stranger.peer)
+    }
+
     /// What to do now, if a phase is complete. `connected` is the number of peers, joined or not.
     pub(super) fn release(&mut self, connected: usize) -> Option<Release> {
         match self.phase {
@@ -249,7 +259,9 @@ impl Barrier {
                     return None;
                 }
                 self.members.values_mut().for_each(|member| member.done = false);
-                self.strangers.iter_mut().for_each(|stranger| stranger.done = false);
+                self.strangers
+                    .iter_mut()
+                    .for_each(|stranger| (stranger.done, stranger.lost) = (false, false));
                 self.cycle += 1;
                 self.phase = Phase::RigActs;
                 Some(Release { frames: sorted(&mut self.from_others), go: vec![rig], cycle: self.cycle })
@@ -411,5 +423,23 @@ mod tests {
         let mut barrier = started_with_stranger();
         barrier.lost(&frame(DRIVE_SENSORS.id), Some(STRANGER + 1));
         assert!(barrier.release(2).is_some());
+    }
+
+    #[test]
+    fn a_foreign_controller_without_an_answer_to_give_is_told_at_the_end_of_the_members_turn() {
+        let unanswering = |barrier: &Barrier| barrier.unanswering().collect::<Vec<_>>();
+        let mut barrier = started_with_stranger();
+        barrier.lost(&frame(DRIVE_SENSORS.id), None);
+        assert_eq!(unanswering(&barrier), [None], "nobody has answered before");
+        barrier.release(2).unwrap();
+        assert!(unanswering(&barrier).is_empty(), "the rig's turn");
+        sensors_under_way(&mut barrier);
+        answer(&mut barrier, 1);
+        barrier.lost(&frame(DRIVE_SENSORS.id), None);
+        assert!(unanswering(&barrier).is_empty(), "it has answered this cycle");
+        barrier.release(2).unwrap();
+        sensors_under_way(&mut barrier);
+        barrier.lost(&frame(DRIVE_SENSORS.id), Some(STRANGER));
+        assert_eq!(unanswering(&barrier), [Some(STRANGER)]);
     }
 }

@@ -10,7 +10,7 @@
 //!
 //! Source: `socket(7)` (SO_TIMESTAMPNS, SO_RXQ_OVFL), `recvmmsg(2)`, Linux Documentation/networking/can.rst (MSG_CONFIRM).
 
-#![allow(unsafe_code)] // recvmmsg, sendmmsg and setsockopt, nothing else
+#![allow(unsafe_code)] // recvmmsg, sendmmsg, setsockopt and the ioctl SIOCOUTQ, nothing else
 
 use rustix::time::{ClockId, clock_gettime};
 use std::io;
@@ -343,6 +343,14 @@ pub(super) fn enable_stamps(socket: BorrowedFd<'_>, count_overflow: bool) -> io:
     Ok(())
 }
 
+/// Bytes in the kernel's accounting that were sent through this Unix socket and that the other end has not read; 0 when it is gone.
+pub(super) fn unread_bytes(socket: BorrowedFd<'_>) -> usize {
+    let mut bytes: libc::c_int = 0;
+    // SAFETY: SIOCOUTQ (the number of TIOCOUTQ) writes one int, and the descriptor is open.
+    let result = unsafe { libc::ioctl(socket.as_raw_fd(), libc::TIOCOUTQ, &raw mut bytes) };
+    if result == 0 { bytes.unsigned_abs() as usize } else { 0 }
+}
+
 fn set_flag(socket: BorrowedFd<'_>, option: libc::c_int) -> io::Result<()> {
     let on: libc::c_int = 1;
     // SAFETY: the descriptor is borrowed for the call, and the value's size is that of the c_int it points to.
@@ -451,5 +459,19 @@ mod tests {
         drop(theirs);
         inbox.fill(ours.as_fd(), Wait::No, &|age_ns| age_ns).unwrap();
         assert_eq!(inbox.take().unwrap().len, 0);
+    }
+
+    #[test]
+    fn what_the_other_end_has_not_read_is_known() {
+        let (ours, theirs) = pair();
+        assert_eq!(unread_bytes(ours.as_fd()), 0);
+        send(&ours, &[7; 16], SendFlags::empty()).unwrap();
+        assert!(unread_bytes(ours.as_fd()) >= 16);
+        let mut inbox = Inbox::new();
+        inbox.fill(theirs.as_fd(), Wait::No, &|age_ns| age_ns).unwrap();
+        assert_eq!(unread_bytes(ours.as_fd()), 0);
+        send(&ours, &[7; 16], SendFlags::empty()).unwrap();
+        drop(theirs);
+        assert_eq!(unread_bytes(ours.as_fd()), 0);
     }
 }

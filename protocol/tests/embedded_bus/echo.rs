@@ -2,10 +2,13 @@
 
 use super::support::*;
 use protocol::bus::control::{Kind, Role};
+use protocol::bus::host::Host;
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{Bus, Received, WireOptions};
 use protocol::can::CanFrame;
 use protocol::frames::{ALIVE_RANGE, DRIVE_VALVE_COMMAND, ECHO_RANGE, Frame, Sensors, ValveCommand};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 fn host(place: &Place, loss: f64) -> RunningHost {
     let barrier = BarrierConfig { members: 0, echo_ids: vec![DRIVE_VALVE_COMMAND.id] };
@@ -88,27 +91,65 @@ fn lost_frames_do_not_hold_the_barrier_of_a_stranger() {
     assert!((450..500).contains(&answered), "{answered} of {CYCLES} answered");
 }
 
-/// One that answers and then stops reading, as a program in a debugger does, lets the others go on.
-#[test]
-fn the_full_queue_of_a_stranger_does_not_hold_the_barrier() {
-    /// Far more than a queue of 2 MiB holds at some 750 bytes a frame, twice over for the kernel's doubling.
-    const FRAMES: usize = 14_000;
-    let place = Place::new();
-    let host = host(&place, 0.0);
-    let mut rig = rig_on(&place);
-    let mut stranger = open(&place.socket());
-    commands_until_go(rig.as_mut(), 0);
+/// Far more than a queue of 2 MiB holds at some 750 bytes a frame, twice over for the kernel's doubling.
+const MORE_THAN_A_QUEUE: usize = 14_000;
+
+/// Runs a foreign controller into a full queue: it answers cycle 0 and does not read in cycle 1, whose sensors it loses.
+fn fill_the_queue_of(stranger: &mut dyn Bus, rig: &mut dyn Bus) {
+    commands_until_go(rig, 0);
     rig.send(&sensors(0)).unwrap();
     rig.done(0);
-    assert_eq!(next_frame(stranger.as_mut()).0, sensors(0));
+    assert_eq!(next_frame(stranger).0, sensors(0));
     stranger.send(&command(0)).unwrap();
-    commands_until_go(rig.as_mut(), 1);
-    for number in 0..FRAMES {
+    commands_until_go(rig, 1);
+    for number in 0..MORE_THAN_A_QUEUE {
         rig.send(&numbered(0x100, number)).unwrap();
     }
     rig.send(&sensors(1)).unwrap();
     rig.done(1);
+}
+
+/// One that answers and then stops reading, as a program in a debugger does, lets the others go on: after the barrier's time-out,
+/// and then at once.
+#[test]
+fn the_full_queue_of_a_stranger_does_not_hold_the_barrier() {
+    let place = Place::new();
+    let barrier = BarrierConfig { members: 0, echo_ids: vec![DRIVE_VALVE_COMMAND.id] };
+    let timeout = Duration::from_millis(300);
+    let host = Host::bind(&place.socket(), WireOptions::default(), Some(barrier)).unwrap();
+    let host = RunningHost::serve(host.with_barrier_timeout(timeout));
+    let mut rig = rig_on(&place);
+    let mut stranger = open(&place.socket());
+    fill_the_queue_of(stranger.as_mut(), rig.as_mut());
     commands_until_go(rig.as_mut(), 2);
+    for cycle in 2..50 {
+        rig.send(&sensors(cycle)).unwrap();
+        rig.done(cycle);
+        commands_until_go(rig.as_mut(), cycle + 1);
+    }
     let dropped = host.stop().peers[1].dropped_at_queue.by_name();
-    assert_eq!(dropped["120"], 1, "{dropped:?}");
+    assert_eq!(dropped["120"], 49, "{dropped:?}");
+}
+
+/// Simulated time does not run away from a foreign controller that has something to read, though nothing to answer.
+#[test]
+fn a_stranger_that_lost_its_sensors_is_waited_for_until_it_has_read_the_rest() {
+    let place = Place::new();
+    let host = host(&place, 0.0);
+    let mut rig = rig_on(&place);
+    let mut stranger = open(&place.socket());
+    fill_the_queue_of(stranger.as_mut(), rig.as_mut());
+    let has_read = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(Duration::from_millis(50));
+            has_read.store(true, Ordering::SeqCst);
+            frames_until(stranger.as_mut(), |frame| frame.standard_id() == Some(FENCE_ID));
+        });
+        commands_until_go(rig.as_mut(), 2);
+        assert!(has_read.load(Ordering::SeqCst), "the barrier went on without it");
+        rig.send(&CanFrame::new(FENCE_ID, &[])).unwrap();
+        rig.done(2);
+    });
+    host.stop();
 }

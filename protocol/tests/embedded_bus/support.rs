@@ -48,7 +48,10 @@ pub(crate) struct RunningHost {
 
 impl RunningHost {
     pub(crate) fn start(path: &Path, wire: WireOptions, barrier: Option<BarrierConfig>) -> Self {
-        let host = Host::bind(path, wire, barrier).unwrap_or_else(|error| panic!("{error}"));
+        Self::serve(Host::bind(path, wire, barrier).unwrap_or_else(|error| panic!("{error}")))
+    }
+
+    pub(crate) fn serve(host: Host) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&stop);
         Self { stop, thread: std::thread::spawn(move || host.serve(&seen)) }
