@@ -39,7 +39,7 @@ pub use super::host_report::{FramesById, HostReport, PeerReport};
 /// Wall time after which the barrier is broken by a member that is not done (bus.md, Lockstep), if nothing else is asked for.
 pub const BARRIER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Wall time that a cycle takes at least in which a foreign controller had nothing to answer: it may still act on what it has read.
+/// Wall time that a cycle takes at least in which a foreign controller had nothing to answer: it may act on what it has read.
 const UNANSWERED_CYCLE: Duration = Duration::from_millis(1);
 /// How often the host looks whether such a controller has read what reached it.
 const UNREAD_LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000 };

@@ -343,7 +343,7 @@ pub(super) fn enable_stamps(socket: BorrowedFd<'_>, count_overflow: bool) -> io:
     Ok(())
 }
 
-/// Bytes in the kernel's accounting that were sent through this Unix socket and that the other end has not read; 0 when it is gone.
+/// Bytes, as the kernel accounts for them, sent through this Unix socket and not yet read; 0 when the other end is gone.
 pub(super) fn unread_bytes(socket: BorrowedFd<'_>) -> usize {
     let mut bytes: libc::c_int = 0;
     // SAFETY: SIOCOUTQ (the number of TIOCOUTQ) writes one int, and the descriptor is open.
