@@ -144,6 +144,11 @@ class Rig(Expectations, People):
         """The bus, for other programs: unix:///PATH."""
         return f"unix://{self.bus_path}"
 
+    @property
+    def telemetry(self) -> Path:
+        """The socket of the emulator's telemetry, for `bench watch --telemetry`."""
+        return self._telemetry
+
     def program(self, name: str) -> Path:
         """A program of airbench, where this rig takes it from. Raises ProgramNotFound."""
         return programs.program(name, self._binaries)
