@@ -12,6 +12,9 @@ FILES = {
     "protocol/rig.dbc": "data/rig.dbc",
     "controller/experiments": "data/experiments",
     "controller/programs": "data/programs",
+    "discrepancy/experiments/held-out.toml": "data/held-out.toml",
+    "latency/bounds.toml": "data/latency-bounds.toml",
+    "latency/bounds-spin.toml": "data/latency-bounds-spin.toml",
     "campaign/campaigns": "data/campaigns",
 }
 

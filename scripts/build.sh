@@ -11,6 +11,6 @@ build_programs() {
     done
     # shellcheck disable=SC2154 # root is the sourcing script's
     (cd "$root" && cargo build --release --locked --quiet -p emulator -p controller -p bench -p discrepancy -p campaign \
-        -p plant-fmu \
+        -p plant-fmu -p front \
         "${chosen[@]}" "${@:2}")
 }

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from pathlib import Path
+from typing import NoReturn
 
 from airbench_hil.errors import ProgramNotFound
 
@@ -30,8 +32,10 @@ def checkout() -> Path | None:
     return None
 
 
-def program(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
+def program(name: str, folder: str | os.PathLike[str] | None = None, *, on_path: bool = True) -> Path:
     """The program of that name: in `folder` if given, else in $AIRBENCH_BIN, the package's bin/, a checkout's target/release, PATH.
+
+    `on_path=False` leaves PATH out.
 
     :raises ProgramNotFound: it is in none of them, or not in the folder that was asked for.
     """
@@ -46,13 +50,25 @@ def program(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     for place in places:
         if os.access(place / name, os.X_OK):
             return (place / name).resolve()
-    if not asked and (found := shutil.which(name)):
+    on_path = on_path and not asked
+    if on_path and (found := shutil.which(name)):
         return Path(found).resolve()
-    looked = ", ".join(map(str, places)) + ("" if asked else ", PATH")
+    looked = ", ".join(map(str, places)) + (", PATH" if on_path else "")
     raise ProgramNotFound(
         f"the program '{name}' of airbench is not in {looked}. Install a wheel of airbench-hil that holds the programs, build a "
         "checkout (cargo build --release), or name their folder: AIRBENCH_BIN=/path/to/folder"
     )
+
+
+def front() -> NoReturn:
+    """The command `airbench` of a wheel: becomes the program of that name, whose `airbench test` takes this interpreter."""
+    try:
+        own = program("airbench", on_path=False)  # where this very command is
+    except ProgramNotFound as error:
+        print(f"airbench: {error}", file=sys.stderr)
+        sys.exit(2)
+    os.environ.setdefault("AIRBENCH_PYTHON", sys.executable)
+    os.execv(own, [str(own), *sys.argv[1:]])
 
 
 def file(name: str) -> Path:

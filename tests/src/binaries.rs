@@ -1,7 +1,7 @@
 //! Where the programs under test are: given by the environment, else built once as they ship.
 //!
-//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped,
-//! `bench`, `discrepancy` and `campaign`; a script that has built them sets these. Without them cargo builds the release
+//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped, `bench`,
+//! `discrepancy`, `campaign` and `airbench`; a script that has built them sets these. Without them cargo builds the release
 //! profile, and says itself where the results are.
 
 use crate::process::{Ended, Running};
@@ -18,6 +18,7 @@ pub enum Program {
     Bench,
     Discrepancy,
     Campaign,
+    Airbench,
 }
 
 impl Program {
@@ -28,6 +29,7 @@ impl Program {
             Self::Bench => "bench",
             Self::Discrepancy => "discrepancy",
             Self::Campaign => "campaign",
+            Self::Airbench => "airbench",
         }
     }
 
@@ -103,9 +105,12 @@ fn build(features: &[&str]) -> PathBuf {
     cargo.current_dir(workspace()).args(["build", "--release", "--message-format=json-render-diagnostics"]);
     // Only these two count their allocations.
     let counting = [Program::Emulator, Program::Controller];
-    let all = [counting[0], counting[1], Program::Bench, Program::Discrepancy, Program::Campaign];
+    let [emulator, controller] = counting;
+    let all =
+        [emulator, controller, Program::Bench, Program::Discrepancy, Program::Campaign, Program::Airbench];
     for program in if features.is_empty() { &all[..] } else { &counting[..] } {
-        cargo.args(["--package", program.name(), "--bin", program.name()]);
+        let package = if *program == Program::Airbench { "front" } else { program.name() };
+        cargo.args(["--package", package, "--bin", program.name()]);
     }
     if features.is_empty() {
         // What `bench export-fmu` packs.

@@ -35,6 +35,7 @@ mod firmware;
 mod firmware_elf;
 mod firmware_r5f;
 mod fmu;
+mod front;
 mod gateway;
 mod gateway_hostile;
 mod hand_and_console;

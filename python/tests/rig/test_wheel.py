@@ -42,6 +42,18 @@ def run(folder, *words):
     return done.returncode, done.stdout + done.stderr
 
 
+def expect_front_command(folder):
+    """`airbench` of the wheel: a run, and the tests with the interpreter whose command it is."""
+    environment = {"PATH": "/usr/bin:/bin", "HOME": str(folder), "AIRBENCH_PYTEST_LOCK": str(folder / "lock")}
+    for words, printed in {
+        ("run", "--lockstep", "--out", "run"): "passed                                        yes",
+        ("test", "-q", "test_first.py"): "passed",
+    }.items():
+        command = [folder / "venv/bin/airbench", *words]
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0 and printed in done.stdout, done.stdout + done.stderr
+
+
 def test_from_the_wheel_without_a_compiler_the_page_goes_as_it_says(tmp_path):
     environment(tmp_path)
     code, said = run(tmp_path, "test_mine.py")
@@ -57,3 +69,4 @@ def test_from_the_wheel_without_a_compiler_the_page_goes_as_it_says(tmp_path):
     assert code == 0 and "3 passed" in said, said
     assert '<property name="requirement" value="REQ-1"' in (tmp_path / "junit.xml").read_text()
     assert "| REQ-1 |  | passed |" in (tmp_path / "report/requirements.md").read_text()
+    expect_front_command(tmp_path)

@@ -24,7 +24,7 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 24] = [
+const ROOMS: [&str; 25] = [
     "settings",
     "protocol",
     "realtime",
@@ -87,6 +87,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("figures", &["runlog", "pagekit"]),
     ("latency", &["protocol", "realtime", "runlog", "pagekit", "figures"]),
     ("live", &["protocol", "realtime", "runlog", "pagekit", "latency"]),
+    ("front", &["protocol", "runlog"]),
     ("socketcan_guest", &["protocol"]),
     ("records", &["protocol", "runlog", "plant"]),
     (
@@ -166,6 +167,7 @@ pub(super) const CRATE_EDGES: Rule = Rule {
         ("campaign/Cargo.toml", "[dependencies]\ndiscrepancy.workspace = true\n", 2),
         ("figures/Cargo.toml", "[dependencies]\nbench.workspace = true\n", 2),
         ("discrepancy/Cargo.toml", "[dependencies]\nfigures.workspace = true\n", 2),
+        ("front/Cargo.toml", "[dependencies]\nbench.workspace = true\n", 2),
         ("axis/Cargo.toml", "[dependencies]\nplant.workspace = true\n", 2),
         ("xcp/Cargo.toml", "[dev-dependencies]\nplant.workspace = true\n", 2),
     ],

@@ -1,0 +1,86 @@
+//! Commands that are another program: `airbench` becomes it, so that signals and the exit code are the program's own.
+
+use crate::{Front, FrontError};
+use std::ffi::{OsStr, OsString};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// A command that is a program, with what stands before the arguments.
+pub(crate) struct Program {
+    command: &'static str,
+    program: &'static str,
+    first: &'static [&'static str],
+}
+
+const PROGRAMS: [Program; 7] = [
+    Program { command: "emulator", program: "emulator", first: &[] },
+    Program { command: "controller", program: "controller", first: &[] },
+    Program { command: "bench", program: "bench", first: &[] },
+    Program { command: "discrepancy", program: "discrepancy", first: &[] },
+    Program { command: "campaign", program: "campaign", first: &[] },
+    Program { command: "can", program: "bench", first: &["can"] },
+    Program { command: "close", program: "discrepancy", first: &["close"] },
+];
+
+/// The program of that command, if it is one.
+pub(crate) fn named(command: &str) -> Option<&'static Program> {
+    PROGRAMS.iter().find(|program| program.command == command)
+}
+
+impl Program {
+    /// Becomes the program; comes back when it cannot.
+    pub(crate) fn become_it(&self, front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontError> {
+        let mut command = Command::new(front.places.program(self.program)?);
+        command.args(self.first);
+        if self.command == "close" && !names_a_rig(&arguments) {
+            command.arg("--rig").arg(front.places.data("rig.toml")?);
+        }
+        Err(replaced_by(command.args(arguments)))
+    }
+}
+
+/// Whether a model stands on the command line, or only help is asked for.
+fn names_a_rig(arguments: &[OsString]) -> bool {
+    let words = arguments.iter().map(|argument| argument.to_string_lossy());
+    words
+        .into_iter()
+        .any(|word| word == "--rig" || word.starts_with("--rig=") || word == "--help" || word == "-h")
+}
+
+fn replaced_by(command: &mut Command) -> FrontError {
+    let program = command.get_program().display().to_string();
+    FrontError::Start { program, reason: command.exec() }
+}
+
+/// `airbench test`: becomes pytest, whose plugin starts the programs from where this command finds them.
+pub(crate) fn test(front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontError> {
+    let emulator = front.places.program("emulator")?;
+    let python = interpreter();
+    let mut look = Command::new(&python);
+    let look = look.args(["-c", "import airbench_hil.pytest_plugin"]).stdin(Stdio::null()).output();
+    let look = look.map_err(|reason| FrontError::Start { program: python.display().to_string(), reason })?;
+    if !look.status.success() {
+        let said = String::from_utf8_lossy(&look.stderr);
+        return Err(FrontError::Input(format!(
+            "{} has no airbench_hil with pytest ({}): install both, as 'pip install airbench-hil pytest' does, or name another \
+             interpreter with AIRBENCH_PYTHON",
+            python.display(),
+            said.lines().last().unwrap_or("it said nothing")
+        )));
+    }
+    let mut command = Command::new(python);
+    command.args(["-m", "pytest"]).args(arguments);
+    command.env("AIRBENCH_BIN", emulator.parent().unwrap_or(Path::new("")));
+    Err(replaced_by(&mut command))
+}
+
+/// The interpreter that was named, that of the virtual environment, or that of the system.
+fn interpreter() -> PathBuf {
+    let set = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+    let of_environment = || set("VIRTUAL_ENV").map(|folder| PathBuf::from(folder).join("bin/python"));
+    set("AIRBENCH_PYTHON")
+        .map(PathBuf::from)
+        .or_else(of_environment)
+        .unwrap_or_else(|| OsStr::new("python3").into())
+}

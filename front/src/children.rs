@@ -1,0 +1,235 @@
+//! Child processes, and the signals that end them: whoever waits for one hears of both.
+//!
+//! Ctrl-C reaches the whole group of processes, a signal to `airbench` only `airbench`, which passes it on as SIGTERM. Children
+//! save what they have and end by themselves. A child is reaped by its owner alone: its number is nobody else's until then.
+
+use crate::FrontError;
+use rustix::io::Errno;
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process, kill_process_group, waitid};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::{flag, iterator::Signals};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+/// Children that do not end on SIGTERM are killed after this time.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// What happened while waiting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Event {
+    /// A child ended, and is no child any more.
+    Ended(Pid, ExitStatus),
+    /// A person or a supervisor wants the end.
+    Interrupted,
+    /// The deadline passed.
+    TimeUp,
+}
+
+enum Message {
+    Ended(Pid),
+    Signal,
+}
+
+struct Running {
+    number: Pid,
+    child: Child,
+    leads_group: bool,
+}
+
+/// The children of this process; those that run end with it.
+pub(crate) struct Children {
+    running: Vec<Running>,
+    interrupted: Arc<AtomicBool>,
+    messages: Receiver<Message>,
+    sender: Sender<Message>,
+}
+
+impl Children {
+    /// Starts watching for signals, other than those ignored when this process began, as `nohup` has it.
+    pub(crate) fn watch() -> Result<Self, FrontError> {
+        let (sender, messages) = channel();
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let watched: Vec<_> =
+            [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| !is_ignored(*signal)).collect();
+        let watching =
+            watched.iter().try_for_each(|signal| flag::register(*signal, Arc::clone(&interrupted)).map(drop));
+        let signals = watching.and_then(|()| Signals::new(&watched));
+        let mut signals =
+            signals.map_err(|error| FrontError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
+        let told = sender.clone();
+        std::thread::spawn(move || signals.forever().try_for_each(|_| told.send(Message::Signal)));
+        Ok(Self { running: Vec::new(), interrupted, messages, sender })
+    }
+
+    /// Whether a signal came.
+    pub(crate) fn interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+
+    /// Starts a child without standard input.
+    pub(crate) fn start(&mut self, command: &mut Command) -> Result<Pid, FrontError> {
+        self.spawn(command, false)
+    }
+
+    /// Starts a child in a process group of its own, so that its children end with it.
+    pub(crate) fn start_group(&mut self, command: &mut Command) -> Result<Pid, FrontError> {
+        self.spawn(command, true)
+    }
+
+    /// One that leads a process group of its own takes the group along when it ends.
+    fn spawn(&mut self, command: &mut Command, leads_group: bool) -> Result<Pid, FrontError> {
+        if leads_group {
+            command.process_group(0);
+        }
+        let program = command.get_program().display().to_string();
+        let child = command.stdin(Stdio::null()).spawn();
+        let child = child.map_err(|reason| FrontError::Start { program, reason })?;
+        let number = Pid::from_child(&child);
+        let told = self.sender.clone();
+        std::thread::spawn(move || {
+            let look = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
+            while matches!(waitid(WaitId::Pid(number), look), Err(Errno::INTR)) {}
+            told.send(Message::Ended(number))
+        });
+        self.running.push(Running { number, child, leads_group });
+        Ok(number)
+    }
+
+    /// Waits for what happens next.
+    pub(crate) fn next(&mut self, deadline: Option<Instant>) -> Event {
+        loop {
+            let message = match deadline {
+                None => self.messages.recv().ok(),
+                Some(deadline) => {
+                    self.messages.recv_timeout(deadline.saturating_duration_since(Instant::now())).ok()
+                }
+            };
+            match message {
+                None => return Event::TimeUp,
+                Some(Message::Signal) => return Event::Interrupted,
+                Some(Message::Ended(number)) => {
+                    let Some(at) = self.running.iter().position(|one| one.number == number) else { continue };
+                    let status = self.running.swap_remove(at).child.wait();
+                    return Event::Ended(number, status.expect("a child that nobody else reaps"));
+                }
+            }
+        }
+    }
+
+    /// Waits until a child has ended; a signal ends all. Its exit code, as [`code`] has it.
+    pub(crate) fn finish(&mut self, child: Pid) -> u8 {
+        loop {
+            match self.next(None) {
+                Event::Ended(number, status) if number == child => return code(status),
+                Event::Ended(..) | Event::TimeUp => {}
+                Event::Interrupted => self.stop_all(),
+            }
+        }
+    }
+
+    /// Starts a child and waits for its end.
+    pub(crate) fn call(&mut self, command: &mut Command) -> Result<u8, FrontError> {
+        let child = self.start(command)?;
+        Ok(self.finish(child))
+    }
+
+    /// How many of these run.
+    pub(crate) fn count(&self, of: &[Pid]) -> usize {
+        self.running.iter().filter(|one| of.contains(&one.number)).count()
+    }
+
+    /// Asks a child to end.
+    pub(crate) fn stop(&self, child: Pid) {
+        self.running.iter().filter(|one| one.number == child).for_each(|one| one.signal(Signal::TERM));
+    }
+
+    /// Asks all to end.
+    pub(crate) fn stop_all(&self) {
+        self.running.iter().for_each(|one| one.signal(Signal::TERM));
+    }
+}
+
+impl Drop for Children {
+    fn drop(&mut self) {
+        self.stop_all();
+        let deadline = Instant::now() + PATIENCE;
+        while !self.running.is_empty() {
+            if self.next(Some(deadline)) == Event::TimeUp {
+                self.running.drain(..).for_each(|mut one| {
+                    one.signal(Signal::KILL);
+                    let _ = one.child.wait();
+                });
+            }
+        }
+    }
+}
+
+impl Running {
+    fn signal(&self, signal: Signal) {
+        // One that has just ended needs none.
+        let _ = if self.leads_group {
+            kill_process_group(self.number, signal)
+        } else {
+            kill_process(self.number, signal)
+        };
+    }
+}
+
+/// The exit code as a shell has it: 128 and the number of the signal that ended a process.
+pub(crate) fn code(status: ExitStatus) -> u8 {
+    let code = status.code().or_else(|| status.signal().map(|signal| 128 + signal));
+    code.and_then(|code| code.try_into().ok()).unwrap_or(u8::MAX)
+}
+
+/// Whether this process was started with the signal ignored.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shell(text: &str) -> Command {
+        let mut command = Command::new("sh");
+        command.args(["-c", text]);
+        command
+    }
+
+    #[test]
+    fn exit_codes_are_those_of_a_shell() {
+        let mut children = Children::watch().unwrap();
+        assert_eq!(children.call(&mut shell("exit 7")).unwrap(), 7);
+        assert_eq!(children.call(&mut shell("kill -KILL $$")).unwrap(), 137);
+        let said = children.call(&mut Command::new("/nowhere/program")).unwrap_err().to_string();
+        assert!(said.contains("cannot start /nowhere/program"), "{said}");
+    }
+
+    #[test]
+    fn children_that_run_end_with_their_owner_and_take_their_group_along() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("number");
+        let mut children = Children::watch().unwrap();
+        let leader = format!("sleep 1000 & echo $! >{0}.new; mv {0}.new {0}; wait", file.display());
+        let _ = children.start_group(&mut shell(&leader)).unwrap();
+        let number: i32 = loop {
+            let Ok(text) = std::fs::read_to_string(&file) else { continue };
+            break text.trim().parse().unwrap();
+        };
+        drop(children);
+        let gone = || match std::fs::read_to_string(format!("/proc/{number}/stat")) {
+            Ok(stat) => stat.contains(") Z"), // not yet reaped by its new parent
+            Err(_) => true,
+        };
+        while !gone() {
+            std::thread::yield_now();
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! `airbench find-effect`: hides an effect in the rig, measures over the bus, has it found, adds it to the model, shows the gap
+//! shrink, and opens the seal.
+//!
+//! ```text
+//!   emulator seal ──► measured: fitted, held-out ──► discrepancy close ──► baseline and extended: fitted, held-out
+//!                                                                           ──► repeated: held-out ──► bench compare ──► judge
+//! ```
+
+mod judge;
+
+use crate::children::Children;
+use crate::cli::FindEffectArguments;
+use crate::pair::{Pair, PairError};
+use crate::private::default_bus;
+use crate::{Front, FrontError, last_lines, make_folder, say};
+use protocol::exit::Exit;
+use std::ffi::OsStr;
+use std::fs::{self, DirBuilder, File};
+use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The rigs that are searched, one after the other.
+struct Search<'a> {
+    arguments: &'a FindEffectArguments,
+    children: Children,
+    out: PathBuf,
+    bus: String,
+    bench: PathBuf,
+    emulator: PathBuf,
+    controller: PathBuf,
+    discrepancy: PathBuf,
+    rig: PathBuf,
+    programs: PathBuf,
+    /// Experiments of the fit and of the comparison, by the names of their folders.
+    experiments: [(&'static str, PathBuf); 2],
+}
+
+/// Searches. Returns the exit code.
+pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Result<u8, FrontError> {
+    if arguments.lockstep && arguments.bus.as_ref().is_some_and(|bus| bus.starts_with("can://")) {
+        let bus = arguments.bus.as_deref().unwrap_or_default();
+        return Err(FrontError::Input(format!("--bus {bus}: lockstep needs an embedded bus")));
+    }
+    let experiment = |option: &str, name: &Path| {
+        front.experiment(name).ok_or_else(|| {
+            let (name, list) = (name.display(), front.list_command());
+            FrontError::Input(format!("{option} {name}: no such experiment; {list} names them"))
+        })
+    };
+    let fitted = experiment("--experiment", &arguments.experiment)?;
+    let held_out = match &arguments.held_out {
+        Some(name) => experiment("--held-out", name)?,
+        None => front.places.data("held-out.toml")?,
+    };
+    let of_environment = std::env::var_os("AIRBENCH_DISCREPANCY").filter(|program| !program.is_empty());
+    let discrepancy = match arguments.discrepancy.clone().or(of_environment.map(PathBuf::from)) {
+        Some(program) if !is_program(&program) => {
+            return Err(FrontError::Input(format!("--discrepancy {}: no program", program.display())));
+        }
+        Some(program) => program,
+        None => front.places.program("discrepancy")?,
+    };
+    let out = front.results(arguments.out.as_deref(), "find-effect")?;
+    if out.join(format!("seed-{}", arguments.seed)).exists() {
+        let out = out.display();
+        return Err(FrontError::Input(format!(
+            "{out} holds an earlier search; choose another folder with --out"
+        )));
+    }
+    let mut private = None;
+    let mut search = Search {
+        children: Children::watch()?,
+        out,
+        bus: default_bus(arguments.bus.as_deref(), arguments.lockstep, &mut private)?,
+        bench: front.places.program("bench")?,
+        emulator: front.places.program("emulator")?,
+        controller: front.places.program("controller")?,
+        discrepancy,
+        rig: front.places.data("rig.toml")?,
+        programs: front.places.data("programs")?,
+        experiments: [("fitted", fitted), ("held-out", held_out)],
+        arguments,
+    };
+    let mut right = 0;
+    for seed in arguments.seed..arguments.seed + arguments.count {
+        right += u64::from(search.one(seed)?);
+    }
+    if arguments.count > 1 {
+        say(&format!("{right} of {} right", arguments.count));
+    }
+    let expected = !arguments.expect_right || right == arguments.count;
+    Ok(if expected { Exit::Good } else { Exit::BoundBroken } as u8)
+}
+
+fn is_program(path: &Path) -> bool {
+    path.metadata().is_ok_and(|found| found.is_file() && found.permissions().mode() & 0o111 != 0)
+}
+
+/// An experiment begins when the initial positioning is over, whatever a hidden effect does to standstill and error: all runs of
+/// an experiment are driven at the same times. An axis that it does not drive has no settling to set.
+fn unsettled(experiment: &str) -> Vec<String> {
+    let driven = ["drive", "load"]
+        .into_iter()
+        .filter(|axis| experiment.lines().any(|line| line.starts_with(&format!("[{axis}]"))));
+    let limits = ["still_m=0.1", "position_error_m=0.5", "force_error_n=2000"];
+    driven.flat_map(|axis| limits.map(|limit| format!("{axis}.settled.{limit}"))).collect()
+}
+
+impl Search<'_> {
+    /// The whole way for one rig; whether what was hidden was named.
+    fn one(&mut self, seed: u64) -> Result<bool, FrontError> {
+        let folder = self.out.join(format!("seed-{seed}"));
+        let hidden = folder.join("hidden");
+        make_folder(&folder)?;
+        DirBuilder::new().mode(0o700).create(&hidden).map_err(|error| FrontError::output(&hidden, &error))?;
+        say(&format!("== seed {seed}: files in {}", folder.display()));
+        let mut seal = Command::new(&self.emulator);
+        seal.args(["seal", "--seed", &seed.to_string(), "--effects", &self.arguments.effects.to_string()]);
+        seal.args(["--axis", &self.arguments.axis, "--out"])
+            .arg(hidden.join("sealed.toml"))
+            .stdout(Stdio::null());
+        self.called(&mut seal, "emulator seal failed")?;
+        for ((name, file), noise) in self.experiments.clone().iter().zip([1000, 2000]) {
+            say(&format!("measuring {name} on the sealed rig …"));
+            // Each with noise of its own, as two measurements have.
+            self.sealed(&folder, &format!("{name}/measured"), file, noise + seed)?;
+        }
+        say("asking what is missing …");
+        let workflow = folder.join("workflow");
+        self.close(&folder, &workflow)?;
+        for (name, file) in self.experiments.clone() {
+            say(&format!("running {name} without the effect and with the extended model …"));
+            self.baseline(&folder.join(name).join("baseline"), name, &file)?;
+            let extended = workflow.join("rig.toml");
+            if !extended.is_file() {
+                let workflow = workflow.display();
+                return Err(FrontError::Process(format!("discrepancy close left no rig.toml in {workflow}")));
+            }
+            // With the noise that the baseline had: the models differ by what was added alone.
+            self.drive(&folder.join(name).join("extended"), &file, &extended, 1, &[])?;
+        }
+        say("measuring held-out on the sealed rig once more …");
+        let (name, file) = self.experiments[1].clone();
+        self.sealed(&folder, "held-out/repeated", &file, 1)?;
+        let mut compare = Command::new(&self.bench);
+        compare.args(["compare", "--differences"]);
+        compare.args(["measured", "baseline", "extended", "repeated"].map(|run| folder.join(name).join(run)));
+        self.called(compare.arg("--out").arg(folder.join("gap.html")), "no picture of the gap")?;
+
+        let report = judge::read(&workflow.join("report.json"))?;
+        let sealed = hidden.join("sealed.toml");
+        let sealed = fs::read_to_string(&sealed).map_err(|error| FrontError::input(&sealed, &error))?;
+        let judged = judge::judge(&sealed, &report);
+        let told = folder.join("told.txt");
+        fs::write(&told, judged.lines.join("\n") + "\n")
+            .map_err(|error| FrontError::output(&told, &error))?;
+        judged.lines.iter().for_each(|line| say(&format!("  {line}")));
+        say(&format!("  report: {}", workflow.join("report.html").display()));
+        Ok(judged.right)
+    }
+
+    /// A run of the rig that the folder's seal hides something in.
+    fn sealed(&mut self, folder: &Path, name: &str, file: &Path, noise: u64) -> Result<(), FrontError> {
+        let (run, hidden) = (folder.join(name), folder.join("hidden"));
+        let rig = self.rig.clone();
+        self.drive(
+            &run,
+            file,
+            &rig,
+            noise,
+            &[OsStr::new("--sealed"), hidden.join("sealed.toml").as_os_str()],
+        )?;
+        // It names the terms of what is hidden.
+        let truth = hidden.join(format!("truth-{}.csv", name.replace('/', "-")));
+        fs::rename(run.join("truth.csv"), &truth).map_err(|error| FrontError::output(&truth, &error))
+    }
+
+    /// Without the effect all rigs are the same one: run once, and copied for the following.
+    fn baseline(&mut self, run: &Path, name: &str, file: &Path) -> Result<(), FrontError> {
+        let kept = self.out.join("baseline").join(name);
+        if kept.is_dir() {
+            return copy_folder(&kept, run);
+        }
+        let rig = self.rig.clone();
+        self.drive(run, file, &rig, 1, &[])?;
+        if self.arguments.count > 1 { copy_folder(run, &kept) } else { Ok(()) }
+    }
+
+    /// A run into a folder. The controllers have the shipped rig's numbers in every run.
+    fn drive(
+        &mut self,
+        run: &Path,
+        file: &Path,
+        rig: &Path,
+        noise: u64,
+        more: &[&OsStr],
+    ) -> Result<(), FrontError> {
+        let experiment = fs::read_to_string(file).map_err(|error| FrontError::input(file, &error))?;
+        let pace = if self.arguments.lockstep { &["--pace", "lockstep"][..] } else { &[] };
+        let mut pair = Pair::new([&self.emulator, &self.controller], [rig, &self.rig], file, run, &self.bus);
+        pair.emulator.args(["--seed", &noise.to_string()]).args(pace).args(more);
+        pair.controller.arg("--programs").arg(&self.programs).args(pace);
+        pair.controller.args(unsettled(&experiment).iter().flat_map(|variable| ["--set", variable]));
+        let console = pair.run(&mut self.children).map_err(|error| match error {
+            PairError::Failed { code, console } => {
+                eprintln!("{}", last_lines(&console, 5));
+                FrontError::Process(format!("a run failed with code {code}; see {}", console.display()))
+            }
+            PairError::Other(error) => error,
+        })?;
+        self.expect_going_on()?;
+        let failed = |error| FrontError::output(&console, &error);
+        let log = File::options().append(true).open(&console).map_err(failed)?;
+        let mut summary = Command::new(&self.bench);
+        summary.arg("summary").arg(run).stdout(log.try_clone().map_err(failed)?).stderr(log);
+        // Bounds of an experiment are the baseline's, and no matter here.
+        match self.children.call(&mut summary)? {
+            0 | 1 => self.expect_going_on(),
+            _ => Err(FrontError::Process(format!("no summary of {}", run.display()))),
+        }
+    }
+
+    /// Asks what is missing.
+    fn close(&mut self, folder: &Path, workflow: &Path) -> Result<(), FrontError> {
+        make_folder(workflow)?;
+        let console = workflow.join("console.log");
+        let log = File::create(&console).map_err(|error| FrontError::output(&console, &error))?;
+        let measured = |name: &str| folder.join(name).join("measured/measurement.csv");
+        let mut close = Command::new(&self.discrepancy);
+        close.arg("close").arg("--rig").arg(&self.rig).arg("--train").arg(measured("fitted"));
+        close.arg("--test").arg(measured("held-out")).arg("--out").arg(workflow);
+        close.stdout(log.try_clone().map_err(|error| FrontError::output(&console, &error))?).stderr(log);
+        let code = self.children.call(&mut close)?;
+        self.expect_going_on()?;
+        if code != 0 {
+            eprintln!("{}", last_lines(&console, 5));
+            return Err(FrontError::Process(format!("discrepancy close failed; see {}", console.display())));
+        }
+        Ok(())
+    }
+
+    fn called(&mut self, command: &mut Command, otherwise: &str) -> Result<(), FrontError> {
+        let code = self.children.call(command)?;
+        self.expect_going_on()?;
+        if code == 0 { Ok(()) } else { Err(FrontError::Process(otherwise.into())) }
+    }
+
+    fn expect_going_on(&self) -> Result<(), FrontError> {
+        if self.children.interrupted() { Err(FrontError::Interrupted) } else { Ok(()) }
+    }
+}
+
+fn copy_folder(from: &Path, to: &Path) -> Result<(), FrontError> {
+    make_folder(to)?;
+    for entry in fs::read_dir(from).map_err(|error| FrontError::input(from, &error))?.flatten() {
+        let (path, copy) = (entry.path(), to.join(entry.file_name()));
+        if path.is_dir() {
+            copy_folder(&path, &copy)?;
+        } else {
+            fs::copy(&path, &copy).map_err(|error| FrontError::output(&copy, &error))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,68 @@
+//! A folder for the sockets of a run that only this user can read, and the CAN interface that takes its place.
+
+use crate::FrontError;
+use std::fs::{self, DirBuilder};
+use std::io::ErrorKind;
+use std::os::unix::fs::DirBuilderExt;
+use std::path::{Path, PathBuf};
+
+/// Removed when it goes.
+#[derive(Debug)]
+pub(crate) struct PrivateFolder(PathBuf);
+
+impl PrivateFolder {
+    /// Below `$XDG_RUNTIME_DIR`, else below the temporary folder.
+    pub(crate) fn make() -> Result<Self, FrontError> {
+        let runtime = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty());
+        let above = runtime.map_or_else(std::env::temp_dir, PathBuf::from);
+        for number in 0.. {
+            let folder = above.join(format!("airbench.{}-{number}", std::process::id()));
+            match DirBuilder::new().mode(0o700).create(&folder) {
+                Ok(()) => return Ok(Self(folder)),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => {
+                    return Err(FrontError::Input(format!(
+                        "cannot make the folder {}: {error}",
+                        folder.display()
+                    )));
+                }
+            }
+        }
+        unreachable!("a number that no folder has")
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// An embedded bus in it.
+    pub(crate) fn bus(&self) -> String {
+        format!("unix://{}/bus0", self.0.display())
+    }
+}
+
+impl Drop for PrivateFolder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The bus that was asked for; else vcan0, when it is up and this is real time; else an embedded bus in a private folder.
+pub(crate) fn default_bus(
+    asked: Option<&str>,
+    lockstep: bool,
+    private: &mut Option<PrivateFolder>,
+) -> Result<String, FrontError> {
+    match asked {
+        Some(bus) => Ok(bus.into()),
+        None if !lockstep && vcan_usable() => Ok("can://vcan0".into()),
+        None => Ok(private.insert(PrivateFolder::make()?).bus()),
+    }
+}
+
+/// A vcan0 (or any CAN interface of that name) that is up: `/sys` tells its type, 280 being CAN, and its flags, bit 0 being up.
+fn vcan_usable() -> bool {
+    let read = |file: &str| fs::read_to_string(format!("/sys/class/net/vcan0/{file}")).unwrap_or_default();
+    let flags = u32::from_str_radix(read("flags").trim().trim_start_matches("0x"), 16).unwrap_or(0);
+    read("type").trim() == "280" && flags & 1 == 1
+}

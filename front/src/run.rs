@@ -1,0 +1,291 @@
+//! `airbench run`: an experiment with emulator and controllers as processes on one bus, and what beside them belongs to it.
+//!
+//! ```text
+//!   bench check-experiment ──► emulator, controller (one or one for each axis) ──► bench summary
+//!                              bench gateway, bench watch: end with the run
+//! ```
+//!
+//! A process that fails takes the others along, after [`GRACE`], in which they notice by themselves, say so and trip the
+//! emergency stop. The exit code is that of the first that failed: what the others say later is not the cause.
+
+use crate::children::{Children, Event, code};
+use crate::cli::RunArguments;
+use crate::private::{PrivateFolder, default_bus};
+use crate::{Front, FrontError, make_folder, say};
+use protocol::exit::Exit;
+use rustix::process::Pid;
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// Time in which the others may notice a failure.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// Runs it. Returns the exit code.
+pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontError> {
+    if arguments.list {
+        return list(front).map(|()| Exit::Good as u8);
+    }
+    check(arguments)?;
+    let file = front.experiment(&arguments.experiment).ok_or_else(|| {
+        let (name, list) = (arguments.experiment.display(), front.list_command());
+        FrontError::Input(format!("no experiment '{name}'; {list} names them"))
+    })?;
+    let program = |name: &str| front.places.program(name);
+    let (emulator, controller, bench) = (program("emulator")?, program("controller")?, program("bench")?);
+    let (rig, programs) = (front.places.data("rig.toml")?, front.places.data("programs")?);
+    let mut children = Children::watch()?;
+
+    // A typo in the bounds is told before the run, not after it.
+    let checked = children.call(Command::new(&bench).arg("check-experiment").arg(&file))?;
+    if checked != 0 {
+        return Ok(checked);
+    }
+    if children.interrupted() {
+        return Ok(Exit::Interrupted as u8);
+    }
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let out = match &arguments.out {
+        Some(out) => out.clone(),
+        None => newest(front, &name)?,
+    };
+    make_folder(&out)?;
+    // The emulator clears the folder of an earlier run; should it not get that far, no old figures may be told as this run's.
+    let _ = fs::remove_file(out.join("summary.json"));
+
+    let mut private = None;
+    let bus = default_bus(arguments.bus.as_deref(), arguments.lockstep, &mut private)?;
+    let mut control = Command::new(&controller);
+    control.arg(if arguments.rehearse { "rehearse" } else { "run" });
+    for_controller(&mut control, arguments);
+    control
+        .arg("--rig")
+        .arg(&rig)
+        .arg("--experiment")
+        .arg(&file)
+        .arg("--programs")
+        .arg(programs)
+        .arg("--out")
+        .arg(&out);
+
+    let mut run = Run { children, members: Vec::new(), stopped: false };
+    if arguments.rehearse {
+        say(&format!("rehearsing {name}, files in {}", out.display()));
+        add(&mut control, "--seed", arguments.seed.as_ref());
+        add(&mut control, "--seconds", arguments.seconds.as_ref());
+        run.join(&mut control)?;
+    } else {
+        say(&format!("running {name} on {bus}, files in {}", out.display()));
+        let mut emulate = Command::new(&emulator);
+        emulate
+            .args(["run", "--bus", &bus, "--rig"])
+            .arg(&rig)
+            .arg("--experiment")
+            .arg(&file)
+            .arg("--out")
+            .arg(&out);
+        for_emulator(&mut emulate, arguments);
+        if arguments.gateway {
+            let mut gateway = Command::new(&bench);
+            gateway.args(["gateway", "--bus", &bus, "--report"]).arg(out.join("gateway.json"));
+            let _ = run.children.start(&mut gateway)?;
+        }
+        if arguments.watch {
+            // Beside the socket of a bus of the run's own, or in a folder that only this user can read.
+            let folder = match &private {
+                Some(folder) => folder,
+                None => private.insert(PrivateFolder::make()?),
+            };
+            let telemetry = folder.path().join("telemetry");
+            let mut watch = Command::new(&bench);
+            watch
+                .args(["watch", "--bus", &bus, "--http", &arguments.http, "--control", "--telemetry"])
+                .arg(&telemetry);
+            let _ = run.children.start(&mut watch)?;
+            emulate.arg("--console").arg("--telemetry").arg(telemetry);
+        }
+        run.join(&mut emulate)?;
+        for axis in if arguments.two { &["drive", "load"][..] } else { &["both"] } {
+            let mut one = Command::new(&controller);
+            one.args(control.get_args()).args(["--bus", &bus, "--axis", axis]);
+            run.join(&mut one)?;
+        }
+    }
+    let first_code = run.wait(front);
+    let interrupted = run.children.interrupted();
+    // Gateway and page outlive the run by nothing.
+    drop(run);
+
+    // A run that never began has nothing to sum up.
+    if first_code == Exit::BadInput as u8 {
+        return Ok(first_code);
+    }
+    let mut summary_code = 0;
+    if out.join("summary.json").is_file() {
+        let summary = Command::new(&bench).arg("summary").arg(&out).status();
+        summary_code = code(
+            summary.map_err(|reason| FrontError::Start { program: bench.display().to_string(), reason })?,
+        );
+    }
+    Ok(match (first_code, interrupted) {
+        (0, false) => summary_code,
+        (0, true) => Exit::Interrupted as u8,
+        (failed, _) => failed,
+    })
+}
+
+/// Prints name and subject of each shipped experiment.
+fn list(front: &Front) -> Result<(), FrontError> {
+    let folder = front.places.data("experiments")?;
+    let unreadable = |reason| FrontError::Input(format!("{}: {reason}", folder.display()));
+    let entries =
+        fs::read_dir(&folder).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(unreadable)?;
+    let mut files: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
+    files.sort();
+    for file in files.iter().filter(|file| file.extension() == Some(OsStr::new("toml"))) {
+        let text = fs::read_to_string(file).map_err(unreadable)?;
+        let subject = text.lines().find_map(|line| line.strip_prefix("about = \"")?.strip_suffix('"'));
+        say(&format!(
+            "{:<18} {}",
+            file.file_stem().unwrap_or_default().to_string_lossy(),
+            subject.unwrap_or_default()
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses options that exclude each other, and files that cannot be read.
+fn check(arguments: &RunArguments) -> Result<(), FrontError> {
+    let refused = [
+        (
+            arguments.sealed.is_some(),
+            "--sealed: a rehearsal runs the plant inside the controller, which must not read it; use --lockstep",
+        ),
+        (
+            arguments.faults.is_some(),
+            "--faults: a rehearsal has no rig process that could break; use --lockstep",
+        ),
+        (arguments.lockstep, "--lockstep and --rehearse exclude each other; see --help"),
+        (arguments.gateway, "--gateway: a rehearsal has no bus; use --lockstep"),
+        (arguments.watch, "--watch: a rehearsal is over before anybody could look; use --lockstep"),
+    ];
+    if let Some((_, why)) = refused.iter().find(|(given, _)| *given && arguments.rehearse) {
+        return Err(FrontError::Input((*why).into()));
+    }
+    for (option, file) in [("--sealed", &arguments.sealed), ("--faults", &arguments.faults)] {
+        if let Some(file) = file.as_ref().filter(|file| File::open(file).is_err()) {
+            return Err(FrontError::Input(format!("{option} {}: cannot be read", file.display())));
+        }
+    }
+    Ok(())
+}
+
+/// A new folder that `runs/latest` points to.
+fn newest(front: &Front, name: &str) -> Result<PathBuf, FrontError> {
+    let out = front.run_folder(name)?;
+    make_folder(&out)?;
+    let latest = front.places.runs().join("latest");
+    let _ = fs::remove_file(&latest);
+    let _ = std::os::unix::fs::symlink(out.file_name().unwrap_or_default(), latest);
+    Ok(out)
+}
+
+/// `--NAME VALUE`, where there is a value.
+fn add(command: &mut Command, name: &str, value: Option<impl AsRef<OsStr>>) {
+    if let Some(value) = value {
+        command.arg(name).arg(value);
+    }
+}
+
+fn for_emulator(command: &mut Command, arguments: &RunArguments) {
+    add(command, "--seed", arguments.seed.as_ref());
+    add(command, "--seconds", arguments.seconds.as_ref());
+    add(command, "--cpu", arguments.cpu.as_ref());
+    add(command, "--spin-us", arguments.spin_us.as_ref());
+    add(command, "--sealed", arguments.sealed.as_ref());
+    add(command, "--faults", arguments.faults.as_ref());
+    add(command, "--pace", arguments.lockstep.then_some("lockstep"));
+    add(command, "--members", (arguments.lockstep && arguments.two).then_some("2"));
+    command.args(arguments.full_timing.then_some("--full-timing"));
+}
+
+fn for_controller(command: &mut Command, arguments: &RunArguments) {
+    add(command, "--drive-program", arguments.drive_program.as_ref());
+    add(command, "--load-program", arguments.load_program.as_ref());
+    arguments.set.iter().for_each(|variable| add(command, "--set", Some(variable)));
+    add(command, "--parameters", arguments.parameters.as_ref());
+    command.args(arguments.seconds.is_some().then_some("--repeat"));
+    // With a page the way back from a stop is a click too.
+    let with_page = arguments.watch.then_some("on-start");
+    add(command, "--after-emergency-stop", arguments.after_emergency_stop.as_deref().or(with_page));
+    if !arguments.rehearse {
+        add(command, "--xcp", arguments.xcp.as_ref());
+        add(command, "--cpu", arguments.controller_cpu.as_ref());
+        add(command, "--pace", arguments.lockstep.then_some("lockstep"));
+        command.args(arguments.watch_programs.then_some("--watch"));
+        command.args(arguments.full_timing.then_some("--full-timing"));
+    }
+}
+
+/// The processes while they run.
+struct Run {
+    children: Children,
+    members: Vec<Pid>,
+    stopped: bool,
+}
+
+impl Run {
+    fn join(&mut self, command: &mut Command) -> Result<(), FrontError> {
+        self.members.push(self.children.start(command)?);
+        Ok(())
+    }
+
+    /// Asks the members to end, once: a second signal adds nothing.
+    fn pass_on(&mut self) {
+        if !std::mem::replace(&mut self.stopped, true) {
+            self.members.iter().for_each(|member| self.children.stop(*member));
+        }
+    }
+
+    /// Waits until all members have ended. The exit code of the first that failed before anybody was asked to end.
+    fn wait(&mut self, front: &Front) -> u8 {
+        let (mut first_code, mut deadline) = (0, None);
+        while self.children.count(&self.members) > 0 {
+            // A signal that came before the first process was there found nobody to pass it on to.
+            if self.children.interrupted() {
+                self.pass_on();
+            }
+            match self.children.next(deadline.filter(|_| !self.stopped)) {
+                Event::Ended(member, status) if self.members.contains(&member) => {
+                    if !status.success() && !self.stopped && !self.children.interrupted() && first_code == 0 {
+                        first_code = self.failed(front, status);
+                        deadline = Some(Instant::now() + GRACE);
+                    }
+                    // The emulator alone waits for nobody.
+                    if deadline.is_some() && self.children.count(&self.members) <= 1 {
+                        self.pass_on();
+                    }
+                }
+                Event::Ended(..) => {}
+                Event::Interrupted | Event::TimeUp => self.pass_on(),
+            }
+        }
+        first_code
+    }
+
+    /// The exit code for a member that failed. One that a signal ended is a partner that failed; bad input is nobody's partner.
+    fn failed(&mut self, front: &Front, status: std::process::ExitStatus) -> u8 {
+        if let Some(signal) = status.signal() {
+            front.warn(&format!("a process was ended by signal {signal}"));
+            return Exit::BusFailed as u8;
+        }
+        let code = code(status);
+        if code == Exit::BadInput as u8 {
+            self.pass_on();
+        }
+        code
+    }
+}

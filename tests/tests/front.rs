@@ -1,0 +1,172 @@
+//! `airbench`, the one command: as it is installed, with its programs and files below a prefix and no checkout around it.
+
+use rustix::process::Signal;
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::foreign_python::of;
+use system_tests::process::{Ended, Running};
+use system_tests::turn;
+
+/// PREFIX/bin/airbench, PREFIX/lib/airbench with the programs, PREFIX/share/airbench with the files, and a working directory.
+struct Prefix(tempfile::TempDir);
+
+impl Prefix {
+    fn made() -> Self {
+        let prefix = Self(tempfile::tempdir().expect("a folder"));
+        for folder in ["bin", "lib/airbench", "share/airbench", "work"] {
+            fs::create_dir_all(prefix.path(folder)).expect("a folder of our own");
+        }
+        let own = executable(Program::Airbench, Build::Shipped);
+        // A link would lead back into the checkout.
+        fs::copy(own, prefix.path("bin/airbench")).expect("a program that can be copied");
+        let programs =
+            [Program::Emulator, Program::Controller, Program::Bench, Program::Discrepancy, Program::Campaign];
+        for program in programs {
+            let path = executable(program, Build::Shipped);
+            symlink(path, prefix.path("lib/airbench").join(program.name())).expect("a link");
+        }
+        let files = ["plant/rig.toml", "protocol/rig.dbc", "controller/experiments", "controller/programs"];
+        for file in files.map(|file| workspace().join(file)) {
+            let name = file.file_name().expect("a name");
+            symlink(&file, prefix.path("share/airbench").join(name)).expect("a link");
+        }
+        prefix
+    }
+
+    fn path(&self, below: &str) -> PathBuf {
+        self.0.path().join(below)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(self.path("bin/airbench"));
+        command.args(arguments).current_dir(self.path("work"));
+        for variable in ["AIRBENCH_BIN", "AIRBENCH_BIN_DIR", "AIRBENCH_SHARE", "VIRTUAL_ENV"] {
+            command.env_remove(variable);
+        }
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Ended {
+        Running::start("airbench", &mut self.command(arguments)).wait()
+    }
+}
+
+#[test]
+fn an_unknown_command_is_answered_with_the_commands_that_there_are() {
+    let prefix = Prefix::made();
+    let known =
+        "run, latency, find-effect, close, can, test, emulator, controller, bench, discrepancy, campaign";
+    let _ = prefix.run(&["fly"]).expect_code(2).expect_said(&["unknown command 'fly'", known]);
+    let _ = prefix.run(&[]).expect_code(2).expect_said(&["Usage: airbench <COMMAND>", "discrepancy"]);
+    prefix
+        .run(&["run", "--help"])
+        .expect_code(0)
+        .expect_printed(&["Usage: airbench run [OPTIONS]", "--lockstep"]);
+}
+
+#[test]
+fn a_program_or_file_that_is_missing_is_named_with_every_path_looked_at() {
+    let prefix = Prefix::made();
+    fs::remove_file(prefix.path("lib/airbench/bench")).expect("a link of our own");
+    let paths = ["bin/bench", "lib/airbench/bench"].map(|path| prefix.path(path).display().to_string());
+    for arguments in [&["bench", "figures"][..], &["can", "--", "true"], &["run", "--lockstep"]] {
+        let ended = prefix.run(arguments).expect_code(2);
+        let _ = ended.expect_said(&[
+            "the program 'bench' is not there",
+            &paths[0],
+            &paths[1],
+            "AIRBENCH_BIN=DIR",
+        ]);
+    }
+    fs::remove_file(prefix.path("share/airbench/rig.toml")).expect("a link of our own");
+    let path = prefix.path("share/airbench/rig.toml").display().to_string();
+    let _ =
+        prefix.run(&["close", "--train", "a.csv"]).expect_code(2).expect_said(&[&path, "AIRBENCH_SHARE=DIR"]);
+}
+
+#[test]
+fn a_command_that_is_a_program_has_its_words_and_its_exit_codes() {
+    let prefix = Prefix::made();
+    let faults = Program::Emulator.start(&[&"faults"]).wait().expect_code(0);
+    assert_eq!(prefix.run(&["emulator", "faults"]).expect_code(0).stdout, faults.stdout);
+    let refused = Program::Bench.start(&[&"summary", &"/nowhere"]).wait().expect_code(2);
+    assert_eq!(prefix.run(&["bench", "summary", "/nowhere"]).expect_code(2).stderr, refused.stderr);
+    let _ = prefix.run(&["can", "--pair", "--", "sh", "-c", "exit 7"]).expect_code(7);
+    prefix.run(&["close", "--help"]).expect_code(0).expect_printed(&["Usage: discrepancy close"]);
+    // The shipped rig file is read before the record.
+    let _ = prefix
+        .run(&["close", "--train", "/nowhere.csv"])
+        .expect_code(2)
+        .expect_said(&["cannot read /nowhere.csv"]);
+}
+
+#[test]
+fn an_installed_run_needs_its_prefix_alone_and_leaves_its_folder_where_it_was_started() {
+    let prefix = Prefix::made();
+    let ended = prefix.run(&["run", "--lockstep"]).expect_code(0);
+    ended.expect_printed(&[
+        "running point-to-point on unix://",
+        "passed                                        yes",
+    ]);
+    assert!(prefix.path("work/runs/latest/measurement.csv").is_file());
+    prefix.run(&["run", "--list"]).expect_code(0).expect_printed(&["\nload-step "]);
+    let _ = prefix.run(&["run", "loadstep"]).expect_code(2).expect_said(&["airbench run --list names them"]);
+}
+
+/// Command lines of processes that hold this text.
+fn processes_with(text: &str) -> Vec<String> {
+    let entries = fs::read_dir("/proc").expect("the kernel's list of processes").flatten();
+    let lines = entries.filter_map(|entry| fs::read(entry.path().join("cmdline")).ok());
+    lines
+        .map(|line| String::from_utf8_lossy(&line).replace('\0', " "))
+        .filter(|line| line.contains(text))
+        .collect()
+}
+
+#[test]
+fn a_signal_to_the_command_alone_ends_all_its_processes_with_everything_saved() {
+    let _machine = turn::take();
+    let prefix = Prefix::made();
+    let (bus, out) = (format!("unix://{}/bus", prefix.path("").display()), prefix.path("out"));
+    let arguments =
+        ["run", "--two", "--watch", "--http", "127.0.0.1:0", "--seconds", "600", "--bus", &bus, "--out"];
+    let mut running = Running::start("airbench run", prefix.command(&arguments).arg(&out));
+    running.wait_for_times("initial-positioning", 2);
+    let out = out.to_str().expect("a path in ASCII");
+    assert!(processes_with(&bus).len() >= 5, "airbench and four of its: {:?}", processes_with(&bus));
+    running.signal(Signal::TERM);
+    let _ = running.wait().expect_code(130);
+    assert_eq!(processes_with(&bus), [""; 0]);
+    assert!(Path::new(out).join("summary.json").is_file());
+}
+
+#[test]
+fn a_suite_of_tests_is_run_by_the_interpreter_that_has_the_package() {
+    let prefix = Prefix::made();
+    let python = prefix.path("work/python");
+    fs::write(&python, "#!/bin/sh\necho \"No module named 'airbench_hil'\" >&2\nexit 1\n")
+        .expect("a folder of our own");
+    fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).expect("a file of our own");
+    let ended =
+        Running::start("airbench test", prefix.command(&["test"]).env("AIRBENCH_PYTHON", &python)).wait();
+    let _ = ended.expect_code(2).expect_said(&[
+        "No module named 'airbench_hil'",
+        "pip install",
+        "AIRBENCH_PYTHON",
+    ]);
+
+    let suite = "import os, airbench_hil.programs as programs\n\n\ndef test_programs():\n    \
+                 assert programs.program('emulator').samefile(os.environ['EXPECTED'])\n\n\n\
+                 def test_wrong():\n    assert not 'wrong'\n";
+    fs::write(prefix.path("work/test_mine.py"), suite).expect("a folder of our own");
+    let pytest = |only: &str| {
+        let mut command = prefix.command(&["test", "-q", "-p", "no:cacheprovider", "-k", only]);
+        command.env("AIRBENCH_PYTHON", of("hil")).env("EXPECTED", prefix.path("lib/airbench/emulator"));
+        Running::start("airbench test", &mut command).wait()
+    };
+    pytest("programs").expect_code(0).expect_printed(&["1 passed"]);
+    pytest("wrong").expect_code(1).expect_printed(&["1 failed"]);
+}
