@@ -59,6 +59,8 @@ class Traceability:
     def write(self, folder: Path, known: Mapping[str, str] | None) -> None:
         """Writes requirements.md, needs.json and requirements.sdoc."""
         folder.mkdir(parents=True, exist_ok=True)
+        # The order in which workers of pytest-xdist are done is chance.
+        self.verdicts = {requirement: dict(sorted(tests.items())) for requirement, tests in sorted(self.verdicts.items())}
         every = dict(known) if known is not None else dict.fromkeys(sorted(self.verdicts), "")
         (folder / "requirements.md").write_text(self._markdown(every), encoding="utf-8")
         (folder / "needs.json").write_text(json.dumps(self._needs(every), indent=2) + "\n", encoding="utf-8")
