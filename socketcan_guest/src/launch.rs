@@ -1,21 +1,29 @@
 //! Starts a program under the filter and serves it until it ends.
 //!
-//! A thread of this process takes the filter upon itself, and starts the program, which inherits it; the thread then ends. What
-//! the thread itself does while it starts the program is answered like a guest's calls. So no code runs between `fork` and
-//! `exec`, and the listener needs no way from one process to the other.
+//! A thread of this process takes the filter upon itself, and starts the program, which inherits it. What the thread itself
+//! does while it starts the program is answered like a guest's calls. So the listener needs no way from one process to the other.
+//!
+//! The program does not outlive this process: the kernel kills it when the thread ends that started it (`PR_SET_PDEATHSIG`), so
+//! the thread waits for the end of [`run`]. The program's own children are not reached so: without a listener their notified
+//! calls get `ENOSYS`, and their sockets are at their end.
+
+#![allow(unsafe_code)] // what the new process does before exec, nothing else
 
 use crate::caller::Caller;
 use crate::interface::{Interface, free_indices};
 use crate::supervisor::{MOST_INTERFACES, Supervisor};
 use crate::{Guest, GuestError, Named, filter};
 use rustix::io::Errno;
-use rustix::process::{Pid, PidfdFlags, Resource, Signal, getrlimit, kill_process, pidfd_open, setrlimit};
+use rustix::process::{
+    Pid, PidfdFlags, Resource, Signal, getpid, getppid, getrlimit, kill_process, pidfd_open,
+    set_parent_process_death_signal, setrlimit,
+};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::ffi::{OsStr, OsString};
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
-use std::os::unix::process::ExitStatusExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, Command, ExitStatus};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -87,8 +95,10 @@ pub fn run(
         return Err(GuestError::Looking(error.into()));
     }
     let (report, reports) = channel();
+    // Dropped when this function returns, whichever way.
+    let (_still_here, end) = channel();
     let (command, name) = (guest.command.to_vec(), guest.command[0].clone());
-    let starter = thread::spawn(move || start(&command, &report)).thread().clone();
+    let starter = thread::spawn(move || start(&command, &report, &end)).thread().clone();
     let listener = match reports.recv() {
         Ok(Started::Listening(listener)) => listener,
         Ok(Started::Program(Err(error))) => return Err(GuestError::Filter(error)),
@@ -136,16 +146,31 @@ fn wait_for_hosts(
     }
 }
 
-/// In a thread of its own, which the filter holds from then on.
-fn start(command: &[OsString], report: &Sender<Started>) {
+/// In a thread of its own, which the filter holds from then on, until the `end`.
+fn start(command: &[OsString], report: &Sender<Started>, end: &Receiver<()>) {
     // Whoever waits for the reports is there until the last one.
     let _ = match filter::install() {
         Ok(listener) => {
             let _ = report.send(Started::Listening(listener));
-            report.send(Started::Program(Command::new(&command[0]).args(&command[1..]).spawn()))
+            report.send(Started::Program(spawn(command)))
         }
         Err(error) => report.send(Started::Program(Err(error))),
     };
+    // Nothing is ever sent.
+    let _ = end.recv();
+}
+
+/// Starts the program, which the kernel kills when the calling thread ends.
+fn spawn(command: &[OsString]) -> io::Result<Child> {
+    let parent = getpid();
+    let end_with_parent = move || {
+        set_parent_process_death_signal(Some(Signal::KILL))?;
+        // It may have ended before.
+        if getppid() == Some(parent) { Ok(()) } else { Err(Errno::SRCH.into()) }
+    };
+    let mut program = Command::new(&command[0]);
+    // SAFETY: between fork and exec it makes two system calls, and takes no lock and no memory.
+    unsafe { program.args(&command[1..]).pre_exec(end_with_parent) }.spawn()
 }
 
 /// Answers the starting thread until the program runs.

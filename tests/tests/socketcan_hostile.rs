@@ -314,3 +314,49 @@ fn a_sender_that_does_not_wait_leaves_the_message_of_a_closed_socket_whole() {
     let ended = Running::start("senders", &mut guest(&scene, "--pair", &command)).wait().expect_code(0);
     ended.expect_printed(&["second waits its turn", "sendmmsg of none 0", "recvmmsg for one EAGAIN"]);
 }
+
+/// Waits for a frame, and then leaves in 16 bytes, which are written natively, how `recvmsg` and the next call ended.
+const ORPHAN: &str = "
+import errno, os, socket, sys
+can = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+can.bind(('vcan0',))
+left = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT)
+def ended(call):
+    try:
+        return str(call())
+    except OSError as refused:
+        return errno.errorcode[refused.errno]
+print('waits', flush=True)
+first = ended(lambda: can.recvmsg(16))
+second = ended(lambda: socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW))
+os.write(left, f'{first} {second}'.ljust(16).encode())
+";
+
+#[test]
+fn a_program_ends_with_a_bench_can_that_is_killed_and_its_children_get_enosys() {
+    let scene = Scene::new(SHORT);
+    let python = python();
+    let left = scene.path("left");
+    // The shell is the program, and looks at nothing; the other is its child.
+    let line = format!(
+        "{} -c \"$ORPHAN\" {} & echo shell $$; trap '' TERM; while :; do sleep 0.1; done",
+        python.display(),
+        left.display()
+    );
+    let mut can = guest(&scene, "--pair", &["sh", "-c", &line]);
+    let running = Running::start("bench can", can.env("ORPHAN", ORPHAN));
+    wait_until("the child", || running.stdout().contains("waits"));
+    let said = running.stdout();
+    let shell = said.lines().find_map(|line| line.strip_prefix("shell ")).expect("the shell's number");
+    let state = format!("/proc/{shell}/stat");
+    let is_alive = || {
+        let stat = fs::read_to_string(&state).unwrap_or_default();
+        // One that has ended and that nobody has waited for is a zombie.
+        stat.rsplit(')').next().is_some_and(|rest| !rest.is_empty() && !rest.starts_with(" Z"))
+    };
+    assert!(is_alive(), "{said}");
+    assert_eq!(running.kill().signal, Some(9));
+    wait_until("the shell's end", || !is_alive());
+    wait_until("the child's words", || fs::read_to_string(&left).is_ok_and(|words| words.len() == 16));
+    assert_eq!(fs::read_to_string(&left).unwrap().trim_end(), "ENOSYS ENOSYS");
+}
