@@ -49,7 +49,7 @@ gather_base() {
     ln -s ../usr/bin/dash "$tree/bin/sh"
     find_program iproute2 ip
     add_program "$tree" "$found_program" ip
-    for program in candump cansend cangen canplayer isotpsend isotprecv; do
+    for program in candump cansend cangen canplayer cansniffer canbusload isotpsend isotprecv; do
         find_program can-utils "$program"
         add_program "$tree" "$found_program" "$program"
     done

@@ -31,6 +31,8 @@ const MOST_FRAMES: u32 = 256;
 pub(crate) enum Action {
     /// A frame goes to the interface of this index, and to the guests on it.
     Send(u32, FrameBytes),
+    /// The frame of `TX_SEND`, whose sender is told what becomes of it.
+    SendOnce(u32, FrameBytes),
     /// A message goes to the guest; the index is that of the interface on which a frame came, 0 for a job that sends.
     Tell(u32, Vec<u8>),
 }
@@ -79,7 +81,7 @@ impl BroadcastManager {
                 if interface == 0 {
                     return Err(Errno::NODEV);
                 }
-                actions.push(Action::Send(interface, frames[0]));
+                actions.push(Action::SendOnce(interface, frames[0]));
                 Ok(bytes.len())
             }
             _ => Err(Errno::INVAL),

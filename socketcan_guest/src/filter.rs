@@ -43,7 +43,8 @@ const SET_OPTIONS: [i32; 8] = [
     libc::SO_PASSCRED,
 ];
 /// Options of `SOL_SOCKET` that a Unix socket would answer with its own nature.
-const ASKED_OPTIONS: [i32; 4] = [libc::SO_TYPE, libc::SO_DOMAIN, libc::SO_PROTOCOL, libc::SO_RXQ_OVFL];
+const ASKED_OPTIONS: [i32; 5] =
+    [libc::SO_TYPE, libc::SO_DOMAIN, libc::SO_PROTOCOL, libc::SO_RXQ_OVFL, libc::SO_ERROR];
 
 /// Calls that are notified whatever their arguments are.
 const ALWAYS: [libc::c_long; 12] = [

@@ -8,6 +8,7 @@ use crate::raw::RawOptions;
 use crate::socket::Kind;
 use crate::supervisor::Supervisor;
 use rustix::io::Errno;
+use std::os::fd::AsFd;
 
 impl Supervisor {
     /// `setsockopt(fd, level, option, value, length)`.
@@ -60,8 +61,8 @@ impl Supervisor {
 
     /// `getsockopt(fd, level, option, value, length)`.
     pub(crate) fn get_option(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
-        let Some(socket) = self.sockets.get(&inode) else { return Answer::Continue };
+        let Some((inode, end)) = self.guest_socket(notification) else { return Answer::Continue };
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
         let (level, option) = (notification.int(1), notification.int(2));
         let is_raw = socket.raw().is_some();
         let number = |number: i32| Ok((number.to_ne_bytes().to_vec(), true));
@@ -73,6 +74,9 @@ impl Supervisor {
             // The kernel does not keep it for CAN.
             (libc::SOL_SOCKET, libc::SO_PROTOCOL) => number(0),
             (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => number(socket.tells_dropped.into()),
+            (libc::SOL_SOCKET, libc::SO_ERROR) => {
+                number(socket.take_error(end.as_fd()).map_or(0, Errno::raw_os_error))
+            }
             (libc::SOL_SOCKET, _) => return Answer::Continue,
             _ => match &socket.kind {
                 Kind::Bcm(_) => Err(Errno::OPNOTSUPP),

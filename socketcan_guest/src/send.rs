@@ -181,6 +181,9 @@ impl Supervisor {
                 }
                 let mut actions = Vec::new();
                 manager.command(bytes, interface, Instant::now(), &mut actions)?;
+                if let [Action::SendOnce(interface, frame)] = actions[..] {
+                    return self.send_frame(inode, interface, &frame);
+                }
                 self.carry_out(inode, actions);
                 Ok(())
             }
@@ -260,7 +263,7 @@ impl Supervisor {
         for action in actions {
             match action {
                 // As the kernel's: what the interface does not take is lost.
-                Action::Send(interface, frame) => {
+                Action::Send(interface, frame) | Action::SendOnce(interface, frame) => {
                     let _ = self.send_frame(inode, interface, &frame);
                 }
                 Action::Tell(interface, message) => {

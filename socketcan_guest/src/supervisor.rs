@@ -317,8 +317,7 @@ impl Supervisor {
     /// Lets the next call that receives fail with this error; natively it reads a message of length 0.
     pub(crate) fn tell_error(&mut self, inode: u64, interface: u32, error: Errno) {
         let note = Note { error: Some(error), ..Note::new(interface, wall_clock_ns()) };
-        let socket = self.sockets.get_mut(&inode).filter(|socket| !matches!(socket.kind, Kind::Bcm(_)));
-        if let Some(socket) = socket {
+        if let Some(socket) = self.sockets.get_mut(&inode) {
             socket.deliver(&[], note);
         }
         self.serve_waiting(inode);

@@ -1,7 +1,7 @@
 //! Programs of SocketCAN: what they answer on vcan, recorded in `tests/expected/socketcan`, and `bench can` as a process.
 
 use crate::binaries::{Program, workspace};
-use crate::foreign_python::tools_path;
+use crate::foreign_python::{python, tools_path};
 use crate::process::Running;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -25,11 +25,25 @@ pub const DIFFERENCES: [(&str, &str); 3] = [
     ("write not bound: -1 ENXIO", "write not bound: 16"),
 ];
 
+/// The same when the bus goes. A descriptor of a Unix socket has no error to give to who does not ask `bench can`.
+pub const DIFFERENCES_WHEN_DOWN: [(&str, &str); 4] = [
+    ("read of CAN_RAW: -1 ENETDOWN", "read of CAN_RAW: 0"),
+    ("read of CAN_ISOTP: -1 ENETDOWN", "read of CAN_ISOTP: 0"),
+    ("poll of CAN_RAW: ERR", "poll of CAN_RAW: IN"),
+    ("write of CAN_RAW: -1 ENETDOWN", "write of CAN_RAW: 16"),
+];
+
 /// The recorded answers, but for the differences.
 #[must_use]
 pub fn expected_answers() -> String {
-    let recorded = fs::read_to_string(expected().join("answers.txt")).expect("the recorded answers");
-    let mut differences = DIFFERENCES.iter().peekable();
+    recorded_but_for("answers.txt", &DIFFERENCES)
+}
+
+/// A recorded output with lines that differ in the place of those on vcan.
+#[must_use]
+pub fn recorded_but_for(file: &str, differences: &[(&str, &str)]) -> String {
+    let recorded = fs::read_to_string(expected().join(file)).expect("a recorded output");
+    let mut differences = differences.iter().peekable();
     let mut expected = String::new();
     for line in recorded.lines() {
         let different = differences.next_if(|(on_vcan, _)| *on_vcan == line);
@@ -59,6 +73,21 @@ pub fn build(folder: &Path, program: &str, compiler: &str) -> PathBuf {
     path
 }
 
+/// The folder that `tests/c/socketcan/payload.sh` fills, for the guest of `scripts/vcan-vm` and for this machine; filled once.
+#[must_use]
+pub fn payload() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let filled = || {
+        let folder = workspace().join("target/socketcan-payload");
+        let mut payload = Command::new(sources().join("payload.sh"));
+        payload.arg(&folder).env("PYTHON", python()).env("PATH", tools_path());
+        let made = payload.output().expect("bash is installed");
+        assert!(made.status.success(), "the payload is not made:\n{}", String::from_utf8_lossy(&made.stderr));
+        folder
+    };
+    FOLDER.get_or_init(filled)
+}
+
 /// A program that several tests start, built once.
 #[must_use]
 pub fn built(program: &'static str) -> PathBuf {
@@ -68,30 +97,6 @@ pub fn built(program: &'static str) -> PathBuf {
     // A build that failed left nothing that another could take for good.
     let _one_at_a_time = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     build(folder.path(), program, "gcc")
-}
-
-/// Builds the program of `tests/rust`, statically linked, and gives its path.
-#[must_use]
-pub fn built_of_rust() -> PathBuf {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    let program = PROGRAM.get_or_init(|| {
-        let mut cargo = Command::new(option_env!("CARGO").unwrap_or("cargo"));
-        cargo.current_dir(workspace()).args([
-            "rustc",
-            "--release",
-            "--quiet",
-            "--locked",
-            "-p",
-            "static-guest",
-        ]);
-        // For the last link alone: what is below it has been compiled for either kind.
-        let built = cargo.args(["--", "-C", "target-feature=+crt-static"]).output().expect("cargo starts");
-        assert!(built.status.success(), "it does not build:\n{}", String::from_utf8_lossy(&built.stderr));
-        let target =
-            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
-        target.join("release/static-guest")
-    });
-    program.clone()
 }
 
 /// `bench can` on the bus of a scene, with options separated by spaces, and a command.

@@ -5,10 +5,12 @@ use rustix::process::Signal;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use system_tests::binaries::workspace;
-use system_tests::process::{Ended, Running};
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::foreign_python::tools_path;
+use system_tests::process::{Ended, Running, wait_until};
 use system_tests::scene::{SHORT, Scene};
 use system_tests::socketcan::{self, built, expected, guest};
+use system_tests::turn;
 
 /// What a program prints, on a bus of its own.
 #[track_caller]
@@ -42,7 +44,7 @@ fn every_system_call_of_a_program_of_musl_answers_as_on_vcan() {
 
 #[test]
 fn a_statically_linked_program_of_rust_prints_what_it_prints_on_vcan() {
-    let program = socketcan::built_of_rust();
+    let program = socketcan::payload().join("static-guest");
     assert!(is_statically_linked(&program), "{} asks for a dynamic linker", program.display());
     let ended = output_of(&Scene::new(SHORT), &program).expect_code(0);
     let recorded = fs::read_to_string(expected().join("rust.txt")).unwrap();
@@ -59,17 +61,23 @@ fn is_statically_linked(program: &Path) -> bool {
     (0..count).all(|place| number(first + place * size, 4) != 3)
 }
 
-/// What a script leaves that starts programs of can-utils. The rest of the bus is in another process: a bus that has other peers.
+/// What a script leaves that starts programs. The rest of the bus is in another process: a bus that has other peers.
 fn texts_of(script: &str) -> BTreeMap<String, String> {
     let scene = Scene::new(SHORT);
     let _host = scene.bus_host("");
     let folder = scene.path("texts");
     let url = format!("vcan2={}", scene.url());
-    let script = socketcan::sources().join(script);
+    let script = socketcan::payload().join(script);
     let command = ["sh".as_ref(), script.as_os_str(), "vcan2".as_ref(), folder.as_os_str()];
-    let _ = Running::start("can-utils", &mut guest(&scene, &format!("--interface {url}"), &command))
-        .wait()
-        .expect_code(0);
+    let mut can = guest(&scene, &format!("--interface {url}"), &command);
+    let programs = executable(Program::Bench, Build::Shipped);
+    let mut path = programs.parent().unwrap().as_os_str().to_owned();
+    path.push(":");
+    path.push(tools_path());
+    can.env("PATH", path);
+    can.env("RIG", workspace().join("plant/rig.toml"));
+    can.env("EXPERIMENT", workspace().join("controller/experiments/point-to-point.toml"));
+    let _ = Running::start(&script.display().to_string(), &mut can).wait().expect_code(0);
     socketcan::texts(&folder)
 }
 
@@ -83,6 +91,46 @@ fn can_utils_print_what_they_print_on_vcan() {
 #[test]
 fn isotpsend_and_isotprecv_print_what_they_print_on_vcan() {
     assert_eq!(texts_of("isotp.sh"), socketcan::texts(&expected().join("isotp")));
+}
+
+#[test]
+fn cansniffer_canbusload_python_can_a_program_of_go_and_the_firmware_print_what_they_print_on_vcan() {
+    assert_eq!(texts_of("programs.sh"), socketcan::texts(&expected().join("programs")));
+}
+
+/// How often a machine may stand still for so long that a controller, as it must, takes its sensors for lost.
+const ATTEMPTS: usize = 4;
+
+#[test]
+fn emulator_and_controller_say_and_send_on_it_what_they_do_on_vcan() {
+    let _turn = turn::take();
+    let expected = socketcan::texts(&expected().join("own-programs"));
+    // Its words for faults that only time makes, as scripts/vm/job-functions knows them.
+    let stalled = ["missed its time", "fell silent", "did not come to rest"];
+    for attempt in 1.. {
+        let texts = texts_of("own-programs.sh");
+        let is_stalled = texts.values().any(|text| stalled.iter().any(|words| text.contains(words)));
+        if attempt == ATTEMPTS || !is_stalled {
+            assert_eq!(texts, expected);
+            return;
+        }
+    }
+}
+
+#[test]
+fn sockets_are_told_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan() {
+    let scene = Scene::new(SHORT);
+    let host = scene.bus_host("");
+    let program = built("socketcan-answers");
+    let command = [program.as_os_str(), "vcan0".as_ref(), "down".as_ref()];
+    let running = Running::start("socketcan-answers", &mut guest(&scene, "", &command));
+    wait_until("the sockets", || running.stdout().contains("ready"));
+    let _ = host.interrupt();
+    wait_until("the answers", || running.stdout().contains("all is seen"));
+    let _host = scene.bus_host("");
+    let ended = running.wait().expect_code(0);
+    let expected = socketcan::recorded_but_for("down.txt", &socketcan::DIFFERENCES_WHEN_DOWN);
+    assert_eq!(socketcan::first_difference(&ended.stdout, &expected), None, "{}", ended.stderr);
 }
 
 #[test]

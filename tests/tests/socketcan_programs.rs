@@ -38,7 +38,7 @@ fn python_can_sends_filters_repeats_and_listens() {
     }
     let ended = running.wait().expect_code(0);
     ended.expect_printed(&[
-        "a limited task ends",
+        "a limited task ends after 5",
         "a notifier hears all",
         "no CAN FD",
         "answered by another peer",

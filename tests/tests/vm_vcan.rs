@@ -21,19 +21,10 @@ fn machine() -> &'static Guest {
     static MACHINE: OnceLock<Guest> = OnceLock::new();
     MACHINE.get_or_init(|| {
         python(); // tells at once what is missing
-        let folder = tempfile::tempdir().unwrap();
-        let payload = folder.path().join("payload");
-        fs::create_dir(&payload).unwrap();
-        let built = firmware::build(&folder.path().join("built"), &["STATIC=-static"]);
-        fs::copy(built.join("firmware-socketcan"), payload.join("firmware-socketcan")).unwrap();
+        let payload = socketcan::payload();
         let line = |n: u16| format!("(1700000000.{:06}) can7 5A5#{n:04X}\n", u32::from(n) * 1000);
         fs::write(payload.join("replay.log"), (0..REPLAYED).map(line).collect::<String>()).unwrap();
         // Between two jobs as long as `lines_of_run` wants it.
-        fs::copy(socketcan::built("socketcan-answers"), payload.join("socketcan-answers")).unwrap();
-        fs::copy(socketcan::built_of_rust(), payload.join("static-guest")).unwrap();
-        for script in ["can-utils.sh", "isotp.sh"] {
-            fs::copy(socketcan::sources().join(script), payload.join(script)).unwrap();
-        }
         let jobs =
             ["job", "job-firmware", "job-foreign", "job-answers"].map(|job| format!("sh /airbench/{job}"));
         let guest =
@@ -271,11 +262,12 @@ fn socketcan_answers_are_those_that_are_recorded() {
     let same = |file: &str, expected: &str| {
         assert_eq!(socketcan::first_difference(&answers(&out.join(file)), expected), None, "{file}");
     };
-    same("socketcan-answers.txt", &answers(&recorded.join("answers.txt")));
-    same("rust.txt", &answers(&recorded.join("rust.txt")));
-    for folder in ["can-utils", "isotp"] {
+    for file in ["answers.txt", "rust.txt", "down.txt"] {
+        same(file, &answers(&recorded.join(file)));
+    }
+    for folder in ["can-utils", "isotp", "programs", "own-programs"] {
         assert_eq!(socketcan::texts(&out.join(folder)), socketcan::texts(&recorded.join(folder)), "{folder}");
     }
     // On this kernel `bench can` has to find a thread's descriptors by its process.
-    same("socketcan-answers-guest.txt", &socketcan::expected_answers());
+    same("answers-guest.txt", &socketcan::expected_answers());
 }

@@ -83,7 +83,7 @@ fn sent(at: u128, data: &[u8]) -> (u128, Action) {
 fn told(actions: &[Action]) -> Vec<(u32, Vec<FrameBytes>)> {
     let read = |action: &Action| match action {
         Action::Tell(_, bytes) => Head::read(bytes).map(|(head, frames)| (head.opcode, frames)).ok(),
-        Action::Send(..) => None,
+        Action::Send(..) | Action::SendOnce(..) => None,
     };
     actions.iter().filter_map(read).collect()
 }

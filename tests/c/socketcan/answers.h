@@ -40,5 +40,6 @@ void stamps_and_losses(void);
 void descriptors(void);
 void broadcast_manager(void);
 void transport_protocol(void);
+void interface_down(void);
 
 #endif

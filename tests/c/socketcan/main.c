@@ -1,5 +1,5 @@
-/* What system calls on SocketCAN answer: socketcan-answers INTERFACE. The output on a vcan of Debian's kernel, with mtu 16 as a
- * classic interface has it, is tests/expected/socketcan-answers.txt. */
+/* What system calls on SocketCAN answer: socketcan-answers INTERFACE; and when it goes down: socketcan-answers INTERFACE down. The
+ * output on a vcan of Debian's kernel, with mtu 16 as a classic interface has it, is in tests/expected/socketcan. */
 #define _GNU_SOURCE
 #include "answers.h"
 
@@ -100,8 +100,9 @@ void identifiers(const char *what, int socket)
 
 int main(int count, char **arguments)
 {
-    if (count != 2) {
-        fprintf(stderr, "usage: socketcan-answers INTERFACE\n");
+    const int goes_down = count == 3 && strcmp(arguments[2], "down") == 0;
+    if (count != 2 && !goes_down) {
+        fprintf(stderr, "usage: socketcan-answers INTERFACE [down]\n");
         return 2;
     }
     setvbuf(stdout, NULL, _IOLBF, 0);
@@ -110,6 +111,10 @@ int main(int count, char **arguments)
     if (interface_index == 0) {
         perror(interface_name);
         return 2;
+    }
+    if (goes_down) {
+        interface_down();
+        return 0;
     }
     interfaces();
     making_and_binding();
