@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 import threading
 import time
@@ -191,6 +192,9 @@ def main(words: Sequence[str] | None = None) -> int:
     say(f"serving ws://{asked.host}:{server.port} ; in Foxglove: Open connection, Foxglove WebSocket; Ctrl-C ends it")
     over = threading.Event()
     try:
+        # A shell that starts it in the background has Ctrl-C ignored; `kill` ends it as well.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler)
         follow(Bridge(context, server.clear_session), url, over, say)
     except KeyboardInterrupt:
         pass

@@ -119,6 +119,15 @@ def test_it_waits_for_the_page_and_ends_well_by_ctrl_c(tmp_path):
     assert program.wait(PATIENCE_S) == 0
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_where_a_shell_had_it_ignored(number):
+    words = ["sh", "-c", f"trap '' INT TERM; exec '{sys.executable}' -m airbench_hil.foxglove --port 0 --watch http://127.0.0.1:1"]
+    program = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=programs.PACKAGE.parent)
+    assert "serving ws://127.0.0.1:" in program.stderr.readline() and "waiting for bench watch" in program.stderr.readline()
+    program.send_signal(number)
+    assert program.wait(PATIENCE_S) == 0
+
+
 def test_another_run_is_another_session():
     sessions = []
     made = Bridge(foxglove.Context(), lambda: sessions.append(1))

@@ -113,7 +113,7 @@ def test_a_killed_interpreter_leaves_no_workflow_running(runs, tmp_path):
     words = [sys.executable, "-c", script, str(run.folder / "measurement.csv"), str(tmp_path)]
     parent = subprocess.Popen(words, cwd=programs.PACKAGE.parent)
     said = tmp_path / "programs/discrepancy.err"
-    until = time.monotonic() + 60
+    until = time.monotonic() + 300
     while not (said.exists() and "screening" in said.read_text()):
         assert parent.poll() is None and time.monotonic() < until
         time.sleep(0.005)
