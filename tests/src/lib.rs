@@ -20,6 +20,7 @@
 //!   noise ── a node that babbles, and whether it was ever obeyed
 //!   pairs ─── runs with something and without, in turns, and the table of what it costs
 //!   socketcan  programs of SocketCAN under `bench can`, and what was recorded of them on vcan
+//!   stalls ── whether the machine kept a program from running
 //!   viewers ─ ten of the live page, for scripts/viewers
 //! ```
 //!
@@ -54,6 +55,7 @@ pub mod scene;
 pub mod skip;
 pub mod small_disk;
 pub mod socketcan;
+pub mod stalls;
 pub mod turn;
 pub mod viewers;
 pub mod xcp;

@@ -1,0 +1,100 @@
+//! Whether the machine kept a program from running: what the kernel counts of its threads' waiting for a processor.
+//!
+//! A test in real time may fail since the machine stood still, and may be tried again for that reason alone. The watcher reads
+//! each 5 ms how long the threads have waited so far (`/proc/PID/task/TID/schedstat`); if it is late itself, that is a stall too.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+const LOOK_EVERY: Duration = Duration::from_millis(5);
+/// Programs are looked for so often, in looks.
+const FIND_EVERY: u32 = 20;
+
+/// Watches until it is asked.
+#[must_use]
+pub struct Stalls {
+    stop: Arc<AtomicBool>,
+    watcher: JoinHandle<Duration>,
+}
+
+impl Stalls {
+    /// Of the programs with this word on their command line, which may start later.
+    pub fn of(word: &str) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let (stopped, word) = (Arc::clone(&stop), word.to_owned());
+        Self { stop, watcher: std::thread::spawn(move || watch(&word, &stopped)) }
+    }
+
+    /// The longest that a thread waited for a processor in one go, or the watcher.
+    pub fn longest(self) -> Duration {
+        self.stop.store(true, Ordering::Relaxed);
+        self.watcher.join().expect("the watcher does not panic")
+    }
+}
+
+fn watch(word: &str, stop: &AtomicBool) -> Duration {
+    let mut longest = Duration::ZERO;
+    let mut programs = Vec::new();
+    let mut waited: BTreeMap<PathBuf, Duration> = BTreeMap::new();
+    let mut looks = 0_u32;
+    while !stop.load(Ordering::Relaxed) {
+        if looks % FIND_EVERY == 0 {
+            programs = programs_with(word);
+        }
+        looks += 1;
+        let threads = programs.iter().filter_map(|program| fs::read_dir(program.join("task")).ok());
+        for thread in threads.flatten().flatten() {
+            let Some(now) = waited_so_far(&thread.path()) else { continue };
+            if let Some(before) = waited.insert(thread.path(), now) {
+                longest = longest.max(now.saturating_sub(before));
+            }
+        }
+        let due = Instant::now() + LOOK_EVERY;
+        std::thread::sleep(LOOK_EVERY);
+        longest = longest.max(due.elapsed());
+    }
+    longest
+}
+
+/// Folders below `/proc`.
+fn programs_with(word: &str) -> Vec<PathBuf> {
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten().map(|entry| entry.path());
+    let has_word = |path: &PathBuf| {
+        let line = fs::read(path.join("cmdline")).unwrap_or_default();
+        line.split(|byte| *byte == 0).any(|argument| String::from_utf8_lossy(argument).contains(word))
+    };
+    processes.filter(has_word).collect()
+}
+
+/// How long a thread has waited for a processor since it began: the second number, in ns.
+fn waited_so_far(thread: &std::path::Path) -> Option<Duration> {
+    let numbers = fs::read_to_string(thread.join("schedstat")).ok()?;
+    numbers.split_whitespace().nth(1)?.parse().ok().map(Duration::from_nanos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::process::Running;
+    use std::process::Command;
+
+    #[test]
+    fn a_program_is_found_by_its_command_line_and_how_long_it_waited_is_counted() {
+        let mut sleeper =
+            Running::start("sh", Command::new("sh").args(["-c", "echo ready >&2; read word-of-stalls"]));
+        sleeper.wait_for("ready");
+        let found = programs_with("word-of-stalls");
+        let thread = format!("/proc/{0}/task/{0}", sleeper.number());
+        assert!(found.contains(&format!("/proc/{}", sleeper.number()).into()), "{found:?}");
+        let waited = waited_so_far(thread.as_ref()).expect("the kernel counts it");
+        sleeper.type_line("");
+        let _ = sleeper.wait();
+        assert!(waited > Duration::ZERO, "it waited once at least, for its first turn");
+        assert!(programs_with("word-of-stalls").is_empty());
+    }
+}
