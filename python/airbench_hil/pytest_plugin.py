@@ -15,7 +15,7 @@ import time
 import zlib
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import can
 import pytest
@@ -25,6 +25,9 @@ from airbench_hil.errors import AirbenchError
 from airbench_hil.processes import Processes, private_folder
 from airbench_hil.rig import Pace, Rig
 from airbench_hil.traceability import Traceability, known_requirements
+
+if TYPE_CHECKING:
+    import pluggy
 
 REQUIREMENT, REAL_TIME = "requirement", "airbench_realtime"
 #: The property of a test that holds a requirement's identifier, in JUnit files too.
@@ -79,7 +82,8 @@ def requirements_of(item: pytest.Item) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-@pytest.hookimpl(wrapper=True, tryfirst=True)
+# Debian 12 has pluggy 1.0, which knows no `wrapper=True`.
+@pytest.hookimpl(hookwrapper=True, tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> Generator[None]:
     """Writes requirements to the tests' properties, and puts tests in real time last, all of one xdist group.
 
@@ -104,17 +108,18 @@ def _lock_path() -> Path:
     return Path(os.environ.get(_LOCK_VARIABLE) or folder / "pytest.lock")
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None]:
     """A test in real time is alone among those of this user's sessions and their workers; all others share."""
     alone = item.get_closest_marker(REAL_TIME) is not None
     rigs = {"airbench_rig", "airbench_bus"} & set(getattr(item, "fixturenames", ()))
     if not alone and not rigs:
-        return (yield)
+        yield
+        return
     # The kernel frees it however this process ends.
     with _lock_path().open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
-        return (yield)
+        yield
 
 
 @pytest.fixture
@@ -196,10 +201,8 @@ def _run_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPat
     return folder
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(
-    item: pytest.Item, call: pytest.CallInfo[None]
-) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, pluggy.Result[pytest.TestReport]]:
     """What a failed test leaves becomes part of its report: properties for JUnit, a section, extras for pytest-html."""
     rigs = item.stash.get(_RIGS, [])
     broke = call.excinfo is not None and call.when != "teardown" and not call.excinfo.errisinstance(pytest.skip.Exception)
@@ -208,7 +211,7 @@ def pytest_runtest_makereport(
             rig.close()
             for key, path in _left(rig):
                 item.user_properties.append((f"airbench_{key}", str(path)))
-    report = yield
+    report = (yield).get_result()
     if report.failed and broke:
         for rig in rigs:
             report.sections.append(("airbench", "\n".join(f"{key}: {path}" for key, path in _left(rig))))
@@ -217,7 +220,6 @@ def pytest_runtest_makereport(
         if not any(key == "airbench_run" for key, _ in item.user_properties):
             for rig in rigs:
                 shutil.rmtree(rig.folder, ignore_errors=True)
-    return report
 
 
 def _left(rig: Rig) -> Iterator[tuple[str, Path]]:
