@@ -33,8 +33,16 @@ def started(words, pattern, **options):
     try:
         yield found[1]
     finally:
-        program.send_signal(signal.SIGINT)
-        program.wait(PATIENCE_S)
+        end(program, signal.SIGINT)
+
+
+def end(program, number):
+    """Its exit code after a signal; it is not left running."""
+    try:
+        program.send_signal(number)
+        return program.wait(PATIENCE_S)
+    finally:
+        program.kill()
 
 
 def bridge(*options):
@@ -115,8 +123,7 @@ def test_it_waits_for_the_page_and_ends_well_by_ctrl_c(tmp_path):
     program = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=programs.PACKAGE.parent)
     assert "serving ws://127.0.0.1:" in program.stderr.readline()
     assert "waiting for bench watch" in program.stderr.readline()
-    program.send_signal(signal.SIGINT)
-    assert program.wait(PATIENCE_S) == 0
+    assert end(program, signal.SIGINT) == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -124,8 +131,7 @@ def test_a_signal_ends_it_where_a_shell_had_it_ignored(number):
     words = ["sh", "-c", f"trap '' INT TERM; exec '{sys.executable}' -m airbench_hil.foxglove --port 0 --watch http://127.0.0.1:1"]
     program = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=programs.PACKAGE.parent)
     assert "serving ws://127.0.0.1:" in program.stderr.readline() and "waiting for bench watch" in program.stderr.readline()
-    program.send_signal(number)
-    assert program.wait(PATIENCE_S) == 0
+    assert end(program, number) == 0
 
 
 def test_another_run_is_another_session():
