@@ -43,7 +43,7 @@ fn watch(word: &str, stop: &AtomicBool) -> Duration {
     let mut waited: BTreeMap<PathBuf, Duration> = BTreeMap::new();
     let mut looks = 0_u32;
     while !stop.load(Ordering::Relaxed) {
-        if looks % FIND_EVERY == 0 {
+        if looks.is_multiple_of(FIND_EVERY) {
             programs = programs_with(word);
         }
         looks += 1;

@@ -6,6 +6,7 @@ set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd "$here/../../.." && pwd)
 python=${PYTHON:-$root/target/tools/venv/bin/python}
+export PATH="$root/target/tools/bin:$PATH"
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
 work=$folder.work
