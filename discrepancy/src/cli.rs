@@ -32,6 +32,8 @@ pub enum Command {
     Extend(ExtendArguments),
     /// Judge an extended rig file on a record that it was not fitted on.
     Verify(VerifyArguments),
+    /// Print a model file's equations, numbers, units and suspects; with records, which of them these can tell apart.
+    Explain(ExplainArguments),
     /// Propose the experiment that distinguishes the effects that a report could not.
     Next(NextArguments),
 }
@@ -39,8 +41,8 @@ pub enum Command {
 /// Records and the model.
 #[derive(Args, Clone, Debug)]
 pub struct RecordArguments {
-    /// Rig file: the model. For close and name also a model file of one balance alone.
-    #[arg(long)]
+    /// Rig file: the model. For close and name also a model file, of any plant or of one balance alone.
+    #[arg(long, visible_alias = "model")]
     pub rig: PathBuf,
     /// Training records: measurement.csv, bus.log, or any CSV with --mapping.
     #[arg(long, required = true, num_args = 1..)]
@@ -93,9 +95,19 @@ pub struct CloseArguments {
     /// What naming is given.
     #[command(flatten)]
     pub name: NameArguments,
-    /// Held-out record, used only to judge the model; a model of one balance accepts several.
+    /// Held-out record, used only to judge the model; a model file accepts several.
     #[arg(long, num_args = 1..)]
     pub test: Vec<PathBuf>,
+}
+
+/// What is explained.
+#[derive(Args, Clone, Debug)]
+pub struct ExplainArguments {
+    /// Model file.
+    pub model: PathBuf,
+    /// Records that the model is fitted to.
+    #[arg(long, num_args = 1..)]
+    pub train: Vec<PathBuf>,
 }
 
 /// What a rig file is extended by.

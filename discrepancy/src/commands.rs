@@ -4,12 +4,14 @@
 //! the verdict `bad-data`, and the exit code for bad input. What was found is printed before it is written, so that a full disk
 //! takes the files alone.
 
+mod any_plant;
 mod text;
 
 use crate::calibrate::calibrate;
 use crate::calibrate::finer::finer;
 use crate::cli::{
-    Cli, Command, ExtendArguments, NameArguments, NextArguments, RecordArguments, VerifyArguments,
+    Cli, Command, ExplainArguments, ExtendArguments, NameArguments, NextArguments, RecordArguments,
+    VerifyArguments,
 };
 use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
@@ -17,7 +19,7 @@ use crate::gridded_record::GriddedRecord;
 use crate::refit::Linearisation;
 use crate::report::{Misfit, Report, Verdict, Verification};
 use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
-use crate::{locate, page, single_equation, verify};
+use crate::{locate, model_file, page, single_equation, verify};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,6 +37,8 @@ pub enum CommandError {
     Workflow(#[from] WorkflowError),
     #[error(transparent)]
     Balance(#[from] single_equation::BalanceError),
+    #[error(transparent)]
+    Model(#[from] model_file::ModelError),
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error("{file}: {why}")]
@@ -60,6 +64,7 @@ pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
         Command::Locate(arguments) => locate_command(arguments),
         Command::Extend(arguments) => extend_command(arguments),
         Command::Verify(arguments) => verify_command(arguments),
+        Command::Explain(arguments) => explain_command(arguments),
         Command::Next(arguments) => next_command(arguments),
     }
 }
@@ -86,6 +91,9 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     never_seen(&records.train, tests)?;
     let text = std::fs::read_to_string(&records.rig)
         .map_err(|why| CommandError::File { file: records.rig.clone(), why })?;
+    if model_file::is_model_file(&text) {
+        return any_plant::close_command(arguments, tests);
+    }
     let one_balance = single_equation::is_model_file(&text);
     let model = match records.rig.file_name() {
         Some(name) if one_balance => PathBuf::from(name),
@@ -359,6 +367,11 @@ struct VerifiedFile<'a> {
     #[serde(rename = "gap")]
     misfit: &'a BTreeMap<String, Misfit>,
     verification: &'a Verification,
+}
+
+fn explain_command(arguments: &ExplainArguments) -> Result<Exit, CommandError> {
+    print(&model_file::explain(&arguments.model, &arguments.train)?)?;
+    Ok(Exit::Good)
 }
 
 fn next_command(arguments: &NextArguments) -> Result<Exit, CommandError> {

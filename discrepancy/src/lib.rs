@@ -26,6 +26,7 @@
 //! | [`next`] | experiment design for ambiguous explanations |
 //! | `verify` | both models on the held-out record |
 //! | [`single_equation`] | the same for a model of one balance, without simulation |
+//! | [`model_file`] | the same for a plant that its user wrote as a file |
 //! | [`report`], `page` | results as data and as a page |
 //! | [`workflow`] | the steps in order |
 //! | [`commands`], [`cli`], `folder` | the program |
@@ -43,6 +44,7 @@ pub(crate) mod fit;
 pub(crate) mod folder;
 pub mod gridded_record;
 pub mod locate;
+pub mod model_file;
 pub mod name;
 pub mod next;
 pub mod outside;

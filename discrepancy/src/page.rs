@@ -18,11 +18,11 @@
 mod candidates;
 mod checks;
 mod decimate;
-mod draw;
+pub(crate) mod draw;
 mod finding;
 mod held_out;
 mod location;
-mod markup;
+pub(crate) mod markup;
 mod pictures;
 mod verdict;
 mod words;
@@ -61,6 +61,8 @@ pub struct Pictures {
     pub(crate) held_out: bool,
     pub(crate) traces: Vec<Trace>,
 }
+
+pub(crate) use words::short as significant;
 
 pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
     let bad = report.verdict == Verdict::BadData;

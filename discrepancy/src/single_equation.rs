@@ -34,7 +34,9 @@ mod select;
 mod terms;
 
 pub use extended::extended_model_text;
+pub(crate) use fit::clustered_t;
 pub(crate) use model::Model;
+pub(crate) use select::{GAIN_APART, SHARE_FLOOR, T_TIME};
 
 use crate::check::FEWEST_ROWS;
 use crate::page::Pictures;

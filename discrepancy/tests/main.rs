@@ -4,6 +4,7 @@ mod bad_records;
 mod bus_log;
 mod calibrate;
 mod locate;
+mod model_files;
 mod name;
 mod outside_expected;
 mod passage;

@@ -18,12 +18,14 @@ pub mod mapping;
 
 mod acting;
 mod bus_log;
+mod columns;
 mod cycles;
 mod foreign;
 mod measurement;
 mod table;
 
 pub use channel::{Channel, Quantity, Signal};
+pub use columns::{ColumnOptions, Columns, read_columns};
 pub use error::ReadError;
 pub use mapping::Mapping;
 

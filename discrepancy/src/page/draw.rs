@@ -54,7 +54,7 @@ impl Scale {
 }
 
 /// Smallest and largest finite value; `None` without any.
-pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let start = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = values
         .filter(|value| value.is_finite())
@@ -63,7 +63,7 @@ pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// A pair of axes with what is drawn between them.
-pub(super) struct Plot {
+pub(crate) struct Plot {
     x: Scale,
     y: Scale,
     body: String,
@@ -71,7 +71,7 @@ pub(super) struct Plot {
 
 impl Plot {
     /// Empty axes over these ranges; a range without length gets some. The labels have their units.
-    pub(super) fn new(x: (f64, f64), y: (f64, f64), x_label: &str, y_label: &str) -> Self {
+    pub(crate) fn new(x: (f64, f64), y: (f64, f64), x_label: &str, y_label: &str) -> Self {
         let wide = |(low, high): (f64, f64), room: f64| {
             let more = if high > low { (high - low) * room } else { low.abs().max(1.0) * 0.5 };
             (low - more, high + more)
@@ -133,7 +133,7 @@ impl Plot {
     }
 
     /// A line, broken where a value is missing.
-    pub(super) fn line(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>) {
+    pub(crate) fn line(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>) {
         let points: Vec<_> = points.collect();
         for piece in points.split(|(x, y)| !x.is_finite() || !y.is_finite()) {
             self.path(class, piece.iter().copied(), false);
@@ -166,7 +166,7 @@ impl Plot {
         }
     }
 
-    pub(super) fn drawn(self, identifier: &str, title: &str, description: &str) -> String {
+    pub(crate) fn drawn(self, identifier: &str, title: &str, description: &str) -> String {
         svg(identifier, TOP + BODY + FOOT, title, description, &self.body)
     }
 }
@@ -221,7 +221,7 @@ fn svg(identifier: &str, height: f64, title: &str, description: &str, body: &str
 
 /// How an entry of a legend is drawn.
 #[derive(Clone, Copy)]
-pub(super) enum Sample {
+pub(crate) enum Sample {
     /// A line of this class.
     Line(&'static str),
     /// An area of this class.
@@ -229,7 +229,7 @@ pub(super) enum Sample {
 }
 
 /// A drawing with its caption, what is said below it, and the names of its curves.
-pub(super) fn figure(caption: &str, about: &str, legend: &[(Sample, &str)], drawing: &str) -> String {
+pub(crate) fn figure(caption: &str, about: &str, legend: &[(Sample, &str)], drawing: &str) -> String {
     let entry = |(sample, name): &(Sample, &str)| {
         let inside = match sample {
             Sample::Line(class) => format!("<path class=\"{class}\" d=\"M1 7L37 7\"/>"),

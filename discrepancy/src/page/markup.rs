@@ -1,11 +1,11 @@
 //! Tables, lists and sections as markup, over that of all pages. What has no content is left out.
 
 use pagekit::markup::Table;
-pub(super) use pagekit::markup::{Cell, number, paragraph, section, words};
+pub(crate) use pagekit::markup::{Cell, number, paragraph, section, words};
 use pagekit::page::escaped;
 
 /// A table; empty without rows. The first cell of a row is its head.
-pub(super) fn table(label: &str, heads: &[&str], rows: impl IntoIterator<Item = Vec<Cell>>) -> String {
+pub(crate) fn table(label: &str, heads: &[&str], rows: impl IntoIterator<Item = Vec<Cell>>) -> String {
     let mut table = Table::new(label, heads.iter().copied());
     rows.into_iter().for_each(|row| table.row(row));
     table.html().unwrap_or_default()
@@ -16,7 +16,7 @@ pub(super) fn heading(text: &str) -> String {
 }
 
 /// Drawings side by side where there is room; nothing without any.
-pub(super) fn charts(figures: &[String]) -> String {
+pub(crate) fn charts(figures: &[String]) -> String {
     if figures.is_empty() {
         String::new()
     } else {

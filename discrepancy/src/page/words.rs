@@ -8,7 +8,7 @@ use plant::effects::sheet::PlaceKind;
 pub(super) const NOTHING: &str = "\u{2013}";
 
 /// A number with three digits that count, plain from 0.001 to 99 999 and with a power of ten beyond.
-pub(super) fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     if !value.is_finite() {
         return NOTHING.to_owned();
     }

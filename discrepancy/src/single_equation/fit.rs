@@ -196,7 +196,7 @@ pub(super) fn rms(values: &[f64]) -> f64 {
 }
 
 /// Mean over its standard error, of differences that are one for each fold and taken as independent.
-pub(super) fn clustered_t(differences: &[f64]) -> f64 {
+pub(crate) fn clustered_t(differences: &[f64]) -> f64 {
     let count = differences.len() as f64;
     let mean = mean(differences);
     let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);

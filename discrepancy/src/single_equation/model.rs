@@ -3,6 +3,7 @@
 //! Keys with defaults, and two examples that run: `discrepancy/docs/one-balance.md`, `discrepancy/models/`.
 
 use super::BalanceError;
+use super::select::SHARE_FLOOR;
 use records::description_error::DescriptionError;
 use records::{Channel, Mapping};
 use serde::Deserialize;
@@ -105,7 +106,7 @@ pub(crate) struct Selection {
 
 impl Default for Selection {
     fn default() -> Self {
-        Self { blocks: 10, bands: 10, share_floor: 0.1, most: 3, pitches_mm: Vec::new() }
+        Self { blocks: 10, bands: 10, share_floor: SHARE_FLOOR, most: 3, pitches_mm: Vec::new() }
     }
 }
 

@@ -23,13 +23,15 @@ use super::terms::{Family, amplitude};
 
 /// Clustered standard errors that folds in time ask, and those in bands. Folds are taken as independent, although their training
 /// rows overlap [Bengio, Grandvalet 2004, JMLR 5]; for ten folds 2 is about 4 % one-sided.
-const T_TIME: f64 = 3.0;
+pub(crate) const T_TIME: f64 = 3.0;
 const T_BANDS: f64 = 2.0;
+/// Least share of the power left out that a term must explain on folds, unless its model says another.
+pub(crate) const SHARE_FLOOR: f64 = 0.1;
 /// Significance of a difference between two effects, in clustered standard errors.
 const T_APART: f64 = 3.0;
 /// Twice the difference of log likelihoods that does the same. "Very strong" is 10 for twice the log Bayes factor [Kass, Raftery
 /// 1995, JASA 90(430)], which this difference approximates for equal numbers of parameters only.
-const GAIN_APART: f64 = 10.0;
+pub(crate) const GAIN_APART: f64 = 10.0;
 
 /// A family with its columns over the training rows.
 pub(super) struct Prepared {

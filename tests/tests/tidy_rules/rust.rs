@@ -93,6 +93,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     (
         "discrepancy",
         &[
+            "settings",
             "records",
             "model",
             "protocol",
@@ -370,6 +371,13 @@ const DIMENSIONLESS: &[&str] = &[
     "chi2_null",             // the same
     "over_noise",            // in units of noise
     "rms",                   // whose unit is a field beside it
+    "rms_before",            // the same
+    "rms_after",             // the same
+    "baseline",              // the same
+    "ratio",                 // of two of them
+    "probability",           // 0 to 1
+    "penalty",               // twice a log likelihood
+    "clustered_t",           // in standard errors
     "quantum",               // of a channel, in its unit
     "unusable",              // share of samples
     "divergence",            // in squared standard deviations

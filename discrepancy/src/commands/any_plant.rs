@@ -1,0 +1,63 @@
+//! `close` and `name` of a model file of any plant.
+
+use super::{CommandError, Exit, NameArguments, print, progress};
+use crate::folder::Folder;
+use crate::model_file::{ClosedModel, ModelReport, close};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
+    let NameArguments { records, without } = arguments;
+    let given = [
+        ("--mapping", records.read.mapping.is_some(), "[record] of the model file says how records are read"),
+        ("--without", !without.is_empty(), "take the suspect out of the model file"),
+    ];
+    if let Some((option, _, instead)) = given.iter().find(|(_, given, _)| *given) {
+        return Err(CommandError::BadData(format!("{option}: not for a model file: {instead}")));
+    }
+    let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
+    let out = Folder::open(&out, [&records.rig].into_iter().chain(&records.train).chain(tests))?;
+    for name in ["report.json", "report.html"] {
+        out.file(name)?;
+    }
+    let mut progress = progress();
+    let closed = close(&records.rig, &records.train, tests, &mut progress)?;
+    print(&in_words(&closed.report))?;
+    if let Some(why) = &closed.not_judged {
+        print(&format!("The model was not judged on the held-out record: {why}\n"))?;
+    }
+    out.write_json("report.json", &closed.report)?;
+    out.write("report.html", &closed.page)?;
+    progress(&format!("report.json and report.html are in {}", out.path().display()));
+    Ok(match closed {
+        ClosedModel { not_judged: Some(_), .. } => Exit::BadInput,
+        _ if records.read.strict && !tests.is_empty() && !closed.is_confirmed() => Exit::BoundBroken,
+        _ => Exit::Good,
+    })
+}
+
+/// What a person reads first.
+fn in_words(report: &ModelReport) -> String {
+    let mut text = format!("{}: {}.\n", report.name, report.headline);
+    for left in report.training.iter().chain(&report.held_out) {
+        let _ = writeln!(
+            text,
+            "{}: {} {:.4} {} rms with the model, {:.4} extended",
+            left.record, left.output, left.rms_before, left.unit, left.rms_after
+        );
+    }
+    for number in &report.parameters {
+        let error =
+            number.standard_error.map_or("not determined".to_owned(), |error| format!("± {error:.2e}"));
+        let _ = writeln!(text, "  {} = {:.5e} {error} {}", number.name, number.value, number.unit);
+    }
+    for suspect in &report.suspects {
+        let _ = writeln!(
+            text,
+            "  suspect {}: probability {:.3}, {}",
+            suspect.suspect, suspect.probability, suspect.decision
+        );
+    }
+    report.notes.iter().for_each(|note| text.push_str(&format!("  note: {note}\n")));
+    text
+}

@@ -1,0 +1,135 @@
+//! The workflow for a plant that its user wrote as a model file: fit, suspects, held-out records.
+//!
+//! ```text
+//!   model file, training records ─► fit of the model ─► suspects one by one ─► named ─► held-out records, frozen ─► verdict
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | `record` | a record as the model reads it |
+//! | `fit` | output-error fit by the one Gauss-Newton |
+//! | `select` | which suspects are taken |
+//! | `held_out` | both models on records that were not used |
+//! | `structure` | which suspects can be told apart, before any fit |
+//! | `report` | the report |
+//! | `explain` | equations, units, suspects in words |
+//! | `page` | the page |
+//!
+//! Nothing of a held-out record is read before the terms are chosen and fitted. Keys and figures: `docs/model-files.md`.
+
+mod explain;
+mod fit;
+mod held_out;
+mod page;
+mod record;
+mod report;
+mod select;
+mod structure;
+
+pub use explain::explain;
+pub use held_out::JudgeError;
+pub use record::RecordError;
+pub use report::ModelReport;
+
+use crate::report::Verdict;
+use held_out::Traces;
+use model::{Failure, Model};
+use record::Measured;
+use std::path::{Path, PathBuf};
+
+/// Why a model file cannot be closed.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    #[error("{}: {why}", file.display())]
+    Open { file: PathBuf, why: std::io::Error },
+    #[error(transparent)]
+    File(#[from] settings::SettingsError),
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error("the model cannot be simulated with its first values: {0}")]
+    Failure(#[from] Failure),
+}
+
+/// Whether a text is a model file: TOML with outputs at its top. A rig file has none, and a model of one balance neither.
+pub(crate) fn is_model_file(text: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("outputs"))
+}
+
+/// Reads a model file.
+///
+/// # Errors
+/// [`ModelError`] with file, line and column.
+pub fn read(file: &Path) -> Result<Model, ModelError> {
+    let text =
+        std::fs::read_to_string(file).map_err(|why| ModelError::Open { file: file.to_owned(), why })?;
+    Ok(Model::parse(&text, file)?)
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct ClosedModel {
+    /// What was found.
+    pub report: ModelReport,
+    /// Why the held-out records were not judged.
+    pub not_judged: Option<String>,
+    /// The page.
+    pub page: String,
+}
+
+/// Closes a model: names what it lacks by the training records, and compares both models on the held-out ones.
+///
+/// # Errors
+/// [`ModelError`] for a model or a training record that cannot be used.
+pub fn close(
+    file: &Path,
+    train: &[PathBuf],
+    tests: &[PathBuf],
+    progress: &mut dyn FnMut(&str),
+) -> Result<ClosedModel, ModelError> {
+    let model = read(file)?;
+    let records = train.iter().map(|path| Measured::read(&model, path)).collect::<Result<Vec<_>, _>>()?;
+    let found = select::search(&model, &records, progress)?;
+    progress("structure");
+    let structure = structure::structure(&found.baseline);
+    let mut report = report::report(file, &found, &structure);
+    let held_out = judged(&model, &found, tests, progress);
+    let (traces, not_judged): (Vec<Traces>, _) = match held_out {
+        Ok(None) => (held_out::trained(&found)?, None),
+        Ok(Some((judged, traces))) => {
+            report.judge(&model, &judged, &traces);
+            (traces, None)
+        }
+        // What was found stays, whatever the held-out records are like.
+        Err(why) => (held_out::trained(&found)?, Some(why)),
+    };
+    let page = page::page(&model, &report, &traces, not_judged.as_deref());
+    Ok(ClosedModel { report, not_judged, page })
+}
+
+type Judgement = (Vec<held_out::Judged>, Vec<Traces>);
+
+/// Both models on the held-out records; `None` where there is none.
+fn judged(
+    model: &Model,
+    found: &select::Found<'_>,
+    tests: &[PathBuf],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Option<Judgement>, String> {
+    if tests.is_empty() {
+        return Ok(None);
+    }
+    let mut records = Vec::new();
+    for test in tests {
+        progress(&format!("held out: {}", test.display()));
+        records.push(Measured::read(model, test).map_err(|error| error.to_string())?);
+    }
+    held_out::judge(found, &records).map(Some).map_err(|error| error.to_string())
+}
+
+impl ClosedModel {
+    /// Whether the held-out records confirm what was found, or nothing was.
+    #[must_use]
+    pub fn is_confirmed(&self) -> bool {
+        self.report.verdict == Verdict::NothingMissing || self.report.confirmed == Some(true)
+    }
+}

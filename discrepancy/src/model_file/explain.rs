@@ -1,0 +1,129 @@
+//! A model file in words: equations, numbers, units, suspects; with records also what these can tell apart.
+
+use super::record::Measured;
+use super::report::{place, significant, term};
+use super::structure::{Structure, structure};
+use super::{ModelError, read, select};
+use model::{Model, Parameter, Program, Solver, Start};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Explains a model file. With training records the model is fitted to them, and what they can tell apart is added.
+///
+/// # Errors
+/// [`ModelError`] for a model or a record that cannot be used.
+pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
+    let model = read(file)?;
+    let mut text = in_words(&model);
+    if train.is_empty() {
+        return Ok(text);
+    }
+    let records = train.iter().map(|path| Measured::read(&model, path)).collect::<Result<Vec<_>, _>>()?;
+    let baseline = select::fitted(&model, &records, &[], None)?;
+    text += &structure_in_words(&structure(&baseline));
+    Ok(text)
+}
+
+pub(crate) fn in_words(model: &Model) -> String {
+    let mut text = format!("{}\n", model.name);
+    let mut section = |name: &str, lines: Vec<String>| {
+        if !lines.is_empty() {
+            let _ = write!(text, "\n{name}\n");
+            lines.iter().for_each(|line| text.push_str(&format!("  {line}\n")));
+        }
+    };
+    let input =
+        |input: &model::Input| format!("{} [{}] from column {}", input.name, input.unit.text, input.column);
+    section("inputs", model.inputs.iter().map(input).collect());
+    let own = |suspect: Option<usize>| suspect.is_none();
+    let equation = |state: &model::State| {
+        let unit = &state.unit;
+        let start = match state.start {
+            Start::Known { value_si } => format!("starts at {}", significant(value_si / unit.factor)),
+            Start::Fitted { .. } => "its start is fitted in each record".into(),
+            Start::Record { output } => {
+                format!("starts at the first sample of {}", model.outputs[output].name)
+            }
+        };
+        format!("d{}/dt = {}    {} in {}, {start}", state.name, state.derivative.text, state.name, unit.text)
+    };
+    section("equations", model.states.iter().filter(|one| own(one.suspect)).map(equation).collect());
+    let definitions = model.definitions.iter().enumerate().filter(|(_, one)| own(one.suspect));
+    let definition = |(index, one): (usize, &model::Definition)| {
+        format!("{} = {}    in {}", one.name, one.value.text, model.definition_unit(index).text)
+    };
+    section("with", definitions.map(definition).collect());
+    let memory = |one: &model::Memory| format!("{} becomes {} after each step", one.name, one.update.text);
+    section("memory", model.memories.iter().filter(|one| own(one.suspect)).map(memory).collect());
+    let output = |output: &model::Output| {
+        let noise = output.noise_si.map_or("noise estimated".into(), |noise| {
+            format!("noise {} {}", significant(noise / output.unit.factor), output.unit.text)
+        });
+        format!("{} [{}] = {}    {noise}", output.name, output.unit.text, output.value.text)
+    };
+    section("outputs", model.outputs.iter().map(output).collect());
+    section("parameters", model.parameters.iter().filter(|one| own(one.suspect)).map(parameter).collect());
+    let suspects = (0..model.suspects.len()).flat_map(|index| {
+        let suspect = &model.suspects[index];
+        let decoy = if suspect.is_decoy { ", a decoy" } else { "" };
+        let twins = match suspect.twins.as_slice() {
+            [] => String::new(),
+            twins => format!("; does the same as {}", twins.join(", ")),
+        };
+        let head = format!("{}{decoy}, {}: {}{twins}", suspect.name, place(model, index), term(model, index));
+        let own = model.parameters.iter().filter(move |one| one.suspect == Some(index));
+        std::iter::once(head).chain(own.map(|one| format!("  {}", parameter(one))))
+    });
+    section("suspects", suspects.collect());
+    let solver = match model.solver {
+        Solver::Adaptive { relative_tolerance } => {
+            format!("adaptive, relative tolerance {relative_tolerance:e}")
+        }
+        Solver::Fixed { step_s } => format!("fixed steps of at most {step_s:e} s"),
+    };
+    let operations = Program::new(model, &[]).map_or(0, |program| program.operations());
+    let _ = write!(text, "\nintegrated: {solver}; {operations} operations for all rates\n");
+    text
+}
+
+fn parameter(parameter: &Parameter) -> String {
+    let factor = parameter.unit.factor;
+    let mut text = format!(
+        "{} = {} {}",
+        parameter.name,
+        significant(parameter.values_si[0] / factor),
+        parameter.unit.text
+    );
+    if parameter.is_fixed {
+        return text + ", known";
+    }
+    let _ = match parameter.tolerance_si {
+        Some(tolerance) => write!(text, " ± {}, fitted", significant(tolerance / factor)),
+        None => write!(text, ", fitted"),
+    };
+    let [least, most] = parameter.range_si.map(|end| end / factor);
+    if least.is_finite() || most.is_finite() {
+        let _ = write!(text, " within {} to {}", significant(least), significant(most));
+    }
+    if parameter.is_per_record {
+        text += ", one for each record";
+    }
+    text
+}
+
+fn structure_in_words(structure: &Structure) -> String {
+    let undetermined = structure.undetermined.iter();
+    let undetermined = undetermined
+        .map(|name| format!("{name}: not determined: other numbers move the outputs in the same way"));
+    let hidden = structure.hidden.iter();
+    let hidden = hidden.map(|name| format!("suspect {name}: looks like a change of the model's own numbers"));
+    let twins = structure.twins.iter().map(|twins| {
+        let [one, other] = &twins.suspects;
+        format!("{one} and {other}: the same to these records (cosine {:.3})", twins.cosine)
+    });
+    let mut lines: Vec<String> = undetermined.chain(hidden).chain(twins).collect();
+    if lines.is_empty() {
+        lines.push("every number, and every suspect from each other".into());
+    }
+    format!("\nwhat these records can tell apart\n  {}\n", lines.join("\n  "))
+}

@@ -1,0 +1,500 @@
+//! The fit of a model to records: its output error, weighed by the noise of each output, by the one Gauss-Newton.
+//!
+//! ```text
+//!   loss = sum over outputs of  rss / (noise^2 + model_error^2)        where the noise is known
+//!                               n ln(rss / n + model_error^2)          where it is estimated
+//!        + sum over priors of   ((p - value) / tolerance)^2
+//! ```
+//! A step that is refused is shortened by damping [Levenberg 1944]: the fraction f adds 1/f - 1 to the scaled normal matrix. The
+//! normal equations are kept for each block of time, so that a fit without a block needs no other simulation.
+//!
+//! Sources: Ljung, System Identification, 2nd edition, 7.2 (output error), 15.3 (concentrated likelihood); Björck 1996, 9.
+
+use super::record::Measured;
+use crate::estimator::{Convergence, Estimator, Iterate, Options, Step};
+use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start, Unit};
+use nalgebra::{DMatrix, DVector};
+
+const OPTIONS: Options =
+    Options { steps: 80, converged: 0.1, fractions: &[1.0, 0.4, 0.16, 0.064, 0.0256, 0.01, 1e-3, 1e-4] };
+/// What a sample adds to the fall of the loss that counts: a change of the residual by half of it, relatively.
+const CONVERGED_PER_SAMPLE: f64 = 1e-4;
+/// Blocks of time of each record.
+pub(crate) const BLOCKS: usize = 10;
+/// Smallest eigenvalue of the scaled normal matrix, over its largest, of a direction that the records determine.
+const DETERMINED: f64 = 1e-10;
+/// Noise of an output is at least this share of its size: a fit that leaves nothing has no likelihood.
+const LEAST_NOISE: f64 = 1e-9;
+
+/// What is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum What {
+    /// A parameter, of all records.
+    Shared(usize),
+    /// A parameter of one record.
+    OfRecord(usize, usize),
+    /// The start of a state in one record.
+    Start(usize, usize),
+}
+
+/// A number that is fitted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unknown {
+    pub(crate) what: What,
+    pub(crate) start_si: f64,
+    pub(crate) range_si: [f64; 2],
+    /// What is known of it: value and standard deviation.
+    pub(crate) prior_si: Option<[f64; 2]>,
+}
+
+/// A model with some suspects, and records.
+#[derive(Clone)]
+pub(crate) struct Fitting<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) program: Program,
+    pub(crate) records: &'a [Measured],
+    pub(crate) unknowns: Vec<Unknown>,
+    /// Rows of each record that count.
+    in_score: Vec<std::ops::Range<usize>>,
+    /// Values of what is not fitted: parameters of each record, and starts.
+    parameters_si: Vec<Vec<f64>>,
+    starts_si: Vec<Vec<f64>>,
+    memories_si: Vec<f64>,
+    /// Least variance of each output.
+    floor: Vec<f64>,
+}
+
+/// Of each output of a record what is left, and what the model says.
+pub(crate) type OfRecord = Vec<[Vec<f64>; 2]>;
+
+/// A point of a fit.
+#[derive(Clone, Debug)]
+pub(crate) struct Point {
+    pub(crate) values_si: Vec<f64>,
+    pub(crate) loss: f64,
+    /// Sum of squares of each output.
+    pub(crate) squares: Vec<f64>,
+    is_at_bound: bool,
+}
+
+impl Iterate for Point {
+    fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    fn is_at_bound(&self) -> bool {
+        self.is_at_bound
+    }
+}
+
+/// Normal equations of a block.
+#[derive(Clone, Debug)]
+pub(crate) struct Normal {
+    pub(crate) matrix: DMatrix<f64>,
+    pub(crate) slope: DVector<f64>,
+    pub(crate) squares: f64,
+}
+
+impl Normal {
+    fn zero(count: usize) -> Self {
+        Self { matrix: DMatrix::zeros(count, count), slope: DVector::zeros(count), squares: 0.0 }
+    }
+
+    fn add(&mut self, other: &Self, weight: f64) {
+        self.matrix += &other.matrix * weight;
+        self.slope += &other.slope * weight;
+        self.squares += weight * other.squares;
+    }
+}
+
+impl<'a> Fitting<'a> {
+    /// Everything that the model leaves open, with these suspects.
+    pub(crate) fn new(
+        model: &'a Model,
+        program: Program,
+        records: &'a [Measured],
+        suspects: &[usize],
+    ) -> Self {
+        let mut unknowns = Vec::new();
+        for index in model.parameters_of(suspects).filter(|index| !model.parameters[*index].is_fixed) {
+            let parameter = &model.parameters[index];
+            let unknown = |what| Unknown {
+                what,
+                start_si: parameter.values_si[0],
+                range_si: parameter.range_si,
+                prior_si: parameter.tolerance_si.map(|tolerance| [parameter.values_si[0], tolerance]),
+            };
+            if parameter.is_per_record {
+                unknowns.extend((0..records.len()).map(|record| unknown(What::OfRecord(index, record))));
+            } else {
+                unknowns.push(unknown(What::Shared(index)));
+            }
+        }
+        for state in program.states() {
+            if let Start::Fitted { guess_si, range_si } = model.states[*state].start {
+                let unknown = |record| Unknown {
+                    what: What::Start(*state, record),
+                    start_si: guess_si,
+                    range_si,
+                    prior_si: None,
+                };
+                unknowns.extend((0..records.len()).map(unknown));
+            }
+        }
+        let first = |record: &Measured, start: Start| match start {
+            Start::Known { value_si } | Start::Fitted { guess_si: value_si, .. } => value_si,
+            Start::Record { output } => {
+                record.outputs[output].iter().flatten().next().copied().unwrap_or(0.0)
+            }
+        };
+        let starts_si = records
+            .iter()
+            .map(|record| model.states.iter().map(|state| first(record, state.start)).collect())
+            .collect();
+        let floor = (0..model.outputs.len()).map(|output| {
+            let values: Vec<f64> =
+                records.iter().flat_map(|record| record.outputs[output].iter().flatten().copied()).collect();
+            let size = values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64;
+            let declared = model.outputs[output].model_error_si;
+            declared * declared + (LEAST_NOISE * LEAST_NOISE * size).max(f64::MIN_POSITIVE)
+        });
+        Self {
+            model,
+            program,
+            records,
+            unknowns,
+            in_score: records.iter().map(|record| 0..record.time_s.len()).collect(),
+            parameters_si: vec![model.parameters.iter().map(|one| one.values_si[0]).collect(); records.len()],
+            starts_si,
+            memories_si: model.memories.iter().map(|memory| memory.start_si).collect(),
+            floor: floor.collect(),
+        }
+    }
+
+    /// The same on other records: what all records share is that of a fit, what each has is left open. Only so many rows count.
+    pub(crate) fn frozen(
+        fitted: &Fitting<'a>,
+        point: &Point,
+        records: &'a [Measured],
+        suspects: &[usize],
+        rows: usize,
+    ) -> Self {
+        let mut other = Self::new(fitted.model, fitted.program.clone(), records, suspects);
+        for (unknown, value) in fitted.unknowns.iter().zip(&point.values_si) {
+            if let What::Shared(index) = unknown.what {
+                other.parameters_si.iter_mut().for_each(|parameters| parameters[index] = *value);
+            }
+        }
+        other.unknowns.retain(|unknown| !matches!(unknown.what, What::Shared(_)));
+        for (range, record) in other.in_score.iter_mut().zip(records) {
+            *range = 0..rows.min(record.time_s.len());
+        }
+        other
+    }
+
+    /// The same with all rows.
+    pub(crate) fn whole(self) -> Self {
+        Self { in_score: self.records.iter().map(|record| 0..record.time_s.len()).collect(), ..self }
+    }
+
+    /// Rows that count of each record.
+    pub(crate) fn rows(&self, record: usize) -> std::ops::Range<usize> {
+        self.in_score[record].clone()
+    }
+
+    /// Measured samples of an output that count.
+    pub(crate) fn count(&self, output: usize) -> f64 {
+        let measured = |(record, rows): (&Measured, &std::ops::Range<usize>)| {
+            record.outputs[output][rows.clone()].iter().flatten().count()
+        };
+        self.records.iter().zip(&self.in_score).map(measured).sum::<usize>() as f64
+    }
+
+    /// Variance of an output's residual as the loss takes it.
+    pub(crate) fn variance(&self, output: usize, squares: f64) -> f64 {
+        match self.model.outputs[output].noise_si {
+            Some(noise_si) => noise_si * noise_si + self.floor[output],
+            None => squares / self.count(output).max(1.0) + self.floor[output],
+        }
+    }
+
+    fn loss(&self, values_si: &[f64], squares: &[f64]) -> f64 {
+        let outputs: f64 = squares
+            .iter()
+            .enumerate()
+            .map(|(output, squares)| match self.model.outputs[output].noise_si {
+                Some(_) => squares / self.variance(output, *squares),
+                None => self.count(output) * self.variance(output, *squares).ln(),
+            })
+            .sum();
+        let priors = self.unknowns.iter().zip(values_si);
+        let priors = priors.filter_map(|(unknown, value)| {
+            unknown.prior_si.map(|[expected, tolerance]| ((value - expected) / tolerance).powi(2))
+        });
+        outputs + priors.sum::<f64>()
+    }
+
+    /// Simulates a record; `sink` gets row, output, value and derivatives by the unknowns of that record.
+    fn simulate(
+        &self,
+        record: usize,
+        values_si: &[f64],
+        with_slopes: bool,
+        mut sink: impl FnMut(usize, usize, f64, &[f64]),
+    ) -> Result<(), Failure> {
+        let mut parameters = self.parameters_si[record].clone();
+        let mut starts = self.starts_si[record].clone();
+        let mut directions = Vec::new();
+        for place in self.of_record(record) {
+            let value = values_si[place];
+            directions.push(match self.unknowns[place].what {
+                What::Shared(index) | What::OfRecord(index, _) => {
+                    parameters[index] = value;
+                    Direction::Parameter(index)
+                }
+                What::Start(state, _) => {
+                    starts[state] = value;
+                    Direction::Start(state)
+                }
+            });
+        }
+        let measured = &self.records[record];
+        let end = self.in_score[record].end;
+        let inputs = Inputs { time_s: &measured.time_s[..end], samples_si: &measured.inputs };
+        let mut simulator = Simulator::new(&self.program, if with_slopes { &directions } else { &[] });
+        simulator.run(&inputs, [&parameters, &starts, &self.memories_si], &mut sink)
+    }
+
+    /// A point with its loss.
+    pub(crate) fn at(&self, values_si: Vec<f64>) -> Result<Point, Failure> {
+        let mut squares = vec![0.0; self.model.outputs.len()];
+        for record in 0..self.records.len() {
+            let (outputs, rows) = (&self.records[record].outputs, self.rows(record));
+            self.simulate(record, &values_si, false, |row, output, value, _| {
+                if let Some(measured) = outputs[output][row].filter(|_| rows.contains(&row)) {
+                    squares[output] += (measured - value).powi(2);
+                }
+            })?;
+        }
+        let loss = self.loss(&values_si, &squares);
+        let mut ends = self.unknowns.iter().zip(&values_si);
+        let is_at_bound = ends.any(|(unknown, value)| unknown.range_si.contains(value));
+        Ok(Point { values_si, loss, squares, is_at_bound })
+    }
+
+    /// Where the fit starts.
+    pub(crate) fn start(&self) -> Vec<f64> {
+        self.unknowns.iter().map(|unknown| unknown.start_si).collect()
+    }
+
+    /// What the model leaves, and what it says: record by record, output by output; NaN where nothing was measured.
+    pub(crate) fn residuals(&self, values_si: &[f64]) -> Result<Vec<OfRecord>, Failure> {
+        let mut all = Vec::new();
+        for (record, measured) in self.records.iter().enumerate() {
+            let mut of_record =
+                vec![
+                    [vec![f64::NAN; measured.time_s.len()], vec![f64::NAN; measured.time_s.len()]];
+                    measured.outputs.len()
+                ];
+            self.simulate(record, values_si, false, |row, output, value, _| {
+                of_record[output][1][row] = value;
+                of_record[output][0][row] = measured.outputs[output][row].map_or(f64::NAN, |y| y - value);
+            })?;
+            all.push(of_record);
+        }
+        Ok(all)
+    }
+
+    /// Derivatives and values of all measured samples, row after row, times the scale of their output.
+    pub(crate) fn sensitivities(
+        &self,
+        values_si: &[f64],
+        scale: &[f64],
+    ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        let (mut slopes, mut values) = (Vec::new(), Vec::new());
+        for record in 0..self.records.len() {
+            let (measured, mine) = (&self.records[record].outputs, self.of_record(record));
+            self.simulate(record, values_si, true, |row, output, value, slope| {
+                if measured[output][row].is_none() {
+                    return;
+                }
+                values.push(scale[output] * value);
+                let first = slopes.len();
+                slopes.resize(first + self.unknowns.len(), 0.0);
+                for (place, slope) in mine.iter().zip(slope) {
+                    slopes[first + place] = scale[output] * slope;
+                }
+            })?;
+        }
+        Ok((slopes, values))
+    }
+
+    /// Unknowns that a record is simulated with, in the order of its directions.
+    fn of_record(&self, record: usize) -> Vec<usize> {
+        let is_mine = |place: &usize| match self.unknowns[*place].what {
+            What::Shared(_) => true,
+            What::OfRecord(_, of) | What::Start(_, of) => of == record,
+        };
+        (0..self.unknowns.len()).filter(is_mine).collect()
+    }
+
+    /// What people call a number.
+    pub(crate) fn name_of(&self, unknown: &Unknown) -> String {
+        let record = |record: usize| &self.records[record].name;
+        match unknown.what {
+            What::Shared(index) => self.model.parameters[index].name.clone(),
+            What::OfRecord(index, of) => format!("{} of {}", self.model.parameters[index].name, record(of)),
+            What::Start(state, of) => format!("start of {} in {}", self.model.states[state].name, record(of)),
+        }
+    }
+
+    /// Its unit.
+    pub(crate) fn unit_of(&self, unknown: &Unknown) -> &'a Unit {
+        match unknown.what {
+            What::Shared(index) | What::OfRecord(index, _) => &self.model.parameters[index].unit,
+            What::Start(state, _) => &self.model.states[state].unit,
+        }
+    }
+
+    /// Normal equations of each block and output.
+    pub(crate) fn normals(&self, values_si: &[f64]) -> Result<Vec<Vec<Normal>>, Failure> {
+        let mut all = Vec::new();
+        for record in 0..self.records.len() {
+            let (measured, rows) = (&self.records[record].outputs, self.rows(record));
+            let mut blocks = vec![vec![Normal::zero(self.unknowns.len()); measured.len()]; BLOCKS];
+            let mine = self.of_record(record);
+            self.simulate(record, values_si, true, |row, output, value, slope| {
+                let Some(measured) = measured[output][row].filter(|_| rows.contains(&row)) else { return };
+                let block = (row - rows.start) * BLOCKS / rows.len();
+                let normal = &mut blocks[block][output];
+                let residual = measured - value;
+                normal.squares += residual * residual;
+                for (i, place) in mine.iter().enumerate() {
+                    normal.slope[*place] += slope[i] * residual;
+                    for (j, other) in mine.iter().enumerate().take(i + 1) {
+                        normal.matrix[(*place, *other)] += slope[i] * slope[j];
+                    }
+                }
+            })?;
+            for normal in blocks.iter_mut().flatten() {
+                let upper = normal.matrix.transpose();
+                let diagonal = DMatrix::from_diagonal(&normal.matrix.diagonal());
+                normal.matrix += upper - diagonal;
+            }
+            all.extend(blocks);
+        }
+        Ok(all)
+    }
+
+    /// Normal equations of all blocks with their weights, and the priors.
+    pub(crate) fn sum(&self, normals: &[Vec<Normal>], point: &Point) -> Normal {
+        let mut sum = Normal::zero(self.unknowns.len());
+        for block in normals {
+            for (output, normal) in block.iter().enumerate() {
+                sum.add(normal, 1.0 / self.variance(output, point.squares[output]));
+            }
+        }
+        for (place, unknown) in self.unknowns.iter().enumerate() {
+            if let Some([expected, tolerance]) = unknown.prior_si {
+                sum.matrix[(place, place)] += tolerance.powi(-2);
+                sum.slope[place] += (expected - point.values_si[place]) / tolerance.powi(2);
+            }
+        }
+        sum
+    }
+
+    /// Fits from a start.
+    pub(crate) fn fit(&self, start: Vec<f64>) -> Result<(Point, Convergence), Failure> {
+        let clamped = self.unknowns.iter().zip(start);
+        let start =
+            clamped.map(|(unknown, value)| value.clamp(unknown.range_si[0], unknown.range_si[1])).collect();
+        let start = self.at(start)?;
+        let samples: f64 = (0..self.model.outputs.len()).map(|output| self.count(output)).sum();
+        let options = Options { converged: OPTIONS.converged + CONVERGED_PER_SAMPLE * samples, ..OPTIONS };
+        Ok(Estimator::new(options).descend(start, |estimator, point| {
+            let Ok(normals) = self.normals(&point.values_si) else { return Step::Impossible };
+            let sum = self.sum(&normals, point);
+            let promised = sum.slope.dot(&self.step(&sum, &point.values_si, 0.0));
+            estimator.backtrack(point, promised, OPTIONS.fractions, |fraction| {
+                let step = self.step(&sum, &point.values_si, 1.0 / fraction - 1.0);
+                let moved = point.values_si.iter().zip(&step).zip(&self.unknowns);
+                let moved = moved.map(|((value, step), unknown)| {
+                    (value + step).clamp(unknown.range_si[0], unknown.range_si[1])
+                });
+                self.at(moved.collect()).ok()
+            })
+        }))
+    }
+
+    /// The step of damped normal equations; a number at the end of its range does not leave it.
+    fn step(&self, normal: &Normal, values_si: &[f64], damping: f64) -> DVector<f64> {
+        let mut is_free = vec![true; values_si.len()];
+        loop {
+            let step = solved(normal, &is_free, damping);
+            let leaves = (0..values_si.len()).find(|place| {
+                let [least, most] = self.unknowns[*place].range_si;
+                is_free[*place]
+                    && (values_si[*place] <= least && step[*place] < 0.0
+                        || values_si[*place] >= most && step[*place] > 0.0)
+            });
+            match leaves {
+                Some(place) => is_free[place] = false,
+                None => return step,
+            }
+        }
+    }
+}
+
+/// Solves scaled normal equations in the directions that they determine.
+pub(crate) fn solved(normal: &Normal, is_free: &[bool], damping: f64) -> DVector<f64> {
+    let places: Vec<usize> =
+        (0..is_free.len()).filter(|place| is_free[*place] && normal.matrix[(*place, *place)] > 0.0).collect();
+    let mut step = DVector::zeros(is_free.len());
+    let (vectors, values, scale) = eigen(normal, &places);
+    let slope = DVector::from_iterator(
+        places.len(),
+        places.iter().zip(&scale).map(|(place, scale)| normal.slope[*place] / scale),
+    );
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    for (column, value) in values.iter().enumerate().filter(|(_, value)| **value > DETERMINED * largest) {
+        let direction = vectors.column(column);
+        let along = direction.dot(&slope) / (value + damping);
+        for (row, place) in places.iter().enumerate() {
+            step[*place] += along * direction[row] / scale[row];
+        }
+    }
+    step
+}
+
+/// Eigenvectors, eigenvalues and scales of the normal matrix with a diagonal of ones.
+fn eigen(normal: &Normal, places: &[usize]) -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
+    let scale: Vec<f64> = places.iter().map(|place| normal.matrix[(*place, *place)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(places.len(), places.len(), |row, column| {
+        normal.matrix[(places[row], places[column])] / (scale[row] * scale[column])
+    });
+    let decomposed = scaled.symmetric_eigen();
+    (decomposed.eigenvectors, decomposed.eigenvalues.iter().copied().collect(), scale)
+}
+
+/// Standard errors; `None` for a number that the records do not determine.
+pub(crate) fn standard_errors(normal: &Normal) -> Vec<Option<f64>> {
+    let places: Vec<usize> =
+        (0..normal.slope.len()).filter(|place| normal.matrix[(*place, *place)] > 0.0).collect();
+    let (vectors, values, scale) = eigen(normal, &places);
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    let mut errors = vec![None; normal.slope.len()];
+    for (row, place) in places.iter().enumerate() {
+        let mut variance = 0.0;
+        let mut is_determined = true;
+        for (column, value) in values.iter().enumerate() {
+            let share = vectors[(row, column)];
+            if *value > DETERMINED * largest {
+                variance += share * share / value;
+            } else if share.abs() > 1e-3 {
+                is_determined = false;
+            }
+        }
+        errors[*place] = is_determined.then(|| variance.sqrt() / scale[row]);
+    }
+    errors
+}

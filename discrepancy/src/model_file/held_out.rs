@@ -1,0 +1,118 @@
+//! Both models on records that were not used: shared numbers frozen, the record's own fitted on its first samples, which are not
+//! scored.
+
+use super::fit::{Fitting, OfRecord};
+use super::record::Measured;
+use super::select::{Fitted, Found};
+use model::Failure;
+
+/// What is left of an output on a record by both models, the baseline's first.
+#[derive(Clone, Debug)]
+pub(crate) struct Judged {
+    pub(crate) record: usize,
+    pub(crate) output: usize,
+    pub(crate) rms_si: [f64; 2],
+    pub(crate) scored_rows: usize,
+}
+
+/// A record with what both models say.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Traces {
+    pub(crate) record: String,
+    pub(crate) time_s: Vec<f64>,
+    /// Of each output: measured, baseline, extended; NaN where there is none.
+    pub(crate) outputs: Vec<[Vec<f64>; 3]>,
+    /// First row that is scored.
+    pub(crate) first_row: usize,
+}
+
+/// Why held-out records are not judged.
+#[derive(Debug, thiserror::Error)]
+pub enum JudgeError {
+    #[error(
+        "held_out.start_samples of the model is 0, and a held-out record has numbers of its own (fitted starts, per_record): \
+         say on how many of its first samples they are fitted"
+    )]
+    NoStart,
+    #[error("{record}: {rows} samples, of which the first {start} are for its start: none is left to judge")]
+    Short { record: String, rows: usize, start: usize },
+    #[error("{record}: {why}")]
+    Failure { record: String, why: Failure },
+}
+
+/// Judges both models.
+pub(crate) fn judge(
+    found: &Found<'_>,
+    records: &[Measured],
+) -> Result<(Vec<Judged>, Vec<Traces>), JudgeError> {
+    let (mut judged, mut traces) = (Vec::new(), Vec::new());
+    for (index, record) in records.iter().enumerate() {
+        let one = std::slice::from_ref(record);
+        let (before, first_row) = residuals(&found.baseline, one)?;
+        let (after, _) = residuals(&found.extended, one)?;
+        let outputs = before.into_iter().zip(after).enumerate().map(
+            |(output, ([left, said], [left_after, extended]))| {
+                let scored: Vec<usize> =
+                    (first_row..left.len()).filter(|row| left[*row].is_finite()).collect();
+                let rms = |of: &[f64]| {
+                    (scored.iter().map(|row| of[*row] * of[*row]).sum::<f64>() / scored.len().max(1) as f64)
+                        .sqrt()
+                };
+                let rms_si = [rms(&left), rms(&left_after)];
+                judged.push(Judged { record: index, output, rms_si, scored_rows: scored.len() });
+                [left.iter().zip(&said).map(|(left, said)| left + said).collect(), said, extended]
+            },
+        );
+        let outputs = outputs.collect();
+        traces.push(Traces {
+            record: record.name.clone(),
+            time_s: record.time_s.clone(),
+            outputs,
+            first_row,
+        });
+    }
+    Ok((judged, traces))
+}
+
+/// What a fitted model leaves of a record, and the first row that is scored.
+fn residuals(fitted: &Fitted<'_>, record: &[Measured]) -> Result<(OfRecord, usize), JudgeError> {
+    let rows = fitted.fitting.model.start_samples;
+    let name = || record[0].name.clone();
+    let frozen = Fitting::frozen(&fitted.fitting, &fitted.point, record, &fitted.suspects, rows);
+    let failed = |why| JudgeError::Failure { record: name(), why };
+    if frozen.unknowns.is_empty() {
+        let residuals = frozen.whole().residuals(&[]).map_err(failed)?;
+        return Ok((residuals.into_iter().next().expect("one record"), 0));
+    }
+    if rows == 0 {
+        return Err(JudgeError::NoStart);
+    }
+    if rows >= record[0].time_s.len() {
+        return Err(JudgeError::Short { record: name(), rows: record[0].time_s.len(), start: rows });
+    }
+    let (point, _) = frozen.fit(frozen.start()).map_err(failed)?;
+    let residuals = frozen.whole().residuals(&point.values_si).map_err(failed)?;
+    Ok((residuals.into_iter().next().expect("one record"), rows))
+}
+
+/// What both models say of the training records.
+pub(crate) fn trained(found: &Found<'_>) -> Result<Vec<Traces>, Failure> {
+    let all =
+        [&found.baseline, &found.extended].map(|fitted| fitted.fitting.residuals(&fitted.point.values_si));
+    let [before, after] = all;
+    let (before, after) = (before?, after?);
+    let records = found.baseline.fitting.records.iter().zip(before.into_iter().zip(after));
+    let traces = records.map(|(record, (before, after))| {
+        let outputs = before.into_iter().zip(after).map(|([residual, said], [_, extended])| {
+            let measured = residual.iter().zip(&said).map(|(left, said)| left + said).collect();
+            [measured, said, extended]
+        });
+        Traces {
+            record: record.name.clone(),
+            time_s: record.time_s.clone(),
+            outputs: outputs.collect(),
+            first_row: 0,
+        }
+    });
+    Ok(traces.collect())
+}

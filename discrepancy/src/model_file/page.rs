@@ -1,0 +1,238 @@
+//! The page of a model file: what was found, the record with both models, suspects, numbers, equations.
+
+use super::explain::in_words;
+use super::held_out::Traces;
+use super::report::{Judgement, Left, ModelReport, Number, significant};
+use crate::page::draw::{Plot, Sample, figure, range};
+use crate::page::markup::{Cell, charts, number, paragraph, section, table, words};
+use model::Model;
+use pagekit::page::{document, escaped};
+use std::ops::Range;
+
+/// Rows of a picture; of a longer record the stretch around the largest difference is drawn.
+const DRAWN_ROWS: usize = 1500;
+/// Length of that stretch.
+const STRETCH_ROWS: usize = 400;
+
+pub(crate) fn page(
+    model: &Model,
+    report: &ModelReport,
+    traces: &[Traces],
+    not_judged: Option<&str>,
+) -> String {
+    let mut head =
+        format!("<h1>{}</h1>\n<p class=\"lead\">{}.</p>\n", escaped(&report.name), escaped(&report.headline));
+    if let Some(why) = not_judged {
+        head += &paragraph(&format!("The held-out record was not judged: {why}."));
+    }
+    let sections = [
+        ("records", "Measured, and both models", pictures(model, report, traces)),
+        ("named", "What is missing", named(report)),
+        ("held-out", "On held-out records", left("Held-out records", &report.held_out)),
+        ("training", "On the training records", left("Training records", &report.training)),
+        ("suspects", "Suspects, the most likely first", suspects(&report.suspects)),
+        ("parameters", "Numbers of the model", numbers(&report.parameters)),
+        ("structure", "What these records can tell apart", structure(report)),
+        ("equations", "The model", format!("<pre>{}</pre>\n", escaped(&in_words(model)))),
+        ("notes", "Notes", pagekit::markup::list(&report.notes, "")),
+    ];
+    let body: String = sections
+        .iter()
+        .filter(|(_, _, markup)| !markup.trim().is_empty())
+        .map(|(name, title, markup)| section(name, title, markup))
+        .collect();
+    let version = report.schema_version;
+    document(
+        &report.name,
+        &format!(
+            "{head}<main>\n{body}</main>\n<footer class=\"page-foot\">\n<p>Schema version {version}. The same for programs is in \
+             report.json beside this page. ± is one standard error.</p>\n</footer>\n"
+        ),
+    )
+}
+
+fn pictures(model: &Model, report: &ModelReport, traces: &[Traces]) -> String {
+    let is_held_out = !report.held_out.is_empty();
+    let mut all = Vec::new();
+    for (record, trace) in traces.iter().enumerate().take(4) {
+        for (output, series) in trace.outputs.iter().enumerate() {
+            let what = &model.outputs[output];
+            let scaled = series
+                .each_ref()
+                .map(|values| values.iter().map(|value| value / what.unit.factor).collect::<Vec<_>>());
+            let rows = rows(&scaled);
+            let label = format!("{} {}", what.name, what.unit.text);
+            let identifier = format!("record-{record}-{output}");
+            let kind = if is_held_out { "held out" } else { "fitted" };
+            let start = match trace.first_row {
+                0 => String::new(),
+                rows => format!(" (its first {rows} samples are for its start)"),
+            };
+            let caption = format!("{}, {kind}{start}: {}", trace.record, what.name);
+            all.push(curves(
+                &identifier,
+                &caption,
+                &label,
+                &trace.time_s[rows.clone()],
+                &scaled,
+                rows.clone(),
+            ));
+            all.push(differences(
+                &format!("{identifier}-left"),
+                &caption,
+                &label,
+                &trace.time_s[rows.clone()],
+                &scaled,
+                rows,
+            ));
+        }
+    }
+    charts(&all)
+}
+
+/// All rows, or the stretch around the largest difference of the model alone.
+fn rows(series: &[Vec<f64>; 3]) -> Range<usize> {
+    let count = series[0].len();
+    if count <= DRAWN_ROWS {
+        return 0..count;
+    }
+    let difference = |row: &usize| (series[0][*row] - series[1][*row]).abs();
+    let worst = (0..count).filter(|row| difference(row).is_finite());
+    let worst = worst.max_by(|a, b| difference(a).total_cmp(&difference(b))).unwrap_or(0);
+    let first = worst.saturating_sub(STRETCH_ROWS / 2).min(count - STRETCH_ROWS);
+    first..first + STRETCH_ROWS
+}
+
+const LOOKS: [&str; 3] = ["line measured", "line s1", "line s2"];
+
+fn curves(
+    identifier: &str,
+    caption: &str,
+    label: &str,
+    time_s: &[f64],
+    series: &[Vec<f64>; 3],
+    rows: Range<usize>,
+) -> String {
+    let of = |which: usize| series[which][rows.clone()].iter().copied();
+    let Some(values) = range((0..3).flat_map(of)) else { return String::new() };
+    let mut plot = Plot::new((time_s[0], time_s[time_s.len() - 1]), values, "time s", label);
+    for (which, look) in LOOKS.into_iter().enumerate() {
+        plot.line(look, time_s.iter().copied().zip(of(which)));
+    }
+    let legend = [
+        (Sample::Line(LOOKS[0]), "measured"),
+        (Sample::Line(LOOKS[1]), "model"),
+        (Sample::Line(LOOKS[2]), "extended"),
+    ];
+    figure(
+        caption,
+        "",
+        &legend,
+        &plot.drawn(identifier, caption, "Measured, the model alone and the extended model over time."),
+    )
+}
+
+fn differences(
+    identifier: &str,
+    caption: &str,
+    label: &str,
+    time_s: &[f64],
+    series: &[Vec<f64>; 3],
+    rows: Range<usize>,
+) -> String {
+    let of = |which: usize| rows.clone().map(move |row| series[0][row] - series[which][row]);
+    let Some(values) = range(of(1).chain(of(2))) else { return String::new() };
+    let mut plot = Plot::new((time_s[0], time_s[time_s.len() - 1]), values, "time s", label);
+    for which in [1, 2] {
+        plot.line(LOOKS[which], time_s.iter().copied().zip(of(which)));
+    }
+    let legend = [(Sample::Line(LOOKS[1]), "model"), (Sample::Line(LOOKS[2]), "extended")];
+    let caption = format!("{caption}, measured minus model");
+    figure(&caption, "", &legend, &plot.drawn(identifier, &caption, "What both models leave over time."))
+}
+
+fn named(report: &ModelReport) -> String {
+    let rows = report.named.iter().map(|one| {
+        vec![
+            words(&one.suspect),
+            words(&one.place),
+            words(&one.term),
+            number(format!("{:.1} %", one.share_explained * 100.0)),
+            words(if one.alternatives.is_empty() { "none".into() } else { one.alternatives.join(", ") }),
+        ]
+    });
+    table("What is missing", &["suspect", "place", "term", "of what is left, on folds", "as good"], rows)
+}
+
+fn left(label: &str, all: &[Left]) -> String {
+    let rows = all.iter().map(|one| {
+        vec![
+            words(&one.record),
+            words(&one.output),
+            number(format!("{} {}", significant(one.rms_before), one.unit)),
+            number(format!("{} {}", significant(one.rms_after), one.unit)),
+            number(one.ratio.map_or_else(String::new, significant)),
+            number(one.rows.to_string()),
+        ]
+    });
+    table(label, &["record", "output", "model, rms", "extended, rms", "ratio", "samples"], rows)
+}
+
+fn suspects(all: &[Judgement]) -> String {
+    let rows = all.iter().map(|one| {
+        let name = if one.is_decoy { format!("{} (decoy)", one.suspect) } else { one.suspect.clone() };
+        let values: Vec<String> = one
+            .numbers
+            .iter()
+            .map(|value| format!("{} {} {}", value.name, significant(value.value), value.unit))
+            .collect();
+        vec![
+            Cell::About(name, one.place.clone()),
+            number(format!("{:.1} %", one.probability * 100.0)),
+            number(format!("{:.1}", one.gain)),
+            number(format!("{:.1}", one.penalty)),
+            number(format!("{:.1} %", one.share * 100.0)),
+            Cell::Sentence(one.decision.clone()),
+            Cell::Sentence(values.join(", ")),
+        ]
+    });
+    let heads = [
+        "suspect",
+        "probability",
+        "likelihood gain",
+        "penalty",
+        "of what is left, on folds",
+        "decision",
+        "numbers",
+    ];
+    table("Suspects beside the model alone", &heads, rows)
+}
+
+fn numbers(all: &[Number]) -> String {
+    let rows = all.iter().map(|one| {
+        let error =
+            one.standard_error.map_or("not determined".into(), |error| format!("± {}", significant(error)));
+        let bound = if one.is_at_bound { "at the end of its range" } else { "" };
+        vec![
+            Cell::About(one.name.clone(), bound.into()),
+            number(significant(one.value)),
+            number(error),
+            words(&one.unit),
+            number(one.baseline.map_or_else(String::new, significant)),
+        ]
+    });
+    table("Numbers of the extended model", &["number", "value", "error", "unit", "without the term"], rows)
+}
+
+fn structure(report: &ModelReport) -> String {
+    let structure = &report.structure;
+    let undetermined = structure.undetermined.iter().map(|name| format!("{name} is not determined."));
+    let hidden =
+        structure.hidden.iter().map(|name| format!("{name} looks like a change of the model's own numbers."));
+    let twins = structure.twins.iter().map(|twins| {
+        let [one, other] = &twins.suspects;
+        format!("{one} and {other} do the same to these records (cosine {:.3}).", twins.cosine)
+    });
+    let all: Vec<String> = undetermined.chain(hidden).chain(twins).collect();
+    pagekit::markup::list(&all, "Every number, and every suspect from each other.")
+}

@@ -1,0 +1,303 @@
+//! The report of a model file, in the model's own names and units.
+
+use super::fit::{Fitting, standard_errors};
+use super::held_out::{Judged, Traces};
+use super::select::{Evaluation, Fitted, Found};
+use super::structure::Structure;
+use crate::report::Verdict;
+use crate::verify::WORSE;
+use model::{Change, Model};
+use serde::Serialize;
+use std::path::Path;
+
+/// Version of `report.json` of a model file.
+const SCHEMA_VERSION: u32 = 1;
+
+/// `report.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelReport {
+    pub schema_version: u32,
+    /// The model file.
+    pub model: String,
+    pub name: String,
+    pub train: Vec<String>,
+    pub verdict: Verdict,
+    /// What was found, or was not, in a sentence.
+    pub headline: String,
+    /// Whether held-out records get better with what was named; `None` without any, or where nothing was named.
+    pub confirmed: Option<bool>,
+    /// Numbers of the extended model, with what they were beside the model alone.
+    pub parameters: Vec<Number>,
+    /// What is left on the training records.
+    pub training: Vec<Left>,
+    /// What is left on each held-out record.
+    pub held_out: Vec<Left>,
+    pub named: Vec<Named>,
+    /// Every suspect beside the model alone, the most likely first.
+    pub suspects: Vec<Judgement>,
+    pub structure: Structure,
+    pub notes: Vec<String>,
+}
+
+/// A number with its unit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Number {
+    pub name: String,
+    pub unit: String,
+    pub value: f64,
+    /// `None` where the records do not determine it.
+    pub standard_error: Option<f64>,
+    /// Fitted without what was named.
+    pub baseline: Option<f64>,
+    pub is_at_bound: bool,
+}
+
+/// What both models leave of an output.
+#[derive(Clone, Debug, Serialize)]
+pub struct Left {
+    pub record: String,
+    pub output: String,
+    pub unit: String,
+    pub rms_before: f64,
+    pub rms_after: f64,
+    /// After over before.
+    pub ratio: Option<f64>,
+    pub rows: usize,
+}
+
+/// A suspect that is missing in the model.
+#[derive(Clone, Debug, Serialize)]
+pub struct Named {
+    pub suspect: String,
+    pub place: String,
+    /// How it stands there.
+    pub term: String,
+    pub share_explained: f64,
+    /// Others that explain the records as well.
+    pub alternatives: Vec<String>,
+}
+
+/// How a suspect did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Judgement {
+    pub suspect: String,
+    pub place: String,
+    pub is_decoy: bool,
+    pub probability: f64,
+    /// Twice the gain in log likelihood, and what chance is granted of it.
+    pub gain: f64,
+    pub penalty: f64,
+    /// Share of what the model leaves, on folds in time.
+    pub share: f64,
+    pub clustered_t: f64,
+    pub decision: String,
+    pub numbers: Vec<Number>,
+}
+
+pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> ModelReport {
+    let fitting = &found.baseline.fitting;
+    let model = fitting.model;
+    let names: Vec<&str> =
+        found.taken.iter().map(|taken| model.suspects[taken.evaluation.suspect].name.as_str()).collect();
+    let verdict = match () {
+        () if found.decoy.is_some() => Verdict::OutsideCatalogue,
+        () if found.taken.iter().any(|taken| !taken.alternatives.is_empty()) => Verdict::Ambiguous,
+        () if found.taken.is_empty() => Verdict::NothingMissing,
+        () => Verdict::Named,
+    };
+    let named: Vec<Named> = found
+        .taken
+        .iter()
+        .map(|taken| Named {
+            suspect: model.suspects[taken.evaluation.suspect].name.clone(),
+            place: place(model, taken.evaluation.suspect),
+            term: term(model, taken.evaluation.suspect),
+            share_explained: taken.evaluation.share,
+            alternatives: taken
+                .alternatives
+                .iter()
+                .map(|other| model.suspects[*other].name.clone())
+                .collect(),
+        })
+        .collect();
+    let headline = match verdict {
+        Verdict::NothingMissing if model.suspects.is_empty() => {
+            "The model was fitted; it has no suspects".to_owned()
+        }
+        Verdict::NothingMissing => "No suspect is missing beyond doubt".to_owned(),
+        Verdict::OutsideCatalogue => {
+            let decoy = &model.suspects[found.decoy.expect("of this verdict")].name;
+            format!(
+                "Something is missing that is no suspect: the decoy {decoy} does better than each of them"
+            )
+        }
+        Verdict::Ambiguous => {
+            let others: Vec<&str> =
+                named.iter().flat_map(|one| &one.alternatives).map(String::as_str).collect();
+            format!("{} is missing, or {}: the records cannot tell", names.join(" and "), others.join(" or "))
+        }
+        _ => format!("{} {} missing", names.join(" and "), if names.len() == 1 { "is" } else { "are" }),
+    };
+    let mut suspects: Vec<Judgement> =
+        found.first.iter().map(|evaluation| judgement(fitting, evaluation, found)).collect();
+    suspects.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.gain.total_cmp(&a.gain)));
+    let mut notes: Vec<String> = fitting
+        .records
+        .iter()
+        .flat_map(|record| record.notes.iter().map(|note| format!("{}: {note}", record.name)))
+        .collect();
+    let failed = found.failed.iter();
+    notes.extend(failed.map(|(suspect, why)| {
+        format!("suspect {}: cannot be simulated: {why}", model.suspects[*suspect].name)
+    }));
+    notes.extend(found.baseline.convergence.doubt().map(|doubt| format!("the model alone: {doubt}")));
+    notes.extend(found.extended.convergence.doubt().map(|doubt| format!("the extended model: {doubt}")));
+    let [before, after] = [found.baseline.rms_si(), found.extended.rms_si()];
+    let training = (0..model.outputs.len()).map(|output| {
+        left(model, "training", output, [before[output], after[output]], fitting.count(output) as usize)
+    });
+    ModelReport {
+        schema_version: SCHEMA_VERSION,
+        model: file.display().to_string(),
+        name: model.name.clone(),
+        train: fitting.records.iter().map(|record| record.name.clone()).collect(),
+        verdict,
+        headline,
+        confirmed: None,
+        parameters: numbers(&found.extended, &found.baseline),
+        training: training.collect(),
+        held_out: Vec::new(),
+        named,
+        suspects,
+        structure: structure.clone(),
+        notes,
+    }
+}
+
+impl ModelReport {
+    /// What held-out records say of what was named. One that gets worse takes the name back.
+    pub(crate) fn judge(&mut self, model: &Model, judged: &[Judged], traces: &[Traces]) {
+        self.held_out = judged
+            .iter()
+            .map(|one| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows))
+            .collect();
+        if self.named.is_empty() {
+            return;
+        }
+        let worse: Vec<&Left> =
+            self.held_out.iter().filter(|left| left.rms_after > WORSE * left.rms_before).collect();
+        let better = self.held_out.iter().any(|left| left.rms_after < left.rms_before / WORSE);
+        self.confirmed = Some(better && worse.is_empty());
+        let about = match worse.first() {
+            Some(first) => format!(
+                "; taken back: on {} it makes {} worse, {} to {} {} rms",
+                first.record,
+                first.output,
+                significant(first.rms_before),
+                significant(first.rms_after),
+                first.unit
+            ),
+            None if better => "; confirmed on what was held out".to_owned(),
+            None => "; what was held out gets neither better nor worse with it".to_owned(),
+        };
+        self.headline += &about;
+    }
+}
+
+pub(crate) fn significant(value: f64) -> String {
+    crate::page::significant(value)
+}
+
+fn left(model: &Model, record: &str, output: usize, rms_si: [f64; 2], rows: usize) -> Left {
+    let output = &model.outputs[output];
+    let [rms_before, rms_after] = rms_si.map(|rms| rms / output.unit.factor);
+    let ratio = (rms_before > 0.0).then(|| rms_after / rms_before);
+    let (record, name, unit) = (record.to_owned(), output.name.clone(), output.unit.text.clone());
+    Left { record, output: name, unit, rms_before, rms_after, ratio, rows }
+}
+
+pub(crate) fn place(model: &Model, suspect: usize) -> String {
+    let target = model.suspects[suspect].target;
+    let kind = match target {
+        model::Target::Input(_) => "input",
+        model::Target::State(_) => "equation of",
+        model::Target::Definition(_) => "definition",
+        model::Target::Output(_) => "output",
+    };
+    format!("{kind} {}", model.target_name(target))
+}
+
+pub(crate) fn term(model: &Model, suspect: usize) -> String {
+    let suspect = &model.suspects[suspect];
+    let name = model.target_name(suspect.target);
+    let text = &suspect.expression.text;
+    match (suspect.change, suspect.target) {
+        (Change::Add, model::Target::State(_)) => format!("d{name}/dt = … + ({text})"),
+        (Change::Multiply, model::Target::State(_)) => format!("d{name}/dt = (…) ({text})"),
+        (Change::Replace, model::Target::State(_)) => format!("d{name}/dt = {text}"),
+        (Change::Add, _) => format!("{name} + ({text})"),
+        (Change::Multiply, _) => format!("{name} ({text})"),
+        (Change::Replace, _) => text.clone(),
+    }
+}
+
+/// Numbers of a fit; their errors count what a coloured residual is worth.
+fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
+    let fitting = &fitted.fitting;
+    let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();
+    let inflation = (counts / fitted.effective.iter().sum::<f64>().max(1.0)).max(1.0).sqrt();
+    let errors = standard_errors(&fitted.normal);
+    let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors);
+    all.map(|((unknown, value), error)| {
+        let unit = fitting.unit_of(unknown);
+        let before = baseline.fitting.unknowns.iter().position(|other| other.what == unknown.what);
+        Number {
+            name: fitting.name_of(unknown),
+            unit: unit.text.clone(),
+            value: value / unit.factor,
+            standard_error: error.map(|error| error * inflation / unit.factor),
+            baseline: before.map(|place| baseline.point.values_si[place] / unit.factor),
+            is_at_bound: unknown.range_si.contains(value),
+        }
+    })
+    .collect()
+}
+
+fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) -> Judgement {
+    let model = fitting.model;
+    let suspect = &model.suspects[evaluation.suspect];
+    let taken = found.taken.iter().position(|taken| taken.evaluation.suspect == evaluation.suspect);
+    let last = found.last.iter().find(|last| last.suspect == evaluation.suspect);
+    let mut decision = match (taken, last) {
+        (Some(round), _) => format!("taken, number {}", round + 1),
+        (None, Some(last)) if last.passes => "passes, but another was better".to_owned(),
+        (None, Some(last)) => format!("rejected: {}", last.gate),
+        (None, None) => "rejected beside what was taken".to_owned(),
+    };
+    if let Some(doubt) = evaluation.convergence.doubt() {
+        decision += &format!("; {doubt}");
+    }
+    let numbers = evaluation.values_si.iter().map(|(index, value)| {
+        let parameter = &model.parameters[*index];
+        Number {
+            name: parameter.name.clone(),
+            unit: parameter.unit.text.clone(),
+            value: value / parameter.unit.factor,
+            standard_error: None,
+            baseline: None,
+            is_at_bound: parameter.range_si.contains(value),
+        }
+    });
+    Judgement {
+        suspect: suspect.name.clone(),
+        place: place(model, evaluation.suspect),
+        is_decoy: suspect.is_decoy,
+        probability: evaluation.probability,
+        gain: evaluation.gain,
+        penalty: evaluation.penalty,
+        share: evaluation.share,
+        clustered_t: evaluation.t,
+        decision,
+        numbers: numbers.collect(),
+    }
+}

@@ -1,0 +1,386 @@
+//! Which suspects are taken, by forward selection on the training records alone.
+//!
+//! A suspect is fitted together with everything that the model leaves open, in the simulator, from each of its starts beside the
+//! values of the model alone.
+//! All of these must hold:
+//!
+//! | gate | asks | against |
+//! |---|---|---|
+//! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n is what a coloured residual is worth |
+//! | folds in time | at least a tenth of the power that the model leaves | size |
+//! | folds in time | a gain without the block that gains most, too | an event that is none of the plant's |
+//!
+//! A mean over its standard error, as [`crate::single_equation`] asks of folds, would ask that a term acts in every block: a tank
+//! overflows in two of ten.
+//!
+//! A fold is judged by the fit without it, which follows from the normal equations of the others by one linear step. The best of
+//! what passes is taken; another that passes and is not better or worse beyond doubt explains the records as well. Thresholds are
+//! those of [`crate::single_equation`].
+//!
+//! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
+
+use super::fit::{Fitting, Normal, Point, What, solved};
+use super::record::Measured;
+use crate::estimator::Convergence;
+use crate::single_equation::{GAIN_APART, SHARE_FLOOR, T_TIME, clustered_t};
+use model::{Failure, Model, Program};
+use rayon::prelude::*;
+
+/// Most terms that are taken.
+const MOST_TERMS: usize = 3;
+/// Most starts of a suspect.
+const MOST_STARTS: usize = 12;
+
+/// A fitted model.
+#[derive(Clone)]
+pub(crate) struct Fitted<'a> {
+    pub(crate) suspects: Vec<usize>,
+    pub(crate) fitting: Fitting<'a>,
+    pub(crate) point: Point,
+    pub(crate) convergence: Convergence,
+    /// Squares that each fold has under the fit without it, output by output.
+    folds: Vec<Vec<f64>>,
+    /// Normal equations at the point.
+    pub(crate) normal: Normal,
+    /// Independent samples that each output's residual is worth.
+    pub(crate) effective: Vec<f64>,
+}
+
+/// How a suspect did in a round.
+#[derive(Clone, Debug)]
+pub(crate) struct Evaluation {
+    pub(crate) suspect: usize,
+    pub(crate) gain: f64,
+    pub(crate) penalty: f64,
+    /// Share of the power left out, on folds in time.
+    pub(crate) share: f64,
+    /// Of the folds' differences.
+    pub(crate) t: f64,
+    pub(crate) passes: bool,
+    /// The gate that decided, in words.
+    pub(crate) gate: String,
+    /// Posterior probability among the suspects of its round and none of them, all as likely before.
+    pub(crate) probability: f64,
+    /// Numbers of the suspect, by parameter.
+    pub(crate) values_si: Vec<(usize, f64)>,
+    pub(crate) convergence: Convergence,
+    /// What each fold gains.
+    differences: Vec<f64>,
+}
+
+/// A suspect that was taken.
+pub(crate) struct Taken {
+    pub(crate) evaluation: Evaluation,
+    /// Others that explain the records as well.
+    pub(crate) alternatives: Vec<usize>,
+}
+
+/// What came of the search.
+pub(crate) struct Found<'a> {
+    pub(crate) baseline: Fitted<'a>,
+    pub(crate) extended: Fitted<'a>,
+    pub(crate) taken: Vec<Taken>,
+    /// All suspects beside the baseline alone, and beside what was taken.
+    pub(crate) first: Vec<Evaluation>,
+    pub(crate) last: Vec<Evaluation>,
+    /// Suspects that cannot be simulated, with the reason.
+    pub(crate) failed: Vec<(usize, String)>,
+    /// The decoy that did better than every suspect, where that ended the search.
+    pub(crate) decoy: Option<usize>,
+}
+
+/// Fits the model alone and searches beside it.
+pub(crate) fn search<'a>(
+    model: &'a Model,
+    records: &'a [Measured],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Found<'a>, Failure> {
+    let baseline = fitted(model, records, &[], None)?;
+    // Once more from there: suspects are fitted from its values, and must gain nothing by that alone.
+    let baseline = fitted(model, records, &[], Some(&baseline))?;
+    progress(&format!("the model alone: {}", left(&baseline)));
+    let plain = power(&baseline, &baseline);
+    let mut found = Found {
+        extended: baseline.clone(),
+        baseline,
+        taken: Vec::new(),
+        first: Vec::new(),
+        last: Vec::new(),
+        failed: Vec::new(),
+        decoy: None,
+    };
+    loop {
+        let taken = found.extended.suspects.clone();
+        let open: Vec<usize> = (0..model.suspects.len()).filter(|suspect| !taken.contains(suspect)).collect();
+        let with = |suspect: &usize| {
+            let suspects: Vec<usize> = taken.iter().copied().chain([*suspect]).collect();
+            (*suspect, fitted(model, records, &suspects, Some(&found.extended)))
+        };
+        let (mut round, mut fits) = (Vec::new(), Vec::new());
+        for (suspect, fit) in open.par_iter().map(with).collect::<Vec<_>>() {
+            match fit {
+                Ok(fit) => {
+                    round.push(judge(&found.extended, &fit, suspect, open.len(), plain));
+                    fits.push(fit);
+                }
+                Err(failure) if found.taken.is_empty() => found.failed.push((suspect, failure.to_string())),
+                Err(_) => {}
+            }
+        }
+        weigh(&mut round);
+        if found.taken.is_empty() {
+            found.first.clone_from(&round);
+        }
+        found.last.clone_from(&round);
+        let passing = (0..round.len()).filter(|place| round[*place].passes);
+        let value = |place: usize| round[place].gain - round[place].penalty;
+        let best = passing.max_by(|a, b| value(*a).total_cmp(&value(*b)));
+        let Some(best) = best.filter(|_| found.taken.len() < MOST_TERMS) else { return Ok(found) };
+        let evaluation = round[best].clone();
+        if model.suspects[evaluation.suspect].is_decoy {
+            found.decoy = Some(evaluation.suspect);
+            return Ok(found);
+        }
+        let alternatives = round
+            .iter()
+            .filter(|other| other.suspect != evaluation.suspect && other.passes)
+            .filter(|other| !model.suspects[other.suspect].is_decoy && !apart(&evaluation, other))
+            .map(|other| other.suspect)
+            .collect();
+        found.extended = fits.swap_remove(best);
+        let name = &model.suspects[evaluation.suspect].name;
+        progress(&format!("with {name}: {}", left(&found.extended)));
+        found.taken.push(Taken { evaluation, alternatives });
+    }
+}
+
+/// What a fit leaves, in words.
+fn left(fitted: &Fitted<'_>) -> String {
+    let model = fitted.fitting.model;
+    let each = model.outputs.iter().zip(fitted.rms_si()).map(|(output, rms_si)| {
+        format!("{} {:.4} {} rms", output.name, rms_si / output.unit.factor, output.unit.text)
+    });
+    each.collect::<Vec<_>>().join(", ")
+}
+
+impl Fitted<'_> {
+    /// Root mean square of what is left of each output.
+    pub(crate) fn rms_si(&self) -> Vec<f64> {
+        let squares = self.point.squares.iter().enumerate();
+        squares.map(|(output, squares)| (squares / self.fitting.count(output).max(1.0)).sqrt()).collect()
+    }
+}
+
+/// Fits a model with suspects, from what a smaller one gave and each start of the suspects that are new.
+pub(crate) fn fitted<'a>(
+    model: &'a Model,
+    records: &'a [Measured],
+    suspects: &[usize],
+    from: Option<&Fitted<'a>>,
+) -> Result<Fitted<'a>, Failure> {
+    let program =
+        Program::new(model, suspects).expect("all suspects together were compiled when the file was read");
+    let fitting = Fitting::new(model, program, records, suspects);
+    let mut best: Option<(Point, Convergence)> = None;
+    let mut why = None;
+    for start in starts(&fitting, suspects, from) {
+        match fitting.fit(start) {
+            Ok(fit) if best.as_ref().is_none_or(|best| fit.0.loss < best.0.loss) => best = Some(fit),
+            Ok(_) => {}
+            Err(failure) => why = Some(failure),
+        }
+    }
+    let Some((point, convergence)) = best else { return Err(why.expect("there is one start at least")) };
+    let normals = fitting.normals(&point.values_si)?;
+    let normal = fitting.sum(&normals, &point);
+    let effective = effective(&fitting, &point)?;
+    Ok(Fitted {
+        suspects: suspects.to_vec(),
+        folds: folds(&normals, &normal, &fitting, &point),
+        fitting,
+        point,
+        convergence,
+        normal,
+        effective,
+    })
+}
+
+/// Starts of a fit: the smaller fit's values, and every start of the newest suspect.
+fn starts(fitting: &Fitting<'_>, suspects: &[usize], from: Option<&Fitted<'_>>) -> Vec<Vec<f64>> {
+    let known = |what: What| {
+        let place = from?.fitting.unknowns.iter().position(|unknown| unknown.what == what)?;
+        Some(from?.point.values_si[place])
+    };
+    let first: Vec<f64> =
+        fitting.unknowns.iter().map(|unknown| known(unknown.what).unwrap_or(unknown.start_si)).collect();
+    let mut all = vec![first];
+    let Some(newest) = suspects.last() else { return all };
+    for (index, parameter) in
+        fitting.model.parameters.iter().enumerate().filter(|(_, one)| one.suspect == Some(*newest))
+    {
+        let others = parameter.values_si[1..].iter().flat_map(|value| {
+            all.iter().map(|start| {
+                let moved = fitting.unknowns.iter().zip(start).map(|(unknown, before)| match unknown.what {
+                    What::Shared(of) | What::OfRecord(of, _) if of == index => *value,
+                    _ => *before,
+                });
+                moved.collect()
+            })
+        });
+        let others: Vec<Vec<f64>> = others.collect();
+        all.extend(others);
+        all.truncate(MOST_STARTS);
+    }
+    all
+}
+
+/// Squares of each fold under the fit without it.
+fn folds(normals: &[Vec<Normal>], all: &Normal, fitting: &Fitting<'_>, point: &Point) -> Vec<Vec<f64>> {
+    let is_free: Vec<bool> = fitting
+        .unknowns
+        .iter()
+        .zip(&point.values_si)
+        .map(|(unknown, value)| unknown.range_si[0] < *value && *value < unknown.range_si[1])
+        .collect();
+    let without = |block: &Vec<Normal>| {
+        let mut rest = all.clone();
+        for (output, normal) in block.iter().enumerate() {
+            let weight = 1.0 / fitting.variance(output, point.squares[output]);
+            rest.matrix -= &normal.matrix * weight;
+            rest.slope -= &normal.slope * weight;
+        }
+        let step = solved(&rest, &is_free, 0.0);
+        let squares = |normal: &Normal| {
+            let quadratic = step.dot(&(&normal.matrix * &step));
+            (normal.squares - 2.0 * step.dot(&normal.slope) + quadratic).max(0.0)
+        };
+        block.iter().map(squares).collect()
+    };
+    normals.iter().map(without).collect()
+}
+
+/// Independent samples that the residual of each output is worth: the sum of its autocorrelations until one is not positive.
+fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> {
+    let residuals = fitting.residuals(&point.values_si)?;
+    let of_output = |output: usize| {
+        let series: Vec<Vec<f64>> = residuals
+            .iter()
+            .map(|record| record[output][0].iter().copied().filter(|value| value.is_finite()).collect())
+            .collect();
+        let squares: f64 = series.iter().flatten().map(|value| value * value).sum();
+        let longest = series.iter().map(Vec::len).max().unwrap_or(0) / 4;
+        let mut sum = 0.0;
+        for lag in 1..longest {
+            let products: f64 = series
+                .iter()
+                .map(|values| {
+                    values.iter().skip(lag).zip(values).map(|(late, early)| late * early).sum::<f64>()
+                })
+                .sum();
+            if products <= 0.0 {
+                break;
+            }
+            sum += products / squares.max(f64::MIN_POSITIVE);
+        }
+        (fitting.count(output) / (1.0 + 2.0 * sum)).max(2.0)
+    };
+    Ok((0..fitting.model.outputs.len()).map(of_output).collect())
+}
+
+/// Power on folds in units of what `reference` leaves of each output.
+fn power(of: &Fitted<'_>, reference: &Fitted<'_>) -> f64 {
+    in_units(of, reference).iter().sum()
+}
+
+fn in_units(of: &Fitted<'_>, reference: &Fitted<'_>) -> Vec<f64> {
+    let weight = |output: usize| 1.0 / reference.fitting.variance(output, reference.point.squares[output]);
+    let fold = |squares: &Vec<f64>| {
+        squares.iter().enumerate().map(|(output, squares)| squares * weight(output)).sum()
+    };
+    of.folds.iter().map(fold).collect()
+}
+
+fn judge(before: &Fitted<'_>, after: &Fitted<'_>, suspect: usize, tried: usize, plain: f64) -> Evaluation {
+    let outputs = 0..after.point.squares.len();
+    let gain: f64 = outputs
+        .map(|output| {
+            let [old, new] = [before.point.squares[output], after.point.squares[output]];
+            let share = after.effective[output] / after.fitting.count(output).max(1.0);
+            match after.fitting.model.outputs[output].noise_si {
+                Some(_) => share * (old - new) / after.fitting.variance(output, new),
+                None => {
+                    let variances =
+                        before.fitting.variance(output, old) / after.fitting.variance(output, new);
+                    after.effective[output] * variances.ln()
+                }
+            }
+        })
+        .sum();
+    let effective: f64 = after.effective.iter().sum();
+    let more = after.fitting.unknowns.len() as f64 - before.fitting.unknowns.len() as f64;
+    let penalty = more * effective.ln() + 2.0 * (tried.max(1) as f64).ln();
+    let differences: Vec<f64> = in_units(before, before)
+        .iter()
+        .zip(in_units(after, before))
+        .map(|(before, after)| before - after)
+        .collect();
+    let share = differences.iter().sum::<f64>() / plain.max(f64::MIN_POSITIVE);
+    let t = clustered_t(&differences);
+    let best_fold = differences.iter().copied().fold(0.0, f64::max);
+    let without_best = differences.iter().sum::<f64>() - best_fold;
+    let percent = share * 100.0;
+    let gates = [
+        (gain / penalty.max(f64::MIN_POSITIVE), format!("likelihood gain {gain:.1}, penalty {penalty:.1}")),
+        (
+            share / SHARE_FLOOR,
+            format!("folds in time: {percent:.1} % of the power, {:.1} asked", SHARE_FLOOR * 100.0),
+        ),
+        (
+            if without_best > 0.0 { f64::INFINITY } else { 0.0 },
+            "folds in time: it gains in one block of time alone".to_owned(),
+        ),
+    ];
+    let (score, gate) = gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are three");
+    let unknowns = after.fitting.unknowns.iter().zip(&after.point.values_si);
+    let values_si = unknowns.filter_map(|(unknown, value)| match unknown.what {
+        What::Shared(index) | What::OfRecord(index, 0)
+            if after.fitting.model.parameters[index].suspect == Some(suspect) =>
+        {
+            Some((index, *value))
+        }
+        _ => None,
+    });
+    Evaluation {
+        suspect,
+        gain,
+        penalty,
+        share,
+        t,
+        passes: score > 1.0,
+        gate,
+        probability: 0.0,
+        values_si: values_si.collect(),
+        convergence: after.convergence,
+        differences,
+    }
+}
+
+/// Probabilities of a round: each suspect and none of them, as likely before; gains in units of the best one's samples.
+fn weigh(round: &mut [Evaluation]) {
+    let best = round.iter().map(|one| one.gain - one.penalty).fold(0.0, f64::max);
+    let sum: f64 = (-0.5 * best).exp()
+        + round.iter().map(|one| (0.5 * (one.gain - one.penalty - best)).exp()).sum::<f64>();
+    for one in round {
+        one.probability = (0.5 * (one.gain - one.penalty - best)).exp() / sum;
+    }
+}
+
+/// Whether one is better than the other beyond doubt: by its likelihood, or on the same folds.
+fn apart(best: &Evaluation, other: &Evaluation) -> bool {
+    if (best.gain - best.penalty) - (other.gain - other.penalty) > GAIN_APART {
+        return true;
+    }
+    let differences: Vec<f64> =
+        best.differences.iter().zip(&other.differences).map(|(best, other)| best - other).collect();
+    clustered_t(&differences) > T_TIME
+}

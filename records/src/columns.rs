@@ -1,0 +1,124 @@
+//! Records of any plant: named columns of a text table over time, without a rig's channels.
+//!
+//! A missing cell is `None`, never NaN and never interpolated; time is checked by whoever uses it.
+
+use super::table::{Layout, Separator, Table};
+use super::{ReadError, Warning};
+use std::path::{Path, PathBuf};
+
+/// How a table is laid out, and which columns are wanted.
+#[derive(Clone, Debug)]
+pub struct ColumnOptions<'a> {
+    /// Column of the time.
+    pub time: &'a str,
+    /// Seconds in a unit of that column.
+    pub time_unit_s: f64,
+    /// Columns that must be there.
+    pub columns: &'a [&'a str],
+    /// One character, or `whitespace`.
+    pub separator: &'a str,
+    /// Whether decimals are written with a comma.
+    pub is_decimal_comma: bool,
+    /// Prefix of a comment line.
+    pub comment: &'a str,
+    /// Lines before the head.
+    pub skip_lines: u64,
+    /// Cells without a value, beside empty ones.
+    pub absent: &'a [String],
+}
+
+/// Columns over time.
+#[derive(Clone, Debug)]
+pub struct Columns {
+    pub file: PathBuf,
+    pub time_s: Vec<f64>,
+    /// Line of each row, from 1.
+    pub lines: Vec<u64>,
+    /// Those that were wanted, in their order, as they are written.
+    pub values: Vec<Vec<Option<f64>>>,
+    pub warnings: Vec<Warning>,
+}
+
+/// Reads the wanted columns of a table.
+///
+/// # Errors
+/// [`ReadError`] with file, line, column, value and what is allowed.
+pub fn read_columns(file: &Path, options: &ColumnOptions<'_>) -> Result<Columns, ReadError> {
+    let separator = match options.separator.as_bytes() {
+        [character] if character.is_ascii() => Separator::Character(*character),
+        _ if options.separator == "whitespace" => Separator::Whitespace,
+        _ => {
+            let reason =
+                format!("separator = \"{}\"; allowed is one character, or \"whitespace\"", options.separator);
+            return Err(ReadError::Open { file: file.into(), reason });
+        }
+    };
+    let comment = Some(options.comment.to_owned()).filter(|comment| !comment.is_empty());
+    let layout = Layout { separator, comment, skip_lines: options.skip_lines, head: true };
+    let table = Table::read(file, &layout)?;
+    let time = table.required(options.time)?;
+    let places =
+        options.columns.iter().map(|column| table.required(column)).collect::<Result<Vec<_>, _>>()?;
+    let mut columns = Columns {
+        file: file.into(),
+        time_s: Vec::with_capacity(table.rows.len()),
+        lines: Vec::with_capacity(table.rows.len()),
+        values: vec![Vec::with_capacity(table.rows.len()); places.len()],
+        warnings: Vec::new(),
+    };
+    for (line, row) in &table.rows {
+        let cell = |place: usize| row.get(place).unwrap_or_default();
+        let value = |place: usize| table.number(*line, place, cell(place), options.is_decimal_comma);
+        columns.time_s.push(value(time)? * options.time_unit_s);
+        columns.lines.push(*line);
+        for (place, values) in places.iter().zip(&mut columns.values) {
+            let is_absent = cell(*place).is_empty() || options.absent.iter().any(|text| text == cell(*place));
+            values.push(if is_absent { None } else { Some(value(*place)?) });
+        }
+    }
+    if table.cut.is_some() {
+        let text = "the last line is cut, and left out: its writer was killed".to_owned();
+        columns.warnings.push(Warning { line: table.cut, text });
+    }
+    Ok(columns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str, columns: &[&str]) -> Result<Columns, ReadError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("any.csv");
+        std::fs::write(&path, text).unwrap();
+        let absent = ["-".to_owned()];
+        let options = ColumnOptions {
+            time: "Zeit",
+            time_unit_s: 1e-3,
+            columns,
+            separator: ";",
+            is_decimal_comma: true,
+            comment: "%",
+            skip_lines: 0,
+            absent: &absent,
+        };
+        read_columns(&path, &options)
+    }
+
+    #[test]
+    fn wanted_columns_are_read_with_their_holes() {
+        let text = "% any plant\nZeit;u;y\n0;1,5;2\n10;;-\n30;3;4\n40;5";
+        let columns = read(text, &["y", "u"]).unwrap();
+        assert_eq!(columns.time_s, [0.0, 0.01, 0.03]);
+        assert_eq!(columns.values, [[Some(2.0), None, Some(4.0)], [Some(1.5), None, Some(3.0)]]);
+        assert_eq!((columns.lines, columns.warnings[0].line), (vec![3, 4, 5], Some(6)));
+    }
+
+    #[test]
+    fn a_missing_column_and_a_text_are_refused_with_their_line() {
+        let message = read("Zeit;u\n0;1\n", &["y"]).unwrap_err().to_string();
+        assert!(message.contains("any.csv:1: column y is missing; the file has Zeit, u"), "{message}");
+        let message = read("Zeit;u\n0;1\n5;x\n", &["u"]).unwrap_err().to_string();
+        assert!(message.contains("any.csv:3: u = 'x'; allowed is a finite number"), "{message}");
+    }
+}
