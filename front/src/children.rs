@@ -203,6 +203,15 @@ mod tests {
         command
     }
 
+    /// Waits, with a limit that protects against hanging.
+    fn eventually(mut condition: impl FnMut() -> bool) {
+        let limit = Instant::now() + Duration::from_secs(300);
+        while !condition() {
+            assert!(Instant::now() < limit, "waited in vain");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
     #[test]
     fn exit_codes_are_those_of_a_shell() {
         let mut children = Children::watch().unwrap();
@@ -219,17 +228,12 @@ mod tests {
         let mut children = Children::watch().unwrap();
         let leader = format!("sleep 1000 & echo $! >{0}.new; mv {0}.new {0}; wait", file.display());
         let _ = children.start_group(&mut shell(&leader)).unwrap();
-        let number: i32 = loop {
-            let Ok(text) = std::fs::read_to_string(&file) else { continue };
-            break text.trim().parse().unwrap();
-        };
+        eventually(|| file.exists());
+        let number = std::fs::read_to_string(&file).unwrap();
         drop(children);
-        let gone = || match std::fs::read_to_string(format!("/proc/{number}/stat")) {
+        eventually(|| match std::fs::read_to_string(format!("/proc/{}/stat", number.trim())) {
             Ok(stat) => stat.contains(") Z"), // not yet reaped by its new parent
             Err(_) => true,
-        };
-        while !gone() {
-            std::thread::yield_now();
-        }
+        });
     }
 }

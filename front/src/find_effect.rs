@@ -43,7 +43,7 @@ pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Res
         return Err(FrontError::Input(format!("--bus {bus}: lockstep needs an embedded bus")));
     }
     let experiment = |option: &str, name: &Path| {
-        front.experiment(name).ok_or_else(|| {
+        front.experiment(name)?.ok_or_else(|| {
             let (name, list) = (name.display(), front.list_command());
             FrontError::Input(format!("{option} {name}: no such experiment; {list} names them"))
         })

@@ -111,7 +111,7 @@ impl Asked {
         if arguments.write && front.places.checkout().is_none() {
             return refused("--write: there is no checkout with bench/docs/latency.md");
         }
-        let Some(experiment) = front.experiment(&arguments.experiment) else {
+        let Some(experiment) = front.experiment(&arguments.experiment)? else {
             let (name, list) = (arguments.experiment.display(), front.list_command());
             return refused(&format!("no experiment '{name}'; {list} names them"));
         };

@@ -91,13 +91,13 @@ impl Front {
     }
 
     /// The file of an experiment: a path, or the name of a shipped one.
-    pub(crate) fn experiment(&self, name: &Path) -> Option<PathBuf> {
+    pub(crate) fn experiment(&self, name: &Path) -> Result<Option<PathBuf>, FrontError> {
         if name.is_file() {
-            return Some(name.into());
+            return Ok(Some(name.into()));
         }
         let mut file = name.as_os_str().to_owned();
         file.push(".toml");
-        Some(self.places.data("experiments").ok()?.join(file)).filter(|file| file.is_file())
+        Ok(Some(self.places.data("experiments")?.join(file)).filter(|file| file.is_file()))
     }
 
     /// The folder of a new run, named by the time of day and what it is; `runs/latest` of a plain run is its caller's.
