@@ -65,7 +65,7 @@ pub struct ReadArguments {
     #[arg(long)]
     pub(crate) mapping: Option<PathBuf>,
     /// Refuse records with columns that the measurement file does not know (a model of one balance reads its own alone); with
-    /// close, exit code 1 too unless the held-out record confirms what was found.
+    /// close, exit code 1 too where the held-out record contradicts the verdict.
     #[arg(long)]
     pub(crate) strict: bool,
 }

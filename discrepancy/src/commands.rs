@@ -17,7 +17,7 @@ use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
 use crate::refit::Linearisation;
-use crate::report::{Misfit, Report, Verdict, Verification};
+use crate::report::{Misfit, Objection, Report, Verdict, Verification};
 use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
 use crate::{locate, model_file, page, single_equation, verify};
 use plant::effects::{SHEETS, sheet};
@@ -142,20 +142,15 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     })
 }
 
-/// The exit code of a judged report. A finding that the held-out record does not confirm is a broken bound for who asked to be
-/// strict.
+/// The exit code of a judged report. A verdict that the held-out record contradicts is a broken bound for who asked to be
+/// strict; one that it confirms, and that is not the whole, is none.
 fn exit_of(report: &Report, strict: bool) -> Exit {
+    let contradicted = report.objection().is_some_and(|objection| objection != Objection::MoreMissing);
     match report.verdict {
         Verdict::BadData => Exit::BadInput,
-        _ if strict && unconfirmed(report).is_some() => Exit::BoundBroken,
+        _ if strict && contradicted => Exit::BoundBroken,
         _ => Exit::Good,
     }
-}
-
-/// The verification that does not confirm what was found.
-fn unconfirmed(report: &Report) -> Option<&Verification> {
-    let verification = report.verification.as_ref().filter(|verification| !verification.confirmed);
-    verification.filter(|_| !report.is_rig_file_enough())
 }
 
 fn one_balance_outcome(
@@ -471,5 +466,28 @@ mod tests {
         // Nothing was found, so that there is nothing to confirm.
         assert_eq!(exit_of(&report(Verdict::NothingMissing, false), true), Exit::Good);
         assert_eq!(exit_of(&report(Verdict::BadData, false), true), Exit::BadInput);
+    }
+
+    #[test]
+    fn nothing_missing_that_the_held_out_record_contradicts_is_refused_to_who_is_strict() {
+        let report = |verdict, confirmed, worse| Report {
+            verdict,
+            verification: Some(Verification {
+                confirmed,
+                worse,
+                more_missing: true,
+                ..Verification::default()
+            }),
+            ..Report::default()
+        };
+        let contradicted = report(Verdict::NothingMissing, false, false);
+        assert_eq!(
+            [false, true].map(|strict| exit_of(&contradicted, strict)),
+            [Exit::Good, Exit::BoundBroken]
+        );
+        assert_eq!(exit_of(&report(Verdict::NothingMissing, false, true), true), Exit::BoundBroken);
+        // The finding is right, and not the whole.
+        assert_eq!(exit_of(&report(Verdict::Named, true, false), true), Exit::Good);
+        assert_eq!(exit_of(&report(Verdict::BadData, false, true), true), Exit::BadInput);
     }
 }

@@ -16,6 +16,7 @@
 
 mod consistency;
 mod elimination;
+mod explanations;
 mod gauss_newton;
 mod needed_parameters;
 mod null_distribution;
@@ -32,6 +33,8 @@ use crate::screen::{Columns, Screened};
 use consistency::{amplitude_variation, eliminate_inconsistent, prefer_consistent, prefer_large};
 pub(crate) use elimination::same;
 use elimination::{alternatives, eliminate_backward, shares, swap};
+pub use explanations::{Evidence, Explanation, ExplanationKind};
+use explanations::{Fits, explanations};
 use gauss_newton::{backtrack, fit_selected};
 use needed_parameters::with_needed;
 pub(crate) use needed_parameters::{is_off, off};
@@ -132,6 +135,8 @@ pub struct SelectionResult {
     pub amplitude_variation: Vec<f64>,
     /// Why the effects of the model are not named.
     pub not_explained: Option<NotExplained>,
+    /// What was compared, nothing first.
+    pub explanations: Vec<Explanation>,
 }
 
 impl SelectionResult {
@@ -223,6 +228,9 @@ pub fn name(
     };
     let mut shares = shares_of(&model, &rounds);
     let any_named = (0..model.placed.len()).any(|at| is_named(&model, &shares, at));
+    progress("weighing explanations");
+    let fits = Fits { parameters: &calibrated.fit, model: &model, fitted: &fitted };
+    let explanations = explanations(here, &linearisation, &columns, &fits);
     let explains_too_little = lacks_fit && (!any_named || model.loss > MOST_LOSS_LEFT * calibrated.fit.loss);
     if explains_too_little && let Some(first) = first {
         // It comes nearest to what is outside the catalogue.
@@ -269,6 +277,7 @@ pub fn name(
         lacks_fit,
         amplitude_variation,
         not_explained,
+        explanations,
     }
 }
 
@@ -296,8 +305,12 @@ fn gains_enough(before: &Refit, after: &Refit) -> bool {
 
 /// Whether a model with this loss leaves more than noise.
 fn lacks_fit(engine: &Engine<'_>, loss: f64) -> bool {
-    let most = if engine.is_linked() { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF };
-    loss > most * engine.scaled_dof().iter().sum::<f64>()
+    loss > lack_of_fit_per_dof(engine.is_linked()) * engine.scaled_dof().iter().sum::<f64>()
+}
+
+/// Mean log ratio of a window's chi2 to its degrees of freedom above which a model leaves more than noise.
+pub(crate) fn lack_of_fit_per_dof(linked: bool) -> f64 {
+    if linked { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF }
 }
 
 /// Whether one of an effect's amplitudes is above the floor.

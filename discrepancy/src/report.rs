@@ -3,7 +3,11 @@
 //! Lists have a deterministic order, and nothing depends on time, threads or machine: two runs write the same bytes. Only `gap`
 //! and `verification` know the held-out record.
 
+mod objection;
+
 use crate::estimator::Convergence;
+use crate::name::{Evidence, ExplanationKind};
+pub(crate) use objection::Objection;
 use plant::effects::sheet::{Part, Place};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -28,13 +32,6 @@ pub enum Verdict {
     OutsideCatalogue,
     /// A record cannot be used.
     BadData,
-}
-
-impl Report {
-    /// Whether the rig file explains the records as it is: the extended one is the same.
-    pub(crate) fn is_rig_file_enough(&self) -> bool {
-        self.verdict == Verdict::NothingMissing && self.small.is_empty()
-    }
 }
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -71,6 +68,8 @@ pub struct Report {
     pub verification: Option<Verification>,
     /// All candidates, the best first.
     pub candidates: Vec<Candidate>,
+    /// All explanations that were weighed: nothing, parameters, sets of effects with the reported one first, none of these.
+    pub explanations: Vec<Explanation>,
     /// Effects that the training records do not excite.
     pub(crate) not_excited: Vec<EffectPlace>,
     /// Amplitude of each other effect at which the expected linear gain reaches the threshold: found in about half of the records
@@ -159,7 +158,7 @@ pub struct NamedEffect {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct EffectPlace {
+pub struct EffectPlace {
     pub effect: String,
     #[serde(rename = "where")]
     pub place: Where,
@@ -184,6 +183,16 @@ pub struct Candidate {
     /// Outcome, in words.
     #[serde(rename = "fate")]
     pub decision: String,
+}
+
+/// An explanation of the training records.
+#[derive(Clone, Debug, Serialize)]
+pub struct Explanation {
+    pub kind: ExplanationKind,
+    /// Sets of effects that the records cannot tell apart, the best first; empty without effects.
+    pub sets: Vec<Vec<EffectPlace>>,
+    /// What the records say about it; null for none of these.
+    pub evidence: Option<Evidence>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -356,6 +365,9 @@ pub struct Verification {
     pub worse: bool,
     /// Whether `chi2_after` is not above its null range.
     pub adequate: bool,
+    /// Whether the record shows more than the extended model has: `chi2_after` exceeds its null range, and the middle of it by
+    /// the factor at which a model of the training records is not adequate.
+    pub more_missing: bool,
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]

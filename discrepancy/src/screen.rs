@@ -59,6 +59,11 @@ impl Columns {
         Columns { candidates, probes, columns }
     }
 
+    /// Number of columns of probes.
+    pub(crate) fn count(&self) -> usize {
+        self.columns.len()
+    }
+
     /// Column of a probe.
     pub fn column(&self, index: usize) -> &[f64] {
         &self.columns[index]

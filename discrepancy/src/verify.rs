@@ -30,6 +30,7 @@ mod traces;
 
 use crate::fit::LEAST;
 use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
+use crate::name::lack_of_fit_per_dof;
 use crate::page::Trace;
 use crate::report::{BeforeAfter, Misfit, Verification};
 use crate::stats::mean_and_variance;
@@ -68,7 +69,7 @@ pub(crate) fn verify(
     progress: &mut dyn FnMut(&str),
 ) -> Verified {
     progress("held-out record in windows, before and after");
-    let (before, after) = rayon::join(|| Model::new(record, before), || Model::new(record, after));
+    let (before, after) = both(before, after, record);
     progress("held-out record: what noise alone would show");
     let part = record.thinned(searched_share(std::slice::from_ref(record)));
     let part = part.as_ref().map(|part| Model::new(part, after.windows.rig()));
@@ -111,9 +112,29 @@ pub(crate) fn verify(
         confirmed: !worse && is_better(power_before, power_after),
         worse,
         adequate: chi2_after <= null.range[1],
+        more_missing: leaves_more(chi2_after, null.range, record.linked),
     };
     let traces = traces::traces(&before, &after);
     Verified { misfit, verification, traces }
+}
+
+/// Both models on a record for the page alone, without judgement.
+pub(crate) fn drawn(before: &RigParameters, after: &RigParameters, record: &GriddedRecord) -> Vec<Trace> {
+    let (before, after) = both(before, after, record);
+    traces::traces(&before, &after)
+}
+
+fn both<'a>(
+    before: &RigParameters,
+    after: &RigParameters,
+    record: &'a GriddedRecord,
+) -> (Model<'a>, Model<'a>) {
+    rayon::join(|| Model::new(record, before), || Model::new(record, after))
+}
+
+/// Whether a model leaves more than noise: above the null range, and by as much as an inadequate model of training records.
+pub(crate) fn leaves_more(chi2: f64, [least, most]: [f64; 2], linked: bool) -> bool {
+    chi2 > most && (chi2 / (0.5 * (least + most))).ln() > lack_of_fit_per_dof(linked)
 }
 
 /// A model in the windows of the record.

@@ -7,17 +7,17 @@
 //!
 //! All but [`Report::misfit`] and [`Report::verification`] is computed before the held-out record is opened.
 
+mod explained;
 mod findings;
 mod reported;
 
-use crate::candidates::Candidate;
 use crate::check::{Checked, check};
 use crate::discrepancy_term::{Beside, located_term};
 use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::locate::{UnknownSeries, locate};
-use crate::name::{SelectionResult, is_off, name, on_all};
+use crate::name::{SelectionResult, is_off, on_all};
 use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
@@ -26,7 +26,9 @@ use crate::refit::{Refit, rig_of};
 use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Next, Report, Verdict};
 use crate::single_equation::is_model_file;
 use crate::tabulate::{tables, tabulate};
-use crate::verify::verify;
+use crate::verify::{drawn, verify};
+pub use explained::explained;
+use explained::searched_for;
 pub(crate) use findings::empty;
 pub(crate) use findings::place_name;
 use findings::{report_of, summary};
@@ -168,8 +170,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     }
     let engine = Engine::new(part.as_ref().unwrap_or(&records), rig);
     let linked = records.iter().any(|record| record.linked);
-    let candidates = Candidate::all(rig, records[0].measured, linked, &task.without);
-    let mut found = name(&engine, candidates, progress);
+    let mut found = searched_for(&engine, &records, task, progress);
     if part.is_some() {
         progress("fitting what was found on all of the records");
         on_all(&Engine::new(&records, rig), &mut found);
@@ -281,8 +282,9 @@ fn held_out(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Pictures, WorkflowError> {
     let Some(test) = &task.test else {
-        let verified = verify(rig, after, &records[0], progress);
-        return Ok(Pictures { record: records[0].name.clone(), held_out: false, traces: verified.traces });
+        progress("training record, before and after");
+        let traces = drawn(rig, after, &records[0]);
+        return Ok(Pictures { record: records[0].name.clone(), held_out: false, traces });
     };
     progress(&format!("judging on {}", test.display()));
     let unusable = |why: String| WorkflowError::Unusable { file: test.display().to_string(), why };

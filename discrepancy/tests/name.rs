@@ -3,7 +3,7 @@
 use crate::record::{gridded, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
-use discrepancy::name::{SelectionResult, is_large, name};
+use discrepancy::name::{ExplanationKind, SelectionResult, is_large, name};
 use discrepancy::parameters::{COUNT, with_factors};
 use plant::RigParameters;
 
@@ -54,6 +54,10 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     let found = found(&RigParameters::baseline(), &[]);
     assert_eq!(names(&found), Vec::<String>::new());
     assert_eq!(found.not_explained, None);
+    let kinds: Vec<ExplanationKind> = found.explanations.iter().map(|explanation| explanation.kind).collect();
+    assert_eq!(kinds, [ExplanationKind::Nothing, ExplanationKind::Parameters, ExplanationKind::NoneOfThese]);
+    let nothing = found.explanations[0].evidence.expect("of the rig file");
+    assert!(nothing.loss_per_dof.abs() < 0.08 && nothing.parameters_moved == 0.0, "{nothing:?}");
     for (at, (factor, error)) in factors(&found).into_iter().enumerate() {
         assert!((factor - 1.0).abs() < 5.0 * error + 0.003, "parameter {at}: {factor} +- {error}");
     }
@@ -88,6 +92,13 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
     assert!((leakage - 4.0).abs() < 4.0 * error + 0.05, "{leakage} +- {error}");
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
+    let explanation = &found.explanations[2];
+    assert_eq!(explanation.sets[0][0].candidate.name(), "rod-leakage drive.b");
+    let evidence = explanation.evidence.expect("of the leak");
+    assert!(evidence.behind == 0.0 && evidence.amplitude_variation < Some(0.1), "{evidence:?}");
+    for other in &found.explanations[..2] {
+        assert!(other.evidence.expect("of another explanation").behind > 100.0, "{other:?}");
+    }
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! What the commands print: verdict, effects and numbers in a few lines.
 
-use super::unconfirmed;
-use crate::report::{NamedEffect, Quantity, Report, decimals};
+use crate::report::{NamedEffect, Objection, Quantity, Report, decimals};
 use crate::workflow;
 use std::fmt::Write as _;
 
@@ -20,8 +19,13 @@ pub(super) fn in_words(report: &Report) -> String {
     for quantity in &report.parameters {
         let _ = writeln!(text, "  {}", quantity_in_words(quantity));
     }
-    if let Some(verification) = unconfirmed(report) {
-        let how = if verification.worse { "gets worse with it" } else { "does not confirm it" };
+    if let Some(objection) = report.objection() {
+        let how = match objection {
+            Objection::Worse => "gets worse with it",
+            Objection::NotConfirmed => "does not confirm it",
+            Objection::SomethingMissing => "shows that something is missing",
+            Objection::MoreMissing => "shows that more is missing",
+        };
         let _ = writeln!(text, "  the held-out record {how}");
     }
     for (signal, misfit) in &report.misfit {

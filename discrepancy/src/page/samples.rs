@@ -1,6 +1,7 @@
 //! Made-up reports, one for each verdict, as like real ones as made-up ones can be.
 
 use super::{Pictures, Trace};
+use crate::name::{Evidence, ExplanationKind};
 use crate::report::*;
 use plant::effects::SHEETS;
 use std::collections::BTreeMap;
@@ -113,6 +114,7 @@ fn verification() -> Verification {
         confirmed: true,
         worse: false,
         adequate: true,
+        more_missing: false,
     }
 }
 
@@ -221,6 +223,30 @@ fn check(file: &str) -> RecordCheck {
     }
 }
 
+fn explanations() -> Vec<Explanation> {
+    let effect = |name: &str| EffectPlace { effect: name.to_owned(), place: at("drive", None) };
+    let evidence = |loss_per_dof, behind, amplitude_variation| Evidence {
+        loss_per_dof,
+        behind,
+        parameters_moved: 0.4,
+        amplitude_variation,
+        smallest_amplitude: amplitude_variation.map(|_| 5.0),
+        share: 0.968,
+    };
+    let of = |kind, sets, evidence| Explanation { kind, sets, evidence };
+    let leakages = ["piston-leakage", "valve-null-leakage"];
+    vec![
+        of(ExplanationKind::Nothing, Vec::new(), Some(evidence(3.1, 4200.0, None))),
+        of(ExplanationKind::Parameters, Vec::new(), Some(evidence(1.2, 1600.0, None))),
+        of(
+            ExplanationKind::Effects,
+            leakages.map(|name| vec![effect(name)]).to_vec(),
+            Some(evidence(-0.01, 0.0, Some(0.02))),
+        ),
+        of(ExplanationKind::NoneOfThese, Vec::new(), None),
+    ]
+}
+
 pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
     let size = if verdict == Verdict::NothingMissing { 0.02 } else { 1.0 };
     let mut pictures = pictures(size);
@@ -235,6 +261,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
         adequate: Some(verdict != Verdict::OutsideCatalogue),
         verification: Some(verification()),
         candidates: candidates(size),
+        explanations: explanations(),
         not_excited: vec![
             EffectPlace { effect: "silencer-back-pressure".to_owned(), place: at("drive", None) },
             EffectPlace { effect: "supply-droop".to_owned(), place: at("supply", None) },

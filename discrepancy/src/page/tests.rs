@@ -102,6 +102,21 @@ fn a_held_out_record_that_gets_worse_and_a_model_that_leaves_more_stand_in_the_h
 }
 
 #[test]
+fn a_held_out_record_that_shows_more_than_the_model_stands_in_the_headline() {
+    for (verdict, headline) in [
+        (Verdict::Named, "The held-out record shows that more is missing"),
+        (Verdict::NothingMissing, "The held-out record shows that something is missing"),
+    ] {
+        let (mut report, pictures) = sample(verdict);
+        let verification = report.verification.as_mut().unwrap();
+        (verification.chi2_after, verification.more_missing) = (61.8, true);
+        let seen = text(&page(&report, &pictures));
+        assert!(seen.starts_with(headline), "{seen}");
+        assert!(seen.contains("per degree of freedom 61.8, of noise at most 1.09"), "{seen}");
+    }
+}
+
+#[test]
 fn small_effects_stand_apart_from_what_is_missing() {
     let seen = text(&made(Verdict::Named));
     let named = seen.find("piston-leakage at the drive axis: leakage").expect("what is missing");

@@ -1,7 +1,7 @@
 //! The box on top: verdict, effects with numbers, closed gap.
 
 use super::words;
-use crate::report::{NamedEffect, Report, Verdict, listed};
+use crate::report::{NamedEffect, Objection, Report, Verdict, listed};
 use crate::verify::WORSE;
 use pagekit::page::escaped;
 
@@ -20,18 +20,19 @@ pub(super) fn title(report: &Report) -> &'static str {
 
 /// What a finding lacks: the support of the held-out record, or that nothing beside it is missing.
 fn doubt(report: &Report) -> Option<&'static str> {
-    if report.verdict == Verdict::BadData || report.is_rig_file_enough() {
-        return None;
-    }
-    match &report.verification {
-        Some(verification) if verification.worse => Some("What was found makes the held-out record worse"),
-        Some(verification) if !verification.confirmed => {
-            Some("The held-out record does not confirm what was found")
+    match report.objection() {
+        Some(Objection::Worse) if report.is_rig_file_enough() => {
+            Some("Fitted parameters make the held-out record worse")
         }
-        _ if report.verdict == Verdict::Named && report.adequate == Some(false) => {
+        Some(Objection::Worse) => Some("What was found makes the held-out record worse"),
+        Some(Objection::NotConfirmed) => Some("The held-out record does not confirm what was found"),
+        Some(Objection::SomethingMissing) => Some("The held-out record shows that something is missing"),
+        Some(Objection::MoreMissing) if report.verdict == Verdict::OutsideCatalogue => None,
+        Some(Objection::MoreMissing) => Some("The held-out record shows that more is missing"),
+        None if report.verdict == Verdict::Named && report.adequate == Some(false) => {
             Some("Part of what the simulation lacks")
         }
-        _ => None,
+        None => None,
     }
 }
 
@@ -72,6 +73,7 @@ pub(super) fn head(report: &Report) -> String {
         )
     }));
     points.extend(misfit(report));
+    points.extend(held_out_excess(report));
     if let Some(next) = &report.next {
         let what = next.experiment.as_ref().or(next.otherwise.as_ref());
         points.extend(what.map(|what| format!("To run next: {}", escaped(what))));
@@ -105,14 +107,32 @@ fn one(named: &NamedEffect, before: &str) -> String {
     )
 }
 
+/// What the held-out record shows beyond the model.
+fn held_out_excess(report: &Report) -> Option<String> {
+    let verification = report.verification.as_ref()?;
+    let than = match report.objection()? {
+        Objection::SomethingMissing => "the rig file",
+        Objection::MoreMissing => "the extended model",
+        Objection::Worse | Objection::NotConfirmed => return None,
+    };
+    Some(format!(
+        "{}, a held-out record, differs from {than} by more than noise: \u{3c7}\u{b2} per degree of freedom {}, of noise at most \
+         {}. It excites what the training records do not: give it as --train, and another record as --test",
+        escaped(&verification.record),
+        words::short(verification.chi2_after),
+        words::short(verification.chi2_null[1])
+    ))
+}
+
 /// How much of the gap of the held-out record is closed, over the signals that had one.
 fn misfit(report: &Report) -> Option<String> {
-    if report.verdict == Verdict::BadData || report.is_rig_file_enough() {
+    let is_worse = report.objection() == Some(Objection::Worse);
+    if report.verdict == Verdict::BadData || report.is_rig_file_enough() && !is_worse {
         return None;
     }
     let verification = report.verification.as_ref()?;
     let record = escaped(&verification.record);
-    if verification.worse {
+    if is_worse {
         let signals: Vec<String> = report
             .misfit
             .iter()

@@ -14,7 +14,7 @@ use crate::report::{
     BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, InputFiles, Location, Misfit, NamedEffect,
     Next, Outside, Quantity, Report, Verdict, Verification, Where,
 };
-use crate::verify::WORSE;
+use crate::verify::{WORSE, leaves_more};
 use crate::workflow::empty;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -382,17 +382,20 @@ impl Study {
             .map(|fold| fold_mean_square(&self.extended_fit.residual, fold) / trained)
             .collect();
         folds.sort_by(f64::total_cmp);
+        let worse = after_rms > WORSE * before_rms;
+        let (chi2_after, chi2_null) = (after_rms.powi(2) / trained, [folds[0], folds[folds.len() - 1]]);
         report.verification = Some(Verification {
             record: runs.iter().map(|run| run.name.clone()).collect::<Vec<_>>().join(", "),
             chi2_before: before_rms.powi(2) / trained,
-            chi2_after: after_rms.powi(2) / trained,
-            chi2_null: [folds[0], folds[folds.len() - 1]],
+            chi2_after,
+            chi2_null,
             free_run_nrmse_percent: BTreeMap::new(),
             whiteness: BTreeMap::from([(signal, BeforeAfter { before: lag(before), after: lag(after) })]),
             physical: Vec::new(),
-            confirmed: !self.found.taken.is_empty() && clustered_t(&differences) > 3.0,
-            worse: after_rms > WORSE * before_rms,
-            adequate: after_rms.powi(2) / trained <= folds[folds.len() - 1],
+            confirmed: !worse && !self.found.taken.is_empty() && clustered_t(&differences) > 3.0,
+            worse,
+            adequate: chi2_after <= chi2_null[1],
+            more_missing: leaves_more(chi2_after, chi2_null, false),
         });
     }
 }

@@ -45,6 +45,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
         parameters,
         insignificant,
         candidates: candidates(found),
+        explanations: explanations(found),
         not_excited,
         detection_limits,
         ..empty(verdict, String::new())
@@ -169,6 +170,19 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             }
         })
         .collect()
+}
+
+pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> {
+    let effect = |placed: &EffectEstimate| EffectPlace {
+        effect: placed.candidate.sheet.name.to_owned(),
+        place: Where::from(placed.candidate.place),
+    };
+    let all = found.explanations.iter().map(|explanation| report::Explanation {
+        kind: explanation.kind,
+        sets: explanation.sets.iter().map(|set| set.iter().map(effect).collect()).collect(),
+        evidence: explanation.evidence,
+    });
+    all.collect()
 }
 
 /// Candidates that the records do not excite, and the detection limits of the others.

@@ -278,6 +278,10 @@ const DIMENSIONLESS: &[&str] = &[
     "prior_std",             // of a factor
     "amplitude_variation",   // between windows, over the amplitude
     "loss",                  // probability
+    "loss_per_dof",          // of a fit
+    "behind",                // difference of losses
+    "parameters_moved",      // a count in part
+    "smallest_amplitude",    // over the smallest that is named
     "size",                  // of a drawing, in its own units
     "values",                // of parameters, each with its own unit
     "searched_share",        // of records

@@ -1,0 +1,275 @@
+//! The explanations of the records, each with its evidence: nothing, parameters alone, sets of effects, none of these.
+//!
+//! ```text
+//!   model of the selection, then all fits by loss ──► a set of effects each ──► alike sets together ──► the first few
+//!   evidence of each: what it leaves, how far it is behind, parameters moved, agreement of the windows, amplitude, share
+//! ```
+//!
+//! Sets of effects are alike when they differ in one effect, and the responses to the two have a cosine above [`ALIKE_COSINE`],
+//! parameters projected out. Losses are J of `refit`: minus twice the log-likelihood of the windows, priors and penalties
+//! included.
+
+use super::{amplitude_ratio, consistency::amplitude_variation, same};
+use crate::engine::Engine;
+use crate::fit;
+use crate::parameters::{COUNT, PARAMETERS};
+use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, parameter_precisions};
+use crate::screen::Columns;
+
+/// Number of sets of effects, alike ones counted once.
+const SETS: usize = 4;
+/// Cosine above which the responses to two effects are alike; that of the study's classes.
+const ALIKE_COSINE: f64 = 0.95;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExplanationKind {
+    /// The rig file as it is.
+    Nothing,
+    /// Parameters of the rig file that are off.
+    Parameters,
+    /// Effects of the catalogue, parameters beside them.
+    Effects,
+    /// Other effects of the catalogue, other sets of them, or what it does not have.
+    NoneOfThese,
+}
+
+/// What the records say about an explanation.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Evidence {
+    /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included.
+    pub loss_per_dof: f64,
+    /// Loss above that of the best explanation.
+    pub behind: f64,
+    /// Number of parameters off the rig file's values, each counted by x^2 / (x^2 + tolerance^2) of its relative deviation x.
+    pub parameters_moved: f64,
+    /// Largest coefficient of variation of its effects' amplitudes between windows; null without effects.
+    pub amplitude_variation: Option<f64>,
+    /// Smallest amplitude of its effects over the smallest that is named; null without effects.
+    pub smallest_amplitude: Option<f64>,
+    /// Share of the loss under parameters alone that it removes.
+    pub share: f64,
+}
+
+/// An explanation and its evidence; none of these has none.
+#[derive(Clone, Debug)]
+pub struct Explanation {
+    pub kind: ExplanationKind,
+    /// Sets of effects that these records cannot tell apart, the best first.
+    pub sets: Vec<Vec<EffectEstimate>>,
+    pub evidence: Option<Evidence>,
+}
+
+/// The fits that explanations are made of.
+pub(super) struct Fits<'a> {
+    pub(super) parameters: &'a Refit,
+    /// Of the selection.
+    pub(super) model: &'a Refit,
+    pub(super) fitted: &'a [Refit],
+}
+
+/// All explanations that were fitted: nothing, parameters, the best sets of effects, none of these.
+pub(super) fn explanations(
+    engine: &Engine<'_>,
+    linearisation: &Linearisation,
+    columns: &Columns,
+    fits: &Fits<'_>,
+) -> Vec<Explanation> {
+    let at_model = linearise(engine, fits.model);
+    let dof: f64 = engine.scaled_dof().iter().sum();
+    let baseline = engine.squares(&engine.residual(&engine.simulate(engine.rig())));
+    let nothing = fit::loss(&baseline, engine.scaled_dof());
+    let alike = Alike::new(engine, linearisation, columns, fits.model);
+    let classes = classes(fits, |left, right| alike.are(left, right));
+    let losses = classes.iter().map(|class| class[0].loss).chain([nothing, fits.parameters.loss]);
+    let best = losses.fold(f64::INFINITY, f64::min);
+    let evidence = |loss: f64, factors: &[f64; COUNT]| Evidence {
+        loss_per_dof: loss / dof,
+        behind: loss - best,
+        parameters_moved: parameters_moved(factors),
+        amplitude_variation: None,
+        smallest_amplitude: None,
+        share: (1.0 - loss / fits.parameters.loss.max(1e-9)).clamp(0.0, 1.0),
+    };
+    let without_effects = |kind, evidence| Explanation { kind, sets: Vec::new(), evidence };
+    let mut all = vec![
+        without_effects(ExplanationKind::Nothing, Some(evidence(nothing, &[1.0; COUNT]))),
+        without_effects(
+            ExplanationKind::Parameters,
+            Some(evidence(fits.parameters.loss, &fits.parameters.factors)),
+        ),
+    ];
+    all.extend(classes.iter().map(|class| {
+        let best = class[0];
+        let variation = amplitude_variation(engine, &at_model, best);
+        let ratios = best.placed.iter().map(amplitude_ratio);
+        let evidence = Evidence {
+            amplitude_variation: variation.map(|all| all.into_iter().fold(0.0, f64::max)),
+            smallest_amplitude: Some(ratios.fold(f64::INFINITY, f64::min)),
+            ..evidence(best.loss, &best.factors)
+        };
+        Explanation {
+            kind: ExplanationKind::Effects,
+            sets: class.iter().map(|fit| fit.placed.clone()).collect(),
+            evidence: Some(evidence),
+        }
+    }));
+    all.push(without_effects(ExplanationKind::NoneOfThese, None));
+    all
+}
+
+fn parameters_moved(factors: &[f64; COUNT]) -> f64 {
+    let deviations = factors.iter().zip(&PARAMETERS).map(|(factor, parameter)| {
+        let square = ((factor - 1.0) / parameter.prior_std).powi(2);
+        square / (square + 1.0)
+    });
+    deviations.sum()
+}
+
+/// The best fit of each set of effects, alike ones together: the model's class first, then by loss.
+fn classes<'a>(
+    fits: &Fits<'a>,
+    are_alike: impl Fn(&EffectEstimate, &EffectEstimate) -> bool,
+) -> Vec<Vec<&'a Refit>> {
+    let mut all: Vec<&Refit> = fits.fitted.iter().collect();
+    all.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+    all.insert(0, fits.model);
+    let mut classes: Vec<Vec<&Refit>> = Vec::new();
+    for fit in all {
+        if fit.placed.is_empty()
+            || classes.iter().flatten().any(|other| has_all(other, fit) && has_all(fit, other))
+        {
+            continue;
+        }
+        match classes.iter().position(|class| differ_by_alike(class[0], fit, &are_alike)) {
+            Some(at) => classes[at].push(fit),
+            None if classes.len() < SETS => classes.push(vec![fit]),
+            None => {}
+        }
+    }
+    classes
+}
+
+/// Whether a model has all effects of another one.
+fn has_all(model: &Refit, other: &Refit) -> bool {
+    other.placed.iter().all(|effect| model.placed.iter().any(|placed| same(placed, effect)))
+}
+
+fn differ_by_alike(
+    left: &Refit,
+    right: &Refit,
+    are_alike: impl Fn(&EffectEstimate, &EffectEstimate) -> bool,
+) -> bool {
+    let only = |of: &'_ Refit, other: &Refit| -> Vec<EffectEstimate> {
+        of.placed
+            .iter()
+            .filter(|placed| !other.placed.iter().any(|other| same(placed, other)))
+            .cloned()
+            .collect()
+    };
+    match (&only(left, right)[..], &only(right, left)[..]) {
+        ([left], [right]) => are_alike(left, right),
+        _ => false,
+    }
+}
+
+/// Responses to effects, parameters projected out.
+struct Alike<'a> {
+    columns: &'a Columns,
+    /// Products of the columns of all probes.
+    products: nalgebra::DMatrix<f64>,
+}
+
+impl<'a> Alike<'a> {
+    /// With the weights of a model's windows.
+    fn new(engine: &Engine<'_>, linearisation: &Linearisation, columns: &'a Columns, model: &Refit) -> Self {
+        let probes = (0..columns.count()).map(|index| columns.column(index));
+        let all: Vec<&[f64]> = linearisation.columns.iter().map(Vec::as_slice).chain(probes).collect();
+        let products = engine.products(&vec![0.0; all[0].len()], &all);
+        let mut precisions = parameter_precisions();
+        precisions.resize(all.len(), 0.0);
+        let chosen: Vec<usize> = (0..all.len()).collect();
+        let (normal, _) = products.normal(&chosen, &products.weights(&model.squares), &precisions);
+        let further = all.len() - COUNT;
+        let between = normal.view((0, COUNT), (COUNT, further));
+        let among = normal.view((COUNT, COUNT), (further, further));
+        let projected = match normal.view((0, 0), (COUNT, COUNT)).into_owned().cholesky() {
+            Some(parameters) => among - between.transpose() * parameters.solve(&between.into_owned()),
+            None => among.into_owned(),
+        };
+        Alike { columns, products: projected }
+    }
+
+    fn are(&self, left: &EffectEstimate, right: &EffectEstimate) -> bool {
+        let probes = |effect: &EffectEstimate| -> Vec<usize> {
+            let candidates = &self.columns.candidates;
+            let is_it = |candidate: &crate::candidates::Candidate| {
+                candidate.sheet.name == effect.candidate.sheet.name
+                    && candidate.place == effect.candidate.place
+            };
+            let at = candidates.iter().position(is_it);
+            at.map_or(Vec::new(), |at| self.columns.probes[at].iter().map(|(_, index)| *index).collect())
+        };
+        let right = probes(right);
+        probes(left).iter().any(|left| right.iter().any(|right| self.cosine(*left, *right) > ALIKE_COSINE))
+    }
+
+    fn cosine(&self, left: usize, right: usize) -> f64 {
+        let products = &self.products;
+        let lengths = (products[(left, left)] * products[(right, right)]).max(0.0).sqrt();
+        if lengths > 0.0 { products[(left, right)].abs() / lengths } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidates::Candidate;
+    use plant::RigParameters;
+
+    fn fit(names: &[&str], loss: f64) -> Refit {
+        let all = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]);
+        let effect = |name: &&str| {
+            let candidate = *all.iter().find(|candidate| candidate.sheet.name == *name).unwrap();
+            EffectEstimate { candidate, coordinates: candidate.origin() }
+        };
+        Refit {
+            placed: names.iter().map(effect).collect(),
+            factors: [1.0; COUNT],
+            loss,
+            squares: Vec::new(),
+            errors: Vec::new(),
+            design_effect: 1.0,
+            convergence: Default::default(),
+        }
+    }
+
+    #[test]
+    fn a_parameter_counts_by_its_tolerance() {
+        let mut factors = [1.0; COUNT];
+        assert_eq!(parameters_moved(&factors), 0.0);
+        factors[0] += PARAMETERS[0].prior_std;
+        assert!((parameters_moved(&factors) - 0.5).abs() < 1e-9);
+        factors[1] += 100.0 * PARAMETERS[1].prior_std;
+        assert!((parameters_moved(&factors) - 1.5).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_models_class_is_first_and_alike_sets_are_one() {
+        let [model, parameters] = [fit(&["inclination"], 5.0), fit(&[], 90.0)];
+        let fitted = [
+            fit(&["dead-volume"], 4.0),
+            fit(&["inclination"], 6.0),
+            fit(&["friction-asymmetry"], 7.0),
+            fit(&["friction-asymmetry", "dead-volume"], 3.0),
+            fit(&["dead-volume", "inclination"], 2.0),
+        ];
+        let fits = Fits { parameters: &parameters, model: &model, fitted: &fitted };
+        let alike = |left: &EffectEstimate, right: &EffectEstimate| {
+            [left, right].iter().all(|effect| effect.candidate.sheet.name != "dead-volume")
+        };
+        let losses: Vec<Vec<f64>> =
+            classes(&fits, alike).iter().map(|class| class.iter().map(|fit| fit.loss).collect()).collect();
+        assert_eq!(losses, [vec![5.0, 7.0], vec![2.0, 3.0], vec![4.0]]);
+    }
+}

@@ -1,0 +1,37 @@
+//! What the held-out record holds against a report: headline, words and exit code follow it.
+
+use super::{Report, Verdict};
+
+/// What the held-out record holds against a report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Objection {
+    /// A signal gets worse with the extended model.
+    Worse,
+    /// The finding does not improve it significantly.
+    NotConfirmed,
+    /// It shows something, and the training records nothing that is missing.
+    SomethingMissing,
+    /// The finding is confirmed, and more is missing there.
+    MoreMissing,
+}
+
+impl Report {
+    /// Whether the rig file explains the records as it is, insignificant changes of its parameters aside.
+    pub(crate) fn is_rig_file_enough(&self) -> bool {
+        self.verdict == Verdict::NothingMissing && self.small.is_empty()
+    }
+
+    /// What the held-out record holds against the report; `None` without one, and of records that cannot be used.
+    pub(crate) fn objection(&self) -> Option<Objection> {
+        let held_out = self.verification.as_ref().filter(|_| self.verdict != Verdict::BadData)?;
+        let found = !self.is_rig_file_enough();
+        match () {
+            () if held_out.worse => Some(Objection::Worse),
+            () if found && !held_out.confirmed => Some(Objection::NotConfirmed),
+            () if held_out.more_missing => {
+                Some(if found { Objection::MoreMissing } else { Objection::SomethingMissing })
+            }
+            () => None,
+        }
+    }
+}
