@@ -10,6 +10,7 @@
 //! | `pictures` | measured against simulated, before and after |
 //! | `finding` | names, parameters, what is outside the catalogue, what to run next |
 //! | `location` | balances, regimes, maps, unknown inputs over time |
+//! | `explanations` | what was compared: nothing, parameters, sets of effects |
 //! | `candidates` | ranking, what is not excited, detection limits |
 //! | `held_out` | gap and verification |
 //! | `checks` | the records |
@@ -19,6 +20,7 @@ mod candidates;
 mod checks;
 mod decimate;
 pub(crate) mod draw;
+mod explanations;
 mod finding;
 mod held_out;
 mod location;
@@ -74,6 +76,7 @@ pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
         ("gap", "The gap, before and after", held_out::misfit(report)),
         ("verification", "On a held-out record", held_out::verification(report)),
         ("location", "Where they disagree", location::location(report)),
+        ("explanations", "What else it could be", explanations::explanations(report)),
         ("candidates", "Candidates, the best first", candidates::candidates(report)),
         ("limits", "What these records can show", candidates::limits(report)),
         ("records", "The records", checks::checks(report)),

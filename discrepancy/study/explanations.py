@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Collects the evidence of explanations on draws of the study, and fits a conditional logit to it.
 
-  explanations.py collect STUDY [--left-out] [--most N] [--program FILE]
+  explanations.py collect STUDY [--left-out] [--most N] [--program FILE | --label NAME]
                           appends to explanations.csv; draws that are there are not done again
   explanations.py fit     prints weights, and the reliability of cross-validated probabilities
 
 STUDY is a folder of `scripts/study` with records and classes (`one records`, `cosines`). --left-out takes the hidden effect and
 those alike out of the catalogue: then none of these is right. The program is the example `explanations` of the crate
-discrepancy: cargo build --release -p discrepancy --example explanations.
+discrepancy: cargo build --release -p discrepancy --example explanations. --label takes the reports of a study that was run
+(`scripts/study run`, `one run`, `one leave-out`) under that label instead.
 
 Conditional logit (McFadden 1974): of a record, explanation j has the probability exp(w'x_j) / sum_k exp(w'x_k). The weights
 maximise the log-likelihood of the right explanations minus RIDGE |w|^2 / 2.
@@ -57,17 +58,23 @@ def collect(arguments: argparse.Namespace) -> None:
         key = (str(plan["seed"]), str(number), str(int(arguments.left_out)))
         record = study / "records" / f"{number:04}" / "train" / "measurement.csv"
         classes = study / "classes" / f"{number:04}.json"
-        if key in done or (arguments.left_out and len(hidden) != 1) or not record.exists():
+        if key in done or (arguments.left_out and len(hidden) != 1):
             continue
         if hidden and not classes.exists():
             print(f"draw {number}: no classes: scripts/study cosines --out {study}", file=sys.stderr)
             continue
         twins = twins_of(classes, hidden)
         without = sorted({twin.split()[0] for twin in set().union(*twins)}) if arguments.left_out else []
-        done_run = subprocess.run(
-            [arguments.program, RIG, record, *without], check=True, capture_output=True, text=True
-        )
-        explanations = json.loads(done_run.stdout)
+        if arguments.label:
+            report = study / "runs" / arguments.label / f"{number:04}" / "report.json"
+            explanations = json.loads(report.read_text()).get("explanations") if report.exists() else None
+        elif record.exists():
+            command = [arguments.program, RIG, record, *without]
+            explanations = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        else:
+            explanations = None
+        if not explanations:
+            continue
         truth = "parameters" if draw["wrong_parameters"] and not hidden else "effects" if hidden else "nothing"
         append(judged(key, explanations, "none-of-these" if arguments.left_out else truth, twins, hidden))
         added += 1
@@ -257,14 +264,16 @@ def fit(_: argparse.Namespace) -> None:
     for regressor, weight in zip(REGRESSORS, fitted(known), strict=True):
         print(f"{regressor:16} {weight:8.3f}")
     said: list[tuple[float, bool]] = []
-    loss = 0.0
+    loss, first = 0.0, 0
     for fold in range(FOLDS):
         weights = fitted([record for at, record in enumerate(known) if at % FOLDS != fold])
         for explanations, right in known[fold::FOLDS]:
             shares = probabilities(weights, explanations)
             loss -= math.log(max(sum(itertools.compress(shares, right)), 1e-300))
+            first += right[shares.index(max(shares))]
             said += zip(shares, right, strict=True)
-    print(f"{len(known)} records, mean log loss {loss / len(known):.3f} in {FOLDS} folds that the weights did not see")
+    print(f"{len(known)} records in {FOLDS} folds that the weights did not see: mean log loss {loss / len(known):.3f},")
+    print(f"the right explanation is the most probable one of {first}")
     print("probability     explanations  mean said  right")
     for low, high in itertools.pairwise(BINS):
         of_bin = [(p, right) for p, right in said if low <= p < high or p == high == 1]
@@ -282,6 +291,7 @@ def main() -> int:
     collecting.add_argument("--left-out", action="store_true")
     collecting.add_argument("--most", type=int, help="draws that are added at most")
     collecting.add_argument("--program", type=Path, default=PROGRAM)
+    collecting.add_argument("--label", help="reports of a study that was run, in place of the program")
     collecting.set_defaults(run=collect)
     commands.add_parser("fit").set_defaults(run=fit)
     arguments = parser.parse_args()

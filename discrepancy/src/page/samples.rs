@@ -383,6 +383,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
                 ),
             ];
             report.candidates.clear();
+            report.explanations.clear();
             report.location = None;
             report.adequate = None;
             report.misfit.clear();

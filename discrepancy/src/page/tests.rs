@@ -117,6 +117,19 @@ fn a_held_out_record_that_shows_more_than_the_model_stands_in_the_headline() {
 }
 
 #[test]
+fn what_was_compared_stands_with_what_speaks_against_it() {
+    let seen = text(&made(Verdict::Named));
+    // exp(3.1), exp(-0.01).
+    for part in [
+        "What else it could be",
+        "the rig file as it is 22.2 4200",
+        "piston-leakage at the drive axis, or valve-null-leakage at the drive axis 0.990 0 0.400 2.0 %",
+    ] {
+        assert!(seen.replace(" ", "").contains(&part.replace(" ", "")), "{part}: {seen}");
+    }
+}
+
+#[test]
 fn small_effects_stand_apart_from_what_is_missing() {
     let seen = text(&made(Verdict::Named));
     let named = seen.find("piston-leakage at the drive axis: leakage").expect("what is missing");
