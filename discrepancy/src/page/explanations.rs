@@ -30,9 +30,9 @@ pub(super) fn explanations(report: &Report) -> String {
         return table;
     }
     paragraph(
-        "The right explanation leaves about 1 times the noise, moves few parameters, and all stretches of the records agree on its \
-         amplitude. Where no row does all three, it is none of these: look at where they disagree, and record more. Where two \
-         rows do, a difference of less than 9 in loss does not tell them apart.",
+        "The right explanation leaves about 1 times the noise, moves few parameters, and all stretches of the records agree on \
+         its amplitude. Where no row does all three, it is none of these: look at where they disagree, and record more. \
+         Where two rows do, a difference of less than 9 in loss does not tell them apart.",
     ) + &table
 }
 
