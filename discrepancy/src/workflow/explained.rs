@@ -11,7 +11,7 @@ use crate::report;
 /// cannot be used.
 ///
 /// # Errors
-/// [`WorkflowError`] as of [`close`].
+/// [`WorkflowError`] as of [`super::close`].
 pub fn explained(
     task: &Task,
     progress: &mut dyn FnMut(&str),
