@@ -65,14 +65,13 @@ pub fn read(file: &Path) -> Result<Model, ModelError> {
     Ok(Model::parse(&text, file)?)
 }
 
-/// What came out.
+/// Result of closing a model.
 #[derive(Clone, Debug)]
 pub struct ClosedModel {
-    /// What was found.
     pub report: ModelReport,
     /// Why the held-out records were not judged.
     pub not_judged: Option<String>,
-    /// The page.
+    /// `report.html`, self-contained.
     pub page: String,
 }
 

@@ -25,7 +25,6 @@ pub(crate) enum Event {
     Ended(Pid, ExitStatus),
     /// A person or a supervisor wants the end.
     Interrupted,
-    /// The deadline passed.
     TimeUp,
 }
 

@@ -14,7 +14,6 @@ pub struct Cli {
     pub command: Command,
 }
 
-/// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run an experiment: emulator and controller as two processes on one bus, a table, a picture and a folder.

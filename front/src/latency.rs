@@ -14,6 +14,7 @@ use crate::{Front, FrontError, last_lines, say};
 use protocol::exit::Exit;
 use runlog::conditions::Conditions;
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use rustix::thread::{CpuSet, sched_getaffinity};
 use slices::{Bench, Slice, logs};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -121,13 +122,8 @@ impl Asked {
 
 /// Numbers of the CPUs that this process may use.
 fn allowed_cpus() -> Vec<usize> {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap_or_default();
-    let range = |part: &str| {
-        let (first, last) = part.split_once('-').unwrap_or((part, part));
-        Some(first.trim().parse().ok()?..=last.trim().parse().ok()?)
-    };
-    list.split(',').filter_map(range).flatten().collect()
+    let allowed = sched_getaffinity(None).unwrap_or_default();
+    (0..CpuSet::MAX_CPU).filter(|cpu| allowed.is_set(*cpu)).collect()
 }
 
 /// Whether a command is there, by its path or on `PATH`.

@@ -18,9 +18,9 @@ pub struct Model {
     pub record: RecordLayout,
     /// Rows at the head of a held-out record on which its own numbers are fitted; they are not scored.
     pub start_samples: usize,
-    /// How it is integrated.
+    /// Method of integration, with its tolerance or its step.
     pub solver: Solver,
-    /// Measured inputs.
+    /// Columns that drive the equations.
     pub inputs: Vec<Input>,
     /// Parameters of the model and of its suspects.
     pub parameters: Vec<Parameter>,
@@ -28,9 +28,9 @@ pub struct Model {
     pub states: Vec<State>,
     /// Values that are kept over a step.
     pub memories: Vec<Memory>,
-    /// Named parts of equations.
+    /// `[define]`: expressions that others use by name.
     pub definitions: Vec<Definition>,
-    /// Measured outputs.
+    /// Columns that the model is compared with.
     pub outputs: Vec<Output>,
     /// Terms that may be missing.
     pub suspects: Vec<Suspect>,
@@ -47,7 +47,7 @@ pub struct RecordLayout {
     pub time_column: String,
     /// Seconds in a unit of that column.
     pub time_unit_s: f64,
-    /// Between the cells.
+    /// One character between two cells.
     pub separator: String,
     /// Whether decimals are written with a comma.
     pub is_decimal_comma: bool,
@@ -59,7 +59,7 @@ pub struct RecordLayout {
     pub absent: Vec<String>,
 }
 
-/// How equations are integrated.
+/// Method of integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {
     /// Dormand-Prince 5(4) with step control; no step goes over a sample.
@@ -69,7 +69,7 @@ pub enum Solver {
     },
     /// Classical Runge-Kutta of fourth order, with steps that are at most so long and end at samples.
     Fixed {
-        /// Longest step.
+        /// Longest step, s.
         step_s: f64,
     },
 }
@@ -77,7 +77,7 @@ pub enum Solver {
 /// An expression of the file.
 #[derive(Clone, Debug)]
 pub struct Expression {
-    /// As it is written.
+    /// As it is written in the file.
     pub text: String,
     pub(crate) root: Place,
     pub(crate) at: usize,
@@ -117,24 +117,24 @@ pub struct Parameter {
     pub suspect: Option<usize>,
 }
 
-/// Where a state begins.
+/// Value of a state at the first sample of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// Known.
+    /// A number of the file, which is not fitted.
     Known {
-        /// The value.
+        /// In the SI unit of the state.
         value_si: f64,
     },
     /// Fitted, for each record.
     Fitted {
-        /// Where the fit starts.
+        /// Value before the first step of the fit.
         guess_si: f64,
-        /// Least and largest value.
+        /// Least and largest value; infinite where the file has none.
         range_si: [f64; 2],
     },
     /// The first sample of an output.
     Record {
-        /// Which output.
+        /// Index into [`Model::outputs`].
         output: usize,
     },
 }
@@ -144,11 +144,11 @@ pub enum Start {
 pub struct State {
     /// Its name in expressions.
     pub name: String,
-    /// Its unit.
+    /// Unit in which it is written and reported.
     pub unit: Unit,
-    /// Where it begins.
+    /// Value at the first sample.
     pub start: Start,
-    /// Its rate of change.
+    /// Rate of change, in the unit of the state per second.
     pub derivative: Expression,
     /// The suspect that it belongs to.
     pub suspect: Option<usize>,
@@ -159,7 +159,7 @@ pub struct State {
 pub struct Memory {
     /// Its name in expressions.
     pub name: String,
-    /// Its unit.
+    /// Unit in which it is written and reported.
     pub unit: Unit,
     /// Its value before the first step.
     pub start_si: f64,
@@ -174,7 +174,7 @@ pub struct Memory {
 pub struct Definition {
     /// Its name in expressions.
     pub name: String,
-    /// What it is.
+    /// Its value at an instant.
     pub value: Expression,
     /// The suspect that it belongs to.
     pub suspect: Option<usize>,
@@ -206,18 +206,18 @@ pub enum Target {
     State(usize),
     /// A definition.
     Definition(usize),
-    /// What a sensor reads.
+    /// The value that an output reports.
     Output(usize),
 }
 
 /// How a suspect changes its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// It is added.
+    /// Added to the target.
     Add,
-    /// It is a factor.
+    /// Multiplies the target.
     Multiply,
-    /// It stands instead; the name of its target is the value without it.
+    /// Stands instead of the target; the name of its target is the value without it.
     Replace,
 }
 
@@ -226,15 +226,15 @@ pub enum Change {
 pub struct Suspect {
     /// What it is called in reports.
     pub name: String,
-    /// What it changes.
+    /// The input, equation, definition or output that it changes.
     pub target: Target,
-    /// How it changes it.
+    /// Added, a factor, or in its place.
     pub change: Change,
-    /// By what.
+    /// The term, the factor or the replacement, in the unit of the target or, as a factor, without one.
     pub expression: Expression,
     /// Suspects that are known to do the same.
     pub twins: Vec<String>,
-    /// It is carried to be rejected.
+    /// Carried to be rejected: one that does better than every suspect ends the search.
     pub is_decoy: bool,
 }
 

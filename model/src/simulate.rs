@@ -62,15 +62,15 @@ pub enum Failure {
     Start {
         /// File, line and column of its equation.
         place: String,
-        /// What it is.
+        /// The equation of a state, or the output.
         what: String,
     },
     /// A state or output that runs away.
     #[error("{what} is no finite number at {time_s} s")]
     NotFinite {
-        /// What it is.
+        /// The state or output, as the file names it.
         what: String,
-        /// When.
+        /// Time of the record, s.
         time_s: f64,
     },
     /// Steps that would never end.
@@ -78,7 +78,7 @@ pub enum Failure {
         "more than {MOST_STEPS} steps from {time_s} s to the next sample: the equations are stiff or do not end"
     )]
     Steps {
-        /// The sample before.
+        /// Time of the sample before, s.
         time_s: f64,
     },
 }

@@ -39,7 +39,7 @@ impl<'a> Source<'a> {
         Self { columns: true, ..self }
     }
 
-    /// The whole text.
+    /// The file as it was parsed.
     #[must_use]
     pub fn text(&self) -> &str {
         self.text

@@ -69,21 +69,20 @@ fn pictures(model: &Model, report: &ModelReport, traces: &[Traces]) -> String {
                 rows => format!(" (its first {rows} samples are for its start)"),
             };
             let caption = format!("{}, {kind}{start}: {}", trace.record, what.name);
-            all.push(curves(
-                &identifier,
-                &caption,
-                &label,
-                &trace.time_s[rows.clone()],
-                &scaled,
-                rows.clone(),
+            let time_s = &trace.time_s[rows.clone()];
+            let of = |which: usize| scaled[which][rows.clone()].to_vec();
+            let left = |which: usize| rows.clone().map(|row| scaled[0][row] - scaled[which][row]).collect();
+            all.push(lines_over_time(
+                (&identifier, &caption, &label),
+                "Measured, the model alone and the extended model over time.",
+                time_s,
+                &[of(0), of(1), of(2)],
             ));
-            all.push(differences(
-                &format!("{identifier}-left"),
-                &caption,
-                &label,
-                &trace.time_s[rows.clone()],
-                &scaled,
-                rows,
+            all.push(lines_over_time(
+                (&format!("{identifier}-left"), &format!("{caption}, measured minus model"), &label),
+                "What both models leave over time.",
+                time_s,
+                &[left(1), left(2)],
             ));
         }
     }
@@ -103,52 +102,24 @@ fn rows(series: &[Vec<f64>; 3]) -> Range<usize> {
     first..first + STRETCH_ROWS
 }
 
-const LOOKS: [&str; 3] = ["line measured", "line s1", "line s2"];
+const LINES: [(&str, &str); 3] =
+    [("line measured", "measured"), ("line s1", "model"), ("line s2", "extended")];
 
-fn curves(
-    identifier: &str,
-    caption: &str,
-    label: &str,
+/// A picture of the last of [`LINES`], as many as there are values.
+fn lines_over_time(
+    (identifier, caption, label): (&str, &str, &str),
+    description: &str,
     time_s: &[f64],
-    series: &[Vec<f64>; 3],
-    rows: Range<usize>,
+    values: &[Vec<f64>],
 ) -> String {
-    let of = |which: usize| series[which][rows.clone()].iter().copied();
-    let Some(values) = range((0..3).flat_map(of)) else { return String::new() };
-    let mut plot = Plot::new((time_s[0], time_s[time_s.len() - 1]), values, "time s", label);
-    for (which, look) in LOOKS.into_iter().enumerate() {
-        plot.line(look, time_s.iter().copied().zip(of(which)));
+    let Some(bounds) = range(values.iter().flatten().copied()) else { return String::new() };
+    let mut plot = Plot::new((time_s[0], time_s[time_s.len() - 1]), bounds, "time s", label);
+    let lines = &LINES[LINES.len() - values.len()..];
+    for ((look, _), values) in lines.iter().zip(values) {
+        plot.line(look, time_s.iter().copied().zip(values.iter().copied()));
     }
-    let legend = [
-        (Sample::Line(LOOKS[0]), "measured"),
-        (Sample::Line(LOOKS[1]), "model"),
-        (Sample::Line(LOOKS[2]), "extended"),
-    ];
-    figure(
-        caption,
-        "",
-        &legend,
-        &plot.drawn(identifier, caption, "Measured, the model alone and the extended model over time."),
-    )
-}
-
-fn differences(
-    identifier: &str,
-    caption: &str,
-    label: &str,
-    time_s: &[f64],
-    series: &[Vec<f64>; 3],
-    rows: Range<usize>,
-) -> String {
-    let of = |which: usize| rows.clone().map(move |row| series[0][row] - series[which][row]);
-    let Some(values) = range(of(1).chain(of(2))) else { return String::new() };
-    let mut plot = Plot::new((time_s[0], time_s[time_s.len() - 1]), values, "time s", label);
-    for which in [1, 2] {
-        plot.line(LOOKS[which], time_s.iter().copied().zip(of(which)));
-    }
-    let legend = [(Sample::Line(LOOKS[1]), "model"), (Sample::Line(LOOKS[2]), "extended")];
-    let caption = format!("{caption}, measured minus model");
-    figure(&caption, "", &legend, &plot.drawn(identifier, &caption, "What both models leave over time."))
+    let legend: Vec<_> = lines.iter().map(|(look, name)| (Sample::Line(look), *name)).collect();
+    figure(caption, "", &legend, &plot.drawn(identifier, caption, description))
 }
 
 fn named(report: &ModelReport) -> String {

@@ -17,7 +17,7 @@ const SCHEMA_VERSION: u32 = 1;
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelReport {
     pub schema_version: u32,
-    /// The model file.
+    /// Path of the model file as it was given.
     pub model: String,
     pub name: String,
     pub train: Vec<String>,
