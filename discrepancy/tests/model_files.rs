@@ -118,6 +118,11 @@ fn a_hidden_term_is_named_and_confirmed_with_its_number() {
     roxmltree::Document::parse_with_options(&closed.page, options)
         .unwrap_or_else(|error| panic!("the page is well-formed: {error}"));
     assert!(closed.page.contains("cubic-stiffness") && closed.page.contains("dv/dt = "));
+    // A line without a colour in the style sheet is not seen.
+    for name in closed.page.split("class=\"line ").skip(1).filter_map(|rest| rest.split('"').next()) {
+        assert!(closed.page.contains(&format!(".{name}{{--c:")), "line {name} is drawn without a colour");
+    }
+    assert!(closed.page.contains("class=\"line s0\""), "the measured line");
 }
 
 #[test]

@@ -102,8 +102,7 @@ fn rows(series: &[Vec<f64>; 3]) -> Range<usize> {
     first..first + STRETCH_ROWS
 }
 
-const LINES: [(&str, &str); 3] =
-    [("line measured", "measured"), ("line s1", "model"), ("line s2", "extended")];
+const LINES: [(&str, &str); 3] = [("line s0", "measured"), ("line s1", "model"), ("line s2", "extended")];
 
 /// A picture of the last of [`LINES`], as many as there are values.
 fn lines_over_time(
