@@ -1,11 +1,17 @@
 //! Child processes, and the signals that end them: whoever waits for one hears of both.
 //!
 //! Ctrl-C reaches the whole group of processes, a signal to `airbench` only `airbench`, which passes it on as SIGTERM. Children
-//! save what they have and end by themselves. A child is reaped by its owner alone: its number is nobody else's until then.
+//! save what they have and end by themselves. A child is reaped by its owner alone: its number is nobody else's until then. When
+//! this process is killed, the kernel sends them SIGTERM (`PR_SET_PDEATHSIG`).
+
+#![allow(unsafe_code)] // what a new process does before exec, nothing else
 
 use crate::FrontError;
 use rustix::io::Errno;
-use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process, kill_process_group, waitid};
+use rustix::process::{
+    Pid, Signal, WaitId, WaitIdOptions, getpid, getppid, kill_process, kill_process_group,
+    set_parent_process_death_signal, waitid,
+};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::{flag, iterator::Signals};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -85,7 +91,14 @@ impl Children {
             command.process_group(0);
         }
         let program = command.get_program().display().to_string();
-        let child = command.stdin(Stdio::null()).spawn();
+        let owner = getpid();
+        let end_with_owner = move || {
+            set_parent_process_death_signal(Some(Signal::TERM))?;
+            // It may have ended before.
+            if getppid() == Some(owner) { Ok(()) } else { Err(Errno::SRCH.into()) }
+        };
+        // SAFETY: between fork and exec it makes two system calls, and takes no lock and no memory.
+        let child = unsafe { command.stdin(Stdio::null()).pre_exec(end_with_owner) }.spawn();
         let child = child.map_err(|reason| FrontError::Start { program, reason })?;
         let number = Pid::from_child(&child);
         let told = self.sender.clone();
@@ -211,6 +224,11 @@ mod tests {
         }
     }
 
+    /// Whether a process is gone, or only waits for whoever reaps it.
+    fn has_ended(number: &str) -> bool {
+        std::fs::read_to_string(format!("/proc/{number}/stat")).map_or(true, |stat| stat.contains(") Z"))
+    }
+
     #[test]
     fn exit_codes_are_those_of_a_shell() {
         let mut children = Children::watch().unwrap();
@@ -230,9 +248,19 @@ mod tests {
         eventually(|| file.exists());
         let number = std::fs::read_to_string(&file).unwrap();
         drop(children);
-        eventually(|| match std::fs::read_to_string(format!("/proc/{}/stat", number.trim())) {
-            Ok(stat) => stat.contains(") Z"), // not yet reaped by its new parent
-            Err(_) => true,
-        });
+        eventually(|| has_ended(number.trim()));
+    }
+
+    /// The kernel takes the end of the thread that started a child for that of the process.
+    #[test]
+    fn children_end_when_their_owner_is_gone_without_a_word() {
+        let start = || {
+            let mut children = Children::watch().unwrap();
+            let child = children.start(Command::new("sleep").arg("1000")).unwrap();
+            std::mem::forget(children);
+            child
+        };
+        let child = std::thread::spawn(start).join().unwrap();
+        eventually(|| has_ended(&child.as_raw_pid().to_string()));
     }
 }
