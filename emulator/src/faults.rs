@@ -38,7 +38,7 @@ pub struct Fault {
 /// Why something is no fault of the table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are")]
+    #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are{near}", near = of_the_kind(.0))]
     Unknown(String),
     #[error("at = '{at}': {fault} is at {allowed}")]
     Place { fault: &'static str, at: String, allowed: String },
@@ -58,6 +58,14 @@ const PLACES_TOLD: usize = 12;
 /// Why a fault of the bus cannot be put into a run.
 pub const NEEDS_HOST: &str =
     "only the embedded bus that this emulator hosts can do it; use --bus unix:///PATH without another host";
+
+/// The faults that begin with the same word as a name that is none.
+fn of_the_kind(name: &str) -> String {
+    let kind = name.split('-').next();
+    let near: Vec<_> =
+        table::all().map(|spec| spec.name).filter(|near| near.split('-').next() == kind).collect();
+    if near.is_empty() { String::new() } else { format!(", such as {}", near.join(", ")) }
+}
 
 impl Fault {
     /// A fault of this name at this place, for comparisons: its numbers mean nothing.

@@ -312,7 +312,11 @@ mod tests {
             ("[[fault]]\nname = 3\n".to_owned(), "f.toml:2: name = 3: allowed: a text"),
             (
                 "[[fault]]\nname = \"valve\"\n".to_owned(),
-                "f.toml:2: fault 'valve' is unknown; 'emulator faults'",
+                "f.toml:2: fault 'valve' is unknown; 'emulator faults' lists those that there are, such as valve-",
+            ),
+            (
+                "[[fault]]\nname = \"volve-stuck\"\n".to_owned(),
+                "f.toml:2: fault 'volve-stuck' is unknown; 'emulator faults' lists those that there are",
             ),
             (
                 "[[fault]]\nname = \"valve-stuck\"\nat = \"both\"\n".to_owned(),
