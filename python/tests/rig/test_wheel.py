@@ -43,11 +43,13 @@ def run(folder, *words):
 
 
 def expect_front_command(folder):
-    """`airbench` of the wheel: a run, and the tests with the interpreter whose command it is."""
+    """`airbench` of the wheel: a run, the tests with the interpreter whose command it is, and an FMU."""
     environment = {"PATH": "/usr/bin:/bin", "HOME": str(folder), "AIRBENCH_PYTEST_LOCK": str(folder / "lock")}
+    [rig] = folder.glob("venv/lib/python3*/site-packages/airbench_hil/data/rig.toml")
     for words, printed in {
         ("run", "--lockstep", "--out", "run"): "passed                                        yes",
         ("test", "-q", "test_first.py"): "passed",
+        ("bench", "export-fmu", "--rig", rig, "--out", "plant.fmu"): "plant.fmu: FMI 2.0 co-simulation",
     }.items():
         command = [folder / "venv/bin/airbench", *words]
         done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
