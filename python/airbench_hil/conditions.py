@@ -136,7 +136,8 @@ class _Compiler(ast.NodeTransformer):
         return _call("_v", self.signals.index(signal))
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
-        raise self.wrong(f"'{node.id}' is no signal; signals are Message.signal")
+        near = [name for name in self.names.signals if name.endswith(f".{node.id}")]
+        raise self.wrong(f"'{node.id}' is no signal; signals are Message.signal{': ' * bool(near)}{', '.join(near)}")
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         if isinstance(node.value, str):
@@ -197,7 +198,10 @@ def parse(text: str, names: Names) -> Condition:
     except SyntaxError as error:
         raise SignalUnknown(f"'{text}': {error.msg}") from error
     compiler = _Compiler(names, text)
-    tree = ast.fix_missing_locations(compiler.visit(tree))
+    try:
+        tree = ast.fix_missing_locations(compiler.visit(tree))
+    except SignalUnknown as error:
+        raise error.with_traceback(None) from None  # the way through the tree says nothing to who wrote the text
     return Condition(text, compiler.signals, compile(tree, text, "eval"), compiler.parts)
 
 

@@ -204,8 +204,12 @@ class Answering:
         opening = self._law(Sensors(cycle, *(part.of(word) for part in self._parts)))
         if opening is None:
             return None
-        if not -1.0 <= opening <= 1.0:  # a NaN lies in no range
-            raise ValueError(f"cycle {cycle}: the controller gave an opening of {opening}; -1 to 1 are allowed")
+        try:
+            allowed = bool(-1.0 <= opening <= 1.0)  # a NaN lies in no range
+        except (TypeError, ValueError):  # a text; an array of several numbers
+            allowed = False
+        if not allowed:
+            raise ValueError(f"cycle {cycle}: the controller gave an opening of {opening!r}; numbers from -1 to 1 are allowed, or None")
         self._alive = (self._alive + 1) % 16
         values = {"opening": float(opening), "alive": self._alive, "echo": cycle % 4096, "enable": 1}
         return self._names.encoded(self._command, values)

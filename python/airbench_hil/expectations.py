@@ -126,7 +126,6 @@ class Expectations:
 
         :raises ExpectationFailed: it did not hold within that time.
         """
-        __tracebackhide__ = True  # of pytest: a failure is shown where the test expects
         watch, began_s = self._watch(test), self._now_s
         until_s = began_s + seconds(within) - _HALF_S
         try:
@@ -140,7 +139,6 @@ class Expectations:
 
     def wait_for(self, test: Test, timeout: Duration = "60 s") -> float:
         """As `expect`, for what a test only needs to go on: a state of the rig, a phase of the experiment."""
-        __tracebackhide__ = True
         return self.expect(test, within=timeout)
 
     def never(self, test: Test, during: Duration) -> None:
@@ -148,7 +146,6 @@ class Expectations:
 
         :raises ExpectationFailed: it did, or the run ended before.
         """
-        __tracebackhide__ = True
         self._hold(test, seconds(during), wanted=False, what="never")
 
     def always(self, test: Test, during: Duration) -> None:
@@ -156,11 +153,9 @@ class Expectations:
 
         :raises ExpectationFailed: it did not, or the run ended before.
         """
-        __tracebackhide__ = True
         self._hold(test, seconds(during), wanted=True, what="always")
 
     def _hold(self, test: Test, during_s: float, wanted: bool, what: str) -> None:
-        __tracebackhide__ = True
         watch, began_s = self._watch(test), self._now_s
         until_s = began_s + during_s - _HALF_S
         title = f"expected {what} for {during_s:g} s: {_text(test)}"
@@ -184,7 +179,6 @@ class Expectations:
         :returns: the rig's time at which the stable part began, s.
         :raises ExpectationFailed: there was no such part.
         """
-        __tracebackhide__ = True
         wanted_s, since = seconds(duration), self._steady(what, tolerance)
         began_s = self._now_s
         until_s = began_s + seconds(within) - _HALF_S
@@ -231,7 +225,6 @@ class Expectations:
         return parse(text, self.names)
 
     def _fail(self, title: str, test: Test, began_s: float, why: str) -> NoReturn:
-        __tracebackhide__ = True
         signals: list[Signal] = []
         if isinstance(test, str):
             signals = [self.names.signal(test)] if test in self.names.signals else self._condition(test).signals

@@ -10,6 +10,7 @@ import fcntl
 import os
 import re
 import shutil
+import sys
 import tempfile
 import time
 import zlib
@@ -74,6 +75,15 @@ def pytest_configure(config: pytest.Config) -> None:
     except (OSError, ValueError) as error:
         raise pytest.UsageError(f"airbench_requirements: {error}") from error
     config.stash[_TRACE] = Traceability()
+    for name, module in list(sys.modules.items()):
+        if name.startswith("airbench_hil."):
+            vars(module)["__tracebackhide__"] = _is_explained
+
+
+def _is_explained(error: pytest.ExceptionInfo[BaseException]) -> bool:
+    """The message says it all, or what broke is a controller: a traceback then has the lines of the test alone (not with --full-trace)."""
+    ours = Path(error.traceback[-1].path).parent == programs.PACKAGE
+    return not ours or error.errisinstance((AirbenchError, AssertionError, ImportError, ValueError))
 
 
 def requirements_of(item: pytest.Item) -> list[str]:

@@ -461,6 +461,8 @@ class Rig(Expectations, People):
 def _controllers(asked: Controller | Law | Sequence[Controller | Law] | None) -> list[Controller]:
     if asked is None:
         return []
+    if isinstance(asked, str):
+        raise ValueError(f"controller {asked!r}: Own({asked!r}) runs an axis program, Process({asked!r}) a command")
     every: Sequence[Controller | Law] = asked if isinstance(asked, Sequence) else [asked]
     for each in every:
         if not isinstance(each, (Own, Process, Elf, Python)) and not callable(each):

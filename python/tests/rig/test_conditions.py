@@ -99,7 +99,7 @@ def test_the_age_of_a_message_is_the_rigs_time_since_it(bus):
 @pytest.mark.parametrize("text, words", [
     ("DriveSensors.posision > 1", "DriveSensors.position"),
     ("Drive.position > 1", "DriveSensors"),
-    ("position > 1", "Message.signal"),
+    ("position > 1", "Message.signal: DriveSensors.position, LoadSensors.position"),
     ('DriveChainStatus.main_chain == "dine"', "experiment"),
     ('DriveSensors.position == "far"', "no words"),
     ("DriveSensors.position >", "invalid syntax"),

@@ -100,6 +100,31 @@ def test_a_failure_is_reported_with_its_folder_and_requirements_reach_junit_and_
     assert "UID: REQ-4\nSTATUS: untested" in (suite.path / "trace/requirements.sdoc").read_text()
 
 
+def test_a_traceback_has_the_lines_of_the_test_and_of_its_controller_alone_unless_the_package_broke(suite):
+    suite.makepyfile(test_suite="""
+        from airbench_hil import conditions
+
+        def broken(sensors):
+            return 1 / (sensors.cycle - 5)
+
+        def test_controller(airbench_rig):
+            airbench_rig(controller=broken).run_for("1 s")
+
+        def test_signal(airbench_rig):
+            airbench_rig().expect("position > 0.3")
+
+        def test_package():
+            conditions.parse(None, None)
+    """)
+    result = run(suite, "--tb=short", "-k", "not package")
+    result.assert_outcomes(failed=2)
+    result.stdout.fnmatch_lines([
+        "*return 1 / (sensors.cycle - 5)", "*ZeroDivisionError*", "*Message.signal: DriveSensors.position, LoadSensors.position*",
+    ])
+    result.stdout.no_re_match_line(r".*airbench_hil/\w+\.py:\d+|.*/ast\.py:\d+")
+    run(suite, "--tb=short", "-k", "package").stdout.re_match_lines([r".*airbench_hil/conditions\.py:\d+: in parse"])
+
+
 def test_last_failed_runs_it_alone_and_only_folders_of_failures_are_kept_if_asked(suite):
     suite.runpytest_subprocess("--airbench-keep=failed", timeout=120).assert_outcomes(passed=2, failed=1, skipped=1)
     assert [path.name for path in (suite.path / "runs").iterdir()] == ["test_suite.py-test_fails"]

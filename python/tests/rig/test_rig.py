@@ -156,6 +156,7 @@ def test_bad_input_is_the_programs_own_message_and_exit_code(tmp_path):
         ({"controller": Own("position-q"), "experiment": "step"}, "position-cascade"),
         ({"controller": Own()}, "runs an experiment"),
         ({"controller": [Own(), Own()], "experiment": "step"}, "named controller"),
+        ({"controller": "position-p", "experiment": "step"}, r"Own\('position-p'\) runs an axis program"),
         ({"pace": "fast"}, "lockstep"),
         ({"controller": airbench_hil.Elf("x.elf"), "pace": "real"}, "lockstep only"),
     ]:
@@ -186,7 +187,7 @@ def test_a_python_controllers_own_exception_reaches_the_test_and_so_does_a_bad_o
 
     with Rig(controller=raising, out=tmp_path / "raising") as rig, pytest.raises(KeyError, match="mine"):
         rig.run_for("1 s")
-    for opening in (1.5, float("nan")):
+    for opening in (1.5, float("nan"), "0.5", [0.5, 0.5]):
         with Rig(controller=lambda _: opening, out=tmp_path / "bad") as rig:  # noqa: B023
             with pytest.raises(ValueError, match="cycle 0.*-1 to 1 are allowed"):
                 rig.run_for("1 s")
