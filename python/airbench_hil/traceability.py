@@ -1,12 +1,21 @@
-"""Requirements, the tests that verify them, and verdicts: as Markdown, for sphinx-needs (needs.json) and for StrictDoc (.sdoc)."""
+"""Requirements, the tests that verify them, and verdicts: as Markdown, for sphinx-needs (needs.json) and for StrictDoc (.sdoc).
+
+pytest writes them by the plugin; `python -m airbench_hil.traceability` of Robot Framework's results and of JUnit files.
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
+import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from airbench_hil.errors import BAD_INPUT, GOOD
 
 if TYPE_CHECKING:
     import pytest
@@ -48,6 +57,11 @@ class Traceability:
                 tests[report.nodeid] = SKIPPED
             elif report.when == "call" and before is None:
                 tests[report.nodeid] = PASSED
+
+    def add(self, test: str, requirements: Sequence[str], verdict: str) -> None:
+        """A test that is over."""
+        for requirement in requirements:
+            self.verdicts.setdefault(requirement, {})[test] = verdict
 
     def verdict(self, requirement: str) -> str:
         """Failed if one test has, passed if all that ran have and one did, skipped or untested else."""
@@ -121,3 +135,77 @@ def _test_ids(verdicts: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
         used.add(name)
         ids[test] = name
     return ids
+
+
+def results(path: Path, is_requirement: Callable[[str], bool]) -> Iterator[tuple[str, list[str], str]]:
+    """Tests of a JUnit file or of Robot Framework's output.xml: name, requirements, verdict.
+
+    :param is_requirement: whether a tag of Robot Framework is one.
+    :raises OSError: it cannot be read.
+    :raises ValueError: it is none of both.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{path}: {error}") from error
+    if root.tag == "robot":
+        for suite in root.findall("suite"):
+            for test, tags, verdict in _of_robot(suite, ""):
+                yield test, [tag for tag in tags if is_requirement(tag)], verdict
+    elif root.tag in ("testsuites", "testsuite"):
+        yield from _of_junit(root)
+    else:
+        raise ValueError(f"{path}: <{root.tag}> is none of <robot> (Robot Framework's output.xml), <testsuites>, <testsuite> (JUnit)")
+
+
+def _of_robot(suite: ElementTree.Element, above: str) -> Iterator[tuple[str, list[str], str]]:
+    name = f"{above}{suite.get('name', '')}."
+    for test in suite.findall("test"):
+        status = test.find("status")
+        word = status.get("status", "") if status is not None else ""
+        verdict = {"PASS": PASSED, "SKIP": SKIPPED}.get(word, FAILED)
+        yield f"{name}{test.get('name', '')}", [tag.text or "" for tag in test.iter("tag")], verdict
+    for below in suite.findall("suite"):
+        yield from _of_robot(below, name)
+
+
+def _of_junit(root: ElementTree.Element) -> Iterator[tuple[str, list[str], str]]:
+    for case in root.iter("testcase"):
+        broke = case.find("failure") is not None or case.find("error") is not None
+        verdict = FAILED if broke else SKIPPED if case.find("skipped") is not None else PASSED
+        named = [each.get("value", "") for each in case.iter("property") if each.get("name") == "requirement"]
+        yield ".".join(part for part in (case.get("classname"), case.get("name")) if part), named, verdict
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """The command line; gives the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m airbench_hil.traceability",
+        description="Writes requirements.md, needs.json and requirements.sdoc of tests that have run. In JUnit files a requirement is the "
+        "property 'requirement' of a test, in Robot Framework's output.xml a tag.",
+        epilog="Exit codes: 0 good; 2 usage, or what cannot be read or written.",
+    )
+    parser.add_argument("results", nargs="+", type=Path, metavar="FILE", help="output.xml of Robot Framework, or a JUnit file")
+    parser.add_argument("--requirements", type=Path, metavar="FILE", help="TOML file of all requirements: REQ-1 = \"its text\"")
+    parser.add_argument("--tags", default="REQ-*", metavar="PATTERN", help="tags that are requirements, beside those of --requirements")
+    parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="where the files go (default: here)")
+    asked = parser.parse_args(words)
+    collected = Traceability()
+    try:
+        known = known_requirements(asked.requirements) if asked.requirements else None
+        for path in asked.results:
+            for test, named, verdict in results(path, lambda tag: fnmatchcase(tag, asked.tags) or tag in (known or ())):
+                unknown = [each for each in named if known is not None and each not in known]
+                if unknown:
+                    raise ValueError(f"{path}: {test}: {', '.join(unknown)} is in no line of {asked.requirements}")
+                collected.add(test, named, verdict)
+        collected.write(asked.out, known)
+    except (OSError, ValueError) as error:
+        print(f"airbench_hil.traceability: {error}", file=sys.stderr)
+        return BAD_INPUT
+    print(asked.out / "requirements.md")
+    return GOOD
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
-from airbench_hil import programs
+from airbench_hil import programs, traceability
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "docs/book"))
 import robot_keywords  # noqa: E402
@@ -52,6 +52,10 @@ def test_the_example_suite_passes_and_leaves_nothing_running(tmp_path):
     assert "<svg" in "".join(messages(results, "The Drive Reaches Its Place In Time"))
     assert len(list((tmp_path / "runs").iterdir())) == 8  # one test has two
     assert running(tmp_path) == []
+    assert traceability.main([str(tmp_path / "output.xml"), "--out", str(tmp_path / "trace")]) == 0
+    table = (tmp_path / "trace/requirements.md").read_text()
+    assert "| REQ-POS-1 |  | passed | `Robot.Positioning.The Drive Reaches Its Place In Time` passed |" in table
+    assert table.count(" | passed | ") == 7 and "7 requirements: 7 passed" in table
 
 
 def test_a_failure_shows_its_signals_and_ends_the_rig_with_the_test(tmp_path):
@@ -121,6 +125,40 @@ Axis
     assert "experiment 'no-such-experiment': no such file, and none of by-hand" in said
     assert "emulator ended with exit code 2:" in said and "carriage_position_m" in said
     assert "'carriage' that cannot be converted to 'drive' or 'load'" in said
+
+
+ROBOT = """<robot><suite name="Rig"><suite name="Stop">
+<test name="It stops"><kw><status status="PASS"/></kw><tag>REQ-1</tag><tag>slow</tag><status status="FAIL">late</status></test>
+<test name="It may wait"><tag>STOP-2</tag><status status="SKIP"/></test></suite></suite></robot>"""
+JUNIT = """<testsuites><testsuite><testcase classname="test_stop" name="test_fast"><properties>
+<property name="requirement" value="STOP-2"/><property name="airbench_run" value="x"/></properties></testcase>
+<testcase classname="test_stop" name="test_error"><properties><property name="requirement" value="REQ-3"/></properties><error/></testcase>
+</testsuite></testsuites>"""
+
+
+def test_results_of_robot_and_of_junit_become_one_table_of_requirements(tmp_path, capsys):
+    output, junit, known, odd = (tmp_path / name for name in ("output.xml", "junit.xml", "requirements.toml", "odd.xml"))
+    output.write_text(ROBOT)
+    junit.write_text(JUNIT)
+    known.write_text('REQ-1 = "It stops"\nSTOP-2 = "It waits"\nREQ-3 = "No errors"\nREQ-4 = "Nobody tests it"\n')
+    asked = [str(output), str(junit), "--out", str(tmp_path / "trace"), "--requirements", str(known)]
+    assert traceability.main(asked) == 0
+    assert (tmp_path / "trace/requirements.md").read_text().splitlines()[2:] == [
+        "| REQ-1 | It stops | failed | `Rig.Stop.It stops` failed |",
+        "| STOP-2 | It waits | passed | `Rig.Stop.It may wait` skipped<br>`test_stop.test_fast` passed |",
+        "| REQ-3 | No errors | failed | `test_stop.test_error` failed |",
+        "| REQ-4 | Nobody tests it | untested | none |",
+        "", "4 requirements: 1 passed, 2 failed, 1 untested",
+    ]
+    known.write_text('STOP-2 = "It waits"\n')
+    odd.write_text("<page/>")
+    for files, words in [
+        ([output], "Rig.Stop.It stops: REQ-1 is in no line of"), ([odd], "<page> is none of <robot>"), ([known], "syntax error"),
+        ([tmp_path / "none.xml"], "No such file"),
+    ]:
+        assert traceability.main([*map(str, files), "--requirements", str(known), "--out", str(tmp_path / "bad")]) == 2
+        assert words in capsys.readouterr().err
+    assert not (tmp_path / "bad").exists()
 
 
 def test_the_page_has_the_keywords_as_libdoc_has_them_and_its_example_is_in_the_suite():
