@@ -11,7 +11,7 @@ mod judge;
 use crate::children::Children;
 use crate::cli::FindEffectArguments;
 use crate::pair::{Pair, PairError};
-use crate::private::default_bus;
+use crate::private::RunBus;
 use crate::{Front, FrontError, last_lines, make_folder, say};
 use protocol::exit::Exit;
 use std::ffi::OsStr;
@@ -68,11 +68,11 @@ pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Res
             "{out} holds an earlier search; choose another folder with --out"
         )));
     }
-    let mut private = None;
+    let bus = RunBus::of_its_own(arguments.bus.as_deref(), arguments.lockstep)?;
     let mut search = Search {
         children: Children::watch()?,
         out,
-        bus: default_bus(arguments.bus.as_deref(), arguments.lockstep, &mut private)?,
+        bus: bus.url.clone(),
         bench: front.places.program("bench")?,
         emulator: front.places.program("emulator")?,
         controller: front.places.program("controller")?,

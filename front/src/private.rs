@@ -1,6 +1,8 @@
-//! A folder for the sockets of a run that only this user can read, and the CAN interface that takes its place.
+//! A folder for the sockets of a run that only this user can read, and the buses that take its place.
 
 use crate::FrontError;
+use protocol::bus::BusUrl;
+use protocol::socket_file::{Reservation, SocketType};
 use std::fs::{self, DirBuilder};
 use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
@@ -47,16 +49,45 @@ impl Drop for PrivateFolder {
     }
 }
 
-/// The bus that was asked for; else vcan0, when it is up and this is real time; else an embedded bus in a private folder.
-pub(crate) fn default_bus(
-    asked: Option<&str>,
-    lockstep: bool,
-    private: &mut Option<PrivateFolder>,
-) -> Result<String, FrontError> {
-    match asked {
-        Some(bus) => Ok(bus.into()),
-        None if !lockstep && vcan_usable() => Ok("can://vcan0".into()),
-        None => Ok(private.insert(PrivateFolder::make()?).bus()),
+/// The bus of a run, and what goes with it.
+#[derive(Default)]
+pub(crate) struct RunBus {
+    /// As the programs take it.
+    pub(crate) url: String,
+    /// A folder for sockets, where the run has one of its own.
+    pub(crate) private: Option<PrivateFolder>,
+    /// So that no other run takes the same bus by itself.
+    pub(crate) reservation: Option<Reservation>,
+}
+
+impl RunBus {
+    /// The bus that was asked for; else vcan0, when it is up and this is real time; else an embedded bus in a private folder.
+    pub(crate) fn of_its_own(asked: Option<&str>, simulated_time: bool) -> Result<Self, FrontError> {
+        match asked {
+            Some(bus) => Ok(Self { url: bus.into(), ..Self::default() }),
+            None if !simulated_time && vcan_usable() => {
+                Ok(Self { url: "can://vcan0".into(), ..Self::default() })
+            }
+            None => {
+                let private = PrivateFolder::make()?;
+                Ok(Self { url: private.bus(), private: Some(private), reservation: None })
+            }
+        }
+    }
+
+    /// The same, but in real time the embedded bus where other programs of the user look for it, unless somebody has it already.
+    pub(crate) fn for_others(asked: Option<&str>, simulated_time: bool) -> Result<Self, FrontError> {
+        let bus = BusUrl::default_embedded();
+        let reservation = match &bus {
+            BusUrl::Unix { path, .. } if asked.is_none() && !simulated_time && !vcan_usable() => {
+                Reservation::of(path, SocketType::SEQPACKET)
+            }
+            _ => None,
+        };
+        if reservation.is_none() {
+            return Self::of_its_own(asked, simulated_time);
+        }
+        Ok(Self { url: bus.to_string(), private: None, reservation })
     }
 }
 

@@ -10,7 +10,7 @@
 
 use crate::children::{Children, Event, code};
 use crate::cli::RunArguments;
-use crate::private::{PrivateFolder, default_bus};
+use crate::private::{PrivateFolder, RunBus};
 use crate::{Front, FrontError, make_folder, say};
 use protocol::exit::Exit;
 use rustix::process::Pid;
@@ -56,8 +56,8 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     // The emulator clears the folder of an earlier run; should it not get that far, no old figures may be told as this run's.
     let _ = fs::remove_file(out.join("summary.json"));
 
-    let mut private = None;
-    let bus = default_bus(arguments.bus.as_deref(), arguments.lockstep, &mut private)?;
+    let RunBus { url: bus, mut private, reservation: _reservation } =
+        RunBus::for_others(arguments.bus.as_deref(), arguments.lockstep || arguments.rehearse)?;
     let mut control = Command::new(&controller);
     control.arg(if arguments.rehearse { "rehearse" } else { "run" });
     for_controller(&mut control, arguments);

@@ -54,7 +54,7 @@ impl SocketFile {
                 check_private(folder, rustix::process::getuid()).map_err(SocketFileError::NotPrivate)?;
             }
         }
-        let (lock, lock_path) = open_lock(path)?;
+        let (lock, lock_path) = open_beside(path, ".lock")?;
         if rustix::fs::flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
             return Err(SocketFileError::Taken(lock_path.display().to_string()));
         }
@@ -101,6 +101,34 @@ impl Drop for SocketFile {
     }
 }
 
+/// The right to be the next who serves at a path that several processes would take by themselves; goes with the value.
+pub struct Reservation {
+    _lock: OwnedFd,
+}
+
+impl Reservation {
+    /// Reserves `path`; `None` when a process serves there or has reserved it, or its folder is not this user's alone.
+    ///
+    /// Who binds the socket without asking is not kept from it: what it then meets is [`SocketFileError::Taken`].
+    #[must_use]
+    pub fn of(path: &Path, socket_type: SocketType) -> Option<Self> {
+        let folder = path.parent()?;
+        make_private(folder).ok()?;
+        check_private(folder, rustix::process::getuid()).ok()?;
+        let (lock, _) = open_beside(path, ".reserved").ok()?;
+        rustix::fs::flock(&lock, FlockOperation::NonBlockingLockExclusive).ok()?;
+        (!is_served(path, socket_type)).then_some(Self { _lock: lock })
+    }
+}
+
+/// Whether a process listens at `path`. Its lock is not tried, since a host that begins in that moment would find it taken.
+fn is_served(path: &Path, socket_type: SocketType) -> bool {
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let connected = rustix::net::socket_with(AddressFamily::UNIX, socket_type, flags, None)
+        .and_then(|socket| rustix::net::connect(&socket, &SocketAddrUnix::new(path)?));
+    !matches!(connected, Err(Errno::NOENT | Errno::CONNREFUSED))
+}
+
 fn spare() -> Option<OwnedFd> {
     rustix::fs::open("/dev/null", OFlags::RDONLY | OFlags::CLOEXEC, Mode::empty()).ok()
 }
@@ -128,10 +156,11 @@ fn check_private(folder: &Path, user: Uid) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::PermissionDenied, format!("{} {problem}", folder.display())))
 }
 
-fn open_lock(path: &Path) -> io::Result<(OwnedFd, PathBuf)> {
+/// Opens the file to lock, whose name ends in `ending`.
+fn open_beside(path: &Path, ending: &str) -> io::Result<(OwnedFd, PathBuf)> {
     // Added, not in place of an extension: buses `rig.a` and `rig.b` are two.
     let mut lock_path = path.as_os_str().to_owned();
-    lock_path.push(".lock");
+    lock_path.push(ending);
     let lock_path = PathBuf::from(lock_path);
     let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC | OFlags::NOFOLLOW;
     let lock = rustix::fs::open(&lock_path, flags, Mode::RUSR | Mode::WUSR)?;
@@ -164,6 +193,28 @@ mod tests {
 
     fn problem(folder: &Path, user: Uid) -> String {
         check_private(folder, user).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_path_is_reserved_by_one_and_by_nobody_where_a_process_serves() {
+        let place = tempfile::tempdir().unwrap();
+        std::fs::set_permissions(place.path(), Permissions::from_mode(0o700)).unwrap();
+        let path = place.path().join("bus0");
+        let reserve = || Reservation::of(&path, SocketType::SEQPACKET);
+        let first = reserve();
+        assert!(first.is_some() && reserve().is_none());
+        // Who has reserved it, or a process of his, binds it.
+        let served = SocketFile::bind(&path, SocketType::SEQPACKET, true).unwrap();
+        drop(first);
+        assert!(reserve().is_none());
+        drop(served);
+        assert!(reserve().is_some());
+        // A socket that a killed host left behind.
+        let listener = listen(&path, SocketType::SEQPACKET).unwrap();
+        drop(listener);
+        assert!(path.exists() && reserve().is_some());
+        std::fs::set_permissions(place.path(), Permissions::from_mode(0o770)).unwrap();
+        assert!(reserve().is_none());
     }
 
     #[test]

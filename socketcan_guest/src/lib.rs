@@ -80,7 +80,7 @@ pub enum GuestError {
     /// Nobody hosts the bus.
     #[error(
         "{name}: no host at unix://{path} for {waited_s} s (--wait-s); 'scripts/run --bus unix://{path}' hosts it, as do \
-         'emulator run' and 'emulator bus'; scripts/run alone has a bus of its own; --pair opens one without a rig"
+         'emulator run' and 'emulator bus'; --pair opens one without a rig"
     )]
     NoHost {
         /// The interface.

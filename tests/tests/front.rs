@@ -6,7 +6,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::foreign_python::of;
+use system_tests::foreign_python::{of, tools_path};
 use system_tests::process::{Ended, Running};
 use system_tests::turn;
 
@@ -114,6 +114,37 @@ fn an_installed_run_needs_its_prefix_alone_and_leaves_its_folder_where_it_was_st
     assert!(prefix.path("work/runs/latest/measurement.csv").is_file());
     prefix.run(&["run", "--list"]).expect_code(0).expect_printed(&["\nload-step "]);
     let _ = prefix.run(&["run", "loadstep"]).expect_code(2).expect_said(&["airbench run --list names them"]);
+}
+
+/// In two terminals, without a word on a bus in either.
+#[test]
+fn a_run_in_real_time_and_a_program_of_can_meet_on_the_users_bus_and_a_second_run_has_its_own() {
+    let name = "a_run_in_real_time_and_a_program_of_can_meet_on_the_users_bus_and_a_second_run_has_its_own";
+    if Path::new("/sys/class/net/vcan0").exists() {
+        system_tests::skip::tell(name, "the kernel has a vcan0, which a run takes");
+        return;
+    }
+    let _machine = turn::take();
+    let prefix = Prefix::made();
+    let start = |out: &str, arguments: &[&str]| {
+        let mut command = prefix.command(arguments);
+        command.env("XDG_RUNTIME_DIR", prefix.path("")).env("PATH", tools_path());
+        if !out.is_empty() {
+            command.arg("--out").arg(prefix.path(out));
+        }
+        Running::start("airbench", &mut command)
+    };
+    let mut first = start("first", &["run", "--seconds", "600"]);
+    first.wait_for_times("initial-positioning", 1);
+    let mut second = start("second", &["run", "--seconds", "600"]);
+    second.wait_for_times("initial-positioning", 1);
+    let heard = start("", &["can", "--", "candump", "-n", "20", "vcan0,120:7FF"]).wait().expect_code(0);
+    assert_eq!(heard.stdout.matches("vcan0  120   [8]").count(), 20, "{}", heard.stdout);
+    for (run, on_the_users_bus) in [(second, false), (first, true)] {
+        run.signal(Signal::TERM);
+        let ended = run.wait().expect_code(130);
+        assert_eq!(ended.stdout.contains("airbench/bus0"), on_the_users_bus, "{}", ended.stdout);
+    }
 }
 
 /// Command lines of processes that hold this text.
