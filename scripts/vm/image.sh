@@ -87,15 +87,15 @@ the_only() {
 
 # add_binaries TREE: the programs as they ship, from where AIRBENCH_BIN_DIR says or built, with their libraries.
 add_binaries() {
-    local folder=${AIRBENCH_BIN_DIR:-} program
+    local folder=${AIRBENCH_BIN_DIR:-} program programs=(airbench emulator controller bench)
     if [[ -z $folder ]]; then
-        type -P cargo >/dev/null || fail "$exit_usage" "no cargo to build emulator, controller and bench with"
-        say "building emulator, controller and bench"
+        type -P cargo >/dev/null || fail "$exit_usage" "no cargo to build the programs with"
+        say "building ${programs[*]}"
         folder=${CARGO_TARGET_DIR:-$root/target}/release
-        build_programs emulator controller bench 8>&- || fail "$exit_usage" "emulator, controller or bench cannot be built"
+        build_programs "${programs[@]}" 8>&- || fail "$exit_usage" "one of ${programs[*]} cannot be built"
     fi
     shipped_bench=$folder/bench
-    for program in emulator controller bench; do
+    for program in "${programs[@]}"; do
         add_program "$1" "$folder/$program" "$program"
     done
 }

@@ -77,6 +77,7 @@ fn texts_of(script: &str) -> BTreeMap<String, String> {
     can.env("PATH", path);
     can.env("RIG", workspace().join("plant/rig.toml"));
     can.env("EXPERIMENT", workspace().join("controller/experiments/point-to-point.toml"));
+    can.env("AIRBENCH_SHARE", workspace());
     let _ = Running::start(&script.display().to_string(), &mut can).wait().expect_code(0);
     socketcan::texts(&folder)
 }

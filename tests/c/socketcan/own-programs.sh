@@ -1,6 +1,6 @@
 #!/bin/sh
-# What emulator and controller say on an interface, and which frames they send: own-programs.sh INTERFACE FOLDER, where can-utils.sh
-# runs too. RIG and EXPERIMENT are their files.
+# What emulator and controller say on an interface, apart and as 'airbench run', which scripts/run becomes, and which frames they send:
+# own-programs.sh INTERFACE FOLDER, where can-utils.sh runs too. RIG and EXPERIMENT are their files, AIRBENCH_SHARE has those of a run.
 #
 # Left out, since time makes them: every number but exit codes and lengths of frames, what is said of late cycles, of waiting
 # and of missing rights, and how often and in which order a thing is said.
@@ -24,9 +24,12 @@ controller run --bus "can://$interface" --rig "$RIG" --experiment "$EXPERIMENT" 
 controller_code=$?
 wait $emulator
 echo "emulator $?, controller $controller_code" >own
+# It ends before the experiment begins, in which a machine that stands still would show.
+airbench run --bus "can://$interface" --out own.run --seconds 0.9 >own.airbench 2>&1
+echo "airbench run $?" >>own
 kill $listener
 wait $listener
-for program in emulator controller; do
+for program in emulator controller airbench; do
     sed -e '/warning/d' -e '/woke late/d' -e '/waiting for the rig/d' -e 's/[0-9][0-9.]* [mun]*s\>/TIME/g' -e 's/[0-9][0-9.]*/N/g' -e 's/files in .*/files/' own.$program | sort -u
 done >>own
 sed -e 's/^([0-9.]*) //' own.raw | awk -F '#' '!/7E0/ { print $1 "#", length($2) / 2, "bytes" }' | sort -u >>own

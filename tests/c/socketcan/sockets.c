@@ -143,6 +143,9 @@ void options(void)
     }
     int one = 1;
     socklen_t length = sizeof one;
+    // CAN_RAW_XL_FRAMES, which headers of older kernels lack.
+    answer("set XL_FRAMES", setsockopt(can, SOL_CAN_RAW, 7, &one, sizeof one));
+    answer("get XL_FRAMES", getsockopt(can, SOL_CAN_RAW, 7, &one, &length));
     answer("set option 99", setsockopt(can, SOL_CAN_RAW, 99, &one, sizeof one));
     answer("get option 99", getsockopt(can, SOL_CAN_RAW, 99, &one, &length));
     answer("set at the level of BCM", setsockopt(can, SOL_CAN_BASE + CAN_BCM, 1, &one, sizeof one));

@@ -110,6 +110,11 @@ void sizes_and_addresses(void)
     const int on = 1;
     setsockopt(one, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
     answer("write 72 with FD_FRAMES", write(one, bytes, 72));
+    // A frame of CAN XL: priority, the flag XLF, 64 bytes of data.
+    bytes[0] = 1;
+    bytes[4] = (char)0x80;
+    bytes[6] = 64;
+    answer("write a frame of CAN XL", write(one, bytes, 12 + 64));
     struct can_frame frame = frame_of(0x121, 9, 1);
     answer("write 9 bytes of data", write(one, &frame, sizeof frame));
     frame = frame_of(0x122, 8, 1);
