@@ -17,6 +17,15 @@ sys.path.insert(0, str(PYTHON_CAN))
 sys.modules.pop("test", None)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def light_children():
+    """Interpreters that a test starts have no asammdf, as where airbench-hil is installed without extras; the test itself has."""
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(Path(__file__).parent / "light"), before]))
+    yield
+    os.environ["PYTHONPATH"] = before or ""
+
+
 def emulator():
     """The program."""
     return Path(os.environ.get("AIRBENCH_BIN_DIR", ROOT / "target/release"), "emulator")

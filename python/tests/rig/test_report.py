@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -22,9 +23,11 @@ def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("measured")
     hidden = folder / "hidden.toml"
     hidden.write_text(f"[effects.friction-asymmetry.drive]\nasymmetry_percent = {ASYMMETRY_PERCENT}\n")
+    once = tomllib.loads(programs.experiment("point-to-point").read_text())
+    once["run"]["repetitions"] = 1
 
     def measured(name, seed):
-        with Rig("point-to-point", controller=Own(), sealed=hidden, seed=seed, out=folder / name, summarise=False) as rig:
+        with Rig(once, controller=Own(), sealed=hidden, seed=seed, out=folder / name, summarise=False) as rig:
             return rig.finish()
 
     return measured("fitted", 11), measured("held-out", 12)
