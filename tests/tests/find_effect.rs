@@ -6,6 +6,7 @@ use std::path::Path;
 use system_tests::binaries::script;
 use system_tests::process::{Ended, PATIENCE};
 use system_tests::records::json;
+use system_tests::scene::{SHORT, Scene};
 
 /// Draws a leakage of 5.9 Nl/min across the load's piston: far above its detection limit.
 const SEED: &str = "9";
@@ -80,7 +81,9 @@ fn what_was_named_is_held_against_the_seal() {
         (named("valve-offset", ""), 1, "\n  wrong\n"),
         (nothing, 1, "named: nothing (nothing-missing)"),
     ];
-    let short = ["--experiment", "point-to-point", "--held-out", "point-to-point"];
+    let scene = Scene::new(SHORT);
+    let experiment = scene.path("experiment.toml").display().to_string();
+    let short = ["--experiment", &experiment, "--held-out", &experiment];
     for (place, (report, code, reported)) in cases.iter().enumerate() {
         let (out, program) = (folder.path().join(place.to_string()), stand_in(folder.path(), report));
         let out = out.to_str().expect("a path in ASCII");
