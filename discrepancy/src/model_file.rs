@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `record` | a record as the model reads it |
 //! | `fit` | output-error fit by the one Gauss-Newton |
+//! | `starts` | from where a fit starts |
 //! | `select` | which suspects are taken |
 //! | `held_out` | both models on records that were not used |
 //! | `structure` | which suspects can be told apart, before any fit |
@@ -24,6 +25,7 @@ mod page;
 mod record;
 mod report;
 mod select;
+mod starts;
 mod structure;
 
 pub use explain::explain;

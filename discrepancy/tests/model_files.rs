@@ -158,6 +158,30 @@ fn two_suspects_with_the_same_law_cannot_be_told_apart() {
     );
 }
 
+/// A sine of 7 rad/s, fitted from 20: the squares over its frequency have a minimum in each lobe.
+#[test]
+fn a_fit_from_several_starts_finds_the_lowest_minimum() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("sine.csv");
+    let row = |k: i32| {
+        let [t, noise] = [f64::from(k) * 0.02, 0.01 * f64::from(k * k % 17 - 8) / 8.0];
+        format!("{t},{}\n", 2.0 * (7.0 * t).sin() + noise)
+    };
+    fs::write(&record, "t_s,y\n".to_owned() + &(0..200).map(row).collect::<String>()).unwrap();
+    let frequency = |starts: u32| {
+        let model = folder.path().join("sine.toml");
+        let text = format!(
+            "fit.starts = {starts}\n[parameters]\nsize = {{ value = 0.5, range = [0.01, 10] }}\n\
+             w = {{ unit = \"1/s\", value = 20, range = [0.1, 100] }}\n[outputs.y]\nvalue = \"size*sin(w*t)\"\n"
+        );
+        fs::write(&model, text).unwrap();
+        let report = close(&model, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
+        report.parameters.iter().find(|number| number.name == "w").unwrap().value
+    };
+    assert!((frequency(0) - 7.0).abs() > 1.0, "from one start it stays in a lobe beside: {}", frequency(0));
+    assert!((frequency(24) - 7.0).abs() < 0.01, "{}", frequency(24));
+}
+
 /// Mass, stiffness and damping with a force of unknown gain: one of the four is free.
 #[test]
 fn a_number_that_the_records_do_not_determine_is_said() {

@@ -18,6 +18,8 @@ pub struct Model {
     pub record: RecordLayout,
     /// Rows at the head of a held-out record on which its own numbers are fitted; they are not scored.
     pub start_samples: usize,
+    /// Points from which fits start beside the values of the file.
+    pub starts: usize,
     /// Method of integration, with its tolerance or its step.
     pub solver: Solver,
     /// Columns that drive the equations.

@@ -16,6 +16,8 @@ const RESERVED: [&str; 18] = [
     "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
     "cos", "atan", "delay",
 ];
+/// Points from which fits start unless the file says how many.
+const STARTS: usize = 8;
 /// Most names of each kind.
 const MOST_NAMES: usize = 500;
 
@@ -38,10 +40,16 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
         start_samples = one_or(&mut held_out, "start_samples", 0.0, [0.0, 1e6])? as usize;
         held_out.finish()?;
     }
+    let mut starts = STARTS;
+    if let Some(mut fit) = root.section("fit")? {
+        starts = one_or(&mut fit, "starts", STARTS as f64, [0.0, 1000.0])? as usize;
+        fit.finish()?;
+    }
     let model = Model {
         name,
         record,
         start_samples,
+        starts,
         solver,
         inputs: Vec::new(),
         parameters: Vec::new(),

@@ -11,12 +11,15 @@
 //! Sources: Ljung, System Identification, 2nd edition, 7.2 (output error), 15.3 (concentrated likelihood); Björck 1996, 9.
 
 use super::record::Measured;
-use crate::estimator::{Convergence, Estimator, Iterate, Options, Step};
+use crate::estimator::{Convergence, Estimator, Iterate, Options, Outcome, Step};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start, Unit};
 use nalgebra::{DMatrix, DVector};
 
 const OPTIONS: Options =
     Options { steps: 80, converged: 0.1, fractions: &[1.0, 0.4, 0.16, 0.064, 0.0256, 0.01, 1e-3, 1e-4] };
+/// Steps from each of several starts, and how many of them go on to the end.
+const SHORT: usize = 6;
+const FINISHED: usize = 2;
 /// What a sample adds to the fall of the loss that counts: a change of the residual by half of it, relatively.
 const CONVERGED_PER_SAMPLE: f64 = 1e-4;
 /// Blocks of time of each record.
@@ -403,27 +406,73 @@ impl<'a> Fitting<'a> {
         sum
     }
 
-    /// Fits from a start.
-    pub(crate) fn fit(&self, start: Vec<f64>) -> Result<(Point, Convergence), Failure> {
+    /// Fits from a start in at most so many steps.
+    pub(crate) fn fit(&self, start: Vec<f64>, steps: usize) -> Result<(Point, Convergence), Failure> {
         let clamped = self.unknowns.iter().zip(start);
         let start =
             clamped.map(|(unknown, value)| value.clamp(unknown.range_si[0], unknown.range_si[1])).collect();
         let start = self.at(start)?;
         let samples: f64 = (0..self.model.outputs.len()).map(|output| self.count(output)).sum();
-        let options = Options { converged: OPTIONS.converged + CONVERGED_PER_SAMPLE * samples, ..OPTIONS };
+        let converged = OPTIONS.converged + CONVERGED_PER_SAMPLE * samples;
+        let options = Options { steps, converged, ..OPTIONS };
         Ok(Estimator::new(options).descend(start, |estimator, point| {
             let Ok(normals) = self.normals(&point.values_si) else { return Step::Impossible };
             let sum = self.sum(&normals, point);
             let promised = sum.slope.dot(&self.step(&sum, &point.values_si, 0.0));
-            estimator.backtrack(point, promised, OPTIONS.fractions, |fraction| {
-                let step = self.step(&sum, &point.values_si, 1.0 / fraction - 1.0);
-                let moved = point.values_si.iter().zip(&step).zip(&self.unknowns);
-                let moved = moved.map(|((value, step), unknown)| {
-                    (value + step).clamp(unknown.range_si[0], unknown.range_si[1])
-                });
-                self.at(moved.collect()).ok()
-            })
+            match self.best_step(estimator, point, &sum) {
+                Some(best) => Step::Taken(best),
+                None => Step::Refused { promised },
+            }
         }))
+    }
+
+    /// The damped step with the least loss: shorter ones are tried until one is worse than the one before.
+    fn best_step(&self, estimator: &mut Estimator, point: &Point, sum: &Normal) -> Option<Point> {
+        let mut best: Option<Point> = None;
+        for fraction in OPTIONS.fractions {
+            let step = self.step(sum, &point.values_si, 1.0 / fraction - 1.0);
+            let moved = point.values_si.iter().zip(&step).zip(&self.unknowns);
+            let moved = moved.map(|((value, step), unknown)| {
+                (value + step).clamp(unknown.range_si[0], unknown.range_si[1])
+            });
+            estimator.count();
+            let tried = self.at(moved.collect()).ok();
+            let least = best.as_ref().map_or(point.loss, |best| best.loss);
+            match tried.filter(|tried| tried.loss < least) {
+                Some(better) => best = Some(better),
+                None if best.is_some() => break,
+                None => {}
+            }
+        }
+        best
+    }
+
+    /// The best of the fits from several starts: a few steps from each, and all steps from those that have come lowest.
+    pub(crate) fn fit_from(&self, starts: Vec<Vec<f64>>) -> Result<(Point, Convergence), Failure> {
+        let mut why = None;
+        let mut begun = Vec::new();
+        for start in starts {
+            match self.fit(start, SHORT) {
+                Ok(fit) => begun.push(fit),
+                Err(failure) => why = Some(failure),
+            }
+        }
+        begun.sort_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
+        // Starts that have come to the same minimum go on once.
+        begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.converged);
+        let mut best: Option<(Point, Convergence)> = None;
+        for (point, convergence) in begun.into_iter().take(FINISHED) {
+            let ended = match convergence.outcome {
+                Outcome::StepLimit => self
+                    .fit(point.values_si, OPTIONS.steps)
+                    .map(|(end, more)| (end, convergence.then(more)))?,
+                _ => (point, convergence),
+            };
+            if best.as_ref().is_none_or(|(best, _)| ended.0.loss < best.loss) {
+                best = Some(ended);
+            }
+        }
+        best.ok_or_else(|| why.expect("there is one start at least"))
     }
 
     /// The step of damped normal equations; a number at the end of its range does not leave it.
@@ -469,6 +518,9 @@ pub(crate) fn solved(normal: &Normal, is_free: &[bool], damping: f64) -> DVector
 /// Eigenvectors, eigenvalues and scales of the normal matrix with a diagonal of ones.
 fn eigen(normal: &Normal, places: &[usize]) -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
     let scale: Vec<f64> = places.iter().map(|place| normal.matrix[(*place, *place)].sqrt()).collect();
+    if places.is_empty() {
+        return (DMatrix::zeros(0, 0), Vec::new(), scale);
+    }
     let scaled = DMatrix::from_fn(places.len(), places.len(), |row, column| {
         normal.matrix[(places[row], places[column])] / (scale[row] * scale[column])
     });

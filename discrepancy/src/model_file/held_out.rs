@@ -4,6 +4,7 @@
 use super::fit::{Fitting, OfRecord};
 use super::record::Measured;
 use super::select::{Fitted, Found};
+use super::starts;
 use model::Failure;
 
 /// What is left of an output on a record by both models, the baseline's first.
@@ -90,7 +91,7 @@ fn residuals(fitted: &Fitted<'_>, record: &[Measured]) -> Result<(OfRecord, usiz
     if rows >= record[0].time_s.len() {
         return Err(JudgeError::Short { record: name(), rows: record[0].time_s.len(), start: rows });
     }
-    let (point, _) = frozen.fit(frozen.start()).map_err(failed)?;
+    let (point, _) = frozen.fit_from(starts::starts(&frozen, &[], None)).map_err(failed)?;
     let residuals = frozen.whole().residuals(&point.values_si).map_err(failed)?;
     Ok((residuals.into_iter().next().expect("one record"), rows))
 }

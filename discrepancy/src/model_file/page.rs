@@ -3,6 +3,7 @@
 use super::explain::in_words;
 use super::held_out::Traces;
 use super::report::{Judgement, Left, ModelReport, Number, significant};
+use super::select::share_in_words;
 use crate::page::draw::{Plot, Sample, figure, range};
 use crate::page::markup::{Cell, charts, number, paragraph, section, table, words};
 use model::Model;
@@ -161,7 +162,7 @@ fn suspects(all: &[Judgement]) -> String {
             number(format!("{:.1} %", one.probability * 100.0)),
             number(format!("{:.1}", one.gain)),
             number(format!("{:.1}", one.penalty)),
-            number(format!("{:.1} %", one.share * 100.0)),
+            number(share_in_words(one.share)),
             Cell::Sentence(one.decision.clone()),
             Cell::Sentence(values.join(", ")),
         ]

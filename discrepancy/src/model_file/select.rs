@@ -1,7 +1,6 @@
 //! Which suspects are taken, by forward selection on the training records alone.
 //!
-//! A suspect is fitted together with everything that the model leaves open, in the simulator, from each of its starts beside the
-//! values of the model alone.
+//! A suspect is fitted together with everything that the model leaves open, in the simulator, from several starts ([`starts`]).
 //! All of these must hold:
 //!
 //! | gate | asks | against |
@@ -21,6 +20,7 @@
 
 use super::fit::{Fitting, Normal, Point, What, solved};
 use super::record::Measured;
+use super::starts;
 use crate::estimator::Convergence;
 use crate::single_equation::{GAIN_APART, SHARE_FLOOR, T_TIME, clustered_t};
 use model::{Failure, Model, Program};
@@ -28,8 +28,6 @@ use rayon::prelude::*;
 
 /// Most terms that are taken.
 const MOST_TERMS: usize = 3;
-/// Most starts of a suspect.
-const MOST_STARTS: usize = 12;
 
 /// A fitted model.
 #[derive(Clone)]
@@ -181,16 +179,8 @@ pub(crate) fn fitted<'a>(
     let program =
         Program::new(model, suspects).expect("all suspects together were compiled when the file was read");
     let fitting = Fitting::new(model, program, records, suspects);
-    let mut best: Option<(Point, Convergence)> = None;
-    let mut why = None;
-    for start in starts(&fitting, suspects, from) {
-        match fitting.fit(start) {
-            Ok(fit) if best.as_ref().is_none_or(|best| fit.0.loss < best.0.loss) => best = Some(fit),
-            Ok(_) => {}
-            Err(failure) => why = Some(failure),
-        }
-    }
-    let Some((point, convergence)) = best else { return Err(why.expect("there is one start at least")) };
+    let starts = starts::starts(&fitting, suspects, from.map(|from| (&from.fitting, &from.point)));
+    let (point, convergence) = fitting.fit_from(starts)?;
     let normals = fitting.normals(&point.values_si)?;
     let normal = fitting.sum(&normals, &point);
     let effective = effective(&fitting, &point)?;
@@ -203,35 +193,6 @@ pub(crate) fn fitted<'a>(
         normal,
         effective,
     })
-}
-
-/// Starts of a fit: the smaller fit's values, and every start of the newest suspect.
-fn starts(fitting: &Fitting<'_>, suspects: &[usize], from: Option<&Fitted<'_>>) -> Vec<Vec<f64>> {
-    let known = |what: What| {
-        let place = from?.fitting.unknowns.iter().position(|unknown| unknown.what == what)?;
-        Some(from?.point.values_si[place])
-    };
-    let first: Vec<f64> =
-        fitting.unknowns.iter().map(|unknown| known(unknown.what).unwrap_or(unknown.start_si)).collect();
-    let mut all = vec![first];
-    let Some(newest) = suspects.last() else { return all };
-    for (index, parameter) in
-        fitting.model.parameters.iter().enumerate().filter(|(_, one)| one.suspect == Some(*newest))
-    {
-        let others = parameter.values_si[1..].iter().flat_map(|value| {
-            all.iter().map(|start| {
-                let moved = fitting.unknowns.iter().zip(start).map(|(unknown, before)| match unknown.what {
-                    What::Shared(of) | What::OfRecord(of, _) if of == index => *value,
-                    _ => *before,
-                });
-                moved.collect()
-            })
-        });
-        let others: Vec<Vec<f64>> = others.collect();
-        all.extend(others);
-        all.truncate(MOST_STARTS);
-    }
-    all
 }
 
 /// Squares of each fold under the fit without it.
@@ -328,12 +289,11 @@ fn judge(before: &Fitted<'_>, after: &Fitted<'_>, suspect: usize, tried: usize, 
     let t = clustered_t(&differences);
     let best_fold = differences.iter().copied().fold(0.0, f64::max);
     let without_best = differences.iter().sum::<f64>() - best_fold;
-    let percent = share * 100.0;
     let gates = [
         (gain / penalty.max(f64::MIN_POSITIVE), format!("likelihood gain {gain:.1}, penalty {penalty:.1}")),
         (
             share / SHARE_FLOOR,
-            format!("folds in time: {percent:.1} % of the power, {:.1} asked", SHARE_FLOOR * 100.0),
+            format!("folds in time: {}, {:.0} % asked", share_in_words(share), SHARE_FLOOR * 100.0),
         ),
         (
             if without_best > 0.0 { f64::INFINITY } else { 0.0 },
@@ -375,6 +335,15 @@ fn weigh(round: &mut [Evaluation]) {
     }
 }
 
+/// A share of the power that the model alone leaves on folds; one that leaves much more says how many times as much.
+pub(crate) fn share_in_words(share: f64) -> String {
+    match share {
+        share if share >= -1.0 => format!("{:.1} % of the power", share * 100.0),
+        share if share > -1e4 => format!("worse, {:.0} times the power", 1.0 - share),
+        _ => "worse, more than 10000 times the power".into(),
+    }
+}
+
 /// Whether one is better than the other beyond doubt: by its likelihood, or on the same folds.
 fn apart(best: &Evaluation, other: &Evaluation) -> bool {
     if (best.gain - best.penalty) - (other.gain - other.penalty) > GAIN_APART {
@@ -383,4 +352,22 @@ fn apart(best: &Evaluation, other: &Evaluation) -> bool {
     let differences: Vec<f64> =
         best.differences.iter().zip(&other.differences).map(|(best, other)| best - other).collect();
     clustered_t(&differences) > T_TIME
+}
+
+#[cfg(test)]
+mod tests {
+    use super::share_in_words;
+
+    #[test]
+    fn a_share_that_is_far_below_nothing_is_said_as_a_ratio() {
+        let said = [0.123, -0.5, -1.0, -3351.0, -2e4].map(share_in_words);
+        let expected = [
+            "12.3 % of the power",
+            "-50.0 % of the power",
+            "-100.0 % of the power",
+            "worse, 3352 times the power",
+            "worse, more than 10000 times the power",
+        ];
+        assert_eq!(said, expected);
+    }
 }
