@@ -45,6 +45,7 @@ def main():
         origin = Path(find_spec(package).origin)
         origin = origin.parent if origin.name == "__init__.py" else origin
         copy(origin, library / origin.name)
+    sys.pycache_prefix = None  # compiled files go with what they are of, wherever this interpreter's own are kept
     compileall.compile_dir(library, quiet=1, invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
     (home / "libraries").mkdir()
     for binary in [interpreter, *library.rglob("*.so")]:
