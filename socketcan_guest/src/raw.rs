@@ -19,6 +19,7 @@ const LOOPBACK: i32 = 3;
 const RECEIVE_OWN: i32 = 4;
 const FD_FRAMES: i32 = 5;
 const JOIN_FILTERS: i32 = 6;
+const XL_FRAMES: i32 = 7;
 
 /// `sizeof(struct can_filter)`.
 const FILTER_BYTES: usize = 8;
@@ -60,12 +61,21 @@ pub(crate) struct RawOptions {
     receive_own: i32,
     fd_frames: i32,
     join_filters: i32,
+    xl_frames: i32,
 }
 
 impl Default for RawOptions {
     fn default() -> Self {
         let filters = vec![Filter { id: 0, mask: 0 }];
-        Self { filters, error_mask: 0, loopback: 1, receive_own: 0, fd_frames: 0, join_filters: 0 }
+        Self {
+            filters,
+            error_mask: 0,
+            loopback: 1,
+            receive_own: 0,
+            fd_frames: 0,
+            join_filters: 0,
+            xl_frames: 0,
+        }
     }
 }
 
@@ -92,7 +102,8 @@ impl RawOptions {
     /// `setsockopt`.
     ///
     /// # Errors
-    /// `EINVAL` for a wrong length, `ENOPROTOOPT` for an option that a classic interface's kernel does not know.
+    /// `EINVAL` for a wrong length, and for CAN FD off where CAN XL, which includes it, is on; `ENOPROTOOPT` for an option that
+    /// Linux 6.1 does not know.
     pub(crate) fn set(&mut self, option: i32, value: &[u8]) -> Result<(), Errno> {
         if option == FILTER {
             if !value.len().is_multiple_of(FILTER_BYTES) || value.len() > MOST_FILTERS * FILTER_BYTES {
@@ -102,7 +113,7 @@ impl RawOptions {
             self.filters = value.chunks_exact(FILTER_BYTES).map(filter).collect();
             return Ok(());
         }
-        if !(ERROR_FILTER..=JOIN_FILTERS).contains(&option) {
+        if !(ERROR_FILTER..=XL_FRAMES).contains(&option) {
             return Err(Errno::NOPROTOOPT);
         }
         let number = u32::from_ne_bytes(value.try_into().map_err(|_| Errno::INVAL)?);
@@ -110,8 +121,13 @@ impl RawOptions {
             ERROR_FILTER => self.error_mask = number & ERROR_MASK,
             LOOPBACK => self.loopback = number as i32,
             RECEIVE_OWN => self.receive_own = number as i32,
+            FD_FRAMES if self.xl_frames != 0 && number == 0 => return Err(Errno::INVAL),
             FD_FRAMES => self.fd_frames = number as i32,
-            _ => self.join_filters = number as i32,
+            JOIN_FILTERS => self.join_filters = number as i32,
+            _ => {
+                self.xl_frames = number as i32;
+                self.fd_frames = if number == 0 { self.fd_frames } else { self.xl_frames };
+            }
         }
         Ok(())
     }
@@ -131,6 +147,7 @@ impl RawOptions {
             RECEIVE_OWN => self.receive_own as u32,
             FD_FRAMES => self.fd_frames as u32,
             JOIN_FILTERS => self.join_filters as u32,
+            XL_FRAMES => self.xl_frames as u32,
             _ => return Err(Errno::NOPROTOOPT),
         };
         Ok((number.to_ne_bytes().to_vec(), true))
@@ -187,7 +204,7 @@ mod tests {
         let mut options = RawOptions::default();
         assert_eq!(options.set(FILTER, &[0; 7]), Err(Errno::INVAL));
         assert_eq!(options.set(LOOPBACK, &[1]), Err(Errno::INVAL));
-        assert_eq!(options.set(7, &1_u32.to_ne_bytes()), Err(Errno::NOPROTOOPT));
-        assert_eq!(options.get(7), Err(Errno::NOPROTOOPT));
+        assert_eq!(options.set(8, &1_u32.to_ne_bytes()), Err(Errno::NOPROTOOPT));
+        assert_eq!(options.get(8), Err(Errno::NOPROTOOPT));
     }
 }

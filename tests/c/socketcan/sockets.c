@@ -117,6 +117,9 @@ void making_and_binding(void)
     answer("setsockopt after close", setsockopt(next, SOL_CAN_RAW, CAN_RAW_FILTER, NULL, 0));
 }
 
+/// CAN_RAW_XL_FRAMES, which headers of older kernels lack.
+#define RAW_XL_FRAMES 7
+
 void options(void)
 {
     printf("# options\n");
@@ -127,7 +130,7 @@ void options(void)
     } numbers[] = {
         {"LOOPBACK", CAN_RAW_LOOPBACK, 0},     {"RECV_OWN_MSGS", CAN_RAW_RECV_OWN_MSGS, 1},
         {"ERR_FILTER", CAN_RAW_ERR_FILTER, -1}, {"FD_FRAMES", CAN_RAW_FD_FRAMES, 1},
-        {"JOIN_FILTERS", CAN_RAW_JOIN_FILTERS, 1},
+        {"JOIN_FILTERS", CAN_RAW_JOIN_FILTERS, 1}, {"XL_FRAMES", RAW_XL_FRAMES, 1},
     };
     for (size_t place = 0; place < sizeof numbers / sizeof numbers[0]; place++) {
         printf("%s\n", numbers[place].name);
@@ -143,9 +146,8 @@ void options(void)
     }
     int one = 1;
     socklen_t length = sizeof one;
-    // CAN_RAW_XL_FRAMES, which headers of older kernels lack.
-    answer("set XL_FRAMES", setsockopt(can, SOL_CAN_RAW, 7, &one, sizeof one));
-    answer("get XL_FRAMES", getsockopt(can, SOL_CAN_RAW, 7, &one, &length));
+    int none = 0;
+    answer("FD_FRAMES off with XL_FRAMES on", setsockopt(can, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &none, sizeof none));
     answer("set option 99", setsockopt(can, SOL_CAN_RAW, 99, &one, sizeof one));
     answer("get option 99", getsockopt(can, SOL_CAN_RAW, 99, &one, &length));
     answer("set at the level of BCM", setsockopt(can, SOL_CAN_BASE + CAN_BCM, 1, &one, sizeof one));
