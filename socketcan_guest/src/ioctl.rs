@@ -31,21 +31,16 @@ impl Supervisor {
         let at = notification.arguments[2];
         // A request with another argument than `struct ifreq` is none that is answered.
         let Ok(asked) = caller.read_array::<REQUEST_BYTES>(at) else { return Answer::Continue };
+        let alive = self.listener.check_alive(notification.id);
         let written = if request == SIOCGIFNAME {
             let index = crate::abi::u32_at(&asked, ANSWER as usize);
             let known = self.interfaces.iter().find(|known| known.index == index);
             let Some(known) = known else { return Answer::Continue };
-            if !self.listener.is_alive(notification.id) {
-                return Errno::INTR.into();
-            }
-            caller.write(at, &known.name_field())
+            alive.and_then(|()| caller.write(at, &known.name_field()))
         } else {
             let known = interface::named(&self.interfaces, &asked);
             let Some(answer) = known.and_then(|known| known.answer(request)) else { return Answer::Continue };
-            if !self.listener.is_alive(notification.id) {
-                return Errno::INTR.into();
-            }
-            answer.and_then(|answer| caller.write(at + ANSWER, &answer))
+            alive.and(answer).and_then(|answer| caller.write(at + ANSWER, &answer))
         };
         written.map_or_else(Answer::Error, |()| Answer::Value(0))
     }
@@ -54,18 +49,14 @@ impl Supervisor {
     fn last_stamp(&mut self, notification: &Notification, request: u32) -> Answer {
         let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
         let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
-        let stamp_ns = match socket.last_stamp_ns() {
-            Some(stamp_ns) => stamp_ns,
-            None => return Errno::NOENT.into(),
-        };
+        let Some(stamp_ns) = socket.last_stamp_ns() else { return Errno::NOENT.into() };
         let (seconds, rest) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
         let is_ns = matches!(request, SIOCGSTAMPNS | SIOCGSTAMPNS_NEW);
         let rest = if is_ns { rest } else { rest / 1000 };
-        if !self.listener.is_alive(notification.id) {
-            return Errno::INTR.into();
-        }
         let bytes = [seconds.to_ne_bytes(), rest.to_ne_bytes()].concat();
-        let written = Caller::new(notification.thread).write(notification.arguments[2], &bytes);
+        let caller = Caller::new(notification.thread);
+        let alive = self.listener.check_alive(notification.id);
+        let written = alive.and_then(|()| caller.write(notification.arguments[2], &bytes));
         written.map_or_else(Answer::Error, |()| Answer::Value(0))
     }
 }

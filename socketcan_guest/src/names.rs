@@ -118,9 +118,7 @@ impl Supervisor {
         }
         let address: [u8; abi::ADDRESS_BYTES] =
             Caller::new(notification.thread).read_array(notification.arguments[1])?;
-        if !self.listener.is_alive(notification.id) {
-            return Err(Errno::INTR);
-        }
+        self.listener.check_alive(notification.id)?;
         abi::interface_of(&address).ok_or(Errno::INVAL)
     }
 
@@ -138,9 +136,7 @@ impl Supervisor {
         let caller = Caller::new(notification.thread);
         let written = caller.read_array(length_at).map(i32::from_ne_bytes).and_then(|room| {
             let room = usize::try_from(room).map_err(|_| Errno::INVAL)?;
-            if !self.listener.is_alive(notification.id) {
-                return Err(Errno::INTR);
-            }
+            self.listener.check_alive(notification.id)?;
             caller.write(at, &address[..address.len().min(room)])?;
             caller.write(length_at, &(address.len() as i32).to_ne_bytes())
         });

@@ -11,7 +11,7 @@
 //!
 //! Source: `netlink(7)`, `rtnetlink(7)`; Linux `include/uapi/linux/if_link.h`.
 
-#![allow(unsafe_code)] // recvmsg, nothing else
+#![allow(unsafe_code)] // recvfrom, nothing else
 
 use crate::abi::u32_at;
 use crate::caller::Caller;
@@ -56,6 +56,8 @@ const NO_ARP: u32 = 0x80;
 const RUNNING: u32 = 0x40;
 const UP: u32 = 0x1;
 
+/// `sizeof(struct sockaddr_nl)`.
+const ADDRESS_BYTES: u32 = 12;
 /// Longest datagram of the kernel's in answer to such a request, with room for the guests' interfaces.
 const LONGEST_DATAGRAM: usize = 1 << 16;
 /// Requests whose answers are awaited; one that nobody reads is forgotten for the next.
@@ -231,20 +233,16 @@ fn link(interface: &Interface, flags: u16, sequence: u32, port: u32) -> Vec<u8> 
 
 /// A datagram and its sender's address, without waiting.
 fn receive(end: BorrowedFd<'_>, peek: i32) -> Result<(Vec<u8>, Vec<u8>), Errno> {
-    let (mut bytes, mut address) = (vec![0_u8; LONGEST_DATAGRAM], vec![0_u8; 12]);
-    let mut part = libc::iovec { iov_base: bytes.as_mut_ptr().cast(), iov_len: bytes.len() };
-    // SAFETY: a plain C structure for which all zeros is a valid value.
-    let mut header: libc::msghdr = unsafe { std::mem::zeroed() };
-    header.msg_iov = &raw mut part;
-    header.msg_iovlen = 1;
-    header.msg_name = address.as_mut_ptr().cast();
-    header.msg_namelen = address.len() as u32;
-    // SAFETY: the header points to a part and an address that outlive the call and have the sizes given.
-    let received = unsafe { libc::recvmsg(end.as_raw_fd(), &raw mut header, libc::MSG_DONTWAIT | peek) };
+    let (mut bytes, mut address) = (vec![0_u8; LONGEST_DATAGRAM], vec![0_u8; ADDRESS_BYTES as usize]);
+    let (into, from, mut length) = (bytes.as_mut_ptr().cast(), address.as_mut_ptr().cast(), ADDRESS_BYTES);
+    let flags = libc::MSG_DONTWAIT | peek;
+    // SAFETY: the buffers outlive the call and have the sizes given.
+    let received =
+        unsafe { libc::recvfrom(end.as_raw_fd(), into, LONGEST_DATAGRAM, flags, from, &raw mut length) };
     let received = usize::try_from(received)
         .map_err(|_| Errno::from_io_error(&io::Error::last_os_error()).unwrap_or(Errno::IO))?;
     bytes.truncate(received);
-    address.truncate(header.msg_namelen as usize);
+    address.truncate(length as usize);
     Ok((bytes, address))
 }
 

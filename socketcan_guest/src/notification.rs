@@ -91,6 +91,14 @@ impl Listener {
         unsafe { libc::ioctl(self.0.as_raw_fd(), libc::SECCOMP_IOCTL_NOTIF_ID_VALID, &raw const id) == 0 }
     }
 
+    /// The same before an answer: what was read of the memory of a caller that has gone is somebody else's.
+    ///
+    /// # Errors
+    /// `EINTR`.
+    pub(crate) fn check_alive(&self, id: u64) -> Result<(), Errno> {
+        if self.is_alive(id) { Ok(()) } else { Err(Errno::INTR) }
+    }
+
     /// Answers; false when the caller waits no more. [`Answer::Deferred`] answers nothing.
     pub(crate) fn answer(&self, id: u64, answer: Answer) -> bool {
         let mut response = libc::seccomp_notif_resp { id, val: 0, error: 0, flags: 0 };

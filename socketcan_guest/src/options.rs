@@ -56,7 +56,7 @@ impl Supervisor {
         let length = length.filter(|length| *length <= RawOptions::LONGEST_VALUE).ok_or(Errno::INVAL)?;
         let mut value = vec![0; length];
         Caller::new(notification.thread).read(notification.arguments[3], &mut value)?;
-        if self.listener.is_alive(notification.id) { Ok(value) } else { Err(Errno::INTR) }
+        self.listener.check_alive(notification.id).map(|()| value)
     }
 
     /// `getsockopt(fd, level, option, value, length)`.
@@ -101,9 +101,7 @@ impl Supervisor {
         let [_, _, _, value_at, length_at, _] = notification.arguments;
         let room = i32::from_ne_bytes(caller.read_array(length_at)?);
         let room = usize::try_from(room).map_err(|_| Errno::INVAL)?;
-        if !self.listener.is_alive(notification.id) {
-            return Err(Errno::INTR);
-        }
+        self.listener.check_alive(notification.id)?;
         if room < value.len() && !may_be_cut {
             caller.write(length_at, &(value.len() as i32).to_ne_bytes())?;
             return Err(Errno::RANGE);

@@ -64,7 +64,7 @@ impl Supervisor {
         let read = caller
             .read(buffer, &mut bytes)
             .and_then(|()| read_name(caller, name))
-            .and_then(|name| self.check_alive(notification).map(|()| name));
+            .and_then(|name| self.listener.check_alive(notification.id).map(|()| name));
         let value = bytes.len() as i64;
         match read {
             Err(error) => error.into(),
@@ -122,7 +122,7 @@ impl Supervisor {
         let header = Header::read(caller, at)?;
         let bytes = header.gather(caller)?;
         let name = read_name(caller, (header.name != 0).then_some((header.name, header.name_bytes)))?;
-        self.check_alive(notification)?;
+        self.listener.check_alive(notification.id)?;
         self.send(inode, name.as_deref(), &bytes)?;
         Ok(bytes.len())
     }
@@ -141,7 +141,7 @@ impl Supervisor {
             return Answer::Value(0);
         }
         let read = Header::read(caller, at).and_then(|header| header.gather(caller)).and_then(|bytes| {
-            self.check_alive(notification)?;
+            self.listener.check_alive(notification.id)?;
             if !is_one {
                 caller.write(at + 56, &(bytes.len() as u32).to_ne_bytes())?;
             }
@@ -362,10 +362,6 @@ impl Supervisor {
             }
         }
         self.watch_bus(place);
-    }
-
-    fn check_alive(&self, notification: &Notification) -> Result<(), Errno> {
-        if self.listener.is_alive(notification.id) { Ok(()) } else { Err(Errno::INTR) }
     }
 }
 
