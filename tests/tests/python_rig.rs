@@ -1,5 +1,6 @@
 //! `airbench-hil` as tests in Python use it: its own tests, and the suite of `docs/examples/pytest` on two workers.
 
+use std::path::PathBuf;
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::firmware;
@@ -7,16 +8,37 @@ use system_tests::foreign_python::{of, tools_path};
 use system_tests::process::{Ended, Running};
 use system_tests::turn;
 
-/// pytest on two workers in the environment of `python/`, with the programs as they ship.
+/// pytest in the environment of `python/`, with the programs as they ship.
 fn pytest() -> Command {
-    let programs = [Program::Emulator, Program::Controller, Program::Bench];
+    let programs =
+        [Program::Emulator, Program::Controller, Program::Bench, Program::Discrepancy, Program::Campaign];
     let [emulator, ..] = programs.map(|program| executable(program, Build::Shipped));
     let mut pytest = Command::new(of("hil"));
-    pytest.args(["-m", "pytest", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider", "--color=no"]);
+    pytest.args(["-m", "pytest", "-p", "no:cacheprovider", "--color=no"]);
     pytest
         .env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder"))
         .env("PATH", tools_path());
     pytest
+}
+
+fn on_two_workers() -> Command {
+    let mut pytest = pytest();
+    pytest.args(["-n", "2", "--dist", "loadgroup"]);
+    pytest
+}
+
+/// The files of `python/tests/rig` that have a test of their own here; another one has all others.
+const RIG: [&str; 4] = ["test_rig.py", "test_conditions.py", "test_guard.py", "test_types.py"];
+const PLUGIN: [&str; 4] = ["test_pytest_plugin.py", "test_mutations.py", "test_ci.py", "test_foxglove.py"];
+
+fn in_lockstep(files: &[&str], least: usize) {
+    let mut tests = on_two_workers();
+    tests.args(["-m", "not airbench_realtime"]).args(files.iter().map(|file| folder().join(file)));
+    expect_all_passed(Running::start("pytest", &mut tests).wait(), least);
+}
+
+fn folder() -> PathBuf {
+    workspace().join("python/tests/rig")
 }
 
 fn expect_all_passed(ended: Ended, least: usize) {
@@ -30,13 +52,31 @@ fn expect_all_passed(ended: Ended, least: usize) {
 }
 
 #[test]
-fn the_rig_for_python_its_plugin_and_its_wheel_do_what_they_say() {
-    // Some of them are in real time.
+fn the_rig_for_python_does_what_it_says() {
+    in_lockstep(&RIG, 57);
+}
+
+#[test]
+fn the_plugin_for_pytest_its_mutants_and_its_bridge_do_what_they_say() {
+    in_lockstep(&PLUGIN, 32);
+}
+
+#[test]
+fn reports_campaigns_robot_and_the_wheel_for_python_do_what_they_say() {
+    let mut tests = on_two_workers();
+    tests.args(["-m", "not airbench_realtime"]).arg(folder());
+    tests.args(
+        [RIG, PLUGIN].concat().iter().map(|file| format!("--ignore={}", folder().join(file).display())),
+    );
+    expect_all_passed(Running::start("pytest", &mut tests).wait(), 17);
+}
+
+#[test]
+fn the_rig_for_python_does_in_real_time_what_it_says() {
     let _machine = turn::take();
-    let _ = [Program::Discrepancy, Program::Campaign].map(|program| executable(program, Build::Shipped));
     let mut tests = pytest();
-    tests.arg(workspace().join("python/tests/rig"));
-    expect_all_passed(Running::start("pytest", &mut tests).wait(), 105);
+    tests.args(["-m", "airbench_realtime"]).arg(folder());
+    expect_all_passed(Running::start("pytest", &mut tests).wait(), 7);
 }
 
 #[test]
@@ -44,7 +84,7 @@ fn the_example_suite_holds_our_controller_and_the_firmware_against_their_require
     let _machine = turn::take();
     let folder = tempfile::tempdir().expect("a temporary folder");
     firmware::build(&folder.path().join("firmware"), &[]);
-    let mut suite = pytest();
+    let mut suite = on_two_workers();
     suite
         .current_dir(workspace().join("docs/examples/pytest"))
         .env("AIRBENCH_FIRMWARE", folder.path().join("firmware"));

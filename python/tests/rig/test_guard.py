@@ -72,7 +72,7 @@ def start(tmp_path, pace, number, shell=False):
     return victim, mark, private
 
 
-@pytest.mark.parametrize("pace", ["lockstep", "real"])
+@pytest.mark.parametrize("pace", ["lockstep", pytest.param("real", marks=pytest.mark.airbench_realtime)])
 def test_a_kill_at_random_moments_leaves_no_process_no_socket_no_lock_and_readable_folders(tmp_path, pace):
     chance = random.Random(34)
     runs = 0

@@ -211,6 +211,7 @@ def test_a_requirement_that_there_is_not_and_an_unmarked_test_in_real_time_are_e
     run(suite, "test_wrong.py").stdout.fnmatch_lines(["*mark it @pytest.mark.airbench_realtime*"])
 
 
+@pytest.mark.airbench_realtime  # those of the suite within
 def test_a_test_in_real_time_has_the_machine_alone(suite):
     suite.makepyfile(test_times='''
 import os, time, pytest

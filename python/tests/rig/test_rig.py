@@ -193,6 +193,7 @@ def test_a_python_controllers_own_exception_reaches_the_test_and_so_does_a_bad_o
                 rig.run_for("1 s")
 
 
+@pytest.mark.airbench_realtime
 @pytest.mark.parametrize("asked", [lambda rig: rig.run_for("60 s"), lambda rig: (time.sleep(0.5), rig.end())], ids=["run", "end"])
 def test_in_real_time_a_controllers_exception_reaches_the_test_and_the_run_is_saved(tmp_path, asked):
     def raising(sensors):
@@ -276,6 +277,7 @@ def test_a_controller_that_hangs_is_named_and_one_that_crashes_too(tmp_path):
         assert failed.value.exit_code == -6
 
 
+@pytest.mark.airbench_realtime
 def test_a_foreign_program_that_dies_in_real_time_fails_the_test_and_one_that_ends_with_the_bus_does_not(tmp_path):
     program = tmp_path / "foreign.py"
     real = {"pace": "real", "emulator_options": ["--no-realtime"]}
@@ -320,6 +322,7 @@ def test_an_own_controller_that_is_killed_is_what_its_partner_misses(tmp_path):
             rig.kill("controller-drive")
 
 
+@pytest.mark.airbench_realtime
 def test_real_time_passes_by_itself_and_a_function_answers_in_it(tmp_path):
     with Rig(pace="real", controller=to_300_mm, setup=AT, emulator_options=["--no-realtime"], out=tmp_path) as rig:
         rig.expect("near(DriveSensors.position, 0.3, 0.01)", within="30 s")
@@ -332,6 +335,7 @@ def test_real_time_passes_by_itself_and_a_function_answers_in_it(tmp_path):
     assert run.figures["cycles"] >= 1000 * before
 
 
+@pytest.mark.airbench_realtime
 def test_in_real_time_expectations_begin_at_the_newest_cycle(tmp_path):
     with Rig(pace="real", controller=lambda _: 0.0, emulator_options=["--no-realtime"], out=tmp_path) as rig:
         before = rig.time
