@@ -37,8 +37,19 @@ def mutations():
     return [Mutation(row["name"], row["about"], row["file"], row["from"], row["to"], row["caught_by"]) for row in rows]
 
 
-def build(folder, mutation=None):
-    """The firmware's two programs for Linux in `folder`/build, changed or as it is.
+def _make(sources, build, *targets):
+    make = ["make", "-s", "-C", sources, f"BUILD={build}", f"PYTHON={sys.executable}", f"DBC={ROOT / 'protocol/rig.dbc'}"]
+    subprocess.run([*make, *targets], check=True, stdout=subprocess.DEVNULL)
+
+
+def codec(folder):
+    """The codec of rig.dbc in `folder`, which no mistake touches."""
+    _make(FIRMWARE, folder, folder / "rig.c")
+    return folder
+
+
+def build(folder, codec_folder, mutation=None):
+    """The firmware's two programs for Linux in `folder`/build, changed or as it is, with the codec.
 
     :raises ValueError: the text to be changed does not stand in its file exactly once.
     """
@@ -49,8 +60,8 @@ def build(folder, mutation=None):
         if text.count(mutation.old) != 1:
             raise ValueError(f"{mutation.name}: what it changes stands {text.count(mutation.old)} times in {mutation.file}")
         (sources / mutation.file).write_text(text.replace(mutation.old, mutation.new))
-    make = ["make", "-s", "-C", sources, f"BUILD={folder / 'build'}", f"PYTHON={sys.executable}", f"DBC={ROOT / 'protocol/rig.dbc'}"]
-    subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
+    shutil.copytree(codec_folder, folder / "build")
+    _make(sources, folder / "build")
     return folder / "build"
 
 
@@ -96,7 +107,7 @@ def main():
     for mutation in [None, *chosen]:
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
-            outcomes = run(folder, build(folder, mutation), "-n", "2")
+            outcomes = run(folder, build(folder, codec(folder / "codec"), mutation), "-n", "2")
         failed = [name for name, outcome in outcomes.items() if outcome != "passed"]
         good &= bool(failed) if mutation else not failed
         print(f"{mutation.name if mutation else 'unchanged'}: {', '.join(failed) or 'all tests passed'}", flush=True)

@@ -4,9 +4,15 @@ import mutations
 import pytest
 
 
+@pytest.fixture(scope="module")
+def codec(tmp_path_factory):
+    """Made once."""
+    return mutations.codec(tmp_path_factory.mktemp("codec"))
+
+
 @pytest.mark.parametrize("mutation", mutations.mutations(), ids=lambda mutation: mutation.name)
-def test_a_mistake_in_the_firmware_is_caught(mutation, tmp_path):
-    outcomes = mutations.run(tmp_path, mutations.build(tmp_path, mutation), "-k", mutation.caught_by)
+def test_a_mistake_in_the_firmware_is_caught(mutation, codec, tmp_path):
+    outcomes = mutations.run(tmp_path, mutations.build(tmp_path, codec, mutation), "-k", mutation.caught_by)
     assert outcomes == {mutation.caught_by: "failed"}
 
 
