@@ -21,6 +21,7 @@ mod gauss_newton;
 mod needed_parameters;
 mod null_distribution;
 mod pitch;
+mod probabilities;
 mod round;
 mod start_states;
 
@@ -39,6 +40,7 @@ use gauss_newton::{backtrack, fit_selected};
 use needed_parameters::with_needed;
 pub(crate) use needed_parameters::{is_off, off};
 use null_distribution::NullDistribution;
+pub(crate) use probabilities::probabilities;
 use rayon::prelude::*;
 use round::Round;
 use start_states::{RefitWithInitialStates, refit_with_starts};

@@ -191,6 +191,8 @@ pub struct Explanation {
     pub kind: ExplanationKind,
     /// Sets of effects that the records cannot tell apart, the best first; empty without effects.
     pub sets: Vec<Vec<EffectPlace>>,
+    /// Those of all explanations sum to one.
+    pub probability: f64,
     /// What the records say about it; null for none of these.
     pub evidence: Option<Evidence>,
 }

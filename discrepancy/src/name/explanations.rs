@@ -5,11 +5,12 @@
 //!   evidence of each: what it leaves, how far it is behind, parameters moved, agreement of the windows, amplitude, share
 //! ```
 //!
-//! Sets of effects are alike when they differ in one effect, and the responses to the two have a cosine above [`ALIKE_COSINE`],
+//! A set has the effects that are large enough to be named; fits that differ in smaller ones beside them are the same explanation,
+//! and its evidence is that of the best of them. Sets are alike when they differ in one effect, and the responses to the two have a cosine above [`ALIKE_COSINE`],
 //! parameters projected out. Losses are J of `refit`: minus twice the log-likelihood of the windows, priors and penalties
 //! included.
 
-use super::{amplitude_ratio, consistency::amplitude_variation, same};
+use super::{amplitude_ratio, consistency::amplitude_variation, is_large, same};
 use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -47,6 +48,8 @@ pub struct Evidence {
     pub amplitude_variation: Option<f64>,
     /// Smallest amplitude of its effects over the smallest that is named; null without effects.
     pub smallest_amplitude: Option<f64>,
+    /// Number of effects beside them that are too small to be named.
+    pub small_beside: usize,
     /// Share of the loss under parameters alone that it removes.
     pub share: f64,
 }
@@ -89,6 +92,7 @@ pub(super) fn explanations(
         parameters_moved: parameters_moved(factors),
         amplitude_variation: None,
         smallest_amplitude: None,
+        small_beside: 0,
         share: (1.0 - loss / fits.parameters.loss.max(1e-9)).clamp(0.0, 1.0),
     };
     let without_effects = |kind, evidence| Explanation { kind, sets: Vec::new(), evidence };
@@ -101,16 +105,20 @@ pub(super) fn explanations(
     ];
     all.extend(classes.iter().map(|class| {
         let best = class[0];
-        let variation = amplitude_variation(engine, &at_model, best);
-        let ratios = best.placed.iter().map(amplitude_ratio);
+        let variations = amplitude_variation(engine, &at_model, best).map(|all| {
+            let of_large = all.into_iter().zip(&best.placed).filter(|(_, placed)| is_large(placed));
+            of_large.map(|(variation, _)| variation).fold(0.0, f64::max)
+        });
+        let named = large(best);
         let evidence = Evidence {
-            amplitude_variation: variation.map(|all| all.into_iter().fold(0.0, f64::max)),
-            smallest_amplitude: Some(ratios.fold(f64::INFINITY, f64::min)),
+            amplitude_variation: variations,
+            smallest_amplitude: Some(named.iter().map(amplitude_ratio).fold(f64::INFINITY, f64::min)),
+            small_beside: best.placed.len() - named.len(),
             ..evidence(best.loss, &best.factors)
         };
         Explanation {
             kind: ExplanationKind::Effects,
-            sets: class.iter().map(|fit| fit.placed.clone()).collect(),
+            sets: class.iter().map(|fit| large(fit)).collect(),
             evidence: Some(evidence),
         }
     }));
@@ -126,7 +134,12 @@ fn parameters_moved(factors: &[f64; COUNT]) -> f64 {
     deviations.sum()
 }
 
-/// The best fit of each set of effects, alike ones together: the model's class first, then by loss.
+/// Its effects that are large enough to be named.
+fn large(fit: &Refit) -> Vec<EffectEstimate> {
+    fit.placed.iter().filter(|placed| is_large(placed)).cloned().collect()
+}
+
+/// The best fit of each set of large effects, alike ones together: the model's class first, then by loss.
 fn classes<'a>(
     fits: &Fits<'a>,
     are_alike: impl Fn(&EffectEstimate, &EffectEstimate) -> bool,
@@ -136,7 +149,7 @@ fn classes<'a>(
     all.insert(0, fits.model);
     let mut classes: Vec<Vec<&Refit>> = Vec::new();
     for fit in all {
-        if fit.placed.is_empty()
+        if large(fit).is_empty()
             || classes.iter().flatten().any(|other| has_all(other, fit) && has_all(fit, other))
         {
             continue;
@@ -150,9 +163,10 @@ fn classes<'a>(
     classes
 }
 
-/// Whether a model has all effects of another one.
+/// Whether a model has all large effects of another one among its own.
 fn has_all(model: &Refit, other: &Refit) -> bool {
-    other.placed.iter().all(|effect| model.placed.iter().any(|placed| same(placed, effect)))
+    let large_of_model = large(model);
+    large(other).iter().all(|effect| large_of_model.iter().any(|placed| same(placed, effect)))
 }
 
 fn differ_by_alike(
@@ -160,12 +174,9 @@ fn differ_by_alike(
     right: &Refit,
     are_alike: impl Fn(&EffectEstimate, &EffectEstimate) -> bool,
 ) -> bool {
-    let only = |of: &'_ Refit, other: &Refit| -> Vec<EffectEstimate> {
-        of.placed
-            .iter()
-            .filter(|placed| !other.placed.iter().any(|other| same(placed, other)))
-            .cloned()
-            .collect()
+    let only = |of: &Refit, other: &Refit| -> Vec<EffectEstimate> {
+        let others = large(other);
+        large(of).into_iter().filter(|placed| !others.iter().any(|other| same(placed, other))).collect()
     };
     match (&only(left, right)[..], &only(right, left)[..]) {
         ([left], [right]) => are_alike(left, right),

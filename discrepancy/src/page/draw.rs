@@ -181,32 +181,54 @@ pub(super) struct Bar {
     pub(super) is_full: bool,
 }
 
+/// Height of a bar with its words.
+const BAR_ROW: f64 = 36.0;
+
 /// Bars over a logarithmic axis with a line at 1, which they start from: to the right of it is more than noise or chance.
 pub(super) fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
-    const ROW: f64 = 36.0;
     let largest = bars.iter().map(|bar| bar.value).filter(|value| value.is_finite()).fold(3.0, f64::max);
     let scale = Scale { low: 0.3f64.log10(), high: largest.log10(), from: 8.0, to: WIDTH - 14.0 };
     let place = |value: f64| scale.at(if value.is_nan() { 1.0 } else { value.max(1e-9) }.log10());
-    let bottom = 6.0 + ROW * bars.len() as f64;
-    let one = place(1.0);
+    let decades = (1..=(largest.log10().floor() as i32)).map(|power| 10f64.powi(power));
+    let ticks: Vec<(f64, String)> = decades.map(|at| (at, words::round(at))).collect();
+    bars_from((identifier, title), bars, place, (1.0, "1"), &ticks)
+}
+
+/// Bars of shares, from 0 to 1.
+pub(super) fn share_bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
+    let scale = Scale { low: 0.0, high: 1.0, from: 8.0, to: WIDTH - 14.0 };
+    let ticks: Vec<(f64, String)> = [0.5, 0.9].map(|at| (at, words::percent(at))).into();
+    bars_from((identifier, title), bars, |value| scale.at(value.clamp(0.0, 1.0)), (0.0, "0"), &ticks)
+}
+
+/// Bars that start at a line; the grid has a line at each tick.
+fn bars_from(
+    (identifier, title): (&str, &str),
+    bars: &[Bar],
+    place: impl Fn(f64) -> f64,
+    (start, start_label): (f64, &str),
+    ticks: &[(f64, String)],
+) -> String {
+    let bottom = 6.0 + BAR_ROW * bars.len() as f64;
+    let edge = place(start);
     let mut body = String::new();
-    for power in 1..=(largest.log10().floor() as i32) {
-        let at = place(10f64.powi(power));
+    for (value, label) in ticks {
+        let at = place(*value);
         body += &stroke("grid", (at, 4.0), (at, bottom));
-        body += &text("middle", (at, bottom + 16.0), &words::round(10f64.powi(power)));
+        body += &text("middle", (at, bottom + 16.0), label);
     }
-    body += &stroke("edge", (one, 4.0), (one, bottom + 4.0));
-    body += &text("middle", (one, bottom + 16.0), "1");
+    body += &stroke("edge", (edge, 4.0), (edge, bottom + 4.0));
+    body += &text("middle", (edge, bottom + 16.0), start_label);
     for (row, bar) in bars.iter().enumerate() {
-        let top = 6.0 + ROW * row as f64;
+        let top = 6.0 + BAR_ROW * row as f64;
         let at = place(bar.value);
         let class = if bar.is_full { "bar s1" } else { "bar wait s1" };
         let _ = writeln!(
             body,
             "<rect class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"11\"/>",
-            at.min(one),
+            at.min(edge),
             top + 19.0,
-            (at - one).abs().max(1.0)
+            (at - edge).abs().max(1.0)
         );
         body += &text("name", (8.0, top + 14.0), &bar.label);
         body += &text("end name", (WIDTH - 8.0, top + 14.0), &bar.text);

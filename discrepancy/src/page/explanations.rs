@@ -1,5 +1,6 @@
-//! The explanations that the search compared, each with what speaks for it and against it.
+//! The explanations that the search compared: how probable each is, what speaks for it and against it.
 
+use super::draw::{Bar, figure, share_bars};
 use super::markup::{number, paragraph, table, words as text_cell};
 use super::words;
 use crate::name::{Evidence, ExplanationKind};
@@ -12,6 +13,7 @@ pub(super) fn explanations(report: &Report) -> String {
             |value: Option<f64>| number(value.map_or_else(|| words::NOTHING.to_owned(), words::percent));
         Some(vec![
             text_cell(name(explanation)),
+            number(words::percent(explanation.probability)),
             number(words::short(noise_ratio(&evidence))),
             number(words::short(evidence.behind)),
             number(words::short(evidence.parameters_moved)),
@@ -20,6 +22,7 @@ pub(super) fn explanations(report: &Report) -> String {
     };
     let heads = [
         "explanation",
+        "probability",
         "leaves, times noise",
         "loss behind the best",
         "parameters moved",
@@ -29,11 +32,63 @@ pub(super) fn explanations(report: &Report) -> String {
     if table.is_empty() {
         return table;
     }
-    paragraph(
-        "The right explanation leaves about 1 times the noise, moves few parameters, and all stretches of the records agree on \
-         its amplitude. Where no row does all three, it is none of these: look at where they disagree, and record more. \
-         Where two rows do, a difference of less than 9 in loss does not tell them apart.",
-    ) + &table
+    paragraph(&advice(&report.explanations))
+        + &probabilities(&report.explanations)
+        + &paragraph(
+            "The right explanation leaves about 1 times the noise, moves few parameters, and all stretches of the records agree \
+             on its amplitude.",
+        )
+        + &table
+}
+
+/// Probability from which an explanation is acted on.
+const CLEAR: f64 = 0.9;
+
+/// What to do, in a sentence.
+fn advice(explanations: &[Explanation]) -> String {
+    let mut ranked: Vec<&Explanation> = explanations.iter().collect();
+    ranked.sort_by(|left, right| right.probability.total_cmp(&left.probability));
+    let [first, second, ..] = ranked[..] else { return String::new() };
+    let first_words = format!("{} ({})", name(first), words::percent(first.probability));
+    match (first.kind, first.probability >= CLEAR) {
+        (ExplanationKind::NoneOfThese, _) => format!(
+            "Most probable is {first_words}: look at where model and records disagree before you add anything to the model."
+        ),
+        (ExplanationKind::Nothing, true) => format!("Keep {first_words}."),
+        (ExplanationKind::Parameters, true) => format!("Correct the numbers of the rig file: {first_words}."),
+        (ExplanationKind::Effects, true) => format!("Add to the model: {first_words}."),
+        (_, false) => format!(
+            "No explanation has {}: {first_words} is followed by {} ({}). Record what tells these two apart before you decide.",
+            words::percent(CLEAR),
+            name(second),
+            words::percent(second.probability)
+        ),
+    }
+}
+
+fn probabilities(explanations: &[Explanation]) -> String {
+    let bar = |one: &Explanation| Bar {
+        label: shortened(&name(one)),
+        value: one.probability,
+        text: words::percent(one.probability),
+        is_full: one.probability >= CLEAR,
+    };
+    let rows: Vec<Bar> = explanations.iter().map(bar).collect();
+    figure(
+        "How probable each explanation is",
+        "From the evidence below, weighed as on records whose truth is known; full from 90 %.",
+        &[],
+        &share_bars("probabilities", "Probability of each explanation", &rows),
+    )
+}
+
+/// As much of a name as a bar has room for; the table has all of it.
+fn shortened(name: &str) -> String {
+    const MOST: usize = 44;
+    match name.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", name[..end].trim_end()),
+        None => name.to_owned(),
+    }
 }
 
 /// Mean power of what is left, over that of noise: the geometric mean of the windows.

@@ -231,19 +231,21 @@ fn explanations() -> Vec<Explanation> {
         parameters_moved: 0.4,
         amplitude_variation,
         smallest_amplitude: amplitude_variation.map(|_| 5.0),
+        small_beside: 0,
         share: 0.968,
     };
-    let of = |kind, sets, evidence| Explanation { kind, sets, evidence };
+    let of = |kind, probability, sets, evidence| Explanation { kind, probability, sets, evidence };
     let leakages = ["piston-leakage", "valve-null-leakage"];
     vec![
-        of(ExplanationKind::Nothing, Vec::new(), Some(evidence(3.1, 4200.0, None))),
-        of(ExplanationKind::Parameters, Vec::new(), Some(evidence(1.2, 1600.0, None))),
+        of(ExplanationKind::Nothing, 0.0, Vec::new(), Some(evidence(3.1, 4200.0, None))),
+        of(ExplanationKind::Parameters, 0.0, Vec::new(), Some(evidence(1.2, 1600.0, None))),
         of(
             ExplanationKind::Effects,
+            0.97,
             leakages.map(|name| vec![effect(name)]).to_vec(),
             Some(evidence(-0.01, 0.0, Some(0.02))),
         ),
-        of(ExplanationKind::NoneOfThese, Vec::new(), None),
+        of(ExplanationKind::NoneOfThese, 0.03, Vec::new(), None),
     ]
 }
 

@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{SelectionResult, is_large, off, same};
+use crate::name::{SelectionResult, is_large, off, probabilities, same};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
@@ -177,8 +177,10 @@ pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> 
         effect: placed.candidate.sheet.name.to_owned(),
         place: Where::from(placed.candidate.place),
     };
-    let all = found.explanations.iter().map(|explanation| report::Explanation {
+    let weighed = found.explanations.iter().zip(probabilities(&found.explanations));
+    let all = weighed.map(|(explanation, probability)| report::Explanation {
         kind: explanation.kind,
+        probability,
         sets: explanation.sets.iter().map(|set| set.iter().map(effect).collect()).collect(),
         evidence: explanation.evidence,
     });

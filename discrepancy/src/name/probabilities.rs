@@ -1,0 +1,121 @@
+//! Probabilities of the explanations: a conditional logit of their evidence (McFadden 1974).
+//!
+//! Of a record, explanation j has the probability exp(w'x_j) / sum_k exp(w'x_k). `discrepancy/study/explanations.py` fits w to
+//! draws of the study whose truth is known; its function `regressors` gives the same x. What they say holds where nothing,
+//! parameters and effects are as frequent as in those draws.
+
+use super::explanations::{Explanation, ExplanationKind};
+use serde::Deserialize;
+use std::sync::LazyLock;
+
+static WEIGHTS: LazyLock<Weights> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("../../study/weights.json")).expect("weights of a fit")
+});
+
+/// Scales on which evidence counts: the loss by which alternatives are told apart, what the best model of an exact record leaves,
+/// a variation that chance does not give.
+const BEHIND_SCALE: f64 = 9.0;
+const EXCESS_SCALE: f64 = 0.08;
+const VARIATION_SCALE: f64 = 0.3;
+/// Above so many times the smallest amplitude that is named, a larger one counts no more.
+const LARGEST_RATIO: f64 = 10.0;
+/// Parameters that are moved by less are those of the rig file, and by so much they count as off.
+const SMALLEST_MOVED: f64 = 1e-3;
+const MOVED_SCALE: f64 = 0.1;
+
+/// Log odds for each unit of a regressor.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Weights {
+    parameters: f64,
+    effects: f64,
+    none_of_these: f64,
+    /// The set of effects that the search selected, the first of them.
+    selected: f64,
+    behind: f64,
+    excess: f64,
+    moved: f64,
+    parameters_alone: f64,
+    variation: f64,
+    amplitude: f64,
+    /// Probability of none of these whatever the evidence says.
+    lapse: f64,
+}
+
+/// Of each explanation, in their order; they sum to one.
+pub(crate) fn probabilities(explanations: &[Explanation]) -> Vec<f64> {
+    let selected = explanations.iter().position(|one| one.kind == ExplanationKind::Effects);
+    let utilities: Vec<f64> = explanations
+        .iter()
+        .enumerate()
+        .map(|(at, one)| utility(one, &WEIGHTS) + if selected == Some(at) { WEIGHTS.selected } else { 0.0 })
+        .collect();
+    let most = utilities.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let shares: Vec<f64> = utilities.iter().map(|utility| (utility - most).exp()).collect();
+    let sum: f64 = shares.iter().sum();
+    let lapse = |one: &Explanation| if one.evidence.is_none() { WEIGHTS.lapse } else { 0.0 };
+    let weighed = shares.into_iter().zip(explanations);
+    weighed.map(|(share, one)| (1.0 - WEIGHTS.lapse) * share / sum + lapse(one)).collect()
+}
+
+fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
+    let Some(evidence) = &explanation.evidence else { return weights.none_of_these };
+    let of_kind = match explanation.kind {
+        ExplanationKind::Parameters => {
+            let moved = evidence.parameters_moved.max(SMALLEST_MOVED) / MOVED_SCALE;
+            weights.parameters + weights.parameters_alone * moved.ln()
+        }
+        ExplanationKind::Effects => weights.effects,
+        ExplanationKind::Nothing | ExplanationKind::NoneOfThese => 0.0,
+    };
+    let smallest = evidence.smallest_amplitude.unwrap_or(1.0);
+    of_kind
+        + weights.behind * (evidence.behind / BEHIND_SCALE).ln_1p()
+        + weights.excess * (evidence.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
+        + weights.moved * evidence.parameters_moved
+        + weights.variation * (evidence.amplitude_variation.unwrap_or(0.0) / VARIATION_SCALE).ln_1p()
+        + weights.amplitude * smallest.clamp(1.0, LARGEST_RATIO).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::explanations::Evidence;
+    use super::*;
+
+    fn explanation(kind: ExplanationKind, loss_per_dof: f64, behind: f64) -> Explanation {
+        let evidence = Evidence {
+            loss_per_dof,
+            behind,
+            parameters_moved: 0.0,
+            amplitude_variation: None,
+            smallest_amplitude: None,
+            small_beside: 0,
+            share: 0.0,
+        };
+        let evidence = (kind != ExplanationKind::NoneOfThese).then_some(evidence);
+        Explanation { kind, sets: Vec::new(), evidence }
+    }
+
+    #[test]
+    fn probabilities_sum_to_one_and_follow_what_is_left() {
+        let of = |nothing: f64, behind: f64| {
+            probabilities(&[
+                explanation(ExplanationKind::Nothing, nothing, behind),
+                explanation(ExplanationKind::Parameters, 0.0, 0.0),
+                explanation(ExplanationKind::NoneOfThese, 0.0, 0.0),
+            ])
+        };
+        let [clean, wrong] = [of(0.0, 2.0), of(4.0, 3e5)];
+        for all in [&clean, &wrong] {
+            assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
+        assert!(clean[0] > 0.5 && wrong[0] < 0.01, "{clean:?} {wrong:?}");
+        let nobody = probabilities(&[
+            explanation(ExplanationKind::Nothing, 4.0, 1e5),
+            explanation(ExplanationKind::Parameters, 2.0, 0.0),
+            explanation(ExplanationKind::NoneOfThese, 0.0, 0.0),
+        ]);
+        assert!(nobody[2] > 0.5, "{nobody:?}");
+        assert!(probabilities(&[]).is_empty());
+    }
+}
