@@ -1,8 +1,10 @@
 //! `scripts/latency`: help, arguments that cannot be used, and a shortest measurement as a whole.
 
+use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::Path;
-use system_tests::binaries::script;
-use system_tests::process::{Ended, PATIENCE};
+use system_tests::binaries::{Program, script, workspace};
+use system_tests::process::{Ended, PATIENCE, Running};
 use system_tests::records::json;
 use system_tests::skip;
 
@@ -19,7 +21,7 @@ fn help_tells_options_files_and_exit_codes() {
 
 #[test]
 fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
-    let wrong: [(&[&str], &str); 11] = [
+    let wrong: [(&[&str], &str); 13] = [
         (&["--fly"], "unknown argument --fly"),
         (&["--pairs"], "--pairs needs a value"),
         (&["--pairs", "0"], "from 1 to 1000"),
@@ -30,6 +32,8 @@ fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
         (&["--bus", "vcan0"], "can://IFACE"),
         (&["--experiment", "nothing-of-this-name"], "scripts/run --list"),
         (&["--bounds", "/nowhere.toml"], "cannot be read"),
+        (&["--claims", "--bounds", "/nowhere.toml"], "leave one out"),
+        (&["--claims", "--spin-us", "0"], "leave out --spin-us 0"),
         (&["--out", "/proc/airbench"], "--out"),
     ];
     for (arguments, hint) in wrong {
@@ -77,4 +81,33 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     // A second measurement into the same folder would mix the two.
     let _ =
         latency(&["--pairs", "1", "--seconds", "1", "--out", out]).expect_code(2).expect_said(&["earlier"]);
+}
+
+#[test]
+fn claims_are_judged_gaps_are_recorded_and_the_page_gets_the_table() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // A checkout of links, but for the page that is written.
+    let root = folder.path();
+    for part in ["controller", "discrepancy", "latency", "plant", "protocol", "scripts", "target"] {
+        symlink(workspace().join(part), root.join(part)).expect("a link");
+    }
+    let page = root.join("bench/docs/latency.md");
+    fs::create_dir_all(root.join("bench/docs")).expect("a folder of our own");
+    fs::write(&page, "before\n<!-- latency: begin -->\nold\n<!-- latency: end -->\nafter\n").expect("a page");
+    let mut latency = Program::Airbench.command();
+    latency.env("AIRBENCH_SHARE", root).arg("latency").arg("--out").arg(root.join("out"));
+    latency.args(["--pairs", "1", "--seconds", "1", "--claims", "--probe", "--write"]);
+    let ended = Running::start("airbench latency", &mut latency).wait();
+    let run = root.join("out/pair-01/run");
+    // One pair resolves no claim; a reference that was not measured breaks it.
+    let ended = ended.expect_code(if run.join("cyclictest.json").exists() { 0 } else { 1 });
+    assert!(ended.stdout.contains("is not resolved, neither kept nor broken"), "{}", ended.stdout);
+    assert_eq!(json(&run.join("conditions.json"))["probe"].as_bool(), Some(true));
+    let probed = fs::read_to_string(run.join("probe.csv")).expect("gaps of the machine");
+    assert!(probed.starts_with("cpu,from_ns,to_ns"), "{probed}");
+    let page = fs::read_to_string(&page).expect("the page");
+    let table = page.strip_prefix("before\n<!-- latency: begin -->\n`airbench latency --out ");
+    let table = table.and_then(|page| page.strip_suffix("\n<!-- latency: end -->\nafter\n"));
+    let row = table.and_then(|table| table.lines().find(|line| line.contains("ping-pong-bus p50")));
+    assert!(row.is_some_and(|row| row.contains("**not resolved**")), "{page}");
 }
