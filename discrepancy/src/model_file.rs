@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `record` | a record as the model reads it |
 //! | `fit` | output-error fit by the one Gauss-Newton |
+//! | `normal` | normal equations, steps, standard errors |
 //! | `starts` | from where a fit starts |
 //! | `select` | which suspects are taken |
 //! | `held_out` | both models on records that were not used |
@@ -21,6 +22,7 @@
 mod explain;
 mod fit;
 mod held_out;
+mod normal;
 mod page;
 mod record;
 mod report;

@@ -10,6 +10,7 @@
 //!
 //! Sources: Ljung, System Identification, 2nd edition, 7.2 (output error), 15.3 (concentrated likelihood); Björck 1996, 9.
 
+use super::normal::{Normal, solved};
 use super::record::Measured;
 use crate::estimator::{Convergence, Estimator, Iterate, Options, Outcome, Step};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start, Unit};
@@ -24,8 +25,6 @@ const FINISHED: usize = 2;
 const CONVERGED_PER_SAMPLE: f64 = 1e-4;
 /// Blocks of time of each record.
 pub(crate) const BLOCKS: usize = 10;
-/// Smallest eigenvalue of the scaled normal matrix, over its largest, of a direction that the records determine.
-const DETERMINED: f64 = 1e-10;
 /// Noise of an output is at least this share of its size: a fit that leaves nothing has no likelihood.
 const LEAST_NOISE: f64 = 1e-9;
 
@@ -87,26 +86,6 @@ impl Iterate for Point {
 
     fn is_at_bound(&self) -> bool {
         self.is_at_bound
-    }
-}
-
-/// Normal equations of a block.
-#[derive(Clone, Debug)]
-pub(crate) struct Normal {
-    pub(crate) matrix: DMatrix<f64>,
-    pub(crate) slope: DVector<f64>,
-    pub(crate) squares: f64,
-}
-
-impl Normal {
-    fn zero(count: usize) -> Self {
-        Self { matrix: DMatrix::zeros(count, count), slope: DVector::zeros(count), squares: 0.0 }
-    }
-
-    fn add(&mut self, other: &Self, weight: f64) {
-        self.matrix += &other.matrix * weight;
-        self.slope += &other.slope * weight;
-        self.squares += weight * other.squares;
     }
 }
 
@@ -492,61 +471,4 @@ impl<'a> Fitting<'a> {
             }
         }
     }
-}
-
-/// Solves scaled normal equations in the directions that they determine.
-pub(crate) fn solved(normal: &Normal, is_free: &[bool], damping: f64) -> DVector<f64> {
-    let places: Vec<usize> =
-        (0..is_free.len()).filter(|place| is_free[*place] && normal.matrix[(*place, *place)] > 0.0).collect();
-    let mut step = DVector::zeros(is_free.len());
-    let (vectors, values, scale) = eigen(normal, &places);
-    let slope = DVector::from_iterator(
-        places.len(),
-        places.iter().zip(&scale).map(|(place, scale)| normal.slope[*place] / scale),
-    );
-    let largest = values.iter().copied().fold(0.0, f64::max);
-    for (column, value) in values.iter().enumerate().filter(|(_, value)| **value > DETERMINED * largest) {
-        let direction = vectors.column(column);
-        let along = direction.dot(&slope) / (value + damping);
-        for (row, place) in places.iter().enumerate() {
-            step[*place] += along * direction[row] / scale[row];
-        }
-    }
-    step
-}
-
-/// Eigenvectors, eigenvalues and scales of the normal matrix with a diagonal of ones.
-fn eigen(normal: &Normal, places: &[usize]) -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
-    let scale: Vec<f64> = places.iter().map(|place| normal.matrix[(*place, *place)].sqrt()).collect();
-    if places.is_empty() {
-        return (DMatrix::zeros(0, 0), Vec::new(), scale);
-    }
-    let scaled = DMatrix::from_fn(places.len(), places.len(), |row, column| {
-        normal.matrix[(places[row], places[column])] / (scale[row] * scale[column])
-    });
-    let decomposed = scaled.symmetric_eigen();
-    (decomposed.eigenvectors, decomposed.eigenvalues.iter().copied().collect(), scale)
-}
-
-/// Standard errors; `None` for a number that the records do not determine.
-pub(crate) fn standard_errors(normal: &Normal) -> Vec<Option<f64>> {
-    let places: Vec<usize> =
-        (0..normal.slope.len()).filter(|place| normal.matrix[(*place, *place)] > 0.0).collect();
-    let (vectors, values, scale) = eigen(normal, &places);
-    let largest = values.iter().copied().fold(0.0, f64::max);
-    let mut errors = vec![None; normal.slope.len()];
-    for (row, place) in places.iter().enumerate() {
-        let mut variance = 0.0;
-        let mut is_determined = true;
-        for (column, value) in values.iter().enumerate() {
-            let share = vectors[(row, column)];
-            if *value > DETERMINED * largest {
-                variance += share * share / value;
-            } else if share.abs() > 1e-3 {
-                is_determined = false;
-            }
-        }
-        errors[*place] = is_determined.then(|| variance.sqrt() / scale[row]);
-    }
-    errors
 }

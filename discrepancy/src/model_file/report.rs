@@ -1,7 +1,8 @@
 //! The report of a model file, in the model's own names and units.
 
-use super::fit::{Fitting, standard_errors};
+use super::fit::Fitting;
 use super::held_out::{Judged, Traces};
+use super::normal::standard_errors;
 use super::select::{Evaluation, Fitted, Found};
 use super::structure::Structure;
 use crate::report::Verdict;

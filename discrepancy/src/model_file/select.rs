@@ -18,7 +18,8 @@
 //!
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
-use super::fit::{Fitting, Normal, Point, What, solved};
+use super::fit::{Fitting, Point, What};
+use super::normal::{Normal, solved};
 use super::record::Measured;
 use super::starts;
 use crate::estimator::Convergence;

@@ -6,8 +6,8 @@
 //! | points of a Halton sequence around them, those with the least loss | `kept` of `[fit] starts` |
 //!
 //! A point is spread over a fifth to five times each number, as far as its range allows; a number that may change its sign over
-//! five times it either way, and one whose value is 0 over its range. The sequence is the same in each run, and training records alone
-//! say which of its points are kept.
+//! five times it either way, and one whose value is 0 over its range. The sequence is the same in each run, and training records
+//! alone say which of its points are kept.
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
 

@@ -9,7 +9,8 @@
 //!
 //! Source: discrepancy-notes.md, 3; Brun, Reichert, Künsch 2001, Water Resources Research 37(4) (collinearity).
 
-use super::fit::{Fitting, Normal, solved, standard_errors};
+use super::fit::Fitting;
+use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
 use model::{Failure, Program};
 use nalgebra::{DMatrix, DVector};

@@ -1,0 +1,83 @@
+//! Normal equations: what they determine, the step that they ask for, and standard errors.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Smallest eigenvalue of the scaled normal matrix, over its largest, of a direction that the records determine.
+const DETERMINED: f64 = 1e-10;
+
+/// Normal equations of some rows.
+#[derive(Clone, Debug)]
+pub(crate) struct Normal {
+    pub(crate) matrix: DMatrix<f64>,
+    pub(crate) slope: DVector<f64>,
+    pub(crate) squares: f64,
+}
+
+impl Normal {
+    pub(crate) fn zero(count: usize) -> Self {
+        Self { matrix: DMatrix::zeros(count, count), slope: DVector::zeros(count), squares: 0.0 }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self, weight: f64) {
+        self.matrix += &other.matrix * weight;
+        self.slope += &other.slope * weight;
+        self.squares += weight * other.squares;
+    }
+}
+
+/// Solves scaled normal equations in the directions that they determine.
+pub(crate) fn solved(normal: &Normal, is_free: &[bool], damping: f64) -> DVector<f64> {
+    let places: Vec<usize> =
+        (0..is_free.len()).filter(|place| is_free[*place] && normal.matrix[(*place, *place)] > 0.0).collect();
+    let mut step = DVector::zeros(is_free.len());
+    let (vectors, values, scale) = eigen(normal, &places);
+    let slope = DVector::from_iterator(
+        places.len(),
+        places.iter().zip(&scale).map(|(place, scale)| normal.slope[*place] / scale),
+    );
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    for (column, value) in values.iter().enumerate().filter(|(_, value)| **value > DETERMINED * largest) {
+        let direction = vectors.column(column);
+        let along = direction.dot(&slope) / (value + damping);
+        for (row, place) in places.iter().enumerate() {
+            step[*place] += along * direction[row] / scale[row];
+        }
+    }
+    step
+}
+
+/// Eigenvectors, eigenvalues and scales of the normal matrix with a diagonal of ones.
+fn eigen(normal: &Normal, places: &[usize]) -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
+    let scale: Vec<f64> = places.iter().map(|place| normal.matrix[(*place, *place)].sqrt()).collect();
+    if places.is_empty() {
+        return (DMatrix::zeros(0, 0), Vec::new(), scale);
+    }
+    let scaled = DMatrix::from_fn(places.len(), places.len(), |row, column| {
+        normal.matrix[(places[row], places[column])] / (scale[row] * scale[column])
+    });
+    let decomposed = scaled.symmetric_eigen();
+    (decomposed.eigenvectors, decomposed.eigenvalues.iter().copied().collect(), scale)
+}
+
+/// Standard errors; `None` for a number that the records do not determine.
+pub(crate) fn standard_errors(normal: &Normal) -> Vec<Option<f64>> {
+    let places: Vec<usize> =
+        (0..normal.slope.len()).filter(|place| normal.matrix[(*place, *place)] > 0.0).collect();
+    let (vectors, values, scale) = eigen(normal, &places);
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    let mut errors = vec![None; normal.slope.len()];
+    for (row, place) in places.iter().enumerate() {
+        let mut variance = 0.0;
+        let mut is_determined = true;
+        for (column, value) in values.iter().enumerate() {
+            let share = vectors[(row, column)];
+            if *value > DETERMINED * largest {
+                variance += share * share / value;
+            } else if share.abs() > 1e-3 {
+                is_determined = false;
+            }
+        }
+        errors[*place] = is_determined.then(|| variance.sqrt() / scale[row]);
+    }
+    errors
+}
