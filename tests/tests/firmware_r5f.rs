@@ -113,15 +113,28 @@ fn positions(elf: &Path) -> Option<Positioned> {
     (done.rests > 0 && done.cycles > done.left_out).then_some(done)
 }
 
+fn keeps_the_bounds(done: &Positioned) -> bool {
+    done.set_point_error_m < 2e-5
+        && done.position_error_dynamic_m < DYNAMIC_M
+        && done.position_error_static_m < STATIC_M
+}
+
 #[test]
 fn it_positions_within_the_bounds_in_real_time() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let elf = patient_elf(folder.path());
     let _turn = turn::take();
-    let done = (0..ATTEMPTS).find_map(|_| positions(&elf)).expect("a machine that does not stand still");
-    assert!(done.set_points > 100 && done.set_point_error_m < 2e-5, "{done:?}");
-    assert!(done.position_error_dynamic_m < DYNAMIC_M, "{done:?}");
-    assert!(done.position_error_static_m < STATIC_M, "{done:?}");
+    let done = (1..=ATTEMPTS)
+        .find_map(|attempt| {
+            let stalls = Stalls::of(elf.to_str().expect("text"));
+            let done = positions(&elf);
+            let stalled = stalls.longest();
+            eprintln!("attempt {attempt} of {ATTEMPTS}: kept from running for {stalled:?}");
+            // Nothing but a machine that stood still is a reason to try it again.
+            done.filter(|done| keeps_the_bounds(done) || stalled < STALL || attempt == ATTEMPTS)
+        })
+        .expect("a machine that does not stand still");
+    assert!(done.set_points > 100 && keeps_the_bounds(&done), "{done:?}");
     assert!(done.position_error_dynamic_m > 5e-4, "a real loop has errors: {done:?}");
 }
 
