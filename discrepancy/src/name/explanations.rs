@@ -5,10 +5,10 @@
 //!   evidence of each: what it leaves, how far it is behind, parameters moved, agreement of the windows, amplitude, share
 //! ```
 //!
-//! A set has the effects that are large enough to be named; fits that differ in smaller ones beside them are the same explanation,
-//! and its evidence is that of the best of them. Sets are alike when they differ in one effect, and the responses to the two have a cosine above [`ALIKE_COSINE`],
-//! parameters projected out. Losses are J of `refit`: minus twice the log-likelihood of the windows, priors and penalties
-//! included.
+//! A set has the effects that are large enough to be named; fits that differ in smaller ones beside them are the same
+//! explanation, and its evidence is that of the best of them. Sets are alike when they differ in one effect, and the responses
+//! to the two have a cosine above [`ALIKE_COSINE`], parameters projected out. Losses are J of `refit`: minus twice the
+//! log-likelihood of the windows, priors and penalties included.
 
 use super::{amplitude_ratio, consistency::amplitude_variation, is_large, same};
 use crate::engine::Engine;
