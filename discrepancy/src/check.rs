@@ -29,7 +29,7 @@ pub(crate) use grid::SPARSEST;
 use notes::Notes;
 use plant::{Axis, RigParameters};
 use records::{Channel, Record, Signal};
-pub(crate) use time::FEWEST_ROWS;
+pub(crate) use stuck::stuck;
 
 /// Kind of the finding that an axis stood at the end of its stroke all the time.
 pub(crate) const PARKED: &str = "parked";

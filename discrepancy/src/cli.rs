@@ -28,7 +28,7 @@ pub enum Command {
     Locate(RecordArguments),
     /// Name the missing effects: like 'close', without a held-out record.
     Name(NameArguments),
-    /// Write the rig file extended by the effects that a report names.
+    /// Write the rig file, or the model file, extended by what a report names.
     Extend(ExtendArguments),
     /// Judge an extended rig file on a record that it was not fitted on.
     Verify(VerifyArguments),
@@ -41,7 +41,7 @@ pub enum Command {
 /// Records and the model.
 #[derive(Args, Clone, Debug)]
 pub struct RecordArguments {
-    /// Rig file: the model. For close and name also a model file, of any plant or of one balance alone.
+    /// Rig file: the model. For close and name also a model file, of any plant.
     #[arg(long, visible_alias = "model")]
     pub rig: PathBuf,
     /// Training records: measurement.csv, bus.log, or any CSV with --mapping.
@@ -64,7 +64,7 @@ pub struct ReadArguments {
     /// Mapping file of foreign CSV records.
     #[arg(long)]
     pub(crate) mapping: Option<PathBuf>,
-    /// Refuse records with columns that the measurement file does not know (a model of one balance reads its own alone); with
+    /// Refuse records with columns that the measurement file does not know (a model file reads its own alone); with
     /// close, exit code 1 too where the held-out record contradicts the verdict.
     #[arg(long)]
     pub(crate) strict: bool,
@@ -113,13 +113,13 @@ pub struct ExplainArguments {
 /// What a rig file is extended by.
 #[derive(Args, Clone, Debug)]
 pub struct ExtendArguments {
-    /// Rig file that the report was made with.
-    #[arg(long)]
+    /// Rig file or model file that the report was made with.
+    #[arg(long, visible_alias = "model")]
     pub rig: PathBuf,
     /// report.json.
     #[arg(long)]
     pub report: PathBuf,
-    /// The new rig file.
+    /// The new rig file or model file.
     #[arg(long)]
     pub out: PathBuf,
 }

@@ -18,10 +18,11 @@ use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
 use crate::refit::Linearisation;
 use crate::report::{Misfit, Objection, Report, Verdict, Verification};
-use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
-use crate::{locate, model_file, page, single_equation, verify};
+use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
+use crate::{locate, model_file, page, verify};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
+use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -35,8 +36,6 @@ use text::{in_words, quantity_in_words, significant};
 pub enum CommandError {
     #[error(transparent)]
     Workflow(#[from] WorkflowError),
-    #[error(transparent)]
-    Balance(#[from] single_equation::BalanceError),
     #[error(transparent)]
     Model(#[from] model_file::ModelError),
     #[error(transparent)]
@@ -92,13 +91,10 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     let text = std::fs::read_to_string(&records.rig)
         .map_err(|why| CommandError::File { file: records.rig.clone(), why })?;
     if model_file::is_model_file(&text) {
+        current_form(&records.rig, &text)?;
         return any_plant::close_command(arguments, tests);
     }
-    let one_balance = single_equation::is_model_file(&text);
-    let model = match records.rig.file_name() {
-        Some(name) if one_balance => PathBuf::from(name),
-        _ => PathBuf::from("rig.toml"),
-    };
+    let model = PathBuf::from("rig.toml");
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
     let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests).chain(&records.read.mapping);
     let out = Folder::open(&out, inputs)?;
@@ -107,19 +103,14 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         out.file(name)?;
     }
     let mut progress = progress();
-    let outcome = if one_balance {
-        refuse_whole_rig_options(arguments)?;
-        one_balance_outcome(records, tests, &mut progress)?
-    } else {
-        let task = Task {
-            rig: records.rig.clone(),
-            train: records.train.clone(),
-            test: one_test(tests)?,
-            options: records.read.options(),
-            without: without.clone(),
-        };
-        close(&task, &mut progress)?
+    let task = Task {
+        rig: records.rig.clone(),
+        train: records.train.clone(),
+        test: one_test(tests)?,
+        options: records.read.options(),
+        without: without.clone(),
     };
+    let outcome = close(&task, &mut progress)?;
     let Outcome { report, extended, pictures, experiment, not_judged } = &outcome;
     print(&in_words(report))?;
     if let Some(why) = not_judged {
@@ -153,29 +144,13 @@ fn exit_of(report: &Report, strict: bool) -> Exit {
     }
 }
 
-fn one_balance_outcome(
-    records: &RecordArguments,
-    tests: &[PathBuf],
-    progress: &mut dyn FnMut(&str),
-) -> Result<Outcome, CommandError> {
-    let tests: Vec<&Path> = tests.iter().map(PathBuf::as_path).collect();
-    let single_equation::Closed { report, not_judged, pictures } =
-        single_equation::close(&records.rig, &records.train, &tests, progress)?;
-    let is_model = report.verdict != Verdict::BadData;
-    let extended = is_model
-        .then(|| single_equation::extended_model_text(&records.rig, &Reported::from(&report)).ok())
-        .flatten();
-    Ok(Outcome { report, extended, pictures, experiment: None, not_judged })
-}
-
-/// A model of one balance says itself how its records are read, and which terms it has.
-fn refuse_whole_rig_options(arguments: &NameArguments) -> Result<(), CommandError> {
-    let given = [
-        ("--mapping", arguments.records.read.mapping.is_some(), "mapping = \"…\" in the model file"),
-        ("--without", !arguments.without.is_empty(), "[[terms]] and [selection] of the model file"),
-    ];
-    let Some((option, _, instead)) = given.iter().find(|(_, given, _)| *given) else { return Ok(()) };
-    Err(CommandError::BadData(format!("{option}: not for a model of one balance: {instead}")))
+/// Models of one balance had another form, which says what to do instead.
+fn current_form(file: &Path, text: &str) -> Result<(), CommandError> {
+    let Some(successor) = model_file::successor(text) else { return Ok(()) };
+    Err(CommandError::BadData(format!(
+        "{}: kind: models of one balance are model files now: begin with discrepancy/models/{successor}, see docs/model-files.md",
+        file.display()
+    )))
 }
 
 /// No record is given twice, and none is held out that was trained on. Only names are looked at: nothing is opened.
@@ -307,13 +282,16 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
 }
 
 fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
-    let report = read_report(&arguments.report)?;
-    let text =
-        if std::fs::read_to_string(&arguments.rig).is_ok_and(|text| single_equation::is_model_file(&text)) {
-            single_equation::extended_model_text(&arguments.rig, &report)?
-        } else {
-            workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?
-        };
+    let text = std::fs::read_to_string(&arguments.rig)
+        .map_err(|why| CommandError::File { file: arguments.rig.clone(), why })?;
+    let text = if model_file::is_model_file(&text) {
+        current_form(&arguments.rig, &text)?;
+        let extended = model_file::extended(&text, &read_report(&arguments.report)?);
+        extended.map_err(|why| CommandError::BadData(format!("{}: {why}", arguments.rig.display())))?
+    } else {
+        let report = read_report(&arguments.report)?;
+        workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?
+    };
     spare(&arguments.out, &[&arguments.rig, &arguments.report])?;
     folder::write(&arguments.out, &text)?;
     Ok(Exit::Good)
@@ -404,7 +382,7 @@ fn gridded_records(arguments: &RecordArguments) -> Result<(RigFile, Vec<GriddedR
     Ok((rig_file, all))
 }
 
-fn read_report(path: &Path) -> Result<Reported, CommandError> {
+fn read_report<T: DeserializeOwned>(path: &Path) -> Result<T, CommandError> {
     let bytes = std::fs::read(path).map_err(|why| CommandError::File { file: path.to_owned(), why })?;
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }

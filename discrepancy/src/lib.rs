@@ -25,7 +25,6 @@
 //! | `tabulate` | such terms as tables of the rig file |
 //! | [`next`] | experiment design for ambiguous explanations |
 //! | `verify` | both models on the held-out record |
-//! | [`single_equation`] | the same for a model of one balance, without simulation |
 //! | [`model_file`] | the same for a plant that its user wrote as a file |
 //! | [`report`], `page` | results as data and as a page |
 //! | [`workflow`] | the steps in order |
@@ -54,7 +53,6 @@ pub mod refit;
 pub mod report;
 pub(crate) mod screen;
 pub(crate) mod sensor_inverse;
-pub mod single_equation;
 pub(crate) mod stats;
 pub(crate) mod tabulate;
 pub(crate) mod unknown_inputs;

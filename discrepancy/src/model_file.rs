@@ -7,8 +7,11 @@
 //! | file | holds |
 //! |---|---|
 //! | `record` | a record as the model reads it |
+//! | `processing` | even grid, smoothed inputs, rates, rows |
+//! | `filter` | zero-phase low passes |
 //! | `fit` | output-error fit by the one Gauss-Newton |
 //! | `normal` | normal equations, steps, standard errors |
+//! | `cuts` | rows in blocks of time, and in bands |
 //! | `starts` | from where a fit starts |
 //! | `select` | which suspects are taken |
 //! | `held_out` | both models on records that were not used |
@@ -16,14 +19,19 @@
 //! | `report` | the report |
 //! | `explain` | equations, units, suspects in words |
 //! | `page` | the page |
+//! | `extended` | the model file with what was found |
 //!
 //! Nothing of a held-out record is read before the terms are chosen and fitted. Keys and figures: `docs/model-files.md`.
 
+mod cuts;
 mod explain;
+mod extended;
+mod filter;
 mod fit;
 mod held_out;
 mod normal;
 mod page;
+mod processing;
 mod record;
 mod report;
 mod select;
@@ -31,9 +39,10 @@ mod starts;
 mod structure;
 
 pub use explain::explain;
+pub use extended::{ExtendError, ReportedModel, extended};
 pub use held_out::JudgeError;
 pub use record::RecordError;
-pub use report::ModelReport;
+pub use report::{Left, ModelReport};
 
 use crate::report::Verdict;
 use held_out::Traces;
@@ -54,9 +63,24 @@ pub enum ModelError {
     Failure(#[from] Failure),
 }
 
-/// Whether a text is a model file: TOML with outputs at its top. A rig file has none, and a model of one balance neither.
+/// Whether a text is a model file: TOML with outputs at its top, or of the former form. A rig file has neither.
 pub(crate) fn is_model_file(text: &str) -> bool {
-    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("outputs"))
+    let has = |table: &toml::Table| table.contains_key("outputs") || table.contains_key("kind");
+    text.parse::<toml::Table>().is_ok_and(|table| has(&table))
+}
+
+/// The shipped model file that stands for a model of one balance, as files were written until 0.1.0: TOML with a `kind`.
+pub(crate) fn successor(text: &str) -> Option<&'static str> {
+    let table: toml::Table = text.parse().ok()?;
+    if table.contains_key("outputs") {
+        return None;
+    }
+    match table.get("kind")?.as_str()? {
+        "mass" => Some("emps.toml"),
+        "friction" => Some("cylinder-friction.toml"),
+        "chamber" => Some("chamber.toml"),
+        _ => None,
+    }
 }
 
 /// Reads a model file.
@@ -77,6 +101,8 @@ pub struct ClosedModel {
     pub not_judged: Option<String>,
     /// `report.html`, self-contained.
     pub page: String,
+    /// The model file with what was named; `None` where nothing was.
+    pub extended: Option<String>,
 }
 
 /// Closes a model: names what it lacks by the training records, and compares both models on the held-out ones.
@@ -106,7 +132,9 @@ pub fn close(
         Err(why) => (held_out::trained(&found)?, Some(why)),
     };
     let page = page::page(&model, &report, &traces, not_judged.as_deref());
-    Ok(ClosedModel { report, not_judged, page })
+    let is_named = !report.named.is_empty();
+    let extended = is_named.then(|| extended(model.text(), &ReportedModel::from(&report)).ok()).flatten();
+    Ok(ClosedModel { report, not_judged, page, extended })
 }
 
 type Judgement = (Vec<held_out::Judged>, Vec<Traces>);
@@ -134,5 +162,32 @@ impl ClosedModel {
     #[must_use]
     pub fn is_confirmed(&self) -> bool {
         self.report.verdict == Verdict::NothingMissing || self.report.confirmed == Some(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_file_is_distinguished_from_a_rig_file() {
+        let rig =
+            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../plant/rig.toml")).unwrap();
+        assert!(
+            is_model_file("[outputs.y]\nvalue = \"1\"\n")
+                && !is_model_file(&rig)
+                && !is_model_file("outputs =")
+        );
+    }
+
+    #[test]
+    fn a_model_of_one_balance_names_the_file_that_stands_for_it() {
+        let of = |kind: &str| successor(&format!("kind = \"{kind}\"\n"));
+        let shipped = ["mass", "friction", "chamber"].map(|kind| of(kind).unwrap());
+        for name in shipped {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(name);
+            assert!(read(&file).is_ok(), "{name}");
+        }
+        assert_eq!((of("spring"), successor("[outputs.y]\nvalue = \"1\"\n")), (None, None));
     }
 }

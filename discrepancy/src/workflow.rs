@@ -17,6 +17,7 @@ use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::locate::{UnknownSeries, locate};
+use crate::model_file::is_model_file;
 use crate::name::{SelectionResult, is_off, on_all};
 use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
@@ -24,7 +25,6 @@ use crate::page::Pictures;
 use crate::parameters::COUNT;
 use crate::refit::{Refit, rig_of};
 use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Next, Report, Verdict};
-use crate::single_equation::is_model_file;
 use crate::tabulate::{tables, tabulate};
 use crate::verify::{drawn, verify};
 pub use explained::explained;
@@ -71,10 +71,8 @@ pub enum WorkflowError {
     Rig { file: String, why: std::io::Error },
     #[error(transparent)]
     Parameters(#[from] ParameterError),
-    #[error(
-        "{file}: a model of one balance (it has a kind): only close, name and extend take one; give a rig file here"
-    )]
-    OneBalance { file: String },
+    #[error("{file}: a model file: only close, name, extend and explain take one; give a rig file here")]
+    ModelFile { file: String },
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error("{file}: cannot be used: {why}")]
@@ -105,7 +103,7 @@ impl RigFile {
         let text =
             std::fs::read_to_string(path).map_err(|why| WorkflowError::Rig { file: file.clone(), why })?;
         if is_model_file(&text) {
-            return Err(WorkflowError::OneBalance { file });
+            return Err(WorkflowError::ModelFile { file });
         }
         let rig = RigParameters::from_toml(&text, &file)?;
         Ok(RigFile { file, text, rig })

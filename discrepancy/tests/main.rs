@@ -1,8 +1,10 @@
 //! The integration tests of `discrepancy`, one executable.
 
 mod bad_records;
+mod balances;
 mod bus_log;
 mod calibrate;
+mod chamber;
 mod locate;
 mod model_files;
 mod name;

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 /// A mass on a spring, pushed by a force; what may be missing, and a decoy.
 const OSCILLATOR: &str = r#"
 name = "Oscillator"
+[fit]
+starts = 0 # the files' values are near
 [inputs.force]
 column = "force_N"
 unit = "N"

@@ -4,6 +4,7 @@ use crate::compile::tapes;
 use crate::expression::{Binary, Kind, Place, Wrong};
 use crate::file::{Change, Expression, Model, Target};
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, function, resolve};
+use crate::rows::reads_inputs_alone;
 use crate::units::{Dimension, Unit};
 use std::collections::HashMap;
 
@@ -28,6 +29,13 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
     for output in &model.outputs {
         dimensions.expression(&output.value, None, output.unit.dimension, &output.name)?;
     }
+    if let Some(condition) = &model.rows.condition {
+        dimensions.expression(condition, None, Dimension::NONE, "where")?;
+    }
+    for expression in model.rows.condition.iter().chain(&model.rows.folds) {
+        dimensions.node(expression.root, None)?;
+        reads_inputs_alone(model, expression.root)?;
+    }
     for (index, suspect) in model.suspects.iter().enumerate() {
         let wanted = match suspect.change {
             Change::Multiply => Dimension::NONE,
@@ -35,7 +43,8 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
         };
         dimensions.expression(&suspect.expression, Some(index), wanted, &suspect.name)?;
     }
-    let all: Vec<usize> = (0..model.suspects.len()).collect();
+    let is_suspect = |index: &usize| !model.suspects[*index].is_term;
+    let all: Vec<usize> = (0..model.suspects.len()).filter(is_suspect).collect();
     tapes(model, &all).map(|_| ())
 }
 

@@ -5,9 +5,10 @@
 //! ```
 
 use crate::expression::{Binary, Kind, Place, Wrong};
-use crate::file::{Change, Model, State, Target};
+use crate::file::{Change, Expression, Model, State, Target};
+use crate::inputs::Inputs;
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, function, name_of, resolve};
-use crate::tape::{Builder, Code, Leaves, Register, Tape};
+use crate::tape::{Builder, Code, Leaves, Register, Registers, Tape};
 use std::collections::HashMap;
 
 /// The tapes of a model with some suspects.
@@ -32,7 +33,7 @@ fn leaves(model: &Model) -> Leaves {
 
 /// The tapes with these suspects.
 pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
-    let is_there = |suspect: Option<usize>| suspect.is_none_or(|suspect| suspects.contains(&suspect));
+    let is_there = |owner: Option<usize>| model.is_there(owner, suspects);
     let states: Vec<usize> =
         (0..model.states.len()).filter(|index| is_there(model.states[*index].suspect)).collect();
     let memories: Vec<usize> =
@@ -53,6 +54,29 @@ pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
     let updates = updates.collect::<Result<Vec<_>, _>>()?;
     let updates = compiler.builder.tape(&updates, curves());
     Ok(Tapes { rates, outputs, updates, states, memories })
+}
+
+/// Values of an expression of inputs and fixed numbers at each sample.
+pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs<'_>) -> Vec<f64> {
+    let mut compiler = Compiler::new(model, &[]);
+    let result = compiler.node(expression.root, Scope { suspect: None, before: None });
+    let result = result.expect("it was checked when the file was read");
+    let curves = model.tables.iter().map(|table| table.curve.clone()).collect();
+    let tape = compiler.builder.tape(&[result], curves);
+    let leaves = tape.leaves;
+    let mut registers = Registers::new(&tape, 0, |_| false);
+    for (index, parameter) in model.parameters.iter().enumerate() {
+        registers.set(leaves.parameter(index), parameter.values_si[0]);
+    }
+    let value = |(row, time_s): (usize, &f64)| {
+        registers.set(0, *time_s);
+        for (index, samples) in inputs.samples_si.iter().enumerate() {
+            registers.set(leaves.input(index), samples[row]);
+        }
+        tape.evaluate(&mut registers, inputs);
+        registers.value(tape.result(0))
+    };
+    inputs.time_s.iter().enumerate().map(value).collect()
 }
 
 /// Where an expression stands: the suspect whose own names it may use, and the value that its place has without it.
@@ -87,12 +111,13 @@ impl<'a> Compiler<'a> {
     /// A value with the suspects at its place.
     fn changed(&mut self, target: Target, base: Register) -> Result<Register, Wrong> {
         let mut value = base;
-        for index in self.suspects {
-            let suspect = &self.model.suspects[*index];
+        let terms = (0..self.model.suspects.len()).filter(|index| self.model.suspects[*index].is_term);
+        for index in terms.chain(self.suspects.iter().copied()) {
+            let suspect = &self.model.suspects[index];
             if suspect.target != target {
                 continue;
             }
-            let scope = Scope { suspect: Some(*index), before: Some((target, value)) };
+            let scope = Scope { suspect: Some(index), before: Some((target, value)) };
             let change = self.node(suspect.expression.root, scope)?;
             value = match suspect.change {
                 Change::Add => self.builder.push(Code::Add, &[value, change]),

@@ -1,9 +1,11 @@
 //! A model file as data: what its tables hold, in SI, with the places of its expressions.
 
 use crate::check;
+use crate::compile;
 use crate::expression::{Nodes, Place};
-use crate::inputs::Hold;
+use crate::inputs::{Hold, Inputs};
 use crate::read;
+use crate::rows::Rows;
 use crate::tape::Curve;
 use crate::units::{Dimension, Unit};
 use settings::SettingsError;
@@ -16,6 +18,8 @@ pub struct Model {
     pub name: String,
     /// How its records are laid out.
     pub record: RecordLayout,
+    /// Rows that count, and how the model is compared on them.
+    pub rows: Rows,
     /// Rows at the head of a held-out record on which its own numbers are fitted; they are not scored.
     pub start_samples: usize,
     /// Points from which fits start beside the values of the file.
@@ -45,6 +49,8 @@ pub struct Model {
 /// How a text table is laid out, as in a mapping file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordLayout {
+    /// Distance of an even grid that the record is brought to, s; as it is where the file names none.
+    pub period_s: Option<f64>,
     /// Column of the time.
     pub time_column: String,
     /// Seconds in a unit of that column.
@@ -90,12 +96,29 @@ pub struct Expression {
 pub struct Input {
     /// Its name in expressions.
     pub name: String,
-    /// Its column in the record.
+    /// Its column in the record; none for a rate.
     pub column: String,
+    /// What stands in it times this is in the unit.
+    pub scale: f64,
+    /// The input whose rate of change it is, by central differences.
+    pub rate_of: Option<usize>,
+    /// How its samples are smoothed.
+    pub smoothing: Smoothing,
     /// Unit of that column.
     pub unit: Unit,
     /// What it does between samples.
     pub hold: Hold,
+}
+
+/// What is done to the samples of an input.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Smoothing {
+    /// Edge of a zero-phase Butterworth, Hz; 0 for none.
+    pub low_pass_hz: f64,
+    /// Its order.
+    pub low_pass_order: usize,
+    /// Samples of a mean around each, odd; 1 for none.
+    pub moving_average: usize,
 }
 
 /// A number of the model.
@@ -189,6 +212,8 @@ pub struct Output {
     pub name: String,
     /// Its column in the record.
     pub column: String,
+    /// What stands in it times this is in the unit.
+    pub scale: f64,
     /// Unit of that column.
     pub unit: Unit,
     /// What the model says it is.
@@ -234,6 +259,12 @@ pub struct Suspect {
     pub change: Change,
     /// The term, the factor or the replacement, in the unit of the target or, as a factor, without one.
     pub expression: Expression,
+    /// It stands under `[[terms]]`: a part of the model and no suspect.
+    pub is_term: bool,
+    /// What it is one form of; forms that cannot be told apart are one finding.
+    pub effect: Option<String>,
+    /// It acts in a part of what the folds go over, so that only folds in time judge it.
+    pub is_local: bool,
     /// Suspects that are known to do the same.
     pub twins: Vec<String>,
     /// Carried to be rejected: one that does better than every suspect ends the search.
@@ -267,6 +298,12 @@ impl Model {
             .map_or_else(|error| error, |source| source.with_columns().wrong_from(at, why))
     }
 
+    /// The text of the file.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// File, line and column of an expression.
     #[must_use]
     pub fn place_of(&self, expression: &Expression) -> String {
@@ -292,10 +329,23 @@ impl Model {
         }
     }
 
+    /// Whether a part of the file is there with these suspects: terms always are.
+    pub(crate) fn is_there(&self, owner: Option<usize>, suspects: &[usize]) -> bool {
+        owner.is_none_or(|owner| self.suspects[owner].is_term || suspects.contains(&owner))
+    }
+
+    /// Values of an expression that reads inputs alone, at each sample.
+    ///
+    /// # Panics
+    /// For an expression that was not checked with this model.
+    #[must_use]
+    pub fn at_samples(&self, expression: &Expression, inputs: &Inputs<'_>) -> Vec<f64> {
+        compile::at_samples(self, expression, inputs)
+    }
+
     /// Parameters that are read with these suspects, by their index.
     pub fn parameters_of<'a>(&'a self, suspects: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
-        let is_read =
-            |parameter: &Parameter| parameter.suspect.is_none_or(|suspect| suspects.contains(&suspect));
+        let is_read = |parameter: &Parameter| self.is_there(parameter.suspect, suspects);
         (0..self.parameters.len()).filter(move |index| is_read(&self.parameters[*index]))
     }
 }

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `file`, `read` | the file as data; its reader |
 //! | `expression` | the grammar of expressions |
+//! | `rows` | which rows count, and over what a model is judged |
 //! | `units` | units and dimensions |
 //! | `names` | what names mean |
 //! | `check` | names, numbers of arguments, dimensions |
@@ -28,15 +29,17 @@ mod file;
 mod inputs;
 mod names;
 mod read;
+mod rows;
 mod simulate;
 mod tape;
 mod units;
 
 pub use expression::{DEEPEST, MOST_NODES};
 pub use file::{
-    Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Solver, Start,
-    State, Suspect, Target,
+    Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Smoothing, Solver,
+    Start, State, Suspect, Target,
 };
 pub use inputs::{Hold, Inputs};
+pub use rows::Rows;
 pub use simulate::{Direction, Failure, Program, Simulator};
 pub use units::{Dimension, Unit, UnitError};

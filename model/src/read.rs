@@ -1,11 +1,13 @@
 //! Reads the tables of a model file.
 
+mod inputs;
+
 use crate::expression::{Nodes, is_of_name};
 use crate::file::{
-    Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Solver, Start,
-    State, Suspect, Table, Target,
+    Change, Definition, Expression, Memory, Model, Output, Parameter, RecordLayout, Solver, Start, State,
+    Suspect, Table, Target,
 };
-use crate::inputs::Hold;
+use crate::rows::Rows;
 use crate::tape::Curve;
 use crate::units::{Dimension, Unit};
 use settings::{Section, SettingsError, Source, Text};
@@ -45,11 +47,13 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
         starts = one_or(&mut fit, "starts", STARTS as f64, [0.0, 1000.0])? as usize;
         fit.finish()?;
     }
+    let rows = root.section("rows")?;
     let model = Model {
         name,
         record,
         start_samples,
         starts,
+        rows: Rows::default(),
         solver,
         inputs: Vec::new(),
         parameters: Vec::new(),
@@ -68,8 +72,14 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
     reader.inputs(&mut root)?;
     reader.members(&mut root, None)?;
     reader.outputs(&mut root)?;
+    if let Some(rows) = rows {
+        reader.rows(rows)?;
+    }
+    for section in root.sections("terms")? {
+        reader.suspect(section, true)?;
+    }
     for section in root.sections("suspects")? {
-        reader.suspect(section)?;
+        reader.suspect(section, false)?;
     }
     if reader.model.outputs.is_empty() {
         return Err(root.wrong("[outputs] is missing: what of this model is measured?"));
@@ -81,6 +91,7 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
 
 fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, SettingsError> {
     let mut layout = RecordLayout {
+        period_s: None,
         time_column: "t_s".into(),
         time_unit_s: 1.0,
         separator: ",".into(),
@@ -99,6 +110,9 @@ fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, S
             return Err(section.wrong_at("unit", "unit: no unit of time; allowed is s, ms, us, min, h"));
         }
         layout.time_unit_s = unit.factor;
+    }
+    if section.has("period_s") {
+        layout.period_s = Some(one_or(&mut section, "period_s", 1.0, [1e-9, 1e6])?);
     }
     if let Some(separator) = section.text("separator")? {
         layout.separator = separator.text;
@@ -153,6 +167,14 @@ fn unit(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit, Settings
 fn unit_of(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit, SettingsError> {
     let Some(text) = section.text(key)? else { return Ok(Unit::one()) };
     Unit::parse(&text.text).map_err(|error| source.wrong_from(text.at + error.at, &error.why))
+}
+
+/// The factor that brings what stands in a column to its unit.
+fn scale(section: &mut Section<'_>) -> Result<f64, SettingsError> {
+    match one_or(section, "scale", 1.0, [-1e12, 1e12])? {
+        0.0 => Err(section.wrong_at("scale", "scale: allowed is a number that is not 0")),
+        scale => Ok(scale),
+    }
 }
 
 /// The range of a section in SI.
@@ -235,18 +257,6 @@ impl Reader<'_> {
             section.finish()?;
             let (from, to) = (from.dimension, to.dimension);
             self.model.tables.push(Table { name, curve: Curve { x, y }, from, to });
-        }
-        Ok(())
-    }
-
-    fn inputs(&mut self, root: &mut Section<'_>) -> Result<(), SettingsError> {
-        for (name, mut section) in named(root, "inputs")? {
-            self.is_new(&name, None, &section)?;
-            let column = section.text("column")?.map_or_else(|| name.clone(), |text| text.text);
-            let unit = unit(&mut section, self.source)?;
-            let hold = section.choice("hold", &[("zero", Hold::Zero), ("linear", Hold::Linear)])?;
-            section.finish()?;
-            self.model.inputs.push(Input { name, column, unit, hold });
         }
         Ok(())
     }
@@ -368,19 +378,19 @@ impl Reader<'_> {
         for (name, mut section) in named(root, "outputs")? {
             self.is_new(&name, None, &section)?;
             let column = section.text("column")?.map_or_else(|| name.clone(), |text| text.text);
-            let unit = unit(&mut section, self.source)?;
+            let (unit, scale) = (unit(&mut section, self.source)?, scale(&mut section)?);
             let value = section.needed_text("value", "what the model says it is, an expression")?;
             let value = self.expression(value)?;
             let noise = one_or(&mut section, "noise", 0.0, [0.0, 1e300])?;
             let noise_si = (noise > 0.0).then_some(noise * unit.factor);
             let model_error_si = one_or(&mut section, "model_error", 0.0, [0.0, 1e300])? * unit.factor;
             section.finish()?;
-            self.model.outputs.push(Output { name, column, unit, value, noise_si, model_error_si });
+            self.model.outputs.push(Output { name, column, scale, unit, value, noise_si, model_error_si });
         }
         Ok(())
     }
 
-    fn suspect(&mut self, mut section: Section<'_>) -> Result<(), SettingsError> {
+    fn suspect(&mut self, mut section: Section<'_>, is_term: bool) -> Result<(), SettingsError> {
         let index = self.model.suspects.len();
         let name = section.needed_text("name", "what reports call it")?;
         if self.model.suspects.iter().any(|other| other.name == name.text) {
@@ -408,8 +418,21 @@ impl Reader<'_> {
             );
         };
         let (twins, is_decoy) = (section.texts("twins")?, section.flag("decoy")?);
+        let effect = section.text("effect")?.map(|text| text.text);
+        let is_local = section.flag("local")?;
         section.finish()?;
-        self.model.suspects.push(Suspect { name: name.text, target, change, expression, twins, is_decoy });
+        let name = name.text;
+        self.model.suspects.push(Suspect {
+            name,
+            target,
+            change,
+            expression,
+            is_term,
+            effect,
+            is_local,
+            twins,
+            is_decoy,
+        });
         Ok(())
     }
 

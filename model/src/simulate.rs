@@ -467,7 +467,7 @@ fn put(
     for (index, hold) in program.holds.iter().enumerate() {
         let samples = &inputs.samples_si[index];
         let value = match hold {
-            Hold::Linear if row + 1 < samples.len() => {
+            Hold::Linear if row + 1 < inputs.time_s.len() => {
                 let (from_s, to_s) = (inputs.time_s[row], inputs.time_s[row + 1]);
                 samples[row] + (samples[row + 1] - samples[row]) * ((time_s - from_s) / (to_s - from_s))
             }

@@ -1,7 +1,7 @@
 //! Model files that are accepted, and those that are refused with line and column.
 
 use crate::{read, refused};
-use model::{Change, Hold, Solver, Start, Target};
+use model::{Change, Hold, Inputs, Solver, Start, Target};
 
 const TANK: &str = r#"# A tank with a leak.
 name = "Tank"
@@ -145,6 +145,74 @@ fn suspects_that_depend_on_each_other_in_a_circle_are_refused() {
         "{}",
         refused(text)
     );
+}
+
+/// A balance: nothing is integrated, speed and acceleration come from the measured position.
+const BALANCE: &str = r#"[rows]
+where = "abs(v) > slow and t > 1[s]"
+every = 20
+folds = { position = "x", speed = "abs(v)" }
+[inputs.x]
+unit = "mm"
+low_pass_hz = 100
+[inputs.v]
+rate_of = "x"
+unit = "m/s"
+[parameters]
+slow = { unit = "mm/s", value = 3, fixed = true }
+mass = { unit = "kg", value = 1 }
+[outputs.force]
+scale = 35.2
+unit = "N"
+value = "mass*v/1[s]"
+[[suspects]]
+name = "drag"
+effect = "friction"
+place = "force"
+add = "c*v"
+local = true
+parameters.c = { unit = "N s/m", value = 1 }
+[[terms]]
+name = "weight"
+place = "force"
+add = "w"
+parameters.w = { unit = "N", value = 1 }
+"#;
+
+#[test]
+fn a_balance_reads_rates_rows_and_terms() {
+    let model = read(BALANCE);
+    assert_eq!((model.inputs[1].rate_of, model.inputs[0].smoothing.low_pass_hz), (Some(0), 100.0));
+    assert_eq!((model.rows.every, model.rows.folds.len(), model.outputs[0].scale), (20, 2, 35.2));
+    let names: Vec<_> = model.suspects.iter().map(|one| (one.name.as_str(), one.is_term)).collect();
+    assert_eq!(names, [("weight", true), ("drag", false)], "terms are a part of the model and come first");
+    // A term's number is always read, a suspect's with the suspect.
+    let read_with = |suspects: &[usize]| -> Vec<String> {
+        model.parameters_of(suspects).map(|index| model.parameters[index].name.clone()).collect()
+    };
+    assert_eq!(read_with(&[]), ["slow", "mass", "w"]);
+    assert_eq!(read_with(&[1]), ["slow", "mass", "w", "c"]);
+    let inputs = Inputs { time_s: &[0.0, 2.0, 3.0], samples_si: &[vec![0.0; 3], vec![0.01, 0.01, -0.001]] };
+    let counts = model.at_samples(model.rows.condition.as_ref().unwrap(), &inputs);
+    assert_eq!(counts, [0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn rates_and_rows_that_cannot_be_computed_are_refused() {
+    for (from, to, message) in [
+        ("rate_of = \"x\"", "rate_of = \"v\"", "'v' is no input that stands before this one"),
+        ("unit = \"m/s\"", "unit = \"m\"", "the unit of this input is not that of x over a time"),
+        ("rate_of = \"x\"", "rate_of = \"x\"\ncolumn = \"v\"", "it is the rate of another input"),
+        ("abs(v) > slow", "abs(v) > mass", "comparison of a value in kg and one in m s^-1"),
+        ("and t > 1[s]", "and mass > 1[kg]", "'mass': rows and folds read inputs and fixed numbers alone"),
+        ("low_pass_hz = 100", "moving_average = 4", "allowed is an odd number"),
+        ("scale = 35.2", "scale = 0", "allowed is a number that is not 0"),
+        ("every = 20", "every = 0", "allowed is one number, 1 to 1000"),
+    ] {
+        assert!(BALANCE.contains(from), "{from}");
+        let found = refused(&BALANCE.replacen(from, to, 1));
+        assert!(found.contains(message) && found.starts_with("model.toml:"), "{found}\n  {message}");
+    }
 }
 
 #[test]

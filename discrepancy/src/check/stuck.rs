@@ -40,14 +40,20 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
         let stuck: Vec<Run> = match by_chance(&values) {
             _ if constant && notes.is_of_rig(axis) && is_noisy(channel, rig) => all,
             _ if constant => continue,
-            Some(longest) => {
-                let step = quantum::of(&values.iter().flatten().copied().collect::<Vec<_>>());
-                all.into_iter().filter(|run| run.samples > longest && !is_rest(&values, run, step)).collect()
-            }
-            None => continue,
+            _ => stuck(&values).0,
         };
         add_finding(notes, grid, channel, &values, &stuck);
     }
+}
+
+/// Runs of a column that did not come by chance, and whether too little is left beside them.
+pub(crate) fn stuck(values: &[Option<f64>]) -> (Vec<Run>, bool) {
+    let Some(longest) = by_chance(values) else { return (Vec::new(), false) };
+    let step = quantum::of(&values.iter().flatten().copied().collect::<Vec<_>>());
+    let stuck: Vec<Run> =
+        runs(values).into_iter().filter(|run| run.samples > longest && !is_rest(values, run, step)).collect();
+    let samples: usize = stuck.iter().map(|run| run.samples).sum();
+    (stuck, samples as f64 > MOST * values.iter().flatten().count() as f64)
 }
 
 fn add_finding(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>], stuck: &[Run]) {
@@ -94,11 +100,11 @@ fn is_noisy(channel: Channel, rig: &RigParameters) -> bool {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Run {
+pub(crate) struct Run {
     /// Places from its first sample to its last.
-    pub(super) places: Range<usize>,
+    pub(crate) places: Range<usize>,
     /// Samples in it: what is missing in between is not known to be equal.
-    pub(super) samples: usize,
+    pub(crate) samples: usize,
 }
 
 /// Runs of equal values; a missing sample ends none.

@@ -4,7 +4,7 @@ use super::{CommandError, Exit, NameArguments, print, progress};
 use crate::folder::Folder;
 use crate::model_file::{ClosedModel, ModelReport, close};
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
     let NameArguments { records, without } = arguments;
@@ -17,7 +17,8 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
     }
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
     let out = Folder::open(&out, [&records.rig].into_iter().chain(&records.train).chain(tests))?;
-    for name in ["report.json", "report.html"] {
+    let model = PathBuf::from(records.rig.file_name().unwrap_or("model.toml".as_ref()));
+    for name in [Path::new("report.json"), Path::new("report.html"), &model] {
         out.file(name)?;
     }
     let mut progress = progress();
@@ -26,8 +27,12 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
     if let Some(why) = &closed.not_judged {
         print(&format!("The model was not judged on the held-out record: {why}\n"))?;
     }
+    out.clear(&model)?;
     out.write_json("report.json", &closed.report)?;
     out.write("report.html", &closed.page)?;
+    if let Some(extended) = &closed.extended {
+        out.write(&model, extended)?;
+    }
     progress(&format!("report.json and report.html are in {}", out.path().display()));
     Ok(match closed {
         ClosedModel { not_judged: Some(_), .. } => Exit::BadInput,

@@ -4,7 +4,7 @@ use super::record::Measured;
 use super::report::{place, significant, term};
 use super::structure::{Structure, structure};
 use super::{ModelError, read, select};
-use model::{Model, Parameter, Program, Solver, Start};
+use model::{Model, Parameter, Program, Rows, Smoothing, Solver, Start};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -32,8 +32,13 @@ pub(crate) fn in_words(model: &Model) -> String {
             lines.iter().for_each(|line| text.push_str(&format!("  {line}\n")));
         }
     };
-    let input =
-        |input: &model::Input| format!("{} [{}] from column {}", input.name, input.unit.text, input.column);
+    let input = |input: &model::Input| {
+        let from = match input.rate_of {
+            Some(of) => format!("the rate of {}", model.inputs[of].name),
+            None => format!("from column {}", input.column),
+        };
+        format!("{} [{}] {from}{}", input.name, input.unit.text, smoothed(input.smoothing))
+    };
     section("inputs", model.inputs.iter().map(input).collect());
     let own = |suspect: Option<usize>| suspect.is_none();
     let equation = |state: &model::State| {
@@ -63,7 +68,8 @@ pub(crate) fn in_words(model: &Model) -> String {
     };
     section("outputs", model.outputs.iter().map(output).collect());
     section("parameters", model.parameters.iter().filter(|one| own(one.suspect)).map(parameter).collect());
-    let suspects = (0..model.suspects.len()).flat_map(|index| {
+    section("rows", rows(&model.rows));
+    let suspect = |index: usize| {
         let suspect = &model.suspects[index];
         let decoy = if suspect.is_decoy { ", a decoy" } else { "" };
         let twins = match suspect.twins.as_slice() {
@@ -73,8 +79,11 @@ pub(crate) fn in_words(model: &Model) -> String {
         let head = format!("{}{decoy}, {}: {}{twins}", suspect.name, place(model, index), term(model, index));
         let own = model.parameters.iter().filter(move |one| one.suspect == Some(index));
         std::iter::once(head).chain(own.map(|one| format!("  {}", parameter(one))))
-    });
-    section("suspects", suspects.collect());
+    };
+    for (name, is_term) in [("terms", true), ("suspects", false)] {
+        let all = (0..model.suspects.len()).filter(|index| model.suspects[*index].is_term == is_term);
+        section(name, all.flat_map(suspect).collect());
+    }
     let solver = match model.solver {
         Solver::Adaptive { relative_tolerance } => {
             format!("adaptive, relative tolerance {relative_tolerance:e}")
@@ -84,6 +93,34 @@ pub(crate) fn in_words(model: &Model) -> String {
     let operations = Program::new(model, &[]).map_or(0, |program| program.operations());
     let _ = write!(text, "\nintegrated: {solver}; {operations} operations for all rates\n");
     text
+}
+
+fn smoothed(smoothing: Smoothing) -> String {
+    let Smoothing { low_pass_hz, low_pass_order, moving_average } = smoothing;
+    let mut text = String::new();
+    if low_pass_hz > 0.0 {
+        let _ = write!(text, ", zero-phase Butterworth of order {low_pass_order} at {low_pass_hz} Hz");
+    }
+    if moving_average > 1 {
+        let _ = write!(text, ", mean of {moving_average} samples");
+    }
+    text
+}
+
+fn rows(rows: &Rows) -> Vec<String> {
+    let mut lines = Vec::new();
+    if rows.every > 1 {
+        let Rows { every, order, ripple_decibel, .. } = rows;
+        lines.push(format!(
+            "every {every} samples, behind a zero-phase Chebyshev I of order {order} and {ripple_decibel} dB"
+        ));
+    }
+    lines.extend(rows.condition.iter().map(|condition| format!("where {}", condition.text)));
+    if rows.ends_s > 0.0 {
+        lines.push(format!("within {} s of an end fitted, and no judge of suspects", rows.ends_s));
+    }
+    lines.extend(rows.folds.iter().map(|fold| format!("folds in time, and over {}", fold.text)));
+    lines
 }
 
 fn parameter(parameter: &Parameter) -> String {

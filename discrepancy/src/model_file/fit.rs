@@ -10,21 +10,17 @@
 //!
 //! Sources: Ljung, System Identification, 2nd edition, 7.2 (output error), 15.3 (concentrated likelihood); Björck 1996, 9.
 
+use super::cuts::Cut;
 use super::normal::{Normal, solved};
 use super::record::Measured;
-use crate::estimator::{Convergence, Estimator, Iterate, Options, Outcome, Step};
+use crate::estimator::{Convergence, Estimator, Iterate, Options, Step};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start, Unit};
 use nalgebra::{DMatrix, DVector};
 
-const OPTIONS: Options =
+pub(super) const OPTIONS: Options =
     Options { steps: 80, converged: 0.1, fractions: &[1.0, 0.4, 0.16, 0.064, 0.0256, 0.01, 1e-3, 1e-4] };
-/// Steps from each of several starts, and how many of them go on to the end.
-const SHORT: usize = 6;
-const FINISHED: usize = 2;
 /// What a sample adds to the fall of the loss that counts: a change of the residual by half of it, relatively.
 const CONVERGED_PER_SAMPLE: f64 = 1e-4;
-/// Blocks of time of each record.
-pub(crate) const BLOCKS: usize = 10;
 /// Noise of an output is at least this share of its size: a fit that leaves nothing has no likelihood.
 const LEAST_NOISE: f64 = 1e-9;
 
@@ -241,10 +237,40 @@ impl<'a> Fitting<'a> {
             });
         }
         let measured = &self.records[record];
-        let end = self.in_score[record].end;
-        let inputs = Inputs { time_s: &measured.time_s[..end], samples_si: &measured.inputs };
-        let mut simulator = Simulator::new(&self.program, if with_slopes { &directions } else { &[] });
-        simulator.run(&inputs, [&parameters, &starts, &self.memories_si], &mut sink)
+        let end = measured.samples_of(self.in_score[record].end);
+        let inputs = Inputs { time_s: &measured.sampled_s[..end], samples_si: &measured.inputs };
+        let directions = if with_slopes { directions.as_slice() } else { &[] };
+        let mut simulator = Simulator::new(&self.program, directions);
+        let values = [parameters.as_slice(), &starts, &self.memories_si];
+        let Some(filter) = &measured.thinning else {
+            let mut place = 0;
+            return simulator.run(&inputs, values, |sample, output, value, slopes| {
+                while measured.rows.get(place).is_some_and(|row| *row < sample) {
+                    place += 1;
+                }
+                if measured.rows.get(place) == Some(&sample) {
+                    sink(place, output, value, slopes);
+                }
+            });
+        };
+        // Values and derivatives of all samples go through the filter of what was measured.
+        let width = 1 + directions.len();
+        let mut columns = vec![Vec::with_capacity(end); measured.outputs.len() * width];
+        simulator.run(&inputs, values, |_, output, value, slopes| {
+            let all = std::iter::once(&value).chain(slopes).zip(&mut columns[output * width..]);
+            all.for_each(|(value, column)| column.push(*value));
+        })?;
+        let columns: Vec<Vec<f64>> = columns.iter().map(|column| filter.zero_phase(column)).collect();
+        let mut slopes = vec![0.0; directions.len()];
+        for (place, sample) in measured.rows.iter().enumerate() {
+            for (output, columns) in columns.chunks(width).enumerate() {
+                for (slope, column) in slopes.iter_mut().zip(&columns[1..]) {
+                    *slope = column[*sample];
+                }
+                sink(place, output, columns[0][*sample], &slopes);
+            }
+        }
+        Ok(())
     }
 
     /// A point with its loss.
@@ -330,6 +356,14 @@ impl<'a> Fitting<'a> {
         }
     }
 
+    /// The term or suspect that it belongs to.
+    pub(crate) fn suspect_of(&self, unknown: &Unknown) -> Option<usize> {
+        match unknown.what {
+            What::Shared(index) | What::OfRecord(index, _) => self.model.parameters[index].suspect,
+            What::Start(state, _) => self.model.states[state].suspect,
+        }
+    }
+
     /// Its unit.
     pub(crate) fn unit_of(&self, unknown: &Unknown) -> &'a Unit {
         match unknown.what {
@@ -338,17 +372,16 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Normal equations of each block and output.
-    pub(crate) fn normals(&self, values_si: &[f64]) -> Result<Vec<Vec<Normal>>, Failure> {
-        let mut all = Vec::new();
+    /// Normal equations of each block of a cut and output; the last are those of rows that judge nothing.
+    pub(crate) fn normals(&self, values_si: &[f64], cut: &Cut) -> Result<Vec<Vec<Normal>>, Failure> {
+        let count = self.model.outputs.len();
+        let mut blocks = vec![vec![Normal::zero(self.unknowns.len()); count]; cut.blocks + 1];
         for record in 0..self.records.len() {
             let (measured, rows) = (&self.records[record].outputs, self.rows(record));
-            let mut blocks = vec![vec![Normal::zero(self.unknowns.len()); measured.len()]; BLOCKS];
             let mine = self.of_record(record);
             self.simulate(record, values_si, true, |row, output, value, slope| {
                 let Some(measured) = measured[output][row].filter(|_| rows.contains(&row)) else { return };
-                let block = (row - rows.start) * BLOCKS / rows.len();
-                let normal = &mut blocks[block][output];
+                let normal = &mut blocks[cut.block_of[record][row]][output];
                 let residual = measured - value;
                 normal.squares += residual * residual;
                 for (i, place) in mine.iter().enumerate() {
@@ -358,14 +391,13 @@ impl<'a> Fitting<'a> {
                     }
                 }
             })?;
-            for normal in blocks.iter_mut().flatten() {
-                let upper = normal.matrix.transpose();
-                let diagonal = DMatrix::from_diagonal(&normal.matrix.diagonal());
-                normal.matrix += upper - diagonal;
-            }
-            all.extend(blocks);
         }
-        Ok(all)
+        for normal in blocks.iter_mut().flatten() {
+            let upper = normal.matrix.transpose();
+            let diagonal = DMatrix::from_diagonal(&normal.matrix.diagonal());
+            normal.matrix += upper - diagonal;
+        }
+        Ok(blocks)
     }
 
     /// Normal equations of all blocks with their weights, and the priors.
@@ -394,8 +426,9 @@ impl<'a> Fitting<'a> {
         let samples: f64 = (0..self.model.outputs.len()).map(|output| self.count(output)).sum();
         let converged = OPTIONS.converged + CONVERGED_PER_SAMPLE * samples;
         let options = Options { steps, converged, ..OPTIONS };
+        let cut = self.in_time();
         Ok(Estimator::new(options).descend(start, |estimator, point| {
-            let Ok(normals) = self.normals(&point.values_si) else { return Step::Impossible };
+            let Ok(normals) = self.normals(&point.values_si, &cut) else { return Step::Impossible };
             let sum = self.sum(&normals, point);
             let promised = sum.slope.dot(&self.step(&sum, &point.values_si, 0.0));
             match self.best_step(estimator, point, &sum) {
@@ -424,34 +457,6 @@ impl<'a> Fitting<'a> {
             }
         }
         best
-    }
-
-    /// The best of the fits from several starts: a few steps from each, and all steps from those that have come lowest.
-    pub(crate) fn fit_from(&self, starts: Vec<Vec<f64>>) -> Result<(Point, Convergence), Failure> {
-        let mut why = None;
-        let mut begun = Vec::new();
-        for start in starts {
-            match self.fit(start, SHORT) {
-                Ok(fit) => begun.push(fit),
-                Err(failure) => why = Some(failure),
-            }
-        }
-        begun.sort_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
-        // Starts that have come to the same minimum go on once.
-        begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.converged);
-        let mut best: Option<(Point, Convergence)> = None;
-        for (point, convergence) in begun.into_iter().take(FINISHED) {
-            let ended = match convergence.outcome {
-                Outcome::StepLimit => self
-                    .fit(point.values_si, OPTIONS.steps)
-                    .map(|(end, more)| (end, convergence.then(more)))?,
-                _ => (point, convergence),
-            };
-            if best.as_ref().is_none_or(|(best, _)| ended.0.loss < best.loss) {
-                best = Some(ended);
-            }
-        }
-        best.ok_or_else(|| why.expect("there is one start at least"))
     }
 
     /// The step of damped normal equations; a number at the end of its range does not leave it.

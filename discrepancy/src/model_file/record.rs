@@ -1,11 +1,14 @@
 //! A record as a model reads it: inputs at every sample, outputs where they were measured, all in SI.
 
-use model::{Hold, Model};
+use super::filter::LowPass;
+use super::processing::{Grid, Names};
+use crate::check::stuck;
+use model::{Input, Model};
 use records::{ColumnOptions, Columns, ReadError, read_columns};
 use std::path::Path;
 
 /// Fewest samples of a record.
-const FEWEST_ROWS: usize = 8;
+pub(super) const FEWEST_ROWS: usize = 8;
 /// Share of an input's samples that may be missing; the message of [`RecordError::Input`] says it.
 const MOST_MISSING: f64 = 0.2;
 
@@ -24,17 +27,40 @@ pub enum RecordError {
     Input { file: String, column: String, name: String, percent: f64 },
     #[error("{file}: column {column} of output {name} has no value at all")]
     Output { file: String, column: String, name: String },
+    #[error(
+        "{file}:{line}: column {column} is stuck from there, with other stretches for more than half of its samples: look at the sensor and its cable, and record again"
+    )]
+    Stuck { file: String, line: u64, column: String },
+    #[error(
+        "{file}:{line}: {time_s} s: its distance is not that of the first samples: name the period of an even grid, period_s under [record]"
+    )]
+    Uneven { file: String, line: u64, time_s: f64 },
+    #[error("{file}:{line}: {time_s} s: {rows} rows cannot reach as far at a period of {period_s} s")]
+    Far { file: String, line: u64, time_s: f64, rows: usize, period_s: f64 },
+    #[error("{file}: low_pass_hz of input {name} is {edge_hz}; allowed is below half of {sampling_hz} Hz")]
+    Edge { file: String, name: String, edge_hz: f64, sampling_hz: f64 },
+    #[error("{file}: {rows} rows meet [rows] of the model; {FEWEST_ROWS} are needed")]
+    FewMeet { file: String, rows: usize },
 }
 
 /// A record of a model.
 #[derive(Clone, Debug)]
 pub(crate) struct Measured {
     pub(crate) name: String,
-    pub(crate) time_s: Vec<f64>,
+    /// Times of all samples, over which the model is simulated.
+    pub(crate) sampled_s: Vec<f64>,
     /// Of each input its samples.
     pub(crate) inputs: Vec<Vec<f64>>,
-    /// Of each output its samples.
+    /// Samples that are rows, on which the model is compared, and their times.
+    pub(crate) rows: Vec<usize>,
+    pub(crate) time_s: Vec<f64>,
+    /// Of each output what was measured, at the rows.
     pub(crate) outputs: Vec<Vec<Option<f64>>>,
+    /// What measured and modelled outputs go through.
+    pub(crate) thinning: Option<LowPass>,
+    /// Rows that judge, and what the folds of the model go over, at the rows.
+    pub(crate) is_judged: Vec<bool>,
+    pub(crate) folds: Vec<Vec<f64>>,
     /// What a person should know about it.
     pub(crate) notes: Vec<String>,
 }
@@ -42,7 +68,8 @@ pub(crate) struct Measured {
 impl Measured {
     pub(crate) fn read(model: &Model, file: &Path) -> Result<Self, RecordError> {
         let layout = &model.record;
-        let inputs = model.inputs.iter().map(|input| input.column.as_str());
+        let columns = model.inputs.iter().filter(|input| input.rate_of.is_none());
+        let inputs = columns.map(|input| input.column.as_str());
         let wanted: Vec<&str> =
             inputs.chain(model.outputs.iter().map(|output| output.column.as_str())).collect();
         let options = ColumnOptions {
@@ -68,9 +95,8 @@ impl Measured {
             return Err(RecordError::Time { file, line: lines[row], time_s: time_s[row] });
         }
         let mut notes: Vec<String> = warnings.into_iter().map(|warning| warning.text).collect();
-        let count = model.inputs.len();
-        let mut inputs = Vec::with_capacity(count);
-        for (input, values) in model.inputs.iter().zip(&values) {
+        let measured: Vec<&Input> = model.inputs.iter().filter(|input| input.rate_of.is_none()).collect();
+        for (input, values) in measured.iter().zip(&values) {
             let missing = values.iter().filter(|value| value.is_none()).count();
             let share = missing as f64 / values.len() as f64;
             if share > MOST_MISSING {
@@ -83,40 +109,44 @@ impl Measured {
                     input.column
                 ));
             }
-            inputs.push(filled(&time_s, values, input.hold, input.unit.factor));
         }
-        let mut outputs = Vec::with_capacity(model.outputs.len());
-        for (output, values) in model.outputs.iter().zip(&values[count..]) {
+        for (output, values) in model.outputs.iter().zip(&values[measured.len()..]) {
             if values.iter().all(Option::is_none) {
                 let (column, name) = (output.column.clone(), output.name.clone());
                 return Err(RecordError::Output { file, column, name });
             }
-            outputs.push(values.iter().map(|value| value.map(|value| value * output.unit.factor)).collect());
         }
+        let names = measured.iter().map(|input| &input.column);
+        for (column, values) in names.chain(model.outputs.iter().map(|output| &output.column)).zip(&values) {
+            let (runs, is_fatal) = stuck(values);
+            let Some(first) = runs.first() else { continue };
+            let line = lines[first.places.start];
+            if is_fatal {
+                return Err(RecordError::Stuck { file, line, column: column.clone() });
+            }
+            notes.push(format!(
+                "line {line}: {column} keeps one value over {} samples, {} times in all: stuck, or at the end of its range",
+                first.samples,
+                runs.len()
+            ));
+        }
+        let grid = Grid::of(model, &file, &time_s, &lines)?;
+        let holds = measured.iter().map(|input| (input.hold, input.unit.factor * input.scale));
+        let samples: Vec<Vec<f64>> = holds
+            .zip(&values)
+            .map(|((hold, factor), values)| grid.filled(&time_s, values, hold, factor))
+            .collect();
+        let inputs = grid.inputs(model, &file, samples)?;
+        let outputs = model
+            .outputs
+            .iter()
+            .zip(&values[measured.len()..])
+            .map(|(output, values)| grid.outputs(&time_s, values, output.unit.factor * output.scale));
+        let outputs = outputs.collect();
         let name =
             Path::new(&file).file_name().map_or(file.clone(), |name| name.to_string_lossy().into_owned());
-        Ok(Self { name, time_s, inputs, outputs, notes })
+        grid.compared(model, Names { file, name, notes }, inputs, outputs)
     }
-}
-
-/// Missing samples by the hold of their input: the last value, or straight between neighbours.
-fn filled(time_s: &[f64], values: &[Option<f64>], hold: Hold, factor: f64) -> Vec<f64> {
-    let known: Vec<usize> = (0..values.len()).filter(|row| values[*row].is_some()).collect();
-    let value = |place: usize| values[known[place]].expect("it is known") * factor;
-    (0..values.len())
-        .map(|row| {
-            let right = known.partition_point(|known| *known <= row);
-            match (right, hold) {
-                (0, _) => value(0),
-                (right, Hold::Linear) if right < known.len() => {
-                    let [from_s, to_s] = [time_s[known[right - 1]], time_s[known[right]]];
-                    let share = (time_s[row] - from_s) / (to_s - from_s);
-                    value(right - 1) + share * (value(right) - value(right - 1))
-                }
-                (right, _) => value(right - 1),
-            }
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -44,6 +44,8 @@ pub struct ModelReport {
 #[derive(Clone, Debug, Serialize)]
 pub struct Number {
     pub name: String,
+    /// The term or suspect that it belongs to; `None` for a number of the model.
+    pub suspect: Option<String>,
     pub unit: String,
     pub value: f64,
     /// `None` where the records do not determine it.
@@ -70,6 +72,8 @@ pub struct Left {
 #[derive(Clone, Debug, Serialize)]
 pub struct Named {
     pub suspect: String,
+    /// What it is one form of.
+    pub effect: Option<String>,
     pub place: String,
     /// How it stands there.
     pub term: String,
@@ -98,11 +102,23 @@ pub struct Judgement {
 pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> ModelReport {
     let fitting = &found.baseline.fitting;
     let model = fitting.model;
-    let names: Vec<&str> =
-        found.taken.iter().map(|taken| model.suspects[taken.evaluation.suspect].name.as_str()).collect();
+    let effect = |suspect: usize| {
+        let suspect = &model.suspects[suspect];
+        suspect.effect.as_ref().unwrap_or(&suspect.name).as_str()
+    };
+    let names: Vec<&str> = found.taken.iter().map(|taken| effect(taken.evaluation.suspect)).collect();
+    // Forms of one effect that cannot be told apart are one finding.
+    let others: Vec<&str> = found
+        .taken
+        .iter()
+        .flat_map(|taken| {
+            taken.alternatives.iter().map(|other| [effect(*other), effect(taken.evaluation.suspect)])
+        })
+        .filter_map(|[other, taken]| (other != taken).then_some(other))
+        .collect();
     let verdict = match () {
         () if found.decoy.is_some() => Verdict::OutsideCatalogue,
-        () if found.taken.iter().any(|taken| !taken.alternatives.is_empty()) => Verdict::Ambiguous,
+        () if !others.is_empty() => Verdict::Ambiguous,
         () if found.taken.is_empty() => Verdict::NothingMissing,
         () => Verdict::Named,
     };
@@ -111,6 +127,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         .iter()
         .map(|taken| Named {
             suspect: model.suspects[taken.evaluation.suspect].name.clone(),
+            effect: model.suspects[taken.evaluation.suspect].effect.clone(),
             place: place(model, taken.evaluation.suspect),
             term: term(model, taken.evaluation.suspect),
             share_explained: taken.evaluation.share,
@@ -122,7 +139,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         })
         .collect();
     let headline = match verdict {
-        Verdict::NothingMissing if model.suspects.is_empty() => {
+        Verdict::NothingMissing if found.first.is_empty() => {
             "The model was fitted; it has no suspects".to_owned()
         }
         Verdict::NothingMissing => "No suspect is missing beyond doubt".to_owned(),
@@ -133,12 +150,21 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
             )
         }
         Verdict::Ambiguous => {
-            let others: Vec<&str> =
-                named.iter().flat_map(|one| &one.alternatives).map(String::as_str).collect();
             format!("{} is missing, or {}: the records cannot tell", names.join(" and "), others.join(" or "))
         }
         _ => format!("{} {} missing", names.join(" and "), if names.len() == 1 { "is" } else { "are" }),
     };
+    let forms = named.iter().filter(|one| others.is_empty() && !one.alternatives.is_empty());
+    let forms: String = forms
+        .map(|one| {
+            format!(
+                ", in the form of {} or {}: the records cannot tell",
+                one.suspect,
+                one.alternatives.join(" or ")
+            )
+        })
+        .collect();
+    let headline = headline + &forms;
     let mut suspects: Vec<Judgement> =
         found.first.iter().map(|evaluation| judgement(fitting, evaluation, found)).collect();
     suspects.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.gain.total_cmp(&a.gain)));
@@ -254,6 +280,7 @@ fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
         let before = baseline.fitting.unknowns.iter().position(|other| other.what == unknown.what);
         Number {
             name: fitting.name_of(unknown),
+            suspect: fitting.suspect_of(unknown).map(|suspect| fitting.model.suspects[suspect].name.clone()),
             unit: unit.text.clone(),
             value: value / unit.factor,
             standard_error: error.map(|error| error * inflation / unit.factor),
@@ -271,6 +298,9 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
     let last = found.last.iter().find(|last| last.suspect == evaluation.suspect);
     let mut decision = match (taken, last) {
         (Some(round), _) => format!("taken, number {}", round + 1),
+        _ if found.taken.iter().any(|taken| taken.alternatives.contains(&evaluation.suspect)) => {
+            "explains the records as well as what was taken".to_owned()
+        }
         (None, Some(last)) if last.passes => "passes, but another was better".to_owned(),
         (None, Some(last)) => format!("rejected: {}", last.gate),
         (None, None) => "rejected beside what was taken".to_owned(),
@@ -282,6 +312,7 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
         let parameter = &model.parameters[*index];
         Number {
             name: parameter.name.clone(),
+            suspect: Some(suspect.name.clone()),
             unit: parameter.unit.text.clone(),
             value: value / parameter.unit.factor,
             standard_error: None,

@@ -5,16 +5,17 @@
 //!
 //! | gate | asks | against |
 //! |---|---|---|
-//! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n is what a coloured residual is worth |
+//! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n is what the residual of the best fit is worth |
 //! | folds in time | at least a tenth of the power that the model leaves | size |
 //! | folds in time | a gain without the block that gains most, too | an event that is none of the plant's |
+//! | folds in bands of `[rows.folds]` | half of that share, at 2 clustered standard errors | what does not hold elsewhere |
 //!
-//! A mean over its standard error, as [`crate::single_equation`] asks of folds, would ask that a term acts in every block: a tank
-//! overflows in two of ten.
+//! A mean over its standard error asked of folds in time would ask that a term acts in every block: a tank overflows in two of
+//! ten.
+//! Bands are not asked of a suspect that is `local`.
 //!
 //! A fold is judged by the fit without it, which follows from the normal equations of the others by one linear step. The best of
-//! what passes is taken; another that passes and is not better or worse beyond doubt explains the records as well. Thresholds are
-//! those of [`crate::single_equation`].
+//! what passes is taken; another that passes and is not better or worse beyond doubt explains the records as well.
 //!
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
@@ -23,12 +24,27 @@ use super::normal::{Normal, solved};
 use super::record::Measured;
 use super::starts;
 use crate::estimator::Convergence;
-use crate::single_equation::{GAIN_APART, SHARE_FLOOR, T_TIME, clustered_t};
+use crate::stats::mean;
 use model::{Failure, Model, Program};
 use rayon::prelude::*;
 
 /// Most terms that are taken.
 const MOST_TERMS: usize = 3;
+/// Least share of the power left out that a term must explain on folds in time; on bands half of it.
+const SHARE_FLOOR: f64 = 0.1;
+/// Clustered standard errors that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
+/// Grandvalet 2004, JMLR 5]; for ten folds 2 is about 4 % one-sided.
+const T_BANDS: f64 = 2.0;
+/// Clustered standard errors of a difference between two suspects that tells them apart.
+const T_APART: f64 = 3.0;
+/// Twice the difference of log likelihoods that does the same. "Very strong" is 10 for twice the log Bayes factor [Kass, Raftery
+/// 1995, JASA 90(430)], which this difference approximates for equal numbers of parameters only.
+const GAIN_APART: f64 = 10.0;
+/// Below this it says nothing at all.
+const SAME: f64 = 2.0;
+
+/// Squares of folds, output by output.
+type Folds = Vec<Vec<f64>>;
 
 /// A fitted model.
 #[derive(Clone)]
@@ -37,8 +53,12 @@ pub(crate) struct Fitted<'a> {
     pub(crate) fitting: Fitting<'a>,
     pub(crate) point: Point,
     pub(crate) convergence: Convergence,
-    /// Squares that each fold has under the fit without it, output by output.
-    folds: Vec<Vec<f64>>,
+    /// Squares that each fold in time has under the fit without it, output by output.
+    folds: Folds,
+    /// The same in bands of each of what the model's folds go over.
+    bands: Vec<Folds>,
+    /// Squares of the rows that judge, of each output.
+    judged: Vec<f64>,
     /// Normal equations at the point.
     pub(crate) normal: Normal,
     /// Independent samples that each output's residual is worth.
@@ -98,7 +118,6 @@ pub(crate) fn search<'a>(
     // Once more from there: suspects are fitted from its values, and must gain nothing by that alone.
     let baseline = fitted(model, records, &[], Some(&baseline))?;
     progress(&format!("the model alone: {}", left(&baseline)));
-    let plain = power(&baseline, &baseline);
     let mut found = Found {
         extended: baseline.clone(),
         baseline,
@@ -110,31 +129,44 @@ pub(crate) fn search<'a>(
     };
     loop {
         let taken = found.extended.suspects.clone();
-        let open: Vec<usize> = (0..model.suspects.len()).filter(|suspect| !taken.contains(suspect)).collect();
+        let is_open = |suspect: &usize| !taken.contains(suspect) && !model.suspects[*suspect].is_term;
+        let open: Vec<usize> = (0..model.suspects.len()).filter(is_open).collect();
         let with = |suspect: &usize| {
             let suspects: Vec<usize> = taken.iter().copied().chain([*suspect]).collect();
             (*suspect, fitted(model, records, &suspects, Some(&found.extended)))
         };
-        let (mut round, mut fits) = (Vec::new(), Vec::new());
+        let (mut tried, mut fits) = (Vec::new(), Vec::new());
         for (suspect, fit) in open.par_iter().map(with).collect::<Vec<_>>() {
             match fit {
                 Ok(fit) => {
-                    round.push(judge(&found.extended, &fit, suspect, open.len(), plain));
+                    tried.push(suspect);
                     fits.push(fit);
                 }
                 Err(failure) if found.taken.is_empty() => found.failed.push((suspect, failure.to_string())),
                 Err(_) => {}
             }
         }
+        // Rivals are compared in samples of the one that leaves least: each one's own count would favour what leaves more.
+        let least = fits.iter().min_by(|one, other| one.point.loss.total_cmp(&other.point.loss));
+        let effective = least.map_or(Vec::new(), |least| least.effective.clone());
+        let pairs = tried.iter().zip(&fits);
+        let mut round: Vec<Evaluation> =
+            pairs.map(|(suspect, fit)| judge(&found, fit, *suspect, (open.len(), &effective))).collect();
         weigh(&mut round);
         if found.taken.is_empty() {
             found.first.clone_from(&round);
         }
         found.last.clone_from(&round);
         let passing = (0..round.len()).filter(|place| round[*place].passes);
-        let value = |place: usize| round[place].gain - round[place].penalty;
-        let best = passing.max_by(|a, b| value(*a).total_cmp(&value(*b)));
+        let value = |place: usize| round[place].worth();
+        let best = passing.clone().max_by(|a, b| value(*a).total_cmp(&value(*b)));
         let Some(best) = best.filter(|_| found.taken.len() < MOST_TERMS) else { return Ok(found) };
+        // Of forms of one effect that are as good the first of the file: its order says which is the likelier law.
+        let is_as_good = |place: &usize| {
+            value(*place) > value(best) - SAME
+                && is_one_effect(model, round[*place].suspect, round[best].suspect)
+        };
+        let best = passing.clone().find(is_as_good).unwrap_or(best);
         let evaluation = round[best].clone();
         if model.suspects[evaluation.suspect].is_decoy {
             found.decoy = Some(evaluation.suspect);
@@ -143,7 +175,7 @@ pub(crate) fn search<'a>(
         let alternatives = round
             .iter()
             .filter(|other| other.suspect != evaluation.suspect && other.passes)
-            .filter(|other| !model.suspects[other.suspect].is_decoy && !apart(&evaluation, other))
+            .filter(|other| !model.suspects[other.suspect].is_decoy && !apart(model, &evaluation, other))
             .map(|other| other.suspect)
             .collect();
         found.extended = fits.swap_remove(best);
@@ -182,12 +214,24 @@ pub(crate) fn fitted<'a>(
     let fitting = Fitting::new(model, program, records, suspects);
     let starts = starts::starts(&fitting, suspects, from.map(|from| (&from.fitting, &from.point)));
     let (point, convergence) = fitting.fit_from(starts)?;
-    let normals = fitting.normals(&point.values_si)?;
+    let normals = fitting.normals(&point.values_si, &fitting.in_time())?;
     let normal = fitting.sum(&normals, &point);
+    let bands = (0..model.rows.folds.len()).map(|fold| {
+        let normals = fitting.normals(&point.values_si, &fitting.in_bands(fold))?;
+        Ok(folds(&normals, &normal, &fitting, &point))
+    });
+    let bands = bands.collect::<Result<Vec<_>, Failure>>()?;
+    let judged =
+        normals[..normals.len() - 1].iter().fold(vec![0.0; model.outputs.len()], |mut sum, block| {
+            sum.iter_mut().zip(block).for_each(|(sum, normal)| *sum += normal.squares);
+            sum
+        });
     let effective = effective(&fitting, &point)?;
     Ok(Fitted {
         suspects: suspects.to_vec(),
         folds: folds(&normals, &normal, &fitting, &point),
+        bands,
+        judged,
         fitting,
         point,
         convergence,
@@ -196,7 +240,7 @@ pub(crate) fn fitted<'a>(
     })
 }
 
-/// Squares of each fold under the fit without it.
+/// Squares of each fold under the fit without it; the last block is no fold.
 fn folds(normals: &[Vec<Normal>], all: &Normal, fitting: &Fitting<'_>, point: &Point) -> Vec<Vec<f64>> {
     let is_free: Vec<bool> = fitting
         .unknowns
@@ -218,10 +262,10 @@ fn folds(normals: &[Vec<Normal>], all: &Normal, fitting: &Fitting<'_>, point: &P
         };
         block.iter().map(squares).collect()
     };
-    normals.iter().map(without).collect()
+    normals[..normals.len() - 1].iter().map(without).collect()
 }
 
-/// Independent samples that the residual of each output is worth: the sum of its autocorrelations until one is not positive.
+/// Independent samples that the residual of each output is worth.
 fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> {
     let residuals = fitting.residuals(&point.values_si)?;
     let of_output = |output: usize| {
@@ -229,68 +273,86 @@ fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> 
             .iter()
             .map(|record| record[output][0].iter().copied().filter(|value| value.is_finite()).collect())
             .collect();
-        let squares: f64 = series.iter().flatten().map(|value| value * value).sum();
-        let longest = series.iter().map(Vec::len).max().unwrap_or(0) / 4;
-        let mut sum = 0.0;
-        for lag in 1..longest {
-            let products: f64 = series
-                .iter()
-                .map(|values| {
-                    values.iter().skip(lag).zip(values).map(|(late, early)| late * early).sum::<f64>()
-                })
-                .sum();
-            if products <= 0.0 {
-                break;
-            }
-            sum += products / squares.max(f64::MIN_POSITIVE);
-        }
-        (fitting.count(output) / (1.0 + 2.0 * sum)).max(2.0)
+        independent(&series, fitting.count(output))
     };
     Ok((0..fitting.model.outputs.len()).map(of_output).collect())
 }
 
-/// Power on folds in units of what `reference` leaves of each output.
-fn power(of: &Fitted<'_>, reference: &Fitted<'_>) -> f64 {
-    in_units(of, reference).iter().sum()
+/// Samples over the sum of their autocorrelations until one is not positive.
+fn independent(series: &[Vec<f64>], count: f64) -> f64 {
+    let squares: f64 = series.iter().flatten().map(|value| value * value).sum();
+    let longest = series.iter().map(Vec::len).max().unwrap_or(0) / 4;
+    let mut sum = 0.0;
+    for lag in 1..longest {
+        let products = |values: &Vec<f64>| -> f64 {
+            values.iter().skip(lag).zip(values).map(|(late, early)| late * early).sum()
+        };
+        let products: f64 = series.iter().map(products).sum();
+        if products <= 0.0 {
+            break;
+        }
+        sum += products / squares.max(f64::MIN_POSITIVE);
+    }
+    (count / (1.0 + 2.0 * sum)).max(2.0)
 }
 
-fn in_units(of: &Fitted<'_>, reference: &Fitted<'_>) -> Vec<f64> {
+/// Folds in units of what `reference` leaves of each output.
+fn in_units(folds: &Folds, reference: &Fitted<'_>) -> Vec<f64> {
     let weight = |output: usize| 1.0 / reference.fitting.variance(output, reference.point.squares[output]);
     let fold = |squares: &Vec<f64>| {
         squares.iter().enumerate().map(|(output, squares)| squares * weight(output)).sum()
     };
-    of.folds.iter().map(fold).collect()
+    folds.iter().map(fold).collect()
 }
 
-fn judge(before: &Fitted<'_>, after: &Fitted<'_>, suspect: usize, tried: usize, plain: f64) -> Evaluation {
-    let outputs = 0..after.point.squares.len();
-    let gain: f64 = outputs
+/// What each fold gains, in units of what is left before.
+fn gained(before: &Folds, after: &Folds, reference: &Fitted<'_>) -> Vec<f64> {
+    let [before, after] = [before, after].map(|folds| in_units(folds, reference));
+    before.iter().zip(after).map(|(before, after)| before - after).collect()
+}
+
+/// Mean over its standard error, of differences that are one for each fold and taken as independent.
+fn clustered_t(differences: &[f64]) -> f64 {
+    let count = differences.len() as f64;
+    let mean = mean(differences);
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    mean / (variance / count).sqrt().max(f64::MIN_POSITIVE)
+}
+
+fn judge(
+    found: &Found<'_>,
+    after: &Fitted<'_>,
+    suspect: usize,
+    (tried, samples): (usize, &[f64]),
+) -> Evaluation {
+    let (baseline, before) = (&found.baseline, &found.extended);
+    let gain: f64 = (0..after.judged.len())
         .map(|output| {
-            let [old, new] = [before.point.squares[output], after.point.squares[output]];
-            let share = after.effective[output] / after.fitting.count(output).max(1.0);
+            let [old, new] = [before, after].map(|of| of.judged[output]);
+            let share = samples[output] / after.fitting.count(output).max(1.0);
             match after.fitting.model.outputs[output].noise_si {
                 Some(_) => share * (old - new) / after.fitting.variance(output, new),
                 None => {
                     let variances =
                         before.fitting.variance(output, old) / after.fitting.variance(output, new);
-                    after.effective[output] * variances.ln()
+                    samples[output] * variances.ln()
                 }
             }
         })
         .sum();
-    let effective: f64 = after.effective.iter().sum();
+    let effective: f64 = samples.iter().sum();
     let more = after.fitting.unknowns.len() as f64 - before.fitting.unknowns.len() as f64;
     let penalty = more * effective.ln() + 2.0 * (tried.max(1) as f64).ln();
-    let differences: Vec<f64> = in_units(before, before)
-        .iter()
-        .zip(in_units(after, before))
-        .map(|(before, after)| before - after)
-        .collect();
-    let share = differences.iter().sum::<f64>() / plain.max(f64::MIN_POSITIVE);
+    let differences = gained(&before.folds, &after.folds, before);
+    let share_of = |differences: &[f64], plain: &Folds| {
+        let plain: f64 = in_units(plain, before).iter().sum();
+        differences.iter().sum::<f64>() / plain.max(f64::MIN_POSITIVE)
+    };
+    let share = share_of(&differences, &baseline.folds);
     let t = clustered_t(&differences);
     let best_fold = differences.iter().copied().fold(0.0, f64::max);
     let without_best = differences.iter().sum::<f64>() - best_fold;
-    let gates = [
+    let mut gates = vec![
         (gain / penalty.max(f64::MIN_POSITIVE), format!("likelihood gain {gain:.1}, penalty {penalty:.1}")),
         (
             share / SHARE_FLOOR,
@@ -301,7 +363,23 @@ fn judge(before: &Fitted<'_>, after: &Fitted<'_>, suspect: usize, tried: usize, 
             "folds in time: it gains in one block of time alone".to_owned(),
         ),
     ];
-    let (score, gate) = gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are three");
+    let model = after.fitting.model;
+    let all_bands = before.bands.iter().zip(&after.bands).zip(&baseline.bands).zip(&model.rows.folds);
+    for (((before_bands, after_bands), plain), over) in
+        all_bands.filter(|_| !model.suspects[suspect].is_local)
+    {
+        let differences = gained(before_bands, after_bands, before);
+        let (share, t) = (share_of(&differences, plain), clustered_t(&differences));
+        let (floor, over) = (SHARE_FLOOR / 2.0, &over.text);
+        let words = share_in_words(share);
+        gates.push((share / floor, format!("folds over {over}: {words}, {:.0} % asked", floor * 100.0)));
+        gates.push((
+            t / T_BANDS,
+            format!("folds over {over}: {t:.1} clustered standard errors, {T_BANDS:.0} asked"),
+        ));
+    }
+    let (score, gate) =
+        gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are three at least");
     let unknowns = after.fitting.unknowns.iter().zip(&after.point.values_si);
     let values_si = unknowns.filter_map(|(unknown, value)| match unknown.what {
         What::Shared(index) | What::OfRecord(index, 0)
@@ -326,13 +404,20 @@ fn judge(before: &Fitted<'_>, after: &Fitted<'_>, suspect: usize, tried: usize, 
     }
 }
 
+impl Evaluation {
+    /// Twice a log likelihood ratio, less what chance is granted.
+    fn worth(&self) -> f64 {
+        self.gain - self.penalty
+    }
+}
+
 /// Probabilities of a round: each suspect and none of them, as likely before; gains in units of the best one's samples.
 fn weigh(round: &mut [Evaluation]) {
-    let best = round.iter().map(|one| one.gain - one.penalty).fold(0.0, f64::max);
-    let sum: f64 = (-0.5 * best).exp()
-        + round.iter().map(|one| (0.5 * (one.gain - one.penalty - best)).exp()).sum::<f64>();
+    let best = round.iter().map(Evaluation::worth).fold(0.0, f64::max);
+    let weight = |worth: f64| (0.5 * (worth - best)).exp();
+    let sum: f64 = weight(0.0) + round.iter().map(|one| weight(one.worth())).sum::<f64>();
     for one in round {
-        one.probability = (0.5 * (one.gain - one.penalty - best)).exp() / sum;
+        one.probability = weight(one.worth()) / sum;
     }
 }
 
@@ -345,19 +430,45 @@ pub(crate) fn share_in_words(share: f64) -> String {
     }
 }
 
-/// Whether one is better than the other beyond doubt: by its likelihood, or on the same folds.
-fn apart(best: &Evaluation, other: &Evaluation) -> bool {
-    if (best.gain - best.penalty) - (other.gain - other.penalty) > GAIN_APART {
+/// Whether two suspects are forms of one effect.
+fn is_one_effect(model: &Model, one: usize, other: usize) -> bool {
+    let [effect, of_other] = [one, other].map(|suspect| model.suspects[suspect].effect.as_ref());
+    one == other || effect.is_some() && effect == of_other
+}
+
+/// Whether one is better than the other beyond doubt: by its likelihood, or on the same folds. Forms of one effect differ by so
+/// little that the spread over folds is nothing to compare it with: of them the likelihood decides alone.
+fn apart(model: &Model, best: &Evaluation, other: &Evaluation) -> bool {
+    if best.worth() - other.worth() > GAIN_APART {
         return true;
+    }
+    if is_one_effect(model, best.suspect, other.suspect) {
+        return false;
     }
     let differences: Vec<f64> =
         best.differences.iter().zip(&other.differences).map(|(best, other)| best - other).collect();
-    clustered_t(&differences) > T_TIME
+    clustered_t(&differences) > T_APART
 }
 
 #[cfg(test)]
 mod tests {
-    use super::share_in_words;
+    use super::{clustered_t, independent, share_in_words};
+
+    #[test]
+    fn rows_that_repeat_their_neighbours_count_once() {
+        // A hundred values, each ten times, of alternating signs.
+        let residual = (0..1000).map(|at| if (at / 10) % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        let effective = independent(&[residual], 1000.0);
+        assert!((100.0..300.0).contains(&effective), "{effective}");
+    }
+
+    #[test]
+    fn blocks_that_differ_are_no_gain_beyond_their_error() {
+        let alternating: Vec<f64> = (0..10).map(|at| if at % 2 == 0 { 1.1 } else { -0.9 }).collect();
+        // A mean of 0.1, and a standard error of 1 / sqrt(10 - 1).
+        assert!((clustered_t(&alternating) - 0.3).abs() < 1e-9);
+        assert!(clustered_t(&[1.0; 10]) > 1e6);
+    }
 
     #[test]
     fn a_share_that_is_far_below_nothing_is_said_as_a_ratio() {

@@ -11,12 +11,17 @@
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
 
-use super::fit::{Fitting, Point, What};
+use super::fit::{Fitting, OPTIONS, Point, What};
+use crate::estimator::{Convergence, Outcome};
+use model::Failure;
 
 /// Most starts that values of the file make.
 const MOST: usize = 12;
 /// Points of the sequence that are kept.
 const KEPT: usize = 3;
+/// Steps from each start, and how many of those that have come lowest go on to the end.
+const SHORT: usize = 6;
+const FINISHED: usize = 2;
 /// How far a number is spread, times or over its value.
 const FACTOR: f64 = 5.0;
 /// Bases of the sequence; numbers beyond them keep their values.
@@ -49,6 +54,36 @@ pub(crate) fn starts(
     }
     all.extend(spread);
     all
+}
+
+impl Fitting<'_> {
+    /// The best of the fits from several starts: a few steps from each, and all steps from those that have come lowest.
+    pub(crate) fn fit_from(&self, starts: Vec<Vec<f64>>) -> Result<(Point, Convergence), Failure> {
+        let mut why = None;
+        let mut begun = Vec::new();
+        for start in starts {
+            match self.fit(start, SHORT) {
+                Ok(fit) => begun.push(fit),
+                Err(failure) => why = Some(failure),
+            }
+        }
+        begun.sort_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
+        // Starts that have come to the same minimum go on once.
+        begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.converged);
+        let mut best: Option<(Point, Convergence)> = None;
+        for (point, convergence) in begun.into_iter().take(FINISHED) {
+            let ended = match convergence.outcome {
+                Outcome::StepLimit => self
+                    .fit(point.values_si, OPTIONS.steps)
+                    .map(|(end, more)| (end, convergence.then(more)))?,
+                _ => (point, convergence),
+            };
+            if best.as_ref().is_none_or(|(best, _)| ended.0.loss < best.loss) {
+                best = Some(ended);
+            }
+        }
+        best.ok_or_else(|| why.expect("there is one start at least"))
+    }
 }
 
 /// Every start of the newest suspect beside the other numbers.

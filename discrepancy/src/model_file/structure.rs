@@ -51,7 +51,9 @@ pub(crate) fn structure(baseline: &Fitted<'_>) -> Structure {
         .map(|output| fitting.variance(output, point.squares[output]).sqrt().recip())
         .collect();
     let Ok((columns, base)) = columns(fitting, &point.values_si, &scale) else { return Structure::default() };
-    for (index, suspect) in model.suspects.iter().enumerate().filter(|(_, suspect)| !suspect.is_decoy) {
+    for (index, suspect) in
+        model.suspects.iter().enumerate().filter(|(_, suspect)| !suspect.is_decoy && !suspect.is_term)
+    {
         let Ok(changed) = changed(baseline, index, &scale) else { continue };
         let change: DVector<f64> = changed - &base;
         let rest = &change - &columns * projected(&columns, &change);

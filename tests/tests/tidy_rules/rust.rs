@@ -385,6 +385,9 @@ const DIMENSIONLESS: &[&str] = &[
     "quantum",               // of a channel, in its unit
     "unusable",              // share of samples
     "divergence",            // in squared standard deviations
+    "ripple_decibel",        // of a filter
+    "scale",                 // of a column, whose unit is a field beside it
+    "edge",                  // of a filter, over a Nyquist frequency
 ];
 
 /// A public number says its unit in its name.

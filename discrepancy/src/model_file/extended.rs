@@ -1,0 +1,132 @@
+//! The extended model file: what was named stands under `[[terms]]`, numbers are those of the fit.
+//!
+//! Everything else of the file stays, comments too. Terms are fitted again with the model in the next run.
+
+use serde::Deserialize;
+use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
+
+/// Why a model file cannot be extended.
+#[derive(Debug, thiserror::Error)]
+pub enum ExtendError {
+    #[error(transparent)]
+    Text(#[from] toml_edit::TomlError),
+    #[error("suspect {name} of the report is not in the model file: is it the report of this model?")]
+    Unknown { name: String },
+    #[error("suspects and terms are written as [[suspects]] and [[terms]]")]
+    Form,
+}
+
+/// What a report of a model file says of the extended model.
+#[derive(Debug, Deserialize)]
+pub struct ReportedModel {
+    named: Vec<ReportedName>,
+    parameters: Vec<ReportedNumber>,
+}
+
+#[derive(Debug, Deserialize)]
+struct ReportedName {
+    suspect: String,
+}
+
+#[derive(Debug, Deserialize)]
+struct ReportedNumber {
+    name: String,
+    #[serde(default)]
+    suspect: Option<String>,
+    value: f64,
+    is_at_bound: bool,
+}
+
+impl From<&super::ModelReport> for ReportedModel {
+    fn from(report: &super::ModelReport) -> Self {
+        let named = report.named.iter().map(|named| ReportedName { suspect: named.suspect.clone() });
+        let parameters = report.parameters.iter().map(|number| ReportedNumber {
+            name: number.name.clone(),
+            suspect: number.suspect.clone(),
+            value: number.value,
+            is_at_bound: number.is_at_bound,
+        });
+        Self { named: named.collect(), parameters: parameters.collect() }
+    }
+}
+
+/// The text of a model file with what its report names.
+///
+/// # Errors
+/// A text that is no TOML, or a report of another model.
+pub fn extended(text: &str, report: &ReportedModel) -> Result<String, ExtendError> {
+    let mut document: DocumentMut = text.parse()?;
+    put(document.as_table_mut(), report, None);
+    let terms = document.get_mut("terms").and_then(Item::as_array_of_tables_mut);
+    for term in terms.into_iter().flat_map(ArrayOfTables::iter_mut) {
+        let name = term.get("name").and_then(Item::as_str).map(str::to_owned);
+        put(term, report, name.as_deref());
+    }
+    for ReportedName { suspect } in &report.named {
+        let suspects = document.get_mut("suspects").and_then(Item::as_array_of_tables_mut);
+        let suspects = suspects.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
+        let is_it = |table: &toml_edit::Table| table.get("name").and_then(Item::as_str) == Some(suspect);
+        let place = suspects.iter().position(is_it);
+        let place = place.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
+        let mut term = suspects.get(place).expect("it was found").clone();
+        suspects.remove(place);
+        put(&mut term, report, Some(suspect));
+        let terms = document.entry("terms").or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
+        terms.as_array_of_tables_mut().ok_or(ExtendError::Form)?.push(term);
+    }
+    Ok(document.to_string())
+}
+
+/// Writes fitted numbers over the values of a table's parameters. One at an end of its range keeps that of the file.
+fn put(table: &mut dyn TableLike, report: &ReportedModel, suspect: Option<&str>) {
+    let Some(parameters) = table.get_mut("parameters").and_then(Item::as_table_like_mut) else { return };
+    for number in report.parameters.iter().filter(|number| number.suspect.as_deref() == suspect) {
+        let Some(parameter) = parameters.get_mut(&number.name).and_then(Item::as_table_like_mut) else {
+            continue;
+        };
+        if let Some(item) = parameter.get_mut("value").filter(|_| !number.is_at_bound) {
+            *item = value(number.value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MODEL: &str = r#"
+# A comment.
+[parameters]
+mass = { unit = "kg", value = 1 } # of the carriage
+[[suspects]]
+name = "drag"
+parameters.k = { value = [1, 2], range = [0, 9] }
+[[suspects]]
+name = "offset"
+"#;
+
+    fn report(suspect: &str) -> ReportedModel {
+        let text = format!(
+            r#"{{"named": [{{"suspect": "{suspect}"}}], "parameters": [
+                {{"name": "mass", "suspect": null, "value": 1.5, "is_at_bound": false}},
+                {{"name": "k", "suspect": "drag", "value": 0.25, "is_at_bound": false}}]}}"#
+        );
+        serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn what_is_named_becomes_a_term_with_its_number() {
+        let text = extended(MODEL, &report("drag")).unwrap();
+        let read: toml::Table = text.parse().unwrap();
+        assert_eq!(read["suspects"].as_array().unwrap().len(), 1, "{text}");
+        assert_eq!(read["terms"][0]["parameters"]["k"]["value"].as_float(), Some(0.25), "{text}");
+        assert_eq!(read["parameters"]["mass"]["value"].as_float(), Some(1.5), "{text}");
+        assert!(text.contains("# A comment.") && text.contains("# of the carriage"), "{text}");
+    }
+
+    #[test]
+    fn the_report_of_another_model_is_refused() {
+        let message = extended(MODEL, &report("leak")).unwrap_err().to_string();
+        assert!(message.contains("suspect leak of the report is not in the model file"), "{message}");
+    }
+}

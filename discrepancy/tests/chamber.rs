@@ -1,0 +1,73 @@
+//! The model file of a chamber on records that the plant made: a hidden volume, a valve that passes more, nothing.
+
+use crate::real::crate_folder;
+use discrepancy::model_file::{ModelReport, close};
+use discrepancy::report::Verdict;
+use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
+use std::fmt::Write as _;
+
+/// A record of the drive alone, 8 s: opens and shuts in steps of many sizes.
+fn record(rig: &RigParameters, seed: u64) -> String {
+    let setup = Setup { carriage_position_m: 0.1, linked: false, added_mass_kg: 0.0 };
+    let mut plant = Plant::new(rig, &setup).unwrap();
+    let mut sensors = Sensors::new(rig, seed);
+    let mut text =
+        String::from("time_s,drive_valve,drive_position_m,drive_pressure_a_Pa,drive_pressure_b_Pa\n");
+    let openings = [0.25, -0.3, 0.0, 0.4, -0.5, 0.15, -0.15, 0.6, 0.0, -0.6, 0.3, -0.2];
+    for k in 0..8000_u64 {
+        let opening = openings[((k + 37 * seed) / 250) as usize % openings.len()];
+        let inputs = Inputs { valve: [quantise_valve(opening), 0.0], ..Inputs::default() };
+        let [drive, _] = sensors.sample(&plant, &inputs);
+        let seconds = k as f64 * 1e-3;
+        let (x, a, b) = (drive.position.value, drive.pressure_a.value, drive.pressure_b.value);
+        writeln!(text, "{seconds:.3},{},{x},{a},{b}", inputs.valve[0]).unwrap();
+        plant.step(&inputs);
+    }
+    text
+}
+
+fn closed(rig: &RigParameters) -> ModelReport {
+    let folder = tempfile::tempdir().unwrap();
+    let [train, test] = [1, 2].map(|seed| {
+        let file = folder.path().join(format!("{seed}.csv"));
+        std::fs::write(&file, record(rig, seed)).unwrap();
+        file
+    });
+    let model = crate_folder().join("models/chamber.toml");
+    close(&model, &[train], &[test], &mut |_| {}).unwrap_or_else(|error| panic!("{error}")).report
+}
+
+fn number(report: &ModelReport, name: &str) -> f64 {
+    report.parameters.iter().find(|number| number.name == name).unwrap_or_else(|| panic!("{report:#?}")).value
+}
+
+#[test]
+fn a_hidden_dead_volume_is_named_in_the_pressure_of_its_chamber() {
+    let rig = RigParameters::baseline();
+    let report = closed(&rig.with_effect("dead-volume", "drive", &[("volume_cm3", 50.0)]).unwrap());
+    // In one chamber an offset of the position is the same, and which of the two it is stays open.
+    assert_eq!(report.verdict, Verdict::Ambiguous, "{}", report.headline);
+    assert_eq!(report.named[0].suspect, "dead-volume");
+    assert_eq!(report.named[0].alternatives, ["position-sensor-offset"]);
+    let more = number(&report, "more");
+    assert!((more - 30.0).abs() < 5.0, "{more} cm^3 more than the 20 of the file");
+    assert_eq!(report.confirmed, Some(true), "{}", report.headline);
+}
+
+#[test]
+fn a_chamber_without_anything_hidden_lacks_nothing() {
+    let report = closed(&RigParameters::baseline());
+    assert_eq!(report.verdict, Verdict::NothingMissing, "{}", report.headline);
+}
+
+#[test]
+fn a_chamber_whose_valve_passes_more_has_another_scale() {
+    let rig = RigParameters::baseline();
+    let valve = rig.valve();
+    let more = |kv: &[f64]| -> Vec<f64> { kv.iter().map(|kv| 1.1 * kv).collect() };
+    let (supply, exhaust) = (more(&valve.kv_supply_m3_per_h), more(&valve.kv_exhaust_m3_per_h));
+    let rig = rig.with("valve.kv_supply_m3_per_h", &supply).unwrap();
+    let report = closed(&rig.with("valve.kv_exhaust_m3_per_h", &exhaust).unwrap());
+    assert_eq!((report.verdict, report.named[0].suspect.as_str()), (Verdict::Named, "valve-passes-more"));
+    assert!((number(&report, "scale") - 1.1).abs() < 0.03, "{}", number(&report, "scale"));
+}
