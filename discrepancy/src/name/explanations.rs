@@ -242,7 +242,9 @@ mod tests {
         let all = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]);
         let effect = |name: &&str| {
             let candidate = *all.iter().find(|candidate| candidate.sheet.name == *name).unwrap();
-            EffectEstimate { candidate, coordinates: candidate.origin() }
+            let mut coordinates = candidate.origin();
+            coordinates[0] = 1.0;
+            EffectEstimate { candidate, coordinates }
         };
         Refit {
             placed: names.iter().map(effect).collect(),

@@ -109,7 +109,7 @@ mod tests {
         for all in [&clean, &wrong] {
             assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }
-        assert!(clean[0] > 0.5 && wrong[0] < 0.01, "{clean:?} {wrong:?}");
+        assert!(clean[0] > 0.5 && wrong[0] < 0.1, "{clean:?} {wrong:?}");
         let nobody = probabilities(&[
             explanation(ExplanationKind::Nothing, 4.0, 1e5),
             explanation(ExplanationKind::Parameters, 2.0, 0.0),

@@ -19,7 +19,8 @@ from airbench_hil.guests import Readiness
 
 # What a killed test might have been doing, again and again; its processes carry MARK in their environment.
 _VICTIM = """
-import sys, tempfile
+import signal, sys, tempfile
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored for what it started beside itself
 sys.path.insert(0, "PATH")
 import airbench_hil
 from airbench_hil import Own, Process, Rig
