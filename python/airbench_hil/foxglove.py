@@ -82,7 +82,8 @@ class Bridge:
                 row = {name: values[at] for name, values in data["columns"].items() if values[at] is not None}
                 self._row.log({"t_s": time_s, **row}, log_time=self._stamp_ns(time_s))
         elif event == "state":
-            self._state.log(data, log_time=self._stamp_ns(data.get("t_s")))
+            # A state may be newer than the rows that follow it.
+            self._state.log(data, log_time=self._stamp_ns(data.get("t_s"), moves=False))
         elif event == "histograms":
             self._histograms.log(data, log_time=self._stamp_ns(None))
         elif event == "message":

@@ -27,10 +27,12 @@ generators=$!
 cangen "$interface" -I 12345678 -e -L 2 -D 0102 -g 10 &
 generators="$generators $!"
 timeout -s INT 2 cansniffer "$interface" -t 0 </dev/null >sniffer.raw
-# Of each screen the identifiers, without the time between frames.
-sed -n 's/^[0-9]* | /time | /p' sniffer.raw | sort -u >sniffer
+# Of each screen the identifiers, without the time between frames. Until the first extended frame comes, 5A5 stands without
+# dashes before it: whether a screen falls into that time is chance.
+seen() { sed -n -e '/ | 5A5 | /d' -e 's/^[0-9]* | /time | /p' sniffer.raw | sort -u; }
+seen >sniffer
 timeout -s INT 2 cansniffer "$interface" -t 0 -B </dev/null >sniffer.raw
-sed -n 's/^[0-9]* | /time | /p' sniffer.raw | sort -u >sniffer-bits
+seen >sniffer-bits
 # shellcheck disable=SC2086 # a list
 kill $generators
 # shellcheck disable=SC2086
