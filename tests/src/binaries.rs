@@ -6,6 +6,7 @@
 
 use crate::process::{Ended, Running};
 use std::ffi::OsStr;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
@@ -47,6 +48,21 @@ impl Program {
 pub enum Build {
     Shipped,
     CountingAllocations,
+}
+
+/// Writes an executable file, and does so in another process. A descriptor that is open for writing here would be inherited by
+/// what another test starts at that moment, and Linux executes no file that any process has open for writing (ETXTBSY).
+pub fn install(contents: &[u8], path: &Path) {
+    let mut install = Command::new("install");
+    let mut install =
+        install.args(["-m", "755", "/dev/stdin"]).arg(path).stdin(Stdio::piped()).spawn().expect("coreutils");
+    let written = install.stdin.take().expect("stdin is piped").write_all(contents);
+    let status = install.wait().expect("a child that can be waited for");
+    assert!(
+        written.is_ok() && status.success(),
+        "{} cannot be written: {written:?}, {status}",
+        path.display()
+    );
 }
 
 /// The executable of `program` in `build`, which is made if nobody has.

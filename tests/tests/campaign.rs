@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Build, Program, executable, install, workspace};
 use system_tests::process::{Ended, PATIENCE, Running};
 use system_tests::records::json;
 use system_tests::skip;
@@ -216,9 +216,7 @@ fn what_a_program_answers_becomes_a_table_and_a_confusion_matrix() {
     );
     let script = "#!/bin/sh\nread line\ncase $line in *crash*) echo broken >&2; exit 3;; *leak*) n=leak;; *) n=leak;; esac\n\
                   echo \"{\\\"named\\\": \\\"$n\\\", \\\"score\\\": 0.5}\"\n";
-    fs::write(place.path("judge.sh"), script).expect("a script");
-    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
-    fs::set_permissions(place.path("judge.sh"), mode).expect("it can be made a program");
+    install(script.as_bytes(), &place.path("judge.sh"));
     let _ = place.run("run", &["--out", "out", "--expect-passed"]).expect_code(BOUND_BROKEN);
     let table = place.text("out/runs.csv");
     let cell = |run: usize, name: &str| row(&table, run)[name].clone();

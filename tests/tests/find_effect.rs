@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::path::Path;
-use system_tests::binaries::script;
+use system_tests::binaries::{install, script};
 use system_tests::process::{Ended, PATIENCE};
 use system_tests::records::json;
 use system_tests::scene::{SHORT, Scene};
@@ -25,9 +25,7 @@ fn stand_in(folder: &Path, said: &str) -> String {
          cp \"$3\" \"$9/rig.toml\"\ncp '{}' \"$9/report.json\"\n",
         report.display()
     );
-    fs::write(&program, text).expect("a folder that can be written");
-    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
-    fs::set_permissions(&program, mode).expect("a file of our own");
+    install(text.as_bytes(), &program);
     program.display().to_string()
 }
 

@@ -2,10 +2,10 @@
 
 use rustix::process::Signal;
 use std::fs;
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Build, Program, executable, install, workspace};
 use system_tests::foreign_python::{of, tools_path};
 use system_tests::process::{Ended, Running};
 use system_tests::turn;
@@ -21,7 +21,7 @@ impl Prefix {
         }
         let own = executable(Program::Airbench, Build::Shipped);
         // A link would lead back into the checkout.
-        fs::copy(own, prefix.path("bin/airbench")).expect("a program that can be copied");
+        install(&fs::read(own).expect("our own program"), &prefix.path("bin/airbench"));
         let programs =
             [Program::Emulator, Program::Controller, Program::Bench, Program::Discrepancy, Program::Campaign];
         for program in programs {
@@ -178,9 +178,7 @@ fn a_signal_to_the_command_alone_ends_all_its_processes_with_everything_saved() 
 fn a_suite_of_tests_is_run_by_the_interpreter_that_has_the_package() {
     let prefix = Prefix::made();
     let python = prefix.path("work/python");
-    fs::write(&python, "#!/bin/sh\necho \"No module named 'airbench_hil'\" >&2\nexit 1\n")
-        .expect("a folder of our own");
-    fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).expect("a file of our own");
+    install(b"#!/bin/sh\necho \"No module named 'airbench_hil'\" >&2\nexit 1\n", &python);
     let ended =
         Running::start("airbench test", prefix.command(&["test"]).env("AIRBENCH_PYTHON", &python)).wait();
     let _ = ended.expect_code(2).expect_said(&[

@@ -5,7 +5,7 @@ use rustix::process::Signal;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Build, Program, executable, install, workspace};
 use system_tests::foreign_python::python;
 use system_tests::launch::Pace;
 use system_tests::peer::Packet;
@@ -207,7 +207,7 @@ fn for_everybody() -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o777)).unwrap();
     let bench = folder.path().join("bench");
-    std::fs::copy(executable(Program::Bench, Build::Shipped), &bench).unwrap();
+    install(&std::fs::read(executable(Program::Bench, Build::Shipped)).unwrap(), &bench);
     (folder, bench)
 }
 

@@ -2,11 +2,10 @@
 
 use rustix::process::{Pid, Signal, test_kill_process};
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Build, Program, executable, install, workspace};
 use system_tests::process::{Ended, PATIENCE, Running};
 use tempfile::TempDir;
 
@@ -29,8 +28,7 @@ impl Place {
     fn new(script: &str, draws: u32) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let program = folder.path().join("program");
-        fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("a program");
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it can be run");
+        install(format!("#!/bin/sh\n{script}\n").as_bytes(), &program);
         let program = program.display().to_string();
         let start = [STUDY, "one", "run", "--out", "study", "--label", "fake", "--program", &program];
         let words: Vec<_> = start.into_iter().chain(SHAPE).map(|word| format!("{word:?}")).collect();
