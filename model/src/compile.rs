@@ -4,11 +4,12 @@
 //!   equation of its file ──► + the suspects that are switched on, in their order ──► tape of rates, outputs, memories
 //! ```
 
-use crate::expression::{Binary, Kind, Place, Wrong};
 use crate::file::{Change, Expression, Model, State, Target};
 use crate::inputs::Inputs;
-use crate::names::{DEEPEST_CHAIN, Symbol, chain, function, name_of, resolve};
+use crate::names::{DEEPEST_CHAIN, Symbol, chain, name_of, resolve};
 use crate::tape::{Builder, Code, Leaves, Register, Registers, Tape};
+use expression::compile::Compile;
+use expression::grammar::{Kind, Node, Place, Wrong};
 use std::collections::HashMap;
 
 /// The tapes of a model with some suspects.
@@ -168,42 +169,37 @@ impl<'a> Compiler<'a> {
         self.known.insert(symbol, register);
         Ok(register)
     }
+}
 
-    fn node(&mut self, place: Place, scope: Scope) -> Result<Register, Wrong> {
-        let node = self.model.nodes.get(place).clone();
-        Ok(match node.kind {
-            Kind::Number(value, _) => self.builder.constant(value),
-            Kind::Name(name) => {
-                if let Some((target, before)) = scope.before
-                    && !matches!(target, Target::State(_))
-                    && self.model.target_name(target) == name
-                {
-                    return Ok(before);
-                }
-                let symbol = resolve(self.model, &name, scope.suspect, node.at)?;
-                self.symbol(symbol, node.at)?
-            }
-            Kind::Negation(inner) => {
-                let inner = self.node(inner, scope)?;
-                self.builder.push(Code::Negate, &[inner])
-            }
-            Kind::Binary(Binary::Power, base, exponent) if self.is_two(exponent) => {
-                let base = self.node(base, scope)?;
-                self.builder.push(Code::Multiply, &[base, base])
-            }
-            Kind::Binary(operator, left, right) => {
-                let operands = [self.node(left, scope)?, self.node(right, scope)?];
-                self.builder.push(code_of(operator), &operands)
-            }
-            Kind::Call(name, arguments) => self.call(&name, &arguments, node.at, scope)?,
-        })
+impl Compile for Compiler<'_> {
+    type Scope = Scope;
+
+    fn at(&self, place: Place) -> Node {
+        self.model.nodes.get(place).clone()
     }
 
-    fn is_two(&self, place: Place) -> bool {
-        matches!(self.model.nodes.get(place).kind, Kind::Number(2.0, None))
+    fn builder(&mut self) -> &mut Builder {
+        &mut self.builder
     }
 
-    fn call(&mut self, name: &str, arguments: &[Place], at: usize, scope: Scope) -> Result<Register, Wrong> {
+    fn named(&mut self, name: &str, at: usize, scope: Scope) -> Result<Register, Wrong> {
+        if let Some((target, before)) = scope.before
+            && !matches!(target, Target::State(_))
+            && self.model.target_name(target) == name
+        {
+            return Ok(before);
+        }
+        let symbol = resolve(self.model, name, scope.suspect, at)?;
+        self.symbol(symbol, at)
+    }
+
+    fn called(
+        &mut self,
+        name: &str,
+        arguments: &[Place],
+        at: usize,
+        scope: Scope,
+    ) -> Result<Option<Register>, Wrong> {
         if name == "delay" {
             let Kind::Name(input) = &self.model.nodes.get(arguments[0]).kind else {
                 return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
@@ -213,40 +209,12 @@ impl<'a> Compiler<'a> {
                 return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
             };
             let earlier = self.node(arguments[1], scope)?;
-            return Ok(self.builder.push(Code::Delayed(input as u16), &[earlier]));
+            return Ok(Some(self.builder.push(Code::Delayed(input as u16), &[earlier])));
         }
-        let operands =
-            arguments.iter().map(|argument| self.node(*argument, scope)).collect::<Result<Vec<_>, _>>()?;
-        if let Some(table) = self.model.tables.iter().position(|table| table.name == name) {
-            return Ok(self.builder.push(Code::Table(table as u16), &operands));
-        }
-        if name == "not" {
-            let zero = self.builder.constant(0.0);
-            return Ok(self.builder.push(Code::Equal, &[operands[0], zero]));
-        }
-        let (code, _) = function(name).ok_or_else(|| Wrong::new(at, format!("'{name}' is no function")))?;
-        if matches!(code, Code::Min | Code::Max) {
-            let [first, rest @ ..] = operands.as_slice() else {
-                unreachable!("the number of arguments was checked")
-            };
-            return Ok(rest.iter().fold(*first, |left, right| self.builder.push(code, &[left, *right])));
-        }
-        Ok(self.builder.push(code, &operands))
-    }
-}
-
-fn code_of(operator: Binary) -> Code {
-    match operator {
-        Binary::Add => Code::Add,
-        Binary::Subtract => Code::Subtract,
-        Binary::Multiply => Code::Multiply,
-        Binary::Divide => Code::Divide,
-        Binary::Power => Code::Power,
-        Binary::Less => Code::Less,
-        Binary::LessOrEqual => Code::LessOrEqual,
-        Binary::Equal => Code::Equal,
-        Binary::NotEqual => Code::NotEqual,
-        Binary::And => Code::And,
-        Binary::Or => Code::Or,
+        let Some(table) = self.model.tables.iter().position(|table| table.name == name) else {
+            return Ok(None);
+        };
+        let operand = self.node(arguments[0], scope)?;
+        Ok(Some(self.builder.push(Code::Table(table as u16), &[operand])))
     }
 }

@@ -2,12 +2,12 @@
 
 use crate::check;
 use crate::compile;
-use crate::expression::{Nodes, Place};
 use crate::inputs::{Hold, Inputs};
 use crate::read;
 use crate::rows::Rows;
-use crate::tape::Curve;
 use crate::units::{Dimension, Unit};
+use expression::curve::Curve;
+use expression::grammar::{Nodes, Place};
 use settings::SettingsError;
 use std::path::{Path, PathBuf};
 

@@ -8,38 +8,34 @@
 //! | file | holds |
 //! |---|---|
 //! | `file`, `read` | the file as data; its reader |
-//! | `expression` | the grammar of expressions |
 //! | `rows` | which rows count, and over what a model is judged |
-//! | `units` | units and dimensions |
 //! | `names` | what names mean |
 //! | `check` | names, numbers of arguments, dimensions |
 //! | `compile` | suspects in their places, bytecode |
-//! | `tape` | bytecode with forward derivatives |
-//! | `inputs` | inputs between their samples |
 //! | `simulate` | integration with sensitivities |
+//!
+//! Grammar, units and bytecode of expressions are in the crate `expression`.
 //!
 //! Keys and examples: `docs/model-files.md`.
 
 #![warn(missing_docs)] // an interface of other crates
 
+use expression::{inputs, tape, units};
+
 mod check;
 mod compile;
-mod expression;
 mod file;
-mod inputs;
 mod names;
 mod read;
 mod rows;
 mod simulate;
-mod tape;
-mod units;
 
-pub use expression::{DEEPEST, MOST_NODES};
+pub use expression::grammar::{DEEPEST, MOST_NODES};
+pub use expression::inputs::{Hold, Inputs};
+pub use expression::units::{Dimension, Unit, UnitError};
 pub use file::{
     Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Smoothing, Solver,
     Start, State, Suspect, Target,
 };
-pub use inputs::{Hold, Inputs};
 pub use rows::Rows;
 pub use simulate::{Direction, Failure, Program, Simulator};
-pub use units::{Dimension, Unit, UnitError};

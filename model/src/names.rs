@@ -1,8 +1,7 @@
 //! What names in expressions mean: quantities of the model, and functions.
 
-use crate::expression::Wrong;
 use crate::file::Model;
-use crate::tape::Code;
+use expression::grammar::Wrong;
 
 /// Definitions that stand in each other; with the depth of each it bounds the stack.
 pub(crate) const DEEPEST_CHAIN: usize = 32;
@@ -22,25 +21,6 @@ pub(crate) enum Symbol {
     Memory(usize),
     Definition(usize),
     Output(usize),
-}
-
-/// A function and the least number of its arguments; `min` and `max` take more.
-pub(crate) fn function(name: &str) -> Option<(Code, usize)> {
-    Some(match name {
-        "abs" => (Code::Abs, 1),
-        "sign" => (Code::Sign, 1),
-        "sqrt" => (Code::Sqrt, 1),
-        "exp" => (Code::Exp, 1),
-        "log" => (Code::Log, 1),
-        "tanh" => (Code::Tanh, 1),
-        "sin" => (Code::Sin, 1),
-        "cos" => (Code::Cos, 1),
-        "atan" => (Code::Atan, 1),
-        "min" => (Code::Min, 2),
-        "max" => (Code::Max, 2),
-        "if" => (Code::Select, 3),
-        _ => return None,
-    })
 }
 
 pub(crate) fn name_of(model: &Model, symbol: Symbol) -> &str {

@@ -2,14 +2,14 @@
 
 mod inputs;
 
-use crate::expression::{Nodes, is_of_name};
 use crate::file::{
     Change, Definition, Expression, Memory, Model, Output, Parameter, RecordLayout, Solver, Start, State,
     Suspect, Table, Target,
 };
 use crate::rows::Rows;
-use crate::tape::Curve;
 use crate::units::{Dimension, Unit};
+use expression::curve::Curve;
+use expression::grammar::{Nodes, is_of_name};
 use settings::{Section, SettingsError, Source, Text};
 use std::path::Path;
 
@@ -256,7 +256,7 @@ impl Reader<'_> {
             }
             section.finish()?;
             let (from, to) = (from.dimension, to.dimension);
-            self.model.tables.push(Table { name, curve: Curve { x, y }, from, to });
+            self.model.tables.push(Table { name, curve: Curve::new(x, y), from, to });
         }
         Ok(())
     }

@@ -5,9 +5,9 @@
 //! ```
 //! Measured and modelled go through the same filter, so that numbers do not change, and a residual is what is left behind it.
 
-use crate::expression::{Kind, Place, Wrong};
 use crate::file::{Expression, Model};
 use crate::names::{Symbol, resolve};
+use expression::grammar::{Kind, Place, Wrong};
 
 /// Rows that count.
 #[derive(Clone, Debug)]

@@ -121,7 +121,7 @@ impl Program {
     /// Operations of one evaluation of all rates.
     #[must_use]
     pub fn operations(&self) -> usize {
-        self.tapes.rates.len()
+        self.tapes.rates.operations()
     }
 
     /// States that it integrates, by their index in the model.

@@ -9,6 +9,7 @@
 mod acting;
 mod actuation;
 mod air;
+pub mod declared;
 pub mod draw;
 mod first_order;
 mod flows;
@@ -27,6 +28,7 @@ mod terms;
 use crate::parameters::RigParameters;
 use crate::state::Axis;
 pub(crate) use acting::Effects;
+use declared::{DeclaredTerms, Target};
 pub(crate) use replaced::{dead_volumes_m3, linkage};
 pub(crate) use sheet::OpenBalance;
 use sheet::{Effect, Element, Law, Part, Place, PlaceKind, Sheet, Switched};
@@ -79,6 +81,8 @@ macro_rules! catalogue {
             $($(#[$when])* pub(crate) $module: slot!($type, $kind),)*
             /// Terms of no effect, from tables.
             pub(crate) tabulated: Tables,
+            /// Terms that a file declares.
+            pub(crate) declared: DeclaredTerms,
         }
 
         /// Every data sheet, that of the tests' example too.
@@ -97,6 +101,8 @@ macro_rules! catalogue {
                 match module {
                     $($(#[$when])* stringify!($module) => at!(self.$module, element, $kind).is_some(),)*
                     "tabulated" => self.tabulated.adds(balance_of(element)),
+                    "declared" => self.declared.adds(target_of(element, false)),
+                    "declared_reading" => self.declared.adds(target_of(element, true)),
                     _ => false,
                 }
             }
@@ -188,6 +194,7 @@ impl AxisEffects {
         }
         for (own, axis) in axes.iter_mut().zip(Axis::ALL) {
             own.tabulated = Tables::of(rig, axis);
+            own.declared = DeclaredTerms::of(rig, axis);
         }
         axes
     }
@@ -218,10 +225,11 @@ impl Touched {
                 Law::Force => both[axis].force = true,
                 Law::PastReadings => both[axis].past_readings = true,
             });
-            if effects.tabulated.adds_air() {
+            if effects.tabulated.adds_air() || effects.declared.adds_air() {
                 (both[axis].air, both[axis].stored_air) = (true, true);
             }
-            both[axis].force |= effects.tabulated.adds(Balance::Force);
+            both[axis].force |=
+                effects.tabulated.adds(Balance::Force) || effects.declared.adds(Target::Force);
         }
         both
     }
@@ -250,6 +258,15 @@ fn balance_of(element: Option<Element>) -> Balance {
         Some(Element::B) => Balance::FlowB,
         _ => Balance::Force,
     }
+}
+
+/// The target of declared terms at an element, of a reading or of a balance before it.
+fn target_of(element: Option<Element>, is_reading: bool) -> Target {
+    let here = |target: &Target| {
+        let of_reading = target.kind() == PlaceKind::Channel;
+        of_reading == is_reading && target.element() == element
+    };
+    Target::ALL.into_iter().find(here).unwrap_or(Target::Force)
 }
 
 fn chamber(element: Option<Element>) -> usize {

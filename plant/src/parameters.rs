@@ -8,6 +8,7 @@
 
 pub mod table;
 
+mod declared;
 mod reader;
 mod switched;
 mod tabulated;
@@ -22,6 +23,9 @@ pub use table::{
     SensorParameters, StartParameters, SupplyParameters, VALVE_POINTS, ValveParameters,
 };
 
+pub use declared::suspects;
+
+use crate::effects::declared::Declared;
 use crate::effects::sheet::{Place, Switched};
 use crate::effects::tabulated::Tabulated;
 
@@ -158,12 +162,37 @@ impl RigParameters {
         &self.entries.tabulated
     }
 
-    /// The same rig with all effects off, tables too.
+    /// The same rig with a declared term, in place of one of the same name and place.
+    #[must_use]
+    pub fn with_term(&self, term: &Declared) -> Self {
+        let mut entries = self.entries.clone();
+        match entries.terms.iter_mut().find(|own| own.is_same(term)) {
+            Some(own) => *own = term.clone(),
+            None => entries.terms.push(term.clone()),
+        }
+        RigParameters { entries, ..self.clone() }
+    }
+
+    /// The terms that the file declares, in its order.
+    #[must_use]
+    pub fn terms(&self) -> &[Declared] {
+        &self.entries.terms
+    }
+
+    /// Whether anything is added to the baseline: an effect, a table or a declared term.
+    #[must_use]
+    pub fn has_effects(&self) -> bool {
+        let entries = &self.entries;
+        !(entries.effects.is_empty() && entries.tabulated.is_empty() && entries.terms.is_empty())
+    }
+
+    /// The same rig with all effects off, tables and declared terms too.
     #[must_use]
     pub fn without_effects(&self) -> Self {
         let mut entries = self.entries.clone();
         entries.effects.clear();
         entries.tabulated.clear();
+        entries.terms.clear();
         RigParameters { entries, ..self.clone() }
     }
 

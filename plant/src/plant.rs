@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use crate::effects::tabulated::Seen;
 use crate::effects::{Effects, Term, Terms};
 use crate::faults::{Faults, ValvesAtWork};
 use crate::integrator::laws::Baseline;
@@ -172,10 +173,17 @@ impl Plant {
         };
         std::array::from_fn(|i| {
             let axis = &truth.axes[i];
-            let pressure = |chamber, truth| effects.pressure_reading(i, chamber, truth).sum(truth);
+            let seen = Seen {
+                extension_m: self.state.axes[i].extension_m,
+                velocity_m_per_s: axis.rod_velocity_m_per_s,
+                spool: axis.spool,
+                pressure_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
+            };
+            let at = effects.declared_at(i, &seen, axis.sensor_force_n);
+            let pressure = |chamber, truth| effects.pressure_reading(i, chamber, truth, &at).sum(truth);
             [
-                effects.position_reading(i, axis.position_m).sum(axis.position_m),
-                effects.force_reading(i, axis.sensor_force_n).sum(axis.sensor_force_n),
+                effects.position_reading(i, axis.position_m, &at).sum(axis.position_m),
+                effects.force_reading(i, axis.sensor_force_n, &at).sum(axis.sensor_force_n),
                 pressure(0, axis.pressure_a_pa),
                 pressure(1, axis.pressure_b_pa),
             ]
@@ -274,7 +282,7 @@ impl Plant {
     /// Takes the room that faults may need, so that [`Plant::set_faults`] allocates nothing; until then it does at its first
     /// call.
     pub fn expect_faults(&mut self) {
-        if !self.has_effects() && self.effects.is_none() && self.spare.is_none() {
+        if !self.rig.has_effects() && self.effects.is_none() && self.spare.is_none() {
             self.spare = Some(Effects::new(&self.rig, &self.integrator, &self.state));
         }
     }
@@ -285,7 +293,7 @@ impl Plant {
         self.faults = *faults;
         self.valves.set(faults, self.state.axes.map(|axis| axis.spool));
         self.integrator = self.integrator.rebuilt(&self.rig, self.state.added_mass_kg, faults);
-        if !self.has_effects() {
+        if !self.rig.has_effects() {
             if !faults.change_laws() {
                 // The baseline's own step goes on.
                 self.spare = self.effects.take().or(self.spare.take());
@@ -298,11 +306,6 @@ impl Plant {
             effects.set_faults(faults);
             effects.move_with(&self.integrator);
         }
-    }
-
-    /// Whether the rig itself has effects, faults or not.
-    fn has_effects(&self) -> bool {
-        !self.rig.effects().is_empty() || !self.rig.tabulated().is_empty()
     }
 
     /// Puts weights on the carriage or takes them off, kg in all; the velocity stays.

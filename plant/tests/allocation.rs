@@ -5,6 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use plant::effects::declared::Target;
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::faults::{AxisFaults, Faults, SensorFault, SupplyFault, ValveFault};
 use plant::{Axis, Batch, Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
@@ -102,7 +103,35 @@ fn a_period_with_all_effects_allocates_nothing() {
         at: vec![-1.0, 0.0, 1.0],
         value: vec![1.0, 0.0, -1.0],
     });
-    periods_allocate_nothing(&rig.with_tabulated(&tables).expect("allowed"));
+    let mut rig = rig.with_tabulated(&tables).expect("allowed");
+    for term in declared().terms() {
+        rig = rig.with_term(term);
+    }
+    periods_allocate_nothing(&rig);
+}
+
+/// A rig with a term of every target, over all variables.
+fn declared() -> RigParameters {
+    let over = "(x/1[m] + sin(v/1[m/s]) + u + tanh(s) + max(p_a, p_b)/1[MPa] + t/1[s])";
+    let terms = Axis::ALL.into_iter().flat_map(|axis| Target::ALL.map(|target| (axis, target)));
+    let terms: String = terms
+        .map(|(axis, target)| {
+            let place = format!("{}.{}", axis.name(), target.name());
+            format!(
+                "[[terms]]\nname = \"a\"\nplace = \"{place}\"\nadd = \"1e-5[{}]*{over}\"\n",
+                target.unit()
+            )
+        })
+        .collect();
+    let text = format!("{}{terms}", RigParameters::BASELINE_TOML);
+    RigParameters::from_toml(&text, "rig.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_period_with_declared_terms_allocates_nothing() {
+    let rig = declared();
+    assert_eq!(rig.terms().len(), 14);
+    periods_allocate_nothing(&rig);
 }
 
 #[test]

@@ -7,6 +7,7 @@ mod windows;
 mod accuracy;
 mod batch;
 mod closed_forms;
+mod declared;
 mod determinism;
 mod effects;
 mod effects_file;

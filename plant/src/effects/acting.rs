@@ -7,6 +7,7 @@
 //! Laws: the file of each effect. Scheme: the head of `integrator.rs`.
 
 use super::air::HeatAt;
+use super::declared::DeclaredAt;
 use super::flows::PortsAt;
 use super::memory::{Memory, Moving};
 use super::presliding::Bristle;
@@ -52,8 +53,7 @@ pub(crate) const ALONG_X: [f64; 2] = [1.0, -1.0];
 impl Effects {
     /// The effects of a rig at rest in a state; `None` if the rig has none switched on.
     pub(crate) fn of(rig: &RigParameters, of: &Integrator, state: &State) -> Option<Box<Self>> {
-        let none = rig.effects().is_empty() && rig.tabulated().is_empty();
-        (!none).then(|| Self::new(rig, of, state))
+        rig.has_effects().then(|| Self::new(rig, of, state))
     }
 
     /// The same for any rig; one without any moves by the baseline's laws, through this machinery.
@@ -150,8 +150,16 @@ impl Effects {
                 .map_or(0.0, |effect| ALONG_X[axis] * effect.term(position_m)),
             end_cushion: on.end_cushion.map_or(0.0, |effect| effect.stop_force(extension_m, self.stroke_m)),
             tabulated: on.tabulated.force(seen),
+            declared: on.declared.force(&self.declared_at(axis, seen, 0.0)),
             added: on.added(OpenBalance::Force(seen)),
         }
+    }
+
+    /// What declared terms are over.
+    pub(crate) fn declared_at<'a>(&self, axis: usize, seen: &'a Seen, sensor_force_n: f64) -> DeclaredAt<'a> {
+        let command = self.memory.commands[axis].newest();
+        let time_s = self.memory.substeps as f64 * self.substep_s;
+        DeclaredAt { seen, command, time_s, sensor_force_n }
     }
 }
 
@@ -454,6 +462,7 @@ impl Laws for Effects {
     fn keep(&mut self, of: &Integrator, held: Held, lanes: &Lanes, carried: &Moving) {
         let span_s = self.substep_s;
         self.memory.moving = *carried;
+        self.memory.substeps += 1;
         for axis in 0..2 {
             let lane = |pair: Pair| pair.to_array()[axis];
             // Bristles never come to rest to the bit.

@@ -122,14 +122,15 @@ mod tests {
         let seen = Seen { extension_m: 0.2, velocity_m_per_s: 0.1, spool: 0.3, pressure_pa: [4e5, 3e5] };
         let rubbing = Rubbing { extension_m: 0.2, gauge_pa: [3e5, 2e5], rest_s: 0.0 };
         let sums = |effects: &Effects| {
+            let at = effects.declared_at(0, &seen, 0.0);
             [
                 effects.force(0, &seen).sum(0.0),
                 effects.leakage(integrator, 0, &seen)[1].sum(0.0),
                 effects.levels(integrator, 0, &rubbing, 0.1).sliding_n[0],
                 effects.levels(integrator, 0, &rubbing, 0.1).break_away_n[1],
-                effects.position_reading(0, 0.0).sum(0.0),
-                effects.force_reading(0, 0.0).sum(0.0),
-                effects.pressure_reading(0, 1, 0.0).sum(0.0),
+                effects.position_reading(0, 0.0, &at).sum(0.0),
+                effects.force_reading(0, 0.0, &at).sum(0.0),
+                effects.pressure_reading(0, 1, 0.0, &at).sum(0.0),
             ]
         };
         let differences: Vec<f64> =

@@ -71,6 +71,11 @@ impl Commands {
         self.0[0] = command;
     }
 
+    /// The command that acts.
+    pub(crate) fn newest(&self) -> f64 {
+        self.0[0]
+    }
+
     /// The command that was sent `back_s` before the period's beginning, or after it if negative.
     pub(crate) fn before(&self, back_s: f64) -> f64 {
         // Exactly on an edge the newer command counts.
@@ -119,6 +124,8 @@ impl History {
 pub(crate) struct Memory {
     pub(crate) moving: Moving,
     pub(crate) commands: [Commands; 2],
+    /// Substeps since the plant began.
+    pub(crate) substeps: u64,
     /// What left the valve for each chamber, at the midpoints of substeps.
     pub(super) lines: [[Option<History>; 2]; 2],
     /// What the channels position, force, a, b would have shown, at the ends of substeps.
@@ -162,7 +169,13 @@ impl Memory {
             })
         });
         let commands = [0, 1].map(|i: usize| Commands::new(axes[i].spool));
-        Memory { moving: Moving { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 }, commands, lines, channels }
+        Memory {
+            moving: Moving { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 },
+            commands,
+            substeps: 0,
+            lines,
+            channels,
+        }
     }
 
     /// What sensors saw (position, force, pressures of each axis), moved along with what they see now.

@@ -2,6 +2,7 @@
 
 use super::OpenBalance;
 use super::acting::Effects;
+use super::declared::{DeclaredAt, Target};
 use super::sums::{ForceReading, PositionReading, PressureReading};
 
 impl Effects {
@@ -14,7 +15,7 @@ impl Effects {
     }
 
     /// Terms of the position reading of an axis, by its true position, m.
-    pub(crate) fn position_reading(&self, axis: usize, truth: f64) -> PositionReading {
+    pub(crate) fn position_reading(&self, axis: usize, truth: f64, at: &DeclaredAt<'_>) -> PositionReading {
         let on = &self.on[axis];
         PositionReading {
             time_skew: self.skew(axis, 0, truth),
@@ -23,23 +24,31 @@ impl Effects {
                 .map_or(0.0, |_| self.memory.moving.axes[axis].shown[0] - truth),
             position_sensor_gain: on.position_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
             position_sensor_offset: on.position_sensor_offset.map_or(0.0, |effect| effect.term()),
+            declared_reading: on.declared.reading(Target::Position, at),
             added: on.added(OpenBalance::PositionReading { truth_m: truth }),
         }
     }
 
     /// Terms of the force reading of an axis, by what its sensor should show, N.
-    pub(crate) fn force_reading(&self, axis: usize, truth: f64) -> ForceReading {
+    pub(crate) fn force_reading(&self, axis: usize, truth: f64, at: &DeclaredAt<'_>) -> ForceReading {
         let on = &self.on[axis];
         ForceReading {
             time_skew: self.skew(axis, 1, truth),
             force_sensor_gain: on.force_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
             force_sensor_offset: on.force_sensor_offset.map_or(0.0, |effect| effect.term()),
+            declared_reading: on.declared.reading(Target::ForceReading, at),
             added: on.added(OpenBalance::ForceReading { truth_n: truth }),
         }
     }
 
     /// Terms of the pressure reading of a chamber, by its true pressure, Pa.
-    pub(crate) fn pressure_reading(&self, axis: usize, chamber: usize, truth: f64) -> PressureReading {
+    pub(crate) fn pressure_reading(
+        &self,
+        axis: usize,
+        chamber: usize,
+        truth: f64,
+        at: &DeclaredAt<'_>,
+    ) -> PressureReading {
         let on = &self.on[axis];
         PressureReading {
             time_skew: self.skew(axis, 2 + chamber, truth),
@@ -47,6 +56,7 @@ impl Effects {
                 .map_or(0.0, |_| self.memory.moving.axes[axis].shown[1 + chamber] - truth),
             pressure_sensor_gain: on.pressure_sensor_gain[chamber].map_or(0.0, |effect| effect.term(truth)),
             pressure_sensor_offset: on.pressure_sensor_offset[chamber].map_or(0.0, |effect| effect.term()),
+            declared_reading: on.declared.reading([Target::PressureA, Target::PressureB][chamber], at),
             added: on.added(OpenBalance::PressureReading { chamber, truth_pa: truth }),
         }
     }

@@ -68,7 +68,7 @@ balance!(/** Normal flow that leaves the valve for a chamber. */
 balance!(/** Normal flow that enters the line of a chamber's lag. */
     LineFlow "line_flow" in "m3_per_s" = port + line_delay);
 balance!(/** Normal flow into a chamber, beside the valve's. */
-    Leakage "leakage" in "m3_per_s" = nothing + piston_leakage + rod_leakage + tabulated + added);
+    Leakage "leakage" in "m3_per_s" = nothing + piston_leakage + rod_leakage + tabulated + declared + added);
 balance!(/** Rate of a chamber's stored air p V, beside p_N times the flow. */
     AirRate "air_rate" in "W" = nothing + heat_exchange);
 balance!(/** Dead volume of a chamber. */
@@ -86,7 +86,7 @@ balance!(/** Friction where bristles take the place of stick and slip, along the
     Bristles "bristles" in "N" = nothing + presliding);
 balance!(/** Force on the piston along its own extension, beside air, hand, contact and friction. */
     Force "force" in "N" = nothing
-    + inclination + position_dependent_force + end_cushion + tabulated + added);
+    + inclination + position_dependent_force + end_cushion + tabulated + declared + added);
 balance!(/** Gap of the linkage. */
     Gap "gap" in "m" = file + coupling_backlash);
 balance!(/** Stiffness of the linkage. */
@@ -95,9 +95,10 @@ balance!(/** Damping of the linkage. */
     Damping "damping" in "N_s_per_m" = file + coupling_compliance);
 balance!(/** What a position sensor shows, before noise and steps. */
     PositionReading "position_reading" in "m" = truth
-    + time_skew + position_sensor_lag + position_sensor_gain + position_sensor_offset + added);
+    + time_skew + position_sensor_lag + position_sensor_gain + position_sensor_offset + declared_reading + added);
 balance!(/** What a force sensor shows, before noise and steps. */
-    ForceReading "force_reading" in "N" = truth + time_skew + force_sensor_gain + force_sensor_offset + added);
+    ForceReading "force_reading" in "N" = truth
+    + time_skew + force_sensor_gain + force_sensor_offset + declared_reading + added);
 balance!(/** What a pressure sensor shows, before noise and steps. */
     PressureReading "pressure_reading" in "Pa" = truth
-    + time_skew + pressure_sensor_lag + pressure_sensor_gain + pressure_sensor_offset + added);
+    + time_skew + pressure_sensor_lag + pressure_sensor_gain + pressure_sensor_offset + declared_reading + added);

@@ -311,16 +311,23 @@ impl Tables {
     pub(crate) fn flow(&self, chamber: usize, seen: &Seen) -> f64 {
         let flow = self.sum([Balance::FlowA, Balance::FlowB][chamber], seen);
         let pressure_pa = seen.pressure_pa[chamber];
-        if flow < 0.0 {
-            flow * (pressure_pa / self.exhaust_pa).clamp(0.0, 1.0)
-        } else {
-            // Twice the supply's is more than a piston that is pushed back compresses a chamber to.
-            flow * (2.0 - pressure_pa / self.supply_pa).clamp(0.0, 1.0)
-        }
+        neither_empties_nor_bursts(flow, pressure_pa, [self.exhaust_pa, self.supply_pa])
     }
 
     fn sum(&self, balance: Balance, seen: &Seen) -> f64 {
         self.laws.iter().filter(|law| law.balance == balance).map(|law| law.value(seen)).sum()
+    }
+}
+
+/// A flow into a chamber times g(p) of the module's head; `ends_pa` are exhaust and supply.
+#[inline]
+pub(super) fn neither_empties_nor_bursts(flow: f64, pressure_pa: f64, ends_pa: [f64; 2]) -> f64 {
+    let [exhaust_pa, supply_pa] = ends_pa;
+    if flow < 0.0 {
+        flow * (pressure_pa / exhaust_pa).clamp(0.0, 1.0)
+    } else {
+        // Twice the supply's is more than a piston that is pushed back compresses a chamber to.
+        flow * (2.0 - pressure_pa / supply_pa).clamp(0.0, 1.0)
     }
 }
 

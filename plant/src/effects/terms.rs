@@ -188,15 +188,17 @@ impl Effects {
 
             // What the sensors make of it.
             let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m() - place.extension };
-            let open = OpenBalance::PositionReading { truth_m: position_m };
-            teller.open(&self.position_reading(axis, position_m), Some("position"), &open);
             let force_n = forces.sensor_n(of, axis);
+            let declared = self.declared_at(axis, &seen, force_n);
+            let open = OpenBalance::PositionReading { truth_m: position_m };
+            teller.open(&self.position_reading(axis, position_m, &declared), Some("position"), &open);
             let open = OpenBalance::ForceReading { truth_n: force_n };
-            teller.open(&self.force_reading(axis, force_n), Some("force"), &open);
+            teller.open(&self.force_reading(axis, force_n, &declared), Some("force"), &open);
             for (chamber, (name, _)) in CHAMBERS.into_iter().enumerate() {
                 let truth_pa = air.of_axis_pa(axis)[chamber];
                 let open = OpenBalance::PressureReading { chamber, truth_pa };
-                teller.open(&self.pressure_reading(axis, chamber, truth_pa), Some(name), &open);
+                let reading = self.pressure_reading(axis, chamber, truth_pa, &declared);
+                teller.open(&reading, Some(name), &open);
             }
         }
         let (gap, stiffness, damping) = self.linkage_terms();

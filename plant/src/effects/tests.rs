@@ -98,6 +98,7 @@ fn drops_at_a_port_are_each_its_own_at_the_same_flow() {
 #[test]
 fn a_sum_is_the_baseline_and_its_fields_and_off_is_zero() {
     let reading = PositionReading {
+        declared_reading: 0.0,
         time_skew: 1.0,
         position_sensor_lag: 2.0,
         position_sensor_gain: 4.0,

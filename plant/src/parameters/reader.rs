@@ -9,7 +9,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::table::{KEYS, Key, Unit};
-use super::{switched, tabulated};
+use super::{declared, switched, tabulated};
+use crate::effects::declared::Declared;
 use crate::effects::sheet::Switched;
 use crate::effects::tabulated::Tabulated;
 
@@ -22,6 +23,17 @@ impl ParameterError {
     /// Of a line, from 1, of a file.
     pub(super) fn at(file: &str, line: usize, message: &str) -> Self {
         ParameterError(format!("{file}:{line}: {message}"))
+    }
+
+    /// Of a declared term.
+    pub(crate) fn of_term(name: &str, message: &str) -> Self {
+        ParameterError(format!("term {name}: {message}"))
+    }
+}
+
+impl From<settings::SettingsError> for ParameterError {
+    fn from(error: settings::SettingsError) -> Self {
+        ParameterError(error.to_string())
     }
 }
 
@@ -39,6 +51,7 @@ pub(super) struct Entries {
     pub(super) file: String,
     pub(super) effects: Vec<Switched>,
     pub(super) tabulated: Vec<Tabulated>,
+    pub(super) terms: Vec<Declared>,
     entries: BTreeMap<(&'static str, &'static str), Entry>,
 }
 
@@ -54,7 +67,12 @@ impl Entries {
         }
         let effects = switched::read(root.get_ref(), &place)?;
         let tabulated = tabulated::read(root.get_ref(), &place)?;
-        Ok(Entries { file: file.to_owned(), effects, tabulated, entries })
+        let terms = if root.get_ref().contains_key("terms") {
+            declared::read(text, file, "terms")?
+        } else {
+            Vec::new()
+        };
+        Ok(Entries { file: file.to_owned(), effects, tabulated, terms, entries })
     }
 
     /// The entry of a key of the table.
@@ -207,7 +225,7 @@ impl Place<'_> {
     }
 
     fn refuse_unknown(&self, root: &DeTable<'_>) -> Result<(), ParameterError> {
-        let is_key = |name: &str| !["effects", "tabulated"].contains(&name);
+        let is_key = |name: &str| !["effects", "tabulated", "terms"].contains(&name);
         for (name, value) in root.iter().filter(|(name, _)| is_key(name.get_ref())) {
             let known: Vec<&str> =
                 KEYS.iter().filter(|key| key.table == name.get_ref()).map(|key| key.name).collect();

@@ -24,7 +24,7 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 25] = [
+const ROOMS: [&str; 26] = [
     "settings",
     "protocol",
     "realtime",
@@ -46,6 +46,7 @@ const ROOMS: [&str; 25] = [
     "socketcan-guest",
     "bench",
     "records",
+    "expression",
     "model",
     "discrepancy",
     "campaign",
@@ -54,11 +55,12 @@ const ROOMS: [&str; 25] = [
 /// Which of them each room may depend on, tests included.
 const KNOWS: &[(&str, &[&str])] = &[
     ("settings", &[]),
-    ("model", &["settings"]),
+    ("expression", &[]),
+    ("model", &["settings", "expression"]),
     ("protocol", &[]),
     ("realtime", &[]),
     ("runlog", &["protocol", "realtime"]),
-    ("plant", &["settings"]),
+    ("plant", &["settings", "expression"]),
     ("nominal", &["plant"]),
     ("fmu", &["plant"]),
     ("rig_node", &["protocol", "plant"]),
@@ -95,6 +97,7 @@ const KNOWS: &[(&str, &[&str])] = &[
         &[
             "settings",
             "records",
+            "expression",
             "model",
             "protocol",
             "realtime",

@@ -28,7 +28,7 @@ impl Inputs<'static> {
 
 impl Inputs<'_> {
     /// Value and rate of an input in straight lines between its samples; level before the first and after the last.
-    pub(crate) fn between(&self, input: usize, time_s: f64) -> (f64, f64) {
+    pub fn between(&self, input: usize, time_s: f64) -> (f64, f64) {
         let Some(samples) = self.samples_si.get(input).filter(|samples| !samples.is_empty()) else {
             return (f64::NAN, 0.0);
         };

@@ -21,11 +21,11 @@ pub const MOST_NODES: usize = 10_000;
 pub const DEEPEST: usize = 64;
 
 /// A node in the list of all nodes of a file.
-pub(crate) type Place = u32;
+pub type Place = u32;
 
 /// What a node computes.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Kind {
+pub enum Kind {
     /// A number in SI with its unit, if it has one.
     Number(f64, Option<Unit>),
     Name(String),
@@ -36,7 +36,7 @@ pub(crate) enum Kind {
 
 /// Operators between two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Binary {
+pub enum Binary {
     Add,
     Subtract,
     Multiply,
@@ -52,31 +52,31 @@ pub(crate) enum Binary {
 
 /// A node and the byte of the file at which it stands.
 #[derive(Clone, Debug)]
-pub(crate) struct Node {
-    pub(crate) kind: Kind,
-    pub(crate) at: usize,
-    pub(crate) depth: usize,
+pub struct Node {
+    pub kind: Kind,
+    pub at: usize,
+    pub depth: usize,
 }
 
 /// All nodes of a file.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Nodes(Vec<Node>);
+pub struct Nodes(Vec<Node>);
 
 /// What is no expression: at which byte of the file, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Wrong {
-    pub(crate) at: usize,
-    pub(crate) why: String,
+pub struct Wrong {
+    pub at: usize,
+    pub why: String,
 }
 
 impl Wrong {
-    pub(crate) fn new(at: usize, why: impl Into<String>) -> Self {
+    pub fn new(at: usize, why: impl Into<String>) -> Self {
         Self { at, why: why.into() }
     }
 }
 
 impl Nodes {
-    pub(crate) fn get(&self, place: Place) -> &Node {
+    pub fn get(&self, place: Place) -> &Node {
         &self.0[place as usize]
     }
 
@@ -105,7 +105,7 @@ impl Nodes {
     }
 
     /// Reads an expression that begins at byte `at` of its file.
-    pub(crate) fn parse(&mut self, text: &str, at: usize) -> Result<Place, Wrong> {
+    pub fn parse(&mut self, text: &str, at: usize) -> Result<Place, Wrong> {
         let mut parser = Parser { text, begins: at, at: 0, nested: 0, nodes: self };
         let place = parser.level(0)?;
         parser.skip_blanks();
@@ -283,7 +283,7 @@ impl Parser<'_> {
 }
 
 /// Whether a character may stand in a name.
-pub(crate) fn is_of_name(character: char) -> bool {
+pub fn is_of_name(character: char) -> bool {
     character.is_alphanumeric() || character == '_'
 }
 

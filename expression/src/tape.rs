@@ -13,15 +13,16 @@
 //!
 //! Source: Griewank, Walther, Evaluating Derivatives, SIAM 2008, chapter 3 (forward mode).
 
+use crate::curve::Curve;
 use crate::inputs::Inputs;
 use std::collections::HashMap;
 
 /// A register.
-pub(crate) type Register = u32;
+pub type Register = u32;
 
 /// What an operation does with its operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Code {
+pub enum Code {
     Add,
     Subtract,
     Multiply,
@@ -59,66 +60,41 @@ struct Operation {
     operands: [Register; 3],
 }
 
-/// A curve through points, straight between them and level beyond them.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Curve {
-    pub(crate) x: Vec<f64>,
-    pub(crate) y: Vec<f64>,
-}
-
-impl Curve {
-    /// Value and slope.
-    fn at(&self, x: f64) -> (f64, f64) {
-        let last = self.x.len() - 1;
-        if x.is_nan() {
-            return (f64::NAN, 0.0);
-        }
-        if x <= self.x[0] {
-            return (self.y[0], 0.0);
-        }
-        if x >= self.x[last] {
-            return (self.y[last], 0.0);
-        }
-        let right = self.x.partition_point(|point| *point <= x);
-        let left = right - 1;
-        let slope = (self.y[right] - self.y[left]) / (self.x[right] - self.x[left]);
-        (self.y[left] + slope * (x - self.x[left]), slope)
-    }
-}
-
 /// Numbers of registers that hold what comes from outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Leaves {
-    pub(crate) inputs: usize,
-    pub(crate) states: usize,
-    pub(crate) parameters: usize,
-    pub(crate) memories: usize,
+pub struct Leaves {
+    pub inputs: usize,
+    pub states: usize,
+    pub parameters: usize,
+    pub memories: usize,
 }
 
 impl Leaves {
-    pub(crate) fn input(self, index: usize) -> Register {
+    pub fn input(self, index: usize) -> Register {
         (1 + index) as Register
     }
 
-    pub(crate) fn state(self, index: usize) -> Register {
+    pub fn state(self, index: usize) -> Register {
         (1 + self.inputs + index) as Register
     }
 
-    pub(crate) fn parameter(self, index: usize) -> Register {
+    pub fn parameter(self, index: usize) -> Register {
         (1 + self.inputs + self.states + index) as Register
     }
 
-    pub(crate) fn memory(self, index: usize) -> Register {
+    pub fn memory(self, index: usize) -> Register {
         (1 + self.inputs + self.states + self.parameters + index) as Register
     }
 
-    fn count(self) -> usize {
+    /// How many there are, the time included.
+    #[must_use]
+    pub fn count(self) -> usize {
         1 + self.inputs + self.states + self.parameters + self.memories
     }
 }
 
 /// Collects operations, each once.
-pub(crate) struct Builder {
+pub struct Builder {
     leaves: Leaves,
     constants: Vec<f64>,
     operations: Vec<Operation>,
@@ -126,18 +102,18 @@ pub(crate) struct Builder {
 }
 
 /// Constants stand in this many registers behind the leaves; expressions are bounded, and so are their numbers.
-const CONSTANTS: usize = 2 * crate::expression::MOST_NODES;
+const CONSTANTS: usize = 2 * crate::grammar::MOST_NODES;
 
 impl Builder {
-    pub(crate) fn new(leaves: Leaves) -> Self {
+    pub fn new(leaves: Leaves) -> Self {
         Self { leaves, constants: Vec::new(), operations: Vec::new(), known: HashMap::new() }
     }
 
-    pub(crate) fn leaves(&self) -> Leaves {
+    pub fn leaves(&self) -> Leaves {
         self.leaves
     }
 
-    pub(crate) fn constant(&mut self, value: f64) -> Register {
+    pub fn constant(&mut self, value: f64) -> Register {
         let known = self.constants.iter().position(|other| other.to_bits() == value.to_bits());
         let index = known.unwrap_or_else(|| {
             self.constants.push(value);
@@ -146,7 +122,7 @@ impl Builder {
         (self.leaves.count() + index) as Register
     }
 
-    pub(crate) fn push(&mut self, code: Code, operands: &[Register]) -> Register {
+    pub fn push(&mut self, code: Code, operands: &[Register]) -> Register {
         let mut all = [0; 3];
         all[..operands.len()].copy_from_slice(operands);
         let operation = Operation { code, operands: all };
@@ -158,7 +134,7 @@ impl Builder {
     }
 
     /// The tape that computes these registers.
-    pub(crate) fn tape(self, results: &[Register], curves: Vec<Curve>) -> Tape {
+    pub fn tape(self, results: &[Register], curves: Vec<Curve>) -> Tape {
         let (leaves, constants) = (self.leaves.count(), self.constants.len());
         let moved = |register: Register| {
             let register = register as usize;
@@ -180,9 +156,9 @@ impl Builder {
 }
 
 /// Operations in their order, and where their results stand.
-#[derive(Clone, Debug)]
-pub(crate) struct Tape {
-    pub(crate) leaves: Leaves,
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tape {
+    pub leaves: Leaves,
     constants: Vec<f64>,
     operations: Vec<Operation>,
     results: Vec<Register>,
@@ -191,7 +167,7 @@ pub(crate) struct Tape {
 
 /// Values and derivatives of the registers of a tape.
 #[derive(Clone, Debug)]
-pub(crate) struct Registers {
+pub struct Registers {
     values: Vec<f64>,
     /// Register by register, along each direction.
     slopes: Vec<f64>,
@@ -201,7 +177,7 @@ pub(crate) struct Registers {
 
 impl Registers {
     /// Those of `tape`; `is_active` tells of a leaf whether it has derivatives.
-    pub(crate) fn new(tape: &Tape, directions: usize, is_active: impl Fn(Register) -> bool) -> Self {
+    pub fn new(tape: &Tape, directions: usize, is_active: impl Fn(Register) -> bool) -> Self {
         let leaves = tape.leaves.count();
         let count = leaves + tape.constants.len() + tape.operations.len();
         let mut values = vec![0.0; count];
@@ -226,20 +202,24 @@ impl Registers {
         Self { values, slopes: vec![0.0; count * directions], directions, active }
     }
 
-    pub(crate) fn set(&mut self, register: Register, value: f64) {
+    #[inline]
+    pub fn set(&mut self, register: Register, value: f64) {
         self.values[register as usize] = value;
     }
 
-    pub(crate) fn slope_mut(&mut self, register: Register) -> &mut [f64] {
+    #[inline]
+    pub fn slope_mut(&mut self, register: Register) -> &mut [f64] {
         let start = register as usize * self.directions;
         &mut self.slopes[start..start + self.directions]
     }
 
-    pub(crate) fn value(&self, register: Register) -> f64 {
+    #[inline]
+    pub fn value(&self, register: Register) -> f64 {
         self.values[register as usize]
     }
 
-    pub(crate) fn slope(&self, register: Register) -> &[f64] {
+    #[inline]
+    pub fn slope(&self, register: Register) -> &[f64] {
         let start = register as usize * self.directions;
         &self.slopes[start..start + self.directions]
     }
@@ -247,16 +227,18 @@ impl Registers {
 
 impl Tape {
     /// Operations in an evaluation.
-    pub(crate) fn len(&self) -> usize {
+    #[must_use]
+    pub fn operations(&self) -> usize {
         self.operations.len()
     }
 
-    pub(crate) fn result(&self, index: usize) -> Register {
+    #[inline]
+    pub fn result(&self, index: usize) -> Register {
         self.results[index]
     }
 
     /// Computes all registers from the leaves that were set.
-    pub(crate) fn evaluate(&self, registers: &mut Registers, inputs: &Inputs<'_>) {
+    pub fn evaluate(&self, registers: &mut Registers, inputs: &Inputs<'_>) {
         let first = self.leaves.count() + self.constants.len();
         for (place, operation) in self.operations.iter().enumerate() {
             let result = first + place;
@@ -267,6 +249,35 @@ impl Tape {
                 carry(registers, result, operation, partial);
             }
         }
+    }
+
+    /// How many registers it has.
+    #[must_use]
+    pub fn registers(&self) -> usize {
+        self.leaves.count() + self.constants.len() + self.operations.len()
+    }
+
+    /// Puts the constants into their registers.
+    ///
+    /// # Panics
+    /// Where `registers` are fewer than [`Tape::registers`].
+    pub fn begin(&self, registers: &mut [f64]) {
+        let leaves = self.leaves.count();
+        registers[leaves..leaves + self.constants.len()].copy_from_slice(&self.constants);
+    }
+
+    /// The first result, from leaves and constants, without derivatives; it reads no input over time.
+    ///
+    /// # Panics
+    /// Where `registers` are fewer than [`Tape::registers`].
+    #[must_use]
+    pub fn compute(&self, registers: &mut [f64]) -> f64 {
+        let first = self.leaves.count() + self.constants.len();
+        for (place, operation) in self.operations.iter().enumerate() {
+            let operands = operation.operands.map(|operand| registers[operand as usize]);
+            registers[first + place] = self.apply(operation.code, operands, registers[0], &Inputs::none()).0;
+        }
+        registers[self.results[0] as usize]
     }
 
     /// Value, and derivatives by the operands.
@@ -385,7 +396,7 @@ mod tests {
         let mut builder = Builder::new(leaves);
         let operands = [0, 1, 2].map(|index| leaves.parameter(index));
         let result = builder.push(code, &operands);
-        let curve = Curve { x: vec![0.0, 1.0, 3.0], y: vec![1.0, 2.0, -2.0] };
+        let curve = Curve::new(vec![0.0, 1.0, 3.0], vec![1.0, 2.0, -2.0]);
         let tape = builder.tape(&[result], vec![curve]);
         let mut registers = Registers::new(&tape, 2, |leaf| leaf != leaves.parameter(2));
         for (index, value) in [a, b, 0.5].into_iter().enumerate() {
@@ -458,6 +469,6 @@ mod tests {
         assert_eq!(builder.constant(0.5), half);
         assert_eq!(builder.push(Code::Multiply, &operands), first);
         let sum = builder.push(Code::Add, &[first, half]);
-        assert_eq!(builder.tape(&[sum], vec![]).len(), 2);
+        assert_eq!(builder.tape(&[sum], vec![]).operations(), 2);
     }
 }

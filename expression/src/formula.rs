@@ -1,0 +1,266 @@
+//! One expression over named variables, with its numbers: checked once, computed on the stack.
+//!
+//! ```text
+//!   text ──► tree ──► names and dimensions ──► proven finite over all ranges ──► tape ──► value(variables)
+//! ```
+//! A variable beyond its range counts as the end of it, so that what was proven holds for every state. Only a state that is no
+//! number gives a value that is none.
+
+use crate::bounds::{Range, bounds};
+use crate::compile::Compile;
+use crate::dimensions::{Dimensions, Measure};
+use crate::grammar::{Kind, Node, Nodes, Place, Wrong};
+use crate::tape::{Builder, Leaves, Register, Tape};
+use crate::units::Dimension;
+
+/// Registers of a formula at most: names, numbers and operations.
+pub const MOST_REGISTERS: usize = 96;
+
+/// What a formula is over.
+#[derive(Clone, Copy, Debug)]
+pub struct Variable<'a> {
+    /// Its name in the expression.
+    pub name: &'a str,
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// Its smallest and largest value, in SI.
+    pub range: Range,
+}
+
+/// A compiled expression with the values of its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Formula {
+    tape: Tape,
+    /// Ranges of the variables that stand in it; `None` for the others.
+    ranges: Vec<Option<Range>>,
+    /// Registers before an evaluation: parameters and constants.
+    registers: [f64; MOST_REGISTERS],
+    parameters: usize,
+    bounds: Range,
+}
+
+impl Formula {
+    /// Compiles an expression that begins at byte `at` of its file and must have a dimension.
+    ///
+    /// # Errors
+    /// [`Wrong`] with the byte of the file: no expression, an unknown name, another dimension, too long, or not proven finite.
+    pub fn compile(
+        (text, at): (&str, usize),
+        variables: &[Variable<'_>],
+        parameters: &[Variable<'_>],
+        (wanted, what): (Dimension, &str),
+    ) -> Result<Self, Wrong> {
+        let mut nodes = Nodes::default();
+        let root = nodes.parse(text, at)?;
+        let leaves = Leaves { inputs: variables.len(), parameters: parameters.len(), ..Leaves::default() };
+        let mut names = Names { nodes, variables, parameters, builder: Builder::new(leaves) };
+        names.expression(root, (), wanted, (at, what))?;
+        let of = |name: &str| match names.place(name) {
+            Some(place) => names.variable(place).range,
+            None => [std::f64::consts::PI; 2],
+        };
+        let bounds = bounds(&names.nodes, root, &of)?;
+        let is_read: Vec<bool> = variables.iter().map(|variable| names.reads(root, variable.name)).collect();
+        let result = Compile::node(&mut names, root, ())?;
+        let tape = names.builder.tape(&[result], Vec::new());
+        if tape.registers() > MOST_REGISTERS {
+            let why = format!("more than {MOST_REGISTERS} names, numbers and operations in one expression");
+            return Err(Wrong::new(at, why));
+        }
+        let mut registers = [0.0; MOST_REGISTERS];
+        tape.begin(&mut registers);
+        let ranges = variables
+            .iter()
+            .zip(is_read)
+            .map(|(variable, is_read)| is_read.then_some(variable.range))
+            .collect();
+        Ok(Self { tape, ranges, registers, parameters: parameters.len(), bounds })
+    }
+
+    /// Sets the values of its parameters, in SI.
+    ///
+    /// # Panics
+    /// For another number of values than it has parameters.
+    pub fn set(&mut self, values: &[f64]) {
+        assert_eq!(values.len(), self.parameters, "one value for each parameter");
+        for (index, value) in values.iter().enumerate() {
+            self.registers[self.tape.leaves.parameter(index) as usize] = *value;
+        }
+    }
+
+    /// Its value, in SI; `variables` are as many as it was compiled with.
+    #[must_use]
+    pub fn value(&self, variables: &[f64]) -> f64 {
+        let mut registers = self.registers;
+        for (index, (value, range)) in variables.iter().zip(&self.ranges).enumerate() {
+            if let Some([least, most]) = range {
+                registers[self.tape.leaves.input(index) as usize] = value.clamp(*least, *most);
+            }
+        }
+        self.tape.compute(&mut registers)
+    }
+
+    /// Smallest and largest value that it can have over all ranges.
+    #[must_use]
+    pub fn bounds(&self) -> Range {
+        self.bounds
+    }
+
+    /// Whether the variable of this place stands in it.
+    #[must_use]
+    pub fn reads(&self, variable: usize) -> bool {
+        self.ranges[variable].is_some()
+    }
+}
+
+struct Names<'a> {
+    nodes: Nodes,
+    variables: &'a [Variable<'a>],
+    parameters: &'a [Variable<'a>],
+    builder: Builder,
+}
+
+impl Names<'_> {
+    /// The place of a name among variables and parameters.
+    fn place(&self, name: &str) -> Option<usize> {
+        self.variables.iter().chain(self.parameters).position(|one| one.name == name)
+    }
+
+    fn variable(&self, place: usize) -> &Variable<'_> {
+        self.variables.get(place).unwrap_or_else(|| &self.parameters[place - self.variables.len()])
+    }
+
+    /// Whether a name stands in a tree.
+    fn reads(&self, place: Place, wanted: &str) -> bool {
+        match &self.nodes.get(place).kind {
+            Kind::Number(..) => false,
+            Kind::Name(name) => name == wanted,
+            Kind::Negation(inner) => self.reads(*inner, wanted),
+            Kind::Binary(_, left, right) => self.reads(*left, wanted) || self.reads(*right, wanted),
+            Kind::Call(_, arguments) => arguments.iter().any(|argument| self.reads(*argument, wanted)),
+        }
+    }
+
+    fn unknown(&self, name: &str, at: usize) -> Wrong {
+        let known: Vec<&str> = self.variables.iter().chain(self.parameters).map(|one| one.name).collect();
+        Wrong::new(at, format!("'{name}' is unknown here; known are pi, {}", known.join(", ")))
+    }
+}
+
+impl Dimensions for Names<'_> {
+    type Scope = ();
+
+    fn at(&self, place: Place) -> Node {
+        self.nodes.get(place).clone()
+    }
+
+    fn named(&mut self, name: &str, at: usize, (): ()) -> Result<Measure, Wrong> {
+        match self.place(name) {
+            Some(place) => Ok(Some(self.variable(place).dimension)),
+            None if name == "pi" => Ok(Some(Dimension::NONE)),
+            None => Err(self.unknown(name, at)),
+        }
+    }
+
+    fn arguments(&self, _name: &str) -> Option<usize> {
+        None
+    }
+
+    fn functions(&self) -> &'static str {
+        ""
+    }
+
+    fn called(&mut self, name: &str, _measures: &[Measure], at: usize) -> Result<Measure, Wrong> {
+        Err(self.unknown(name, at))
+    }
+}
+
+impl Compile for Names<'_> {
+    type Scope = ();
+
+    fn at(&self, place: Place) -> Node {
+        self.nodes.get(place).clone()
+    }
+
+    fn builder(&mut self) -> &mut Builder {
+        &mut self.builder
+    }
+
+    fn named(&mut self, name: &str, _at: usize, (): ()) -> Result<Register, Wrong> {
+        let leaves = self.builder.leaves();
+        Ok(match self.place(name) {
+            Some(place) if place < self.variables.len() => leaves.input(place),
+            Some(place) => leaves.parameter(place - self.variables.len()),
+            None => self.builder.constant(std::f64::consts::PI),
+        })
+    }
+
+    fn called(
+        &mut self,
+        _name: &str,
+        _arguments: &[Place],
+        _at: usize,
+        (): (),
+    ) -> Result<Option<Register>, Wrong> {
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Unit;
+
+    fn dimension(unit: &str) -> Dimension {
+        Unit::parse(unit).unwrap().dimension
+    }
+
+    fn compiled(text: &str) -> Result<Formula, Wrong> {
+        let variables = [
+            Variable { name: "x", dimension: dimension("m"), range: [0.0, 1.0] },
+            Variable { name: "v", dimension: dimension("m/s"), range: [-1e3, 1e3] },
+        ];
+        let parameters = [Variable { name: "c", dimension: dimension("N s/m"), range: [0.0, 200.0] }];
+        Formula::compile((text, 100), &variables, &parameters, (dimension("N"), "force"))
+    }
+
+    #[test]
+    fn it_has_the_value_of_its_text_with_the_numbers_that_were_set() {
+        let mut brake = compiled("-c*(1 + x/0.5[m])*v").unwrap();
+        brake.set(&[10.0]);
+        assert_eq!(brake.value(&[0.25, 2.0]), -10.0 * 1.5 * 2.0);
+        brake.set(&[20.0]);
+        assert_eq!(brake.value(&[0.25, 2.0]), -20.0 * 1.5 * 2.0);
+        assert_eq!(brake.bounds(), [-6e5, 6e5]);
+        assert_eq!([0, 1].map(|place| brake.reads(place)), [true, true]);
+        assert!(!compiled("c*v").unwrap().reads(0));
+    }
+
+    #[test]
+    fn a_variable_beyond_its_range_counts_as_its_end_and_no_number_stays_one() {
+        let mut brake = compiled("c*v").unwrap();
+        brake.set(&[1.0]);
+        assert_eq!(brake.value(&[0.0, 1e9]), 1e3);
+        assert!(brake.value(&[0.0, f64::NAN]).is_nan());
+        // What it does not read does not matter.
+        assert_eq!(brake.value(&[f64::NAN, 2.0]), 2.0);
+    }
+
+    #[test]
+    fn what_cannot_run_is_refused_at_its_byte() {
+        for (text, at, why) in [
+            ("c*w", 102, "'w' is unknown here; known are pi, x, v, c"),
+            ("c*x", 100, "force is in kg m s^-2, and this is in kg m s^-1"),
+            ("c*v/x*1[m]", 103, "divides by a value that may be 0 (0 to 1)"),
+            ("c*v + exp(abs(v)/0.01[m/s])*1[N]", 106, "counts as not finite"),
+            ("c*v*(", 105, "ends where a value should stand"),
+            ("delay(v, 1)", 100, "'delay' is no function; known are abs, "),
+        ] {
+            let wrong = compiled(text).unwrap_err();
+            assert!(wrong.at == at && wrong.why.contains(why), "{text}: {wrong:?}");
+        }
+        let long = (1..=90).map(|number| format!("{number}.5")).collect::<Vec<_>>().join(",");
+        let wrong = compiled(&format!("c*v*min({long}, x/1[m], 1)")).unwrap_err();
+        assert!(wrong.why.contains("more than 96"), "{wrong:?}");
+    }
+}

@@ -1,0 +1,30 @@
+//! Expressions as text: what model files and rig files write as an equation or a term.
+//!
+//! ```text
+//!   text ──► tree ──┬─► dimensions ──► tape: bytecode with derivatives          (model files)
+//!                   └─► bounds: proven finite over the ranges of its names ──► formula: on the stack   (terms of a rig)
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | `grammar` | text to tree, refused at the byte where it goes wrong |
+//! | `units` | units and dimensions |
+//! | `dimensions` | the dimension of a tree |
+//! | `bounds` | the smallest and the largest value of a tree |
+//! | `compile` | tree to operations |
+//! | `tape` | operations, computed with or without derivatives |
+//! | `curve` | tables |
+//! | `inputs` | inputs over time between their samples |
+//! | `formula` | one expression over named variables |
+//!
+//! Grammar and functions: `docs/model-files.md`.
+
+pub mod bounds;
+pub mod compile;
+pub mod curve;
+pub mod dimensions;
+pub mod formula;
+pub mod grammar;
+pub mod inputs;
+pub mod tape;
+pub mod units;

@@ -1,0 +1,383 @@
+//! declared: a term that a file declares as an expression, for what the catalogue lacks.
+//!
+//! ```text
+//! force   = f(x, v, p_a, p_b, u, s, t)             along the axis' own extension, N
+//! flow    = f(x, v, p_a, p_b, u, s, t) g(p) / rho   into a chamber; f in kg/s
+//! reading = truth + f(x, v, p_a, p_b, u, s, t, F)   of a sensor, m, N or Pa
+//! g(p)    = p / p_exhaust for f < 0, 2 - p / p_supply for f > 0, within 0 to 1
+//! ```
+//!
+//! x extension of the axis, m; v its rate, m/s; p_a, p_b absolute pressures of its chambers, Pa; u command, s spool, -1 to 1;
+//! t time since the plant began, s; F what its force sensor should show, N; rho density at normal conditions, kg/m^3. Extension
+//! and pressures are those at the midpoint of a step; v, u, s and t those at its beginning, since the force itself decides on the
+//! speed after. Terms of one target add up.
+//!
+//! Every expression is proven finite over [`VARIABLES`] and the ranges of its parameters before it acts; a variable beyond its
+//! range counts as the end of it. Force and flow are held at the largest that a table may have, so that no slope makes a step run
+//! away.
+//!
+//! It is no effect of the catalogue: `[[terms]]` of a rig file holds it, and `[[suspects]]` of a file beside one holds terms that
+//! may be missing.
+//!
+//! Properties: the value of its expression; two terms are their sum; nothing is allocated.
+//!
+//! Source: the file that declares it.
+
+use super::sheet::{Element, PlaceKind};
+use super::tabulated::{MOST_FLOW_NL_PER_MIN, MOST_FORCE_N, Seen, neither_empties_nor_bursts};
+use crate::parameters::table::Unit;
+use crate::parameters::{ParameterError, RigParameters};
+use crate::state::Axis;
+use expression::formula::{Formula, Variable};
+use expression::units::Dimension;
+use std::fmt::Write as _;
+
+/// Parameters of a term at most.
+pub const MOST_PARAMETERS: usize = 6;
+/// Terms of a file at most.
+pub const MOST_TERMS: usize = 32;
+/// What expressions are over: name, unit, least and largest value. The last one stands in readings alone.
+pub const VARIABLES: [(&str, &str, [f64; 2]); 8] = [
+    ("x", "m", [0.0, 10.0]),
+    ("v", "m/s", [-1e3, 1e3]),
+    ("p_a", "Pa", [1.0, 1e8]),
+    ("p_b", "Pa", [1.0, 1e8]),
+    ("u", "1", [-1.0, 1.0]),
+    ("s", "1", [-1.0, 1.0]),
+    ("t", "s", [0.0, 1e7]),
+    ("F", "N", [-1e6, 1e6]),
+];
+/// Specific gas constant of air, J/(kg K).
+const GAS_J_PER_KG_K: f64 = 287.0;
+
+/// What a term adds to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// Force on the piston.
+    Force,
+    /// Flow into chamber a.
+    FlowA,
+    /// Flow into chamber b.
+    FlowB,
+    /// Reading of the position sensor.
+    Position,
+    /// Reading of the force sensor.
+    ForceReading,
+    /// Reading of the pressure sensor of chamber a.
+    PressureA,
+    /// Reading of the pressure sensor of chamber b.
+    PressureB,
+}
+
+impl Target {
+    /// All of them.
+    pub const ALL: [Target; 7] = [
+        Target::Force,
+        Target::FlowA,
+        Target::FlowB,
+        Target::Position,
+        Target::ForceReading,
+        Target::PressureA,
+        Target::PressureB,
+    ];
+
+    /// As in `drive.force`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Target::Force => "force",
+            Target::FlowA => "flow-a",
+            Target::FlowB => "flow-b",
+            Target::Position => "position-reading",
+            Target::ForceReading => "force-reading",
+            Target::PressureA => "pressure-a-reading",
+            Target::PressureB => "pressure-b-reading",
+        }
+    }
+
+    /// Unit of the expression.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Target::Force | Target::ForceReading => "N",
+            Target::FlowA | Target::FlowB => "kg/s",
+            Target::Position => "m",
+            Target::PressureA | Target::PressureB => "Pa",
+        }
+    }
+
+    /// Chamber or sensor that it belongs to.
+    #[must_use]
+    pub const fn element(self) -> Option<Element> {
+        match self {
+            Target::Force => None,
+            Target::FlowA | Target::PressureA => Some(Element::A),
+            Target::FlowB | Target::PressureB => Some(Element::B),
+            Target::Position => Some(Element::Position),
+            Target::ForceReading => Some(Element::Force),
+        }
+    }
+
+    /// The places that it is one of.
+    #[must_use]
+    pub const fn kind(self) -> PlaceKind {
+        match self {
+            Target::Force => PlaceKind::Axis,
+            Target::FlowA | Target::FlowB => PlaceKind::Chamber,
+            _ => PlaceKind::Channel,
+        }
+    }
+
+    const fn is_reading(self) -> bool {
+        !matches!(self, Target::Force | Target::FlowA | Target::FlowB)
+    }
+
+    /// What the expression may be over.
+    pub(crate) fn variables(self) -> Vec<Variable<'static>> {
+        let count = VARIABLES.len() - usize::from(!self.is_reading());
+        VARIABLES[..count]
+            .iter()
+            .map(|(name, unit, range)| Variable { name, dimension: dimension(unit), range: *range })
+            .collect()
+    }
+}
+
+/// The dimension of a unit of this module.
+pub(crate) fn dimension(unit: &str) -> Dimension {
+    expression::units::Unit::parse(unit).map(|unit| unit.dimension).expect("a unit of this module")
+}
+
+/// A number of a declared term.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    pub(crate) name: String,
+    pub(crate) unit: expression::units::Unit,
+    pub(crate) value: f64,
+    pub(crate) range: [f64; 2],
+    pub(crate) prior: Option<f64>,
+}
+
+impl Number {
+    /// Its name in the expression.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its unit, as the file writes it.
+    #[must_use]
+    pub fn unit(&self) -> &str {
+        &self.unit.text
+    }
+
+    /// Its value, in the unit of the file; of a suspect the value at which it is off.
+    #[must_use]
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// Least and largest value, in the unit of the file.
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        self.range
+    }
+
+    /// How large it is where the term matters, in the unit of the file, if the file says so.
+    #[must_use]
+    pub fn prior(&self) -> Option<f64> {
+        self.prior
+    }
+}
+
+/// A term as a file declares it, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Declared {
+    pub(crate) name: String,
+    pub(crate) axis: Axis,
+    pub(crate) target: Target,
+    pub(crate) add: String,
+    pub(crate) numbers: Vec<Number>,
+    pub(crate) twins: Vec<String>,
+    pub(crate) formula: Formula,
+}
+
+impl Declared {
+    /// What reports call it.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Axis that it acts on.
+    #[must_use]
+    pub fn axis(&self) -> Axis {
+        self.axis
+    }
+
+    /// What it adds to.
+    #[must_use]
+    pub fn target(&self) -> Target {
+        self.target
+    }
+
+    /// Axis and target, as in the file.
+    #[must_use]
+    pub fn place(&self) -> String {
+        format!("{}.{}", self.axis.name(), self.target.name())
+    }
+
+    /// The expression.
+    #[must_use]
+    pub fn expression(&self) -> &str {
+        &self.add
+    }
+
+    /// Its numbers, in the order of the file.
+    #[must_use]
+    pub fn numbers(&self) -> &[Number] {
+        &self.numbers
+    }
+
+    /// Effects or suspects that are known to do the same.
+    #[must_use]
+    pub fn twins(&self) -> &[String] {
+        &self.twins
+    }
+
+    /// Whether two stand for one term, with whatever numbers.
+    #[must_use]
+    pub fn is_same(&self, other: &Declared) -> bool {
+        self.name == other.name && self.axis == other.axis && self.target == other.target
+    }
+
+    /// The same with other values of its numbers, in the units of the file.
+    ///
+    /// # Errors
+    /// [`ParameterError`] for a value out of its range, and for another number of them.
+    pub fn with(&self, values: &[f64]) -> Result<Self, ParameterError> {
+        let mut changed = self.clone();
+        if values.len() != self.numbers.len() {
+            let message = format!("{} numbers for the {} of {}", values.len(), self.numbers.len(), self.name);
+            return Err(ParameterError::of_term(&self.name, &message));
+        }
+        for (number, value) in changed.numbers.iter_mut().zip(values) {
+            let [least, most] = number.range;
+            if !(least..=most).contains(value) {
+                let message = format!("{} = {value}: allowed are {least} to {most}", number.name);
+                return Err(ParameterError::of_term(&self.name, &message));
+            }
+            number.value = *value;
+        }
+        let values_si = changed.values_si();
+        changed.formula.set(&values_si);
+        Ok(changed)
+    }
+
+    pub(crate) fn values_si(&self) -> Vec<f64> {
+        self.numbers.iter().map(|number| number.value * number.unit.factor).collect()
+    }
+
+    /// What a file says to have this term, numbers to the bit; `table` is `terms` or `suspects`.
+    #[must_use]
+    pub fn toml(&self, table: &str) -> String {
+        let text = |text: &str| toml::Value::from(text).to_string();
+        let mut out = format!(
+            "[[{table}]]\nname = {}\nplace = {}\nadd = {}\n",
+            text(&self.name),
+            text(&self.place()),
+            text(&self.add)
+        );
+        for number in &self.numbers {
+            let [least, most] = number.range;
+            let prior = number.prior.map_or(String::new(), |prior| format!(", prior = {prior:?}"));
+            let _ = writeln!(
+                out,
+                "parameters.{} = {{ unit = {}, value = {:?}, range = [{least:?}, {most:?}]{prior} }}",
+                number.name,
+                text(number.unit()),
+                number.value
+            );
+        }
+        if !self.twins.is_empty() {
+            let twins: Vec<String> = self.twins.iter().map(|twin| text(twin)).collect();
+            let _ = writeln!(out, "twins = [{}]", twins.join(", "));
+        }
+        out
+    }
+}
+
+/// What expressions are over, at an instant of an axis.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DeclaredAt<'a> {
+    pub(crate) seen: &'a Seen,
+    pub(crate) command: f64,
+    pub(crate) time_s: f64,
+    /// What the force sensor should show, N; read by readings alone.
+    pub(crate) sensor_force_n: f64,
+}
+
+impl DeclaredAt<'_> {
+    /// In the order of [`VARIABLES`].
+    fn values(&self) -> [f64; VARIABLES.len()] {
+        let Seen { extension_m, velocity_m_per_s, spool, pressure_pa: [a, b] } = *self.seen;
+        [extension_m, velocity_m_per_s, a, b, self.command, spool, self.time_s, self.sensor_force_n]
+    }
+}
+
+/// The declared terms of an axis.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct DeclaredTerms {
+    terms: Vec<(Target, Formula)>,
+    kg_per_m3: f64,
+    exhaust_pa: f64,
+    supply_pa: f64,
+}
+
+impl DeclaredTerms {
+    /// Those of an axis that a rig has.
+    pub(crate) fn of(rig: &RigParameters, axis: Axis) -> Self {
+        let own = rig.terms().iter().filter(|term| term.axis == axis);
+        DeclaredTerms {
+            terms: own.map(|term| (term.target, term.formula.clone())).collect(),
+            kg_per_m3: rig.gas().normal_pressure_pa / (GAS_J_PER_KG_K * rig.gas().temperature_k),
+            exhaust_pa: rig.supply().exhaust_pressure_pa,
+            supply_pa: rig.supply().pressure_pa,
+        }
+    }
+
+    /// Whether any adds to a target.
+    pub(crate) fn adds(&self, target: Target) -> bool {
+        self.terms.iter().any(|(own, _)| *own == target)
+    }
+
+    /// Whether any adds to a flow.
+    pub(crate) fn adds_air(&self) -> bool {
+        self.adds(Target::FlowA) || self.adds(Target::FlowB)
+    }
+
+    /// Force along the own extension, N.
+    pub(crate) fn force(&self, at: &DeclaredAt<'_>) -> f64 {
+        self.sum(Target::Force, at).clamp(-MOST_FORCE_N, MOST_FORCE_N)
+    }
+
+    /// Flow into a chamber, m^3/s.
+    pub(crate) fn flow(&self, chamber: usize, at: &DeclaredAt<'_>) -> f64 {
+        let most = Unit::NormalLitrePerMinute.to_si(MOST_FLOW_NL_PER_MIN);
+        let flow = self.sum([Target::FlowA, Target::FlowB][chamber], at) / self.kg_per_m3;
+        let pressure_pa = at.seen.pressure_pa[chamber];
+        neither_empties_nor_bursts(flow.clamp(-most, most), pressure_pa, [self.exhaust_pa, self.supply_pa])
+    }
+
+    /// What a sensor shows beside the truth, in SI.
+    pub(crate) fn reading(&self, target: Target, at: &DeclaredAt<'_>) -> f64 {
+        self.sum(target, at)
+    }
+
+    fn sum(&self, target: Target, at: &DeclaredAt<'_>) -> f64 {
+        let mut sum = 0.0;
+        for (_, formula) in self.terms.iter().filter(|(own, _)| *own == target) {
+            sum += formula.value(&at.values());
+        }
+        sum
+    }
+}

@@ -1,0 +1,197 @@
+//! Reads `[[terms]]` of a rig file, and `[[suspects]]` of a file beside one.
+//!
+//! ```text
+//! [[terms]]
+//! name = "eddy-brake"
+//! place = "drive.force"          # drive or load; force, flow-a, flow-b, position-reading, force-reading, pressure-a-reading, …
+//! add = "-(c0 + c1*x)*v"         # over x, v, p_a, p_b, u, s, t, in a reading also F
+//! parameters.c0 = { unit = "N s/m", value = 40, range = [0, 200] }
+//! parameters.c1 = { unit = "N s/m^2", value = 120, range = [0, 500] }
+//! ```
+//!
+//! A term needs the value of each number, and its range is that value alone where the file gives none. A suspect needs ranges,
+//! and its values are those at which it adds nothing, 0 where the file gives none.
+
+use super::reader::ParameterError;
+use crate::effects::declared::{Declared, MOST_PARAMETERS, MOST_TERMS, Number, Target, dimension};
+use crate::effects::sheet;
+use crate::state::Axis;
+use expression::formula::{Formula, Variable};
+use expression::grammar::is_of_name;
+use expression::units::Unit;
+use settings::{Section, SettingsError, Source};
+use std::path::Path;
+
+/// Values of the variables at which a suspect that is off must add nothing, in their order: rest and motion of a rig.
+const OFF_AT: [[f64; 8]; 3] = [
+    [0.0, 0.0, 101_325.0, 101_325.0, 0.0, 0.0, 0.0, 0.0],
+    [0.13, 0.7, 5e5, 2.5e5, 0.6, 0.5, 1.7, 35.0],
+    [0.41, -0.9, 2e5, 6e5, -0.3, -0.4, 9.0, -80.0],
+];
+
+/// The suspects of a file beside a rig file; `file` is only its name for messages.
+///
+/// # Errors
+/// [`ParameterError`] with file, line and column: no TOML, unknown and missing keys, expressions that are none, of another
+/// dimension than their place, or not proven finite, and suspects that add something when they are off.
+pub fn suspects(text: &str, file: &str) -> Result<Vec<Declared>, ParameterError> {
+    let suspects = read(text, file, "suspects")?;
+    if suspects.is_empty() {
+        return Err(ParameterError::at(file, 1, "no [[suspects]] in this file"));
+    }
+    Ok(suspects)
+}
+
+/// The terms under a key of a file. Other keys are the caller's, except in a file of suspects, which has none.
+pub(super) fn read(text: &str, file: &str, key: &str) -> Result<Vec<Declared>, ParameterError> {
+    let source = Source::parse(text, Path::new(file))?.with_columns();
+    let mut root = source.root();
+    let mut all: Vec<Declared> = Vec::new();
+    for section in root.sections(key)? {
+        if all.len() == MOST_TERMS {
+            return Err(section.wrong(&format!("more than {MOST_TERMS} of a kind in one file")).into());
+        }
+        let mut reader = Reader { source: &source, is_suspect: key == "suspects" };
+        let at = section.at("name");
+        let term = reader.term(section)?;
+        if all.iter().any(|other| other.is_same(&term)) {
+            let why = format!("name: {} is at {} already", term.name, term.place());
+            return Err(source.wrong_from(at, &why).into());
+        }
+        all.push(term);
+    }
+    if key == "suspects" {
+        root.finish()?;
+    }
+    Ok(all)
+}
+
+struct Reader<'a> {
+    source: &'a Source<'a>,
+    is_suspect: bool,
+}
+
+impl Reader<'_> {
+    fn term(&mut self, mut section: Section<'_>) -> Result<Declared, SettingsError> {
+        let name = section.needed_text("name", "what reports call it")?;
+        let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
+        if name.text.is_empty() || name.text.len() > 64 || !name.text.chars().all(is_plain) {
+            return Err(section.wrong_at("name", "name: allowed are up to 64 of a-z, A-Z, 0-9, - and _"));
+        }
+        if sheet(&name.text).is_some() {
+            return Err(section.wrong_at("name", "name: an effect of the catalogue has it"));
+        }
+        let places = || -> Vec<(String, Axis, Target)> {
+            let one =
+                |axis: Axis| Target::ALL.map(|own| (format!("{}.{}", axis.name(), own.name()), axis, own));
+            Axis::ALL.into_iter().flat_map(one).collect()
+        };
+        let known = || places().into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(", ");
+        let place = section.needed_text("place", &format!("what it adds to, one of {}", known()))?;
+        let Some((_, axis, target)) = places().into_iter().find(|(name, ..)| *name == place.text) else {
+            let why = format!("place = \"{}\"; allowed is {}", place.text, known());
+            return Err(self.source.wrong_from(place.at, &why));
+        };
+        let add = section.needed_text("add", "the expression that is added")?;
+        let numbers = self.numbers(&mut section)?;
+        let twins = section.texts("twins")?;
+        section.finish()?;
+
+        let variables = target.variables();
+        if let Some(number) = numbers.iter().find(|own| variables.iter().any(|one| one.name == own.name)) {
+            return Err(section.wrong(&format!("parameters.{}: a variable has this name", number.name)));
+        }
+        let parameters: Vec<Variable<'_>> = numbers
+            .iter()
+            .map(|number| Variable {
+                name: &number.name,
+                dimension: number.unit.dimension,
+                range: number.range.map(|end| end * number.unit.factor),
+            })
+            .collect();
+        let wanted = (dimension(target.unit()), place.text.as_str());
+        let formula = Formula::compile((&add.text, add.at), &variables, &parameters, wanted)
+            .map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))?;
+        drop(parameters);
+        let mut term = Declared { name: name.text, axis, target, add: add.text, numbers, twins, formula };
+        let values_si = term.values_si();
+        term.formula.set(&values_si);
+        if self.is_suspect {
+            self.adds_nothing(&term, add.at)?;
+        }
+        Ok(term)
+    }
+
+    /// Refuses a suspect that is not off at the values of its file.
+    fn adds_nothing(&self, term: &Declared, at: usize) -> Result<(), SettingsError> {
+        let is_off = |number: &&Number| number.value == 0.0;
+        let Some(first) = term.numbers.first().filter(is_off) else {
+            let why = "the first of its parameters is its amplitude, and has no value: it is 0 where the suspect is off";
+            return Err(self.source.wrong_from(at, why));
+        };
+        let Some(added) = OFF_AT.iter().map(|values| term.formula.value(values)).find(|value| *value != 0.0)
+        else {
+            return Ok(());
+        };
+        let off: Vec<&str> = term.numbers.iter().filter(is_off).map(Number::name).collect();
+        let (unit, many) = (term.target.unit(), if off.len() > 1 { "are" } else { "is" });
+        let why = format!(
+            "where {} {many} 0 a suspect adds nothing, and this adds {added} {unit}: begin with {}*(...)",
+            off.join(", "),
+            first.name
+        );
+        Err(self.source.wrong_from(at, &why))
+    }
+
+    fn numbers(&self, section: &mut Section<'_>) -> Result<Vec<Number>, SettingsError> {
+        let Some(mut all) = section.section("parameters")? else { return Ok(Vec::new()) };
+        let names = all.keys();
+        if names.len() > MOST_PARAMETERS {
+            return Err(all.wrong(&format!("more than {MOST_PARAMETERS} parameters")));
+        }
+        let mut numbers = Vec::new();
+        for name in names {
+            let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
+            if !begins || !name.chars().all(is_of_name) || name.chars().count() > 64 {
+                return Err(all.wrong_at(&name, &format!("{name}: a name has letters, digits and _ alone")));
+            }
+            let Some(one) = all.section(&name)? else { continue };
+            numbers.push(self.number(name, one)?);
+        }
+        all.finish()?;
+        Ok(numbers)
+    }
+
+    fn number(&self, name: String, mut section: Section<'_>) -> Result<Number, SettingsError> {
+        let unit = match section.text("unit")? {
+            None => Unit::one(),
+            Some(text) => Unit::parse(&text.text)
+                .map_err(|wrong| self.source.wrong_from(text.at + wrong.at, &wrong.why))?,
+        };
+        let value = match section.numbers("value")?.as_slice() {
+            [one] => *one,
+            [] if self.is_suspect => 0.0,
+            _ => return Err(section.wrong_at("value", "value: needed is one number")),
+        };
+        let range = match section.numbers("range")?.as_slice() {
+            [least, most] if least <= most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],
+            [] if !self.is_suspect => [value; 2],
+            _ => {
+                let why = "range: needed are two numbers, the least and the largest value, within 1e12 of 0";
+                return Err(section.wrong_at("range", why));
+            }
+        };
+        let [least, most] = range;
+        if !(least..=most).contains(&value) || self.is_suspect && least == most {
+            let why = format!("range: {least} to {most} must hold more than the value, {value}");
+            return Err(section.wrong_at("range", &why));
+        }
+        let prior = match section.numbers("prior")?.as_slice() {
+            [] => None,
+            [one] if *one > 0.0 => Some(*one),
+            _ => return Err(section.wrong_at("prior", "prior: allowed is one number above 0")),
+        };
+        section.finish()?;
+        Ok(Number { name, unit, value, range, prior })
+    }
+}

@@ -1,0 +1,227 @@
+//! Declared terms in the rig file and in the plant: read as written, refused with reasons, the same as an effect of that law.
+
+use plant::effects::declared::Target;
+use plant::effects::tabulated::{Balance, Tabulated, Variable};
+use plant::parameters::suspects;
+use plant::{Axis, Inputs, Plant, RigParameters, Setup};
+
+/// A rig with terms: place, expression and numbers of each.
+fn with(terms: &[(&str, &str, &str)]) -> RigParameters {
+    RigParameters::from_toml(&text(terms), "rig.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn text(terms: &[(&str, &str, &str)]) -> String {
+    let one = |(index, (place, add, numbers)): (usize, &(&str, &str, &str))| {
+        format!("[[terms]]\nname = \"term-{index}\"\nplace = \"{place}\"\nadd = \"{add}\"\n{numbers}\n")
+    };
+    let terms: String = terms.iter().enumerate().map(one).collect();
+    format!("{}{terms}", RigParameters::BASELINE_TOML)
+}
+
+fn inputs(period: i32) -> Inputs {
+    let phase = f64::from(period) * 4e-3;
+    Inputs { valve: [0.5 * phase.sin(), 0.4 * phase.cos()], ..Inputs::default() }
+}
+
+/// Two seconds of strokes of both axes.
+fn run(rig: &RigParameters) -> Plant {
+    let mut plant = Plant::new(rig, &Setup::default()).expect("good");
+    (0..2000).for_each(|period| plant.step(&inputs(period)));
+    plant
+}
+
+/// Both come to the same state but for rounding.
+fn alike(one: &RigParameters, two: &RigParameters) {
+    let [one, two] = [one, two].map(run);
+    for (one, two) in one.truth(&inputs(0)).values().into_iter().zip(two.truth(&inputs(0)).values()) {
+        assert!((one - two).abs() <= 1e-9 * one.abs().max(1.0), "{one} {two}");
+    }
+}
+
+const EDDY: (&str, &str, &str) = (
+    "drive.force",
+    "-(c0 + c1*x)*v",
+    "parameters.c0 = { unit = \"N s/m\", value = 40, range = [0, 200] }\n\
+     parameters.c1 = { unit = \"N/(mm/s)/m\", value = 0.12 }",
+);
+
+#[test]
+fn a_file_with_terms_is_read_as_it_was_written_numbers_to_the_bit() {
+    let rig = with(&[
+        EDDY,
+        ("load.pressure-b-reading", "c*sin(t/1[s])", "parameters.c = { unit = \"mbar\", value = 3 }"),
+    ]);
+    let [eddy, drift] = rig.terms() else { panic!("two terms") };
+    assert_eq!((eddy.name(), eddy.axis(), eddy.target()), ("term-0", Axis::Drive, Target::Force));
+    assert_eq!((drift.axis(), drift.target()), (Axis::Load, Target::PressureB));
+    assert_eq!(eddy.numbers().iter().map(|own| own.range()).collect::<Vec<_>>(), [[0.0, 200.0], [0.12; 2]]);
+    let changed = eddy.with(&[100.0 / 3.0, 0.12]).expect("in range");
+    let again: String = [&changed, drift].map(|term| term.toml("terms")).concat();
+    let again = format!("{}{again}", RigParameters::BASELINE_TOML);
+    let again = RigParameters::from_toml(&again, "rig.toml").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(again, rig.with_term(&changed));
+    assert_ne!(again, rig);
+    assert_eq!(rig.without_effects(), RigParameters::baseline());
+    assert!(rig.has_effects() && rig.effects().is_empty() && !RigParameters::baseline().has_effects());
+    assert!(eddy.with(&[200.5, 0.12]).unwrap_err().to_string().contains("c0 = 200.5: allowed are 0 to 200"));
+}
+
+#[test]
+fn a_linear_brake_is_viscous_friction() {
+    // b is in N/(mm/s), a factor of 1000.
+    let viscous = RigParameters::baseline().numbers("friction.viscous_n_per_mm_per_s")[0];
+    let thicker =
+        RigParameters::baseline().with("friction.viscous_n_per_mm_per_s", &[viscous + 0.01]).unwrap();
+    let brake = |axis| (axis, "-c*v", "parameters.c = { unit = \"N s/m\", value = 10 }");
+    let [one, two] = [&with(&[brake("drive.force"), brake("load.force")]), &thicker].map(run);
+    for axis in [0, 1] {
+        let [one, two] = [&one, &two].map(|plant| plant.truth(&inputs(0)).axes[axis].position_m);
+        // A friction of the step's own law and a force of its beginning: first order in the substep, 1e-4 of a damped velocity.
+        assert!((one - two).abs() < 2e-5, "{one} {two}");
+        let baseline = run(&RigParameters::baseline()).truth(&inputs(0)).axes[axis].position_m;
+        assert!((one - baseline).abs() > 1e-4, "{one} {baseline}");
+    }
+}
+
+#[test]
+fn a_force_is_a_table_of_the_same_law_and_a_flow_one_of_the_same_mass() {
+    let table = |balance, variable, at: [f64; 2], value: [f64; 2]| Tabulated {
+        axis: Axis::Load,
+        balance,
+        variable,
+        at: at.to_vec(),
+        value: value.to_vec(),
+    };
+    let tabulated = |table| RigParameters::baseline().with_tabulated(&[table]).expect("good");
+    alike(
+        &with(&[("load.force", "40[N/m]*x - 3[N]", "")]),
+        &tabulated(table(Balance::Force, Variable::Extension, [0.0, 0.5], [-3.0, 17.0])),
+    );
+    // 6 Nl/min are 1e-4 m^3/s of 101325/(287*293.15) kg/m^3.
+    let flow = 1e-4 * 101_325.0 / (287.0 * 293.15);
+    alike(
+        &with(&[("load.flow-b", "q*s", &format!("parameters.q = {{ unit = \"kg/s\", value = {flow:?} }}"))]),
+        &tabulated(table(Balance::FlowB, Variable::Spool, [-1.0, 1.0], [-6.0, 6.0])),
+    );
+}
+
+#[test]
+fn a_reading_is_the_truth_and_its_term_and_leaves_the_motion_alone() {
+    let rig = with(&[
+        ("drive.position-reading", "1[mm] + 1e-3*x", ""),
+        ("drive.force-reading", "0.02*F", ""),
+        ("load.pressure-a-reading", "100[Pa]*u + 10[Pa/s]*t", ""),
+    ]);
+    let mut plant = Plant::new(&rig, &Setup::default()).expect("good");
+    let mut bare = Plant::new(&RigParameters::baseline(), &Setup::default()).expect("good");
+    (0..2000).for_each(|period| {
+        plant.step(&inputs(period));
+        bare.step(&inputs(period));
+    });
+    let (truth, expected) = (plant.truth(&inputs(2000)), bare.truth(&inputs(2000)));
+    for (one, two) in truth.values().into_iter().zip(expected.values()) {
+        assert!((one - two).abs() <= 1e-9 * one.abs().max(1.0), "{one} {two}");
+    }
+    let (shown, [drive, load]) = (plant.shown(&truth), truth.axes);
+    assert!((shown[0][0] - (1.001 * drive.position_m + 1e-3)).abs() < 1e-12);
+    assert!((shown[0][1] - 1.02 * drive.sensor_force_n).abs() < 1e-9);
+    let acts = inputs(1999).valve[1];
+    assert!((shown[1][2] - (load.pressure_a_pa + 100.0 * acts + 20.0)).abs() < 1e-6, "{}", shown[1][2]);
+    assert_eq!(shown[1][3], load.pressure_b_pa);
+    assert_eq!(
+        plant.term_names(),
+        [
+            "drive_position_reading_declared_reading_position_m",
+            "drive_force_reading_declared_reading_force_N",
+            "load_pressure_reading_declared_reading_a_Pa"
+        ]
+    );
+}
+
+#[test]
+fn two_terms_act_as_their_sum_and_a_force_is_held_at_2000_newton() {
+    let half = ("drive.force", "-20[N s/m]*v", "");
+    alike(&with(&[half, half]), &with(&[("drive.force", "-40[N s/m]*v", "")]));
+    let plant = run(&with(&[("drive.force", "1e6[N]", "")]));
+    assert_eq!(plant.truth(&inputs(0)).axes[0].effect_force_n, 2000.0);
+    assert_eq!(plant.term_names(), ["drive_force_declared_N"]);
+    assert!(plant.state().is_finite());
+}
+
+#[test]
+fn whatever_is_wrong_is_named_with_line_column_and_what_is_allowed() {
+    let first = RigParameters::BASELINE_TOML.lines().count() + 1;
+    let number = "parameters.c = { unit = \"N s/m\", value = 4, range = [0, 200] }";
+    for (place, add, numbers, line, column, message) in [
+        ("drive.torque", "0", "", 2, 10, "place = \"drive.torque\"; allowed is drive.force, drive.flow-a, "),
+        (
+            "drive.force",
+            "-c*v*w",
+            number,
+            3,
+            13,
+            "'w' is unknown here; known are pi, x, v, p_a, p_b, u, s, t, c",
+        ),
+        ("drive.force", "-c*x", number, 3, 8, "drive.force is in kg m s^-2, and this is in kg m s^-1"),
+        ("drive.force", "F*0.1", "", 3, 8, "'F' is unknown here"),
+        ("drive.force", "c*v/v*1[m/s]", number, 3, 11, "divides by a value that may be 0 (-1000 to 1000)"),
+        (
+            "drive.force",
+            "exp(abs(v)/1[mm/s])*1[N]",
+            "",
+            3,
+            8,
+            "counts as not finite: bound it by min and max",
+        ),
+        (
+            "drive.force",
+            "-c*v",
+            "parameters.c = { unit = \"N s/m\", value = 400, range = [0, 200] }",
+            4,
+            55,
+            "range: 0 to 200 must hold",
+        ),
+        ("drive.force", "-c*v", "parameters.c = { unit = \"N sx/m\", value = 4 }", 4, 28, "'sx' is no unit"),
+        ("drive.force", "-c*v", "parameters.c = { unit = \"N s/m\" }", 4, 16, "value: needed is one number"),
+        ("drive.force", "0", "parameters.v = { value = 4 }", 0, 1, "parameters.v: a variable has this name"),
+        ("drive.force", "0", "gain = 3", 4, 1, "gain; allowed is"),
+    ] {
+        let text = text(&[(place, add, numbers)]);
+        let error = RigParameters::from_toml(&text, "my-rig.toml").expect_err(add).to_string();
+        assert!(error.starts_with(&format!("my-rig.toml:{}:{column}: ", first + line)), "{add}\n{error}");
+        assert!(error.contains(message), "{add}\n{error}");
+    }
+    let twice = text(&[EDDY, EDDY]).replace("term-1", "term-0");
+    let error = RigParameters::from_toml(&twice, "rig.toml").unwrap_err().to_string();
+    assert!(error.contains("name: term-0 is at drive.force already"), "{error}");
+    let catalogue = text(&[EDDY]).replace("term-0", "inclination");
+    let error = RigParameters::from_toml(&catalogue, "rig.toml").unwrap_err().to_string();
+    assert!(error.contains("an effect of the catalogue has it"), "{error}");
+}
+
+#[test]
+fn a_suspect_adds_nothing_while_it_is_off() {
+    let file = |add: &str, numbers: &str| {
+        format!("[[suspects]]\nname = \"eddy\"\nplace = \"drive.force\"\nadd = \"{add}\"\n{numbers}\n")
+    };
+    let c = "parameters.c = { unit = \"N s/m\", range = [0, 200], prior = 50 }";
+    let good =
+        suspects(&file("-c*v", &format!("{c}\ntwins = [\"friction-asymmetry\"]")), "s.toml").expect("good");
+    assert_eq!((good[0].numbers()[0].prior(), good[0].numbers()[0].value()), (Some(50.0), 0.0));
+    assert_eq!(good[0].twins(), ["friction-asymmetry"]);
+    assert_eq!(suspects(&good[0].toml("suspects"), "s.toml").expect("written as it is read"), good);
+    for (text, message) in [
+        (file("3[N] - c*v", c), "s.toml:4:8: where c is 0 a suspect adds nothing, and this adds 3 N"),
+        (
+            file("-c*v", "parameters.c = { unit = \"N s/m\", value = 1, range = [0, 9] }"),
+            "is its amplitude, and has no value",
+        ),
+        (file("-c*v", "parameters.c = { unit = \"N s/m\" }"), "range: needed are two numbers"),
+        (format!("gain = 1\n{}", file("-c*v", c)), "unknown key gain"),
+        ("[[terms]]\n".to_owned(), "unknown key terms"),
+        (String::new(), "no [[suspects]] in this file"),
+    ] {
+        let error = suspects(&text, "s.toml").expect_err(&text).to_string();
+        assert!(error.starts_with("s.toml:") && error.contains(message), "{text}\n{error}");
+    }
+}
