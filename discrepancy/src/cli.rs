@@ -34,6 +34,8 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Print a model file's equations, numbers, units and suspects; with records, which of them these can tell apart.
     Explain(ExplainArguments),
+    /// List the ready suspects that model files use: laws, what they are bound to, numbers with unit and range.
+    Suspects(SuspectsArguments),
     /// Propose the experiment that distinguishes the effects that a report could not.
     Next(NextArguments),
 }
@@ -108,6 +110,13 @@ pub struct ExplainArguments {
     /// Records that the model is fitted to.
     #[arg(long, num_args = 1..)]
     pub train: Vec<PathBuf>,
+}
+
+/// Which suspects are listed.
+#[derive(Args, Clone, Debug)]
+pub struct SuspectsArguments {
+    /// A library, such as friction, or one suspect of it, such as friction/stribeck; without it all are listed, a line each.
+    pub name: Option<String>,
 }
 
 /// What a rig file is extended by.

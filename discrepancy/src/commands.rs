@@ -5,6 +5,7 @@
 //! takes the files alone.
 
 mod any_plant;
+mod libraries;
 mod text;
 
 use crate::calibrate::calibrate;
@@ -64,6 +65,7 @@ pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
         Command::Extend(arguments) => extend_command(arguments),
         Command::Verify(arguments) => verify_command(arguments),
         Command::Explain(arguments) => explain_command(arguments),
+        Command::Suspects(arguments) => libraries::suspects_command(arguments.name.as_deref()),
         Command::Next(arguments) => next_command(arguments),
     }
 }

@@ -127,6 +127,24 @@ fn a_hidden_term_is_named_and_confirmed_with_its_number() {
     assert!(closed.page.contains("class=\"line s0\""), "the measured line");
 }
 
+/// Its number stands in no file: the extended model has it beside the `use`, and goes on from there.
+#[test]
+fn a_term_of_a_library_is_named_and_written_into_the_extended_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let (before, rest) = OSCILLATOR.split_once("add = \"-k*x^3/mass\"\n").unwrap();
+    let rest = rest.split_once("[0, 1e6] }\n").unwrap().1;
+    let used = "use = \"stiffness/cubic\"\ntimes = \"-1/mass\"\nwith.x = \"x\"\n";
+    let library = format!("{before}{used}{rest}");
+    let closed = closed(folder.path(), &library, |x, _| 400.0 * x * x * x);
+    assert_eq!(closed.report.named[0].suspect, "cubic-stiffness", "{}", closed.report.headline);
+    assert_eq!(closed.report.named[0].term, "dv/dt = … + (-1/mass*(k*x^3))");
+    let path = folder.path().join("extended.toml");
+    fs::write(&path, closed.extended.unwrap()).unwrap();
+    let extended = discrepancy::model_file::read(&path).unwrap_or_else(|error| panic!("{error}"));
+    let k = extended.parameters.iter().find(|one| one.name == "k").unwrap();
+    assert!(extended.suspects[0].is_term && (k.values_si[0] / 400.0 - 1.0).abs() < 0.2, "{k:?}");
+}
+
 #[test]
 fn a_model_that_lacks_nothing_names_nothing() {
     let folder = tempfile::tempdir().unwrap();

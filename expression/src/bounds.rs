@@ -115,6 +115,7 @@ fn call(name: &str, ranges: &[Range]) -> Result<Range, String> {
         "tanh" => [libm::tanh(a), libm::tanh(b)],
         "sin" | "cos" => [-1.0, 1.0],
         "atan" => [libm::atan(a), libm::atan(b)],
+        "floor" => [libm::floor(a), libm::floor(b)],
         "min" => ranges[1..].iter().fold([a, b], |all, more| [all[0].min(more[0]), all[1].min(more[1])]),
         "max" => ranges[1..].iter().fold([a, b], |all, more| [all[0].max(more[0]), all[1].max(more[1])]),
         "if" => hull(&[ranges[1][0], ranges[1][1], ranges[2][0], ranges[2][1]]),

@@ -16,6 +16,7 @@ pub fn function(name: &str) -> Option<(Code, usize)> {
         "sin" => (Code::Sin, 1),
         "cos" => (Code::Cos, 1),
         "atan" => (Code::Atan, 1),
+        "floor" => (Code::Floor, 1),
         "min" => (Code::Min, 2),
         "max" => (Code::Max, 2),
         "if" => (Code::Select, 3),

@@ -122,8 +122,9 @@ pub trait Dimensions {
             (_, Some((_, least))) => least,
             _ => {
                 let more = self.functions();
-                let known =
-                    format!("abs, sign, min, max, sqrt, exp, log, tanh, sin, cos, atan, if, not{more}");
+                let known = format!(
+                    "abs, sign, min, max, sqrt, exp, log, tanh, sin, cos, atan, floor, if, not{more}"
+                );
                 return Err(Wrong::new(at, format!("'{name}' is no function; known are {known}")));
             }
         };

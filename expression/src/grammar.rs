@@ -106,15 +106,45 @@ impl Nodes {
 
     /// Reads an expression that begins at byte `at` of its file.
     pub fn parse(&mut self, text: &str, at: usize) -> Result<Place, Wrong> {
-        let mut parser = Parser { text, begins: at, at: 0, nested: 0, nodes: self };
-        let place = parser.level(0)?;
-        parser.skip_blanks();
-        if parser.at < text.len() {
-            return Err(parser.wrong("an operator is missing here, or a bracket was not opened"));
-        }
-        Ok(place)
+        Parser { text, begins: at, at: 0, nested: 0, nodes: self, names: None }.all()
+    }
+
+    /// Reads an expression of another file, all of it at byte `at` of the one that uses it, with what stands for its names.
+    ///
+    /// # Errors
+    /// [`Wrong`] at byte `at`.
+    pub fn parse_bound(&mut self, text: &str, at: usize, names: &Names<'_>) -> Result<Place, Wrong> {
+        Parser { text, begins: at, at: 0, nested: 0, nodes: self, names: Some(names) }.all()
+    }
+
+    /// The product of two expressions.
+    ///
+    /// # Errors
+    /// [`Wrong`] at byte `at` where it is nested too deep.
+    pub fn product(&mut self, left: Place, right: Place, at: usize) -> Result<Place, Wrong> {
+        self.push(Kind::Binary(Binary::Multiply, left, right), at)
+    }
+
+    /// A name.
+    ///
+    /// # Errors
+    /// [`Wrong`] at byte `at` where there are too many.
+    pub fn name(&mut self, name: &str, at: usize) -> Result<Place, Wrong> {
+        self.push(Kind::Name(name.into()), at)
     }
 }
+
+/// What stands for a name of an expression that another file has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stands {
+    /// An expression that was read before.
+    Expression(Place),
+    /// Another name.
+    Name(String),
+}
+
+/// What stands for names; those that it has nothing for stay.
+pub type Names<'a> = dyn Fn(&str) -> Option<Stands> + 'a;
 
 struct Parser<'a> {
     text: &'a str,
@@ -122,6 +152,7 @@ struct Parser<'a> {
     at: usize,
     nested: usize,
     nodes: &'a mut Nodes,
+    names: Option<&'a Names<'a>>,
 }
 
 /// Operators by their level, longest first.
@@ -148,8 +179,22 @@ enum Operator {
 }
 
 impl Parser<'_> {
+    fn all(mut self) -> Result<Place, Wrong> {
+        let place = self.level(0)?;
+        self.skip_blanks();
+        if self.at < self.text.len() {
+            return Err(self.wrong("an operator is missing here, or a bracket was not opened"));
+        }
+        Ok(place)
+    }
+
+    /// Byte of the file that is read.
+    fn place(&self) -> usize {
+        self.begins + if self.names.is_some() { 0 } else { self.at }
+    }
+
     fn wrong(&self, why: &str) -> Wrong {
-        Wrong::new(self.begins + self.at, why)
+        Wrong::new(self.place(), why)
     }
 
     fn rest(&self) -> &str {
@@ -190,7 +235,7 @@ impl Parser<'_> {
         let mut left = self.level(level + 1)?;
         loop {
             self.skip_blanks();
-            let at = self.begins + self.at;
+            let at = self.place();
             let Some((_, operator)) = operators.iter().find(|(sign, _)| self.take(sign)) else {
                 return Ok(left);
             };
@@ -205,7 +250,7 @@ impl Parser<'_> {
 
     fn negation(&mut self) -> Result<Place, Wrong> {
         self.skip_blanks();
-        let at = self.begins + self.at;
+        let at = self.place();
         if self.take("-") {
             let inner = self.deeper(Self::negation)?;
             return self.nodes.push(Kind::Negation(inner), at);
@@ -215,7 +260,7 @@ impl Parser<'_> {
         }
         let base = self.atom()?;
         self.skip_blanks();
-        let at = self.begins + self.at;
+        let at = self.place();
         if self.take("^") {
             let exponent = self.deeper(Self::negation)?;
             return self.nodes.push(Kind::Binary(Binary::Power, base, exponent), at);
@@ -225,7 +270,7 @@ impl Parser<'_> {
 
     fn atom(&mut self) -> Result<Place, Wrong> {
         self.skip_blanks();
-        let at = self.begins + self.at;
+        let at = self.place();
         if self.take("(") {
             let inner = self.deeper(|parser| parser.level(0))?;
             return if self.take(")") {
@@ -247,7 +292,11 @@ impl Parser<'_> {
         let name: String = rest.chars().take_while(|character| is_of_name(*character)).collect();
         self.at += name.len();
         if !self.take("(") {
-            return self.nodes.push(Kind::Name(name), at);
+            return match self.names.and_then(|names| names(&name)) {
+                Some(Stands::Expression(place)) => Ok(place),
+                Some(Stands::Name(other)) => self.nodes.push(Kind::Name(other), at),
+                None => self.nodes.push(Kind::Name(name), at),
+            };
         }
         let mut arguments = Vec::new();
         if !self.take(")") {
@@ -276,7 +325,7 @@ impl Parser<'_> {
         }
         let Some(end) = self.rest().find(']') else { return Err(self.wrong("] is missing after a unit")) };
         let unit = Unit::parse(&self.rest()[..end])
-            .map_err(|error| Wrong::new(self.begins + self.at + error.at, error.why))?;
+            .map_err(|error| Wrong::new(self.place() + error.at, error.why))?;
         self.at += end + 1;
         self.nodes.push(Kind::Number(value * unit.factor, Some(unit)), at)
     }
@@ -285,6 +334,28 @@ impl Parser<'_> {
 /// Whether a character may stand in a name.
 pub fn is_of_name(character: char) -> bool {
     character.is_alphanumeric() || character == '_'
+}
+
+/// A text with its names exchanged, where another stands for them; numbers and units stay.
+#[must_use]
+pub fn renamed(text: &str, other: &dyn Fn(&str) -> Option<String>) -> String {
+    let mut written = String::new();
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let length = if first.is_ascii_digit() || first == '.' {
+            number_length(rest).max(1)
+        } else if first == '[' {
+            rest.find(']').map_or(rest.len(), |end| end + 1)
+        } else if is_of_name(first) {
+            rest.find(|character| !is_of_name(character)).unwrap_or(rest.len())
+        } else {
+            first.len_utf8()
+        };
+        let part = &rest[..length];
+        written += &other(part).unwrap_or_else(|| part.to_owned());
+        rest = &rest[length..];
+    }
+    written
 }
 
 /// Bytes of the number at the head of a text.

@@ -40,6 +40,7 @@ pub enum Code {
     Sin,
     Cos,
     Atan,
+    Floor,
     Less,
     LessOrEqual,
     Equal,
@@ -189,6 +190,7 @@ impl Registers {
             let is_flat = matches!(
                 operation.code,
                 Code::Sign
+                    | Code::Floor
                     | Code::Less
                     | Code::LessOrEqual
                     | Code::Equal
@@ -327,6 +329,7 @@ impl Tape {
             Code::Sin => (libm::sin(a), [libm::cos(a), 0.0, 0.0]),
             Code::Cos => (libm::cos(a), [-libm::sin(a), 0.0, 0.0]),
             Code::Atan => (libm::atan(a), [1.0 / (1.0 + a * a), 0.0, 0.0]),
+            Code::Floor => (libm::floor(a), [0.0; 3]),
             Code::Less => truth(a < b),
             Code::LessOrEqual => truth(a <= b),
             Code::Equal => truth(a == b),

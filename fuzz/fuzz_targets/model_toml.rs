@@ -23,7 +23,7 @@ fuzz_target!(|text: &str| {
     };
     let start = |start: Start| match start {
         Start::Known { value_si } | Start::Fitted { guess_si: value_si, .. } => value_si,
-        Start::Record { .. } => 0.5,
+        Start::Record { .. } | Start::Input { .. } => 0.5,
     };
     let parameters: Vec<f64> = model.parameters.iter().map(|parameter| parameter.values_si[0]).collect();
     let starts: Vec<f64> = model.states.iter().map(|state| start(state.start)).collect();

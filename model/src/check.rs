@@ -51,6 +51,17 @@ pub(crate) fn definition_unit(model: &Model, index: usize) -> Unit {
     Unit { text: dimension.to_string(), dimension, factor: 1.0 }
 }
 
+/// The dimension of an expression of the model's own names; that of 0 is none.
+pub(crate) fn dimension(model: &Model, root: Place) -> Result<Dimension, Wrong> {
+    let mut dimensions = Checker { model, known: HashMap::new(), open: Vec::new() };
+    Ok(dimensions.node(root, None)?.unwrap_or_default())
+}
+
+/// The dimension of what stands at a place; of a state that of its rate.
+pub(crate) fn target_dimension(model: &Model, target: Target) -> Result<Dimension, Wrong> {
+    Checker { model, known: HashMap::new(), open: Vec::new() }.target(target)
+}
+
 struct Checker<'a> {
     model: &'a Model,
     known: HashMap<usize, Measure>,
@@ -107,12 +118,6 @@ impl Dimensions for Checker<'_> {
 
     fn named(&mut self, name: &str, at: usize, suspect: Option<usize>) -> Result<Measure, Wrong> {
         let model = self.model;
-        if let Some(suspect) = suspect.map(|index| &model.suspects[index])
-            && let Target::Output(output) = suspect.target
-            && model.outputs[output].name == *name
-        {
-            return Ok(Some(model.outputs[output].unit.dimension));
-        }
         Ok(Some(match resolve(model, name, suspect, at)? {
             Symbol::Time => Dimension::TIME,
             Symbol::Pi => Dimension::NONE,
@@ -121,6 +126,7 @@ impl Dimensions for Checker<'_> {
             Symbol::Parameter(index) => model.parameters[index].unit.dimension,
             Symbol::Memory(index) => model.memories[index].unit.dimension,
             Symbol::Output(index) => model.outputs[index].unit.dimension,
+            Symbol::Before(suspect) => self.target(model.suspects[suspect].target)?,
             Symbol::Definition(index) => return self.definition(index, at),
         }))
     }

@@ -84,7 +84,7 @@ pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs
 #[derive(Clone, Copy)]
 struct Scope {
     suspect: Option<usize>,
-    before: Option<(Target, Register)>,
+    before: Option<Register>,
 }
 
 struct Compiler<'a> {
@@ -106,19 +106,42 @@ impl<'a> Compiler<'a> {
         let model = self.model;
         let State { derivative, suspect, .. } = &model.states[state];
         let base = self.node(derivative.root, Scope { suspect: *suspect, before: None })?;
-        self.changed(Target::State(state), base)
+        self.changed(Target::State(state), base, None)
     }
 
-    /// A value with the suspects at its place.
-    fn changed(&mut self, target: Target, base: Register) -> Result<Register, Wrong> {
+    /// What the file says of a place, without terms and suspects; of a state it is its value, not its rate.
+    fn base(&mut self, target: Target) -> Result<Register, Wrong> {
+        let model = self.model;
+        let (root, suspect) = match target {
+            Target::Input(index) => return Ok(self.builder.leaves().input(index)),
+            Target::State(index) => return Ok(self.builder.leaves().state(index)),
+            Target::Definition(index) => {
+                let definition = &model.definitions[index];
+                (definition.value.root, definition.suspect)
+            }
+            Target::Output(index) => (model.outputs[index].value.root, None),
+        };
+        self.node(root, Scope { suspect, before: None })
+    }
+
+    fn whole(&mut self, target: Target, until: Option<usize>) -> Result<Register, Wrong> {
+        let base = self.base(target)?;
+        self.changed(target, base, until)
+    }
+
+    /// A value with the suspects at its place, or with those that act before this one.
+    fn changed(&mut self, target: Target, base: Register, until: Option<usize>) -> Result<Register, Wrong> {
         let mut value = base;
         let terms = (0..self.model.suspects.len()).filter(|index| self.model.suspects[*index].is_term);
         for index in terms.chain(self.suspects.iter().copied()) {
             let suspect = &self.model.suspects[index];
+            if until == Some(index) {
+                break;
+            }
             if suspect.target != target {
                 continue;
             }
-            let scope = Scope { suspect: Some(index), before: Some((target, value)) };
+            let scope = Scope { suspect: Some(index), before: Some(value) };
             let change = self.node(suspect.expression.root, scope)?;
             value = match suspect.change {
                 Change::Add => self.builder.push(Code::Add, &[value, change]),
@@ -149,21 +172,13 @@ impl<'a> Compiler<'a> {
         let register = match symbol {
             Symbol::Time => 0,
             Symbol::Pi => self.builder.constant(core::f64::consts::PI),
-            Symbol::Input(index) => self.changed(Target::Input(index), leaves.input(index))?,
+            Symbol::Input(index) => self.whole(Target::Input(index), None)?,
             Symbol::State(index) => leaves.state(index),
             Symbol::Parameter(index) => leaves.parameter(index),
             Symbol::Memory(index) => leaves.memory(index),
-            Symbol::Definition(index) => {
-                let definition = &self.model.definitions[index];
-                let scope = Scope { suspect: definition.suspect, before: None };
-                let base = self.node(definition.value.root, scope)?;
-                self.changed(Target::Definition(index), base)?
-            }
-            Symbol::Output(index) => {
-                let base =
-                    self.node(self.model.outputs[index].value.root, Scope { suspect: None, before: None })?;
-                self.changed(Target::Output(index), base)?
-            }
+            Symbol::Definition(index) => self.whole(Target::Definition(index), None)?,
+            Symbol::Output(index) => self.whole(Target::Output(index), None)?,
+            Symbol::Before(suspect) => self.whole(self.model.suspects[suspect].target, Some(suspect))?,
         };
         self.open.pop();
         self.known.insert(symbol, register);
@@ -183,14 +198,10 @@ impl Compile for Compiler<'_> {
     }
 
     fn named(&mut self, name: &str, at: usize, scope: Scope) -> Result<Register, Wrong> {
-        if let Some((target, before)) = scope.before
-            && !matches!(target, Target::State(_))
-            && self.model.target_name(target) == name
-        {
-            return Ok(before);
+        match (resolve(self.model, name, scope.suspect, at)?, scope.before) {
+            (Symbol::Before(_), Some(before)) => Ok(before),
+            (symbol, _) => self.symbol(symbol, at),
         }
-        let symbol = resolve(self.model, name, scope.suspect, at)?;
-        self.symbol(symbol, at)
     }
 
     fn called(

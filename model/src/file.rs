@@ -162,6 +162,11 @@ pub enum Start {
         /// Index into [`Model::outputs`].
         output: usize,
     },
+    /// The first sample of an input.
+    Input {
+        /// Index into [`Model::inputs`].
+        input: usize,
+    },
 }
 
 /// A state with its equation.
@@ -265,6 +270,8 @@ pub struct Suspect {
     pub effect: Option<String>,
     /// It acts in a part of what the folds go over, so that only folds in time judge it.
     pub is_local: bool,
+    /// Library and suspect in it that it is an instance of, as `use` names them.
+    pub library: Option<String>,
     /// Suspects that are known to do the same.
     pub twins: Vec<String>,
     /// Carried to be rejected: one that does better than every suspect ends the search.

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `file`, `read` | the file as data; its reader |
 //! | `rows` | which rows count, and over what a model is judged |
+//! | `library` | ready suspects in variables of their own |
 //! | `names` | what names mean |
 //! | `check` | names, numbers of arguments, dimensions |
 //! | `compile` | suspects in their places, bytecode |
@@ -25,6 +26,7 @@ use expression::{inputs, tape, units};
 mod check;
 mod compile;
 mod file;
+mod library;
 mod names;
 mod read;
 mod rows;
@@ -37,5 +39,6 @@ pub use file::{
     Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Smoothing, Solver,
     Start, State, Suspect, Target,
 };
+pub use library::{Entry, EntryMemory, EntryParameter, EntryState, Library, Quantity, Variable};
 pub use rows::Rows;
 pub use simulate::{Direction, Failure, Program, Simulator};

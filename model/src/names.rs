@@ -1,6 +1,6 @@
 //! What names in expressions mean: quantities of the model, and functions.
 
-use crate::file::Model;
+use crate::file::{Model, Target};
 use expression::grammar::Wrong;
 
 /// Definitions that stand in each other; with the depth of each it bounds the stack.
@@ -21,6 +21,17 @@ pub(crate) enum Symbol {
     Memory(usize),
     Definition(usize),
     Output(usize),
+    /// What the place of a suspect is without it.
+    Before(usize),
+}
+
+/// Before a name that the suspect of a library gives to a number, state or memory of its own: no text has it, so that it means
+/// nothing else even where the model has a name that reads the same.
+const OWN: char = '#';
+
+/// Such a name.
+pub(crate) fn own_name(name: &str) -> String {
+    format!("{OWN}{name}")
 }
 
 pub(crate) fn name_of(model: &Model, symbol: Symbol) -> &str {
@@ -33,7 +44,19 @@ pub(crate) fn name_of(model: &Model, symbol: Symbol) -> &str {
         Symbol::Memory(index) => &model.memories[index].name,
         Symbol::Definition(index) => &model.definitions[index].name,
         Symbol::Output(index) => &model.outputs[index].name,
+        Symbol::Before(suspect) => model.target_name(model.suspects[suspect].target),
     }
+}
+
+fn own(model: &Model, name: &str, suspect: Option<usize>) -> Option<Symbol> {
+    let is_it = |(other, of): (&String, Option<usize>)| other == name && of.is_some() && of == suspect;
+    let parameter = model.parameters.iter().position(|one| is_it((&one.name, one.suspect)));
+    let state = || model.states.iter().position(|one| is_it((&one.name, one.suspect)));
+    let memory = || model.memories.iter().position(|one| is_it((&one.name, one.suspect)));
+    parameter
+        .map(Symbol::Parameter)
+        .or_else(|| state().map(Symbol::State))
+        .or_else(|| memory().map(Symbol::Memory))
 }
 
 pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usize) -> Result<Symbol, Wrong> {
@@ -42,7 +65,20 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
         "pi" => return Ok(Symbol::Pi),
         _ => {}
     }
-    let seen = |of: Option<usize>| of.is_none() || of == suspect;
+    if let Some(name) = name.strip_prefix(OWN) {
+        return own(model, name, suspect).ok_or_else(|| Wrong::new(at, format!("'{name}' is unknown")));
+    }
+    let owner = suspect.and_then(|index| model.suspects.get(index));
+    // The file's own names alone may stand in what a suspect of a library is bound to.
+    let is_closed = owner.is_some_and(|owner| owner.library.is_some());
+    let seen = |of: Option<usize>| of.is_none() || of == suspect && !is_closed;
+    if let Some(owner) = owner
+        && !matches!(owner.target, Target::State(_))
+        && model.target_name(owner.target) == name
+        && let Some(suspect) = suspect
+    {
+        return Ok(Symbol::Before(suspect));
+    }
     let find = |mut names: Box<dyn Iterator<Item = (&String, Option<usize>)> + '_>| {
         names.position(|(other, of)| other == name && seen(of))
     };

@@ -1,10 +1,10 @@
 //! Reads the tables of a model file.
 
 mod inputs;
+mod suspects;
 
 use crate::file::{
-    Change, Definition, Expression, Memory, Model, Output, Parameter, RecordLayout, Solver, Start, State,
-    Suspect, Table, Target,
+    Definition, Expression, Memory, Model, Output, Parameter, RecordLayout, Solver, Start, State, Table,
 };
 use crate::rows::Rows;
 use crate::units::{Dimension, Unit};
@@ -14,9 +14,9 @@ use settings::{Section, SettingsError, Source, Text};
 use std::path::Path;
 
 /// Names that expressions have from the start.
-const RESERVED: [&str; 18] = [
+const RESERVED: [&str; 19] = [
     "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
-    "cos", "atan", "delay",
+    "cos", "atan", "floor", "delay",
 ];
 /// Points from which fits start unless the file says how many.
 const STARTS: usize = 8;
@@ -25,7 +25,6 @@ const MOST_NAMES: usize = 500;
 
 struct Reader<'a> {
     source: &'a Source<'a>,
-    nodes: Nodes,
     model: Model,
     /// Place names of suspects with what stands there, for when all names are known.
     starts: Vec<(usize, Text)>,
@@ -67,7 +66,7 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
         text: source.text().into(),
         file: file.into(),
     };
-    let mut reader = Reader { source, nodes: Nodes::default(), model, starts: Vec::new() };
+    let mut reader = Reader { source, model, starts: Vec::new() };
     reader.tables(&mut root)?;
     reader.inputs(&mut root)?;
     reader.members(&mut root, None)?;
@@ -86,7 +85,7 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
     }
     reader.resolve_starts()?;
     root.finish()?;
-    Ok(Model { nodes: reader.nodes, ..reader.model })
+    Ok(reader.model)
 }
 
 fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, SettingsError> {
@@ -187,7 +186,10 @@ fn range(section: &mut Section<'_>, unit: &Unit) -> Result<[f64; 2], SettingsErr
 }
 
 /// The tables under a key, by their names.
-fn named<'a>(section: &mut Section<'a>, key: &str) -> Result<Vec<(String, Section<'a>)>, SettingsError> {
+pub(crate) fn named<'a>(
+    section: &mut Section<'a>,
+    key: &str,
+) -> Result<Vec<(String, Section<'a>)>, SettingsError> {
     let Some(mut all) = section.section(key)? else { return Ok(Vec::new()) };
     let mut found = Vec::new();
     for name in all.keys() {
@@ -199,7 +201,7 @@ fn named<'a>(section: &mut Section<'a>, key: &str) -> Result<Vec<(String, Sectio
 
 impl Reader<'_> {
     fn expression(&mut self, text: Text) -> Result<Expression, SettingsError> {
-        let root = self.nodes.parse(&text.text, text.at);
+        let root = self.model.nodes.parse(&text.text, text.at);
         let root = root.map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))?;
         Ok(Expression { text: text.text.trim().into(), root, at: text.at })
     }
@@ -265,7 +267,17 @@ impl Reader<'_> {
     fn members(&mut self, parent: &mut Section<'_>, suspect: Option<usize>) -> Result<(), SettingsError> {
         for (name, section) in named(parent, "parameters")? {
             self.is_new(&name, suspect, &section)?;
-            self.parameter(name, section, suspect)?;
+            let parameter = Parameter {
+                name,
+                unit: Unit::one(),
+                values_si: Vec::new(),
+                tolerance_si: None,
+                range_si: [f64::NEG_INFINITY, f64::INFINITY],
+                is_fixed: false,
+                is_per_record: false,
+                suspect,
+            };
+            self.parameter(section, parameter)?;
         }
         for (name, mut section) in named(parent, "states")? {
             self.is_new(&name, suspect, &section)?;
@@ -298,20 +310,23 @@ impl Reader<'_> {
         section.finish()
     }
 
-    fn parameter(
-        &mut self,
-        name: String,
-        mut section: Section<'_>,
-        suspect: Option<usize>,
-    ) -> Result<(), SettingsError> {
-        let unit = unit(&mut section, self.source)?;
-        let values_si: Vec<f64> = section.numbers("value")?.iter().map(|value| value * unit.factor).collect();
+    /// A parameter with what the file says of it in place of what it is without.
+    fn parameter(&mut self, mut section: Section<'_>, before: Parameter) -> Result<(), SettingsError> {
+        // Each key is asked for, so that a message of one that is misspelt names it.
+        let given = unit(&mut section, self.source)?;
+        let unit = if section.has("unit") { given } else { before.unit };
+        let values = section.numbers("value")?;
+        let values_si: Vec<f64> = match values.as_slice() {
+            [] if !section.has("value") => before.values_si,
+            values => values.iter().map(|value| value * unit.factor).collect(),
+        };
         if values_si.is_empty() || values_si.len() > 8 {
             return Err(
                 section.wrong_at("value", "value: allowed is a number, or up to 8 from which a fit starts")
             );
         }
-        let range_si = range(&mut section, &unit)?;
+        let given = range(&mut section, &unit)?;
+        let range_si = if section.has("range") { given } else { before.range_si };
         let [least, most] = range_si;
         if values_si.iter().any(|value| !(least..=most).contains(value)) {
             return Err(section.wrong_at("value", "value: not within range"));
@@ -321,12 +336,15 @@ impl Reader<'_> {
             [one] if *one > 0.0 => Some(one * unit.factor),
             _ => return Err(section.wrong_at("tolerance", "tolerance: allowed is a number above 0")),
         };
-        let (is_fixed, is_per_record) = (section.flag("fixed")?, section.flag("per_record")?);
+        let given = section.flag("fixed")?;
+        let is_fixed = if section.has("fixed") { given } else { before.is_fixed };
+        let is_per_record = section.flag("per_record")?;
         if is_fixed && is_per_record {
             return Err(section
                 .wrong_at("per_record", "per_record: the number is fixed, so that no record has its own"));
         }
         section.finish()?;
+        let Parameter { name, suspect, .. } = before;
         let parameter =
             Parameter { name, unit, values_si, tolerance_si, range_si, is_fixed, is_per_record, suspect };
         self.model.parameters.push(parameter);
@@ -339,7 +357,7 @@ impl Reader<'_> {
         if section.peek("start").is_none() {
             let value_si = one_or(section, "start", f64::NAN, [-1e300, 1e300])? * unit.factor;
             if value_si.is_nan() {
-                let allowed = "a number, \"fitted\" with a guess, or the name of an output";
+                let allowed = "a number, \"fitted\" with a guess, or the name of an output or input";
                 return Err(section.wrong(&format!("start is missing: allowed is {allowed}")));
             }
             return Ok(Start::Known { value_si });
@@ -359,17 +377,21 @@ impl Reader<'_> {
 
     fn resolve_starts(&mut self) -> Result<(), SettingsError> {
         for (state, text) in &self.starts {
-            let Some(output) = self.model.outputs.iter().position(|output| output.name == text.text) else {
+            let output = self.model.outputs.iter().position(|output| output.name == text.text);
+            let input = self.model.inputs.iter().position(|input| input.name == text.text);
+            let found = output.map(|output| (Start::Record { output }, &self.model.outputs[output].unit));
+            let found = found.or(input.map(|input| (Start::Input { input }, &self.model.inputs[input].unit)));
+            let Some((start, unit)) = found else {
                 let why = format!(
-                    "'{}' is no output; allowed is a number, \"fitted\", or the name of an output",
+                    "'{}' is no output and no input; allowed is a number, \"fitted\", or the name of one",
                     text.text
                 );
                 return Err(self.source.wrong_from(text.at, &why));
             };
-            if self.model.outputs[output].unit.dimension != self.model.states[*state].unit.dimension {
-                return Err(self.source.wrong_from(text.at, "the output has another unit than the state"));
+            if unit.dimension != self.model.states[*state].unit.dimension {
+                return Err(self.source.wrong_from(text.at, "it has another unit than the state"));
             }
-            self.model.states[*state].start = Start::Record { output };
+            self.model.states[*state].start = start;
         }
         Ok(())
     }
@@ -388,65 +410,5 @@ impl Reader<'_> {
             self.model.outputs.push(Output { name, column, scale, unit, value, noise_si, model_error_si });
         }
         Ok(())
-    }
-
-    fn suspect(&mut self, mut section: Section<'_>, is_term: bool) -> Result<(), SettingsError> {
-        let index = self.model.suspects.len();
-        let name = section.needed_text("name", "what reports call it")?;
-        if self.model.suspects.iter().any(|other| other.name == name.text) {
-            return Err(section.wrong_at("name", "name: the name is taken by another suspect"));
-        }
-        let target =
-            section.needed_text("place", "the input, state, definition or output that it changes")?;
-        let target = self.target(&target)?;
-        self.members(&mut section, Some(index))?;
-        let mut found = None;
-        for (key, change) in
-            [("add", Change::Add), ("multiply", Change::Multiply), ("replace", Change::Replace)]
-        {
-            let Some(text) = section.text(key)? else { continue };
-            if found.is_some() {
-                return Err(
-                    section.wrong_at(key, &format!("{key}: a suspect has one of add, multiply, replace"))
-                );
-            }
-            found = Some((change, self.expression(text)?));
-        }
-        let Some((change, expression)) = found else {
-            return Err(
-                section.wrong("one of add, multiply, replace is missing: what the suspect does at its place")
-            );
-        };
-        let (twins, is_decoy) = (section.texts("twins")?, section.flag("decoy")?);
-        let effect = section.text("effect")?.map(|text| text.text);
-        let is_local = section.flag("local")?;
-        section.finish()?;
-        let name = name.text;
-        self.model.suspects.push(Suspect {
-            name,
-            target,
-            change,
-            expression,
-            is_term,
-            effect,
-            is_local,
-            twins,
-            is_decoy,
-        });
-        Ok(())
-    }
-
-    fn target(&self, text: &Text) -> Result<Target, SettingsError> {
-        let model = &self.model;
-        let name = &text.text;
-        let input = model.inputs.iter().position(|one| one.name == *name).map(Target::Input);
-        let states = model.states.iter().position(|one| one.suspect.is_none() && one.name == *name);
-        let defined = model.definitions.iter().position(|one| one.suspect.is_none() && one.name == *name);
-        let output = model.outputs.iter().position(|one| one.name == *name).map(Target::Output);
-        let all = input.or(states.map(Target::State)).or(defined.map(Target::Definition)).or(output);
-        all.ok_or_else(|| {
-            let why = format!("'{name}' is no input, state, definition or output of this model");
-            self.source.wrong_from(text.at, &why)
-        })
     }
 }

@@ -2,6 +2,7 @@
 
 mod files;
 mod integration;
+mod libraries;
 
 #[global_allocator]
 static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;
@@ -21,7 +22,7 @@ pub(crate) fn refused(text: &str) -> String {
 pub(crate) fn first_values(model: &Model) -> [Vec<f64>; 3] {
     let start = |start: Start| match start {
         Start::Known { value_si } | Start::Fitted { guess_si: value_si, .. } => value_si,
-        Start::Record { .. } => 0.0,
+        Start::Record { .. } | Start::Input { .. } => 0.0,
     };
     [
         model.parameters.iter().map(|parameter| parameter.values_si[0]).collect(),

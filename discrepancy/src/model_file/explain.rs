@@ -49,6 +49,7 @@ pub(crate) fn in_words(model: &Model) -> String {
             Start::Record { output } => {
                 format!("starts at the first sample of {}", model.outputs[output].name)
             }
+            Start::Input { input } => format!("starts at the first sample of {}", model.inputs[input].name),
         };
         format!("d{}/dt = {}    {} in {}, {start}", state.name, state.derivative.text, state.name, unit.text)
     };

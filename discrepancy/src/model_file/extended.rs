@@ -1,9 +1,11 @@
 //! The extended model file: what was named stands under `[[terms]]`, numbers are those of the fit.
 //!
-//! Everything else of the file stays, comments too. Terms are fitted again with the model in the next run.
+//! Numbers of a library are written beside its `use`. Everything else of the file stays, comments too. Terms are fitted again
+//! with the model in the next run.
 
+use model::Library;
 use serde::Deserialize;
-use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, value};
 
 /// Why a model file cannot be extended.
 #[derive(Debug, thiserror::Error)]
@@ -65,7 +67,7 @@ pub fn extended(text: &str, report: &ReportedModel) -> Result<String, ExtendErro
     for ReportedName { suspect } in &report.named {
         let suspects = document.get_mut("suspects").and_then(Item::as_array_of_tables_mut);
         let suspects = suspects.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
-        let is_it = |table: &toml_edit::Table| table.get("name").and_then(Item::as_str) == Some(suspect);
+        let is_it = |table: &Table| table.get("name").and_then(Item::as_str) == Some(suspect);
         let place = suspects.iter().position(is_it);
         let place = place.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
         let mut term = suspects.get(place).expect("it was found").clone();
@@ -79,8 +81,28 @@ pub fn extended(text: &str, report: &ReportedModel) -> Result<String, ExtendErro
 
 /// Writes fitted numbers over the values of a table's parameters. One at an end of its range keeps that of the file.
 fn put(table: &mut dyn TableLike, report: &ReportedModel, suspect: Option<&str>) {
-    let Some(parameters) = table.get_mut("parameters").and_then(Item::as_table_like_mut) else { return };
-    for number in report.parameters.iter().filter(|number| number.suspect.as_deref() == suspect) {
+    let numbers = report.parameters.iter().filter(|number| number.suspect.as_deref() == suspect);
+    // Numbers that stand in a library get a place of their own.
+    let library = table.get("use").and_then(Item::as_str).and_then(Library::entry);
+    let parameters = match table.get_mut("parameters") {
+        None if library.is_none() => return,
+        None => {
+            let mut own = Table::new();
+            own.set_dotted(true);
+            table.entry("parameters").or_insert(Item::Table(own))
+        }
+        Some(parameters) => parameters,
+    };
+    let Some(parameters) = parameters.as_table_like_mut() else { return };
+    for number in numbers {
+        let is_of_library = library.is_some_and(|(_, entry)| entry.has_parameter(&number.name));
+        if is_of_library && !number.is_at_bound {
+            let inner = || value(InlineTable::new());
+            let parameter = parameters.entry(&number.name).or_insert_with(inner);
+            if let Some(parameter) = parameter.as_table_like_mut() {
+                parameter.entry("value").or_insert(value(number.value));
+            }
+        }
         let Some(parameter) = parameters.get_mut(&number.name).and_then(Item::as_table_like_mut) else {
             continue;
         };
@@ -114,6 +136,14 @@ name = "offset"
         serde_json::from_str(&text).unwrap()
     }
 
+    impl ReportedModel {
+        fn with(mut self, name: &str, value: f64) -> Self {
+            let suspect = Some("drag".to_owned());
+            self.parameters.push(ReportedNumber { name: name.into(), suspect, value, is_at_bound: false });
+            self
+        }
+    }
+
     #[test]
     fn what_is_named_becomes_a_term_with_its_number() {
         let text = extended(MODEL, &report("drag")).unwrap();
@@ -122,6 +152,22 @@ name = "offset"
         assert_eq!(read["terms"][0]["parameters"]["k"]["value"].as_float(), Some(0.25), "{text}");
         assert_eq!(read["parameters"]["mass"]["value"].as_float(), Some(1.5), "{text}");
         assert!(text.contains("# A comment.") && text.contains("# of the carriage"), "{text}");
+    }
+
+    #[test]
+    fn a_number_of_a_library_stands_with_the_term_that_uses_it() {
+        let model =
+            "[[suspects]]\nname = \"drag\"\nuse = \"damping/turbulent\"\nplace = \"v\"\nwith.v = \"v\"\n";
+        let text = extended(model, &report("drag").with("c", 2.5)).unwrap();
+        let term = &text.parse::<toml::Table>().unwrap()["terms"][0];
+        assert_eq!(term["parameters"]["c"]["value"].as_float(), Some(2.5), "{text}");
+        assert_eq!(term["use"].as_str(), Some("damping/turbulent"), "{text}");
+        // `k` of the report is no number of this suspect.
+        assert!(term["parameters"].get("k").is_none(), "{text}");
+        // Once more, over the number that stands there now.
+        let again =
+            extended(&text.replace("[[terms]]", "[[suspects]]"), &report("drag").with("c", 3.5)).unwrap();
+        assert!(again.contains("3.5") && !again.contains("2.5"), "{again}");
     }
 
     #[test]

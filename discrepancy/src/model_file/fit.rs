@@ -124,6 +124,7 @@ impl<'a> Fitting<'a> {
             Start::Record { output } => {
                 record.outputs[output].iter().flatten().next().copied().unwrap_or(0.0)
             }
+            Start::Input { input } => record.inputs[input].first().copied().unwrap_or(0.0),
         };
         let starts_si = records
             .iter()

@@ -1,0 +1,346 @@
+//! Reads `[[suspects]]` and `[[terms]]`: written out, or from a library with its variables bound.
+
+use super::Reader;
+use crate::check::{dimension, target_dimension};
+use crate::file::{Change, Expression, Memory, Parameter, Start, State, Suspect, Target};
+use crate::library::{Entry, Library, PLACE, Quantity};
+use crate::names::own_name;
+use crate::units::{Dimension, Unit};
+use expression::grammar::{Place, Stands, Wrong, is_of_name, renamed};
+use settings::{Section, SettingsError, Text};
+
+/// Where a suspect of a library stands, and what it is bound to.
+struct Bound<'a> {
+    entry: &'a Entry,
+    index: usize,
+    target: Target,
+    /// Where the file names the library: what goes wrong in its expressions goes wrong there.
+    at: usize,
+    bound: Vec<(&'a str, Place)>,
+    /// What stands for each variable, as the file has it.
+    texts: Vec<(&'a str, String)>,
+    /// Dimensions of the variables, of the place and of time.
+    dimensions: Vec<(&'a str, Dimension)>,
+}
+
+impl Bound<'_> {
+    fn unit(&self, quantity: &Quantity) -> (Unit, bool) {
+        let of = |name: &str| self.dimensions.iter().find(|(other, _)| *other == name);
+        quantity.unit_of(&|name| of(name).map_or(Dimension::NONE, |(_, dimension)| *dimension))
+    }
+
+    /// What stands for a name of the library's expressions.
+    fn stands(&self, name: &str) -> Option<Stands> {
+        let variable = self.bound.iter().find(|(variable, _)| *variable == name);
+        let own = || self.entry.has_own(name).then(|| Stands::Name(own_name(name)));
+        variable.map(|(_, place)| Stands::Expression(*place)).or_else(own)
+    }
+
+    /// An expression of the library in the words of the file.
+    fn written(&self, text: &str) -> String {
+        let of = |name: &str| self.texts.iter().find(|(variable, _)| *variable == name);
+        let written = renamed(text, &|name| of(name).map(|(_, text)| text.clone()));
+        // `abs(v)` has its brackets already.
+        let doubled = self.texts.iter().map(|(_, text)| text).filter(|text| text.starts_with('('));
+        doubled.fold(written, |written, text| written.replace(&format!("({text})"), text))
+    }
+}
+
+/// Where an expression is put in place of a name: in brackets unless it is a name, a number or a call.
+fn bracketed(text: &str) -> String {
+    let name = text.find(|character| !is_of_name(character)).unwrap_or(text.len());
+    let mut depth = 0_i32;
+    let closes = text.find(|character| {
+        depth += i32::from(character == '(') - i32::from(character == ')');
+        character == ')' && depth == 0
+    });
+    let is_call = name > 0 && text[name..].starts_with('(') && closes == Some(text.len() - 1);
+    if name == text.len() || is_call { text.to_owned() } else { format!("({text})") }
+}
+
+impl Reader<'_> {
+    pub(super) fn suspect(&mut self, mut section: Section<'_>, is_term: bool) -> Result<(), SettingsError> {
+        let index = self.model.suspects.len();
+        let used = section.text("use")?;
+        let library = used.as_ref().map(|used| self.entry(used)).transpose()?;
+        let name = match (&library, section.text("name")?) {
+            (_, Some(name)) => name.text,
+            (Some((_, entry)), None) => entry.name.clone(),
+            (None, None) => section.needed_text("name", "what reports call it")?.text,
+        };
+        if self.model.suspects.iter().any(|other| other.name == name) {
+            return Err(section.wrong_at("name", "name: the name is taken by another suspect"));
+        }
+        let place = section.needed_text("place", "the input, state, definition or output that it changes")?;
+        let target = self.target(&place)?;
+        let (twins, is_decoy) = (section.texts("twins")?, section.flag("decoy")?);
+        let effect = section.text("effect")?.map(|text| text.text);
+        let is_local = section.flag("local")?;
+        let (change, expression, effect, is_local) = match library.zip(used.as_ref()) {
+            Some(((library, entry), used)) => {
+                let effect = effect.or_else(|| entry.effect.clone());
+                let expression = self.instance(&mut section, (library, entry), (index, target, used.at))?;
+                (entry.change, expression, effect, is_local || entry.is_local)
+            }
+            None => {
+                let (change, expression) = self.written_out(&mut section, index)?;
+                (change, expression, effect, is_local)
+            }
+        };
+        section.finish()?;
+        let library = used.map(|used| used.text);
+        self.model.suspects.push(Suspect {
+            name,
+            target,
+            change,
+            expression,
+            is_term,
+            effect,
+            is_local,
+            library,
+            twins,
+            is_decoy,
+        });
+        Ok(())
+    }
+
+    /// A suspect whose law the file has.
+    fn written_out(
+        &mut self,
+        section: &mut Section<'_>,
+        index: usize,
+    ) -> Result<(Change, Expression), SettingsError> {
+        self.members(section, Some(index))?;
+        let mut found = None;
+        for (key, change) in
+            [("add", Change::Add), ("multiply", Change::Multiply), ("replace", Change::Replace)]
+        {
+            let Some(text) = section.text(key)? else { continue };
+            if found.is_some() {
+                return Err(
+                    section.wrong_at(key, &format!("{key}: a suspect has one of add, multiply, replace"))
+                );
+            }
+            found = Some((change, self.expression(text)?));
+        }
+        found.ok_or_else(|| {
+            section.wrong("one of add, multiply, replace is missing: what the suspect does at its place")
+        })
+    }
+
+    fn entry(&self, used: &Text) -> Result<(&'static Library, &'static Entry), SettingsError> {
+        let wrong = |why: &str| Err(self.source.wrong_from(used.at, why));
+        let (library, suspect) = used.text.split_once('/').unwrap_or((&used.text, ""));
+        let Some(library) = Library::all().iter().find(|one| one.name == library) else {
+            let known: Vec<&str> = Library::all().iter().map(|one| one.name).collect();
+            return wrong(&format!(
+                "use: '{library}' is no library; allowed is LIBRARY/SUSPECT, of {}",
+                known.join(", ")
+            ));
+        };
+        let Some(entry) = library.entries.iter().find(|entry| entry.name == suspect) else {
+            let known: Vec<&str> = library.entries.iter().map(|entry| entry.name.as_str()).collect();
+            let name = library.name;
+            return wrong(&format!("use: '{suspect}' is not in {name}; it has {}", known.join(", ")));
+        };
+        Ok((library, entry))
+    }
+
+    /// The expression of a suspect of a library, whose numbers, states and memories become those of the model.
+    fn instance(
+        &mut self,
+        section: &mut Section<'_>,
+        (library, entry): (&'static Library, &'static Entry),
+        (index, target, at): (usize, Target, usize),
+    ) -> Result<Expression, SettingsError> {
+        if entry.reads_place() && matches!(target, Target::State(_)) {
+            let name = &entry.name;
+            return Err(section.wrong_at(
+                "place",
+                &format!("place: {name} changes an input, a definition or an output; this is a state"),
+            ));
+        }
+        let (texts, dimensions) = (Vec::new(), vec![("time", Dimension::TIME)]);
+        let mut bound = Bound { entry, index, target, at, bound: Vec::new(), texts, dimensions };
+        let mut of_place = target_dimension(&self.model, target).map_err(|wrong| self.wrong(&wrong))?;
+        let times = match section.text("times")? {
+            Some(_) if entry.change != Change::Add => {
+                return Err(section.wrong_at("times", "times: a factor or a replacement has none"));
+            }
+            Some(text) => {
+                let times = self.expression(text)?;
+                let factor = dimension(&self.model, times.root).map_err(|wrong| self.wrong(&wrong))?;
+                of_place = of_place.over(factor);
+                Some(times)
+            }
+            None => None,
+        };
+        bound.dimensions.push((PLACE, of_place));
+        if !matches!(target, Target::State(_)) {
+            let name = self.model.target_name(target).to_owned();
+            let place = self.model.nodes.name(&name, at).map_err(|wrong| self.wrong(&wrong))?;
+            bound.bound.push((PLACE, place));
+            bound.texts.push((PLACE, name));
+        }
+        self.bind(section, library, &mut bound)?;
+        self.numbers(section, &bound)?;
+        self.states(section, &bound)?;
+        for memory in &entry.memories {
+            let update = self.of_library(&bound, &memory.update)?;
+            let (name, unit) = (memory.name.clone(), bound.unit(&memory.quantity).0);
+            self.model.memories.push(Memory { name, unit, start_si: 0.0, update, suspect: Some(index) });
+        }
+        let mut expression = self.of_library(&bound, &entry.expression)?;
+        if let Some(times) = times {
+            let product = self.model.nodes.product(times.root, expression.root, at);
+            expression.root = product.map_err(|wrong| self.wrong(&wrong))?;
+            expression.text = format!("{}*({})", times.text, expression.text);
+        }
+        Ok(expression)
+    }
+
+    fn wrong(&self, wrong: &Wrong) -> SettingsError {
+        self.source.wrong_from(wrong.at, &wrong.why)
+    }
+
+    /// Binds the variables that the suspect uses.
+    fn bind<'b>(
+        &mut self,
+        section: &mut Section<'_>,
+        library: &'b Library,
+        bound: &mut Bound<'b>,
+    ) -> Result<(), SettingsError> {
+        let variables = library.variables_of(bound.entry);
+        let mut with = section.section("with")?;
+        let mut without = Vec::new();
+        for variable in &variables {
+            let given = with.as_mut().map(|with| with.text(&variable.name)).transpose()?.flatten();
+            match (given, &variable.default) {
+                (Some(text), _) => {
+                    let expression = self.expression(text)?;
+                    let text = bracketed(&expression.text);
+                    self.put(bound, &variable.name, (expression.root, text))?;
+                }
+                (None, Some(default)) => without.push((&variable.name, default)),
+                (None, None) => {
+                    let (name, about, unit) = (&variable.name, &variable.about, &variable.unit.text);
+                    let why = format!("with.{name} is missing: {about}, usually in {unit}");
+                    return Err(section.wrong(&why));
+                }
+            }
+        }
+        if let Some(with) = with {
+            with.finish()?;
+        }
+        for (name, default) in without {
+            let expression = self.of_library(bound, default)?;
+            self.put(bound, name, (expression.root, bracketed(&expression.text)))?;
+        }
+        Ok(())
+    }
+
+    fn put<'b>(
+        &self,
+        bound: &mut Bound<'b>,
+        name: &'b str,
+        (root, text): (Place, String),
+    ) -> Result<(), SettingsError> {
+        let measured = dimension(&self.model, root).map_err(|wrong| self.wrong(&wrong))?;
+        bound.bound.push((name, root));
+        bound.texts.push((name, text));
+        bound.dimensions.push((name, measured));
+        Ok(())
+    }
+
+    fn of_library(&mut self, bound: &Bound<'_>, text: &str) -> Result<Expression, SettingsError> {
+        let root = self.model.nodes.parse_bound(text, bound.at, &|name| bound.stands(name));
+        let root = root.map_err(|wrong| self.wrong(&wrong))?;
+        Ok(Expression { text: bound.written(text), root, at: bound.at })
+    }
+
+    /// The numbers of a suspect of a library, with what the file says of them.
+    fn numbers(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<(), SettingsError> {
+        let mut given = section.section("parameters")?;
+        for number in &bound.entry.parameters {
+            let (unit, is_usual) = bound.unit(&number.quantity);
+            // In another dimension 0 and no bound are the same, and nothing else is.
+            let stays = |value: f64| is_usual || value == 0.0 || value.is_infinite();
+            let [least, most] = number.range_si;
+            let parameter = Parameter {
+                name: number.name.clone(),
+                values_si: if number.values_si.iter().all(|value| stays(*value)) {
+                    number.values_si.clone()
+                } else {
+                    Vec::new()
+                },
+                tolerance_si: None,
+                range_si: [
+                    if stays(least) { least } else { f64::NEG_INFINITY },
+                    if stays(most) { most } else { f64::INFINITY },
+                ],
+                is_fixed: number.is_fixed,
+                is_per_record: false,
+                suspect: Some(bound.index),
+                unit,
+            };
+            let table = given.as_mut().map(|given| given.section(&number.name)).transpose()?.flatten();
+            match table {
+                Some(table) => self.parameter(table, parameter)?,
+                None if parameter.values_si.is_empty() => {
+                    let (name, unit) = (&number.name, &parameter.unit.text);
+                    return Err(section.wrong(&format!(
+                        "parameters.{name}.value is missing: the library has none for this place, in {unit}; or name its unit"
+                    )));
+                }
+                None => self.model.parameters.push(parameter),
+            }
+        }
+        given.map_or(Ok(()), |given| given.finish())
+    }
+
+    /// The states of a suspect of a library; the file may say where they start.
+    fn states(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<(), SettingsError> {
+        let mut given = section.section("states")?;
+        for state in &bound.entry.states {
+            let mut unit = bound.unit(&state.quantity).0;
+            let table = given.as_mut().map(|given| given.section(&state.name)).transpose()?.flatten();
+            let start = match (table, bound.target) {
+                (Some(mut table), _) => {
+                    if table.has("unit") {
+                        unit = super::unit(&mut table, self.source)?;
+                    }
+                    let start = self.start(&mut table, &unit)?;
+                    table.finish()?;
+                    start
+                }
+                (None, _) if state.is_zero_at_start => Start::Known { value_si: 0.0 },
+                (None, Target::Input(input)) => Start::Input { input },
+                (None, Target::Output(output)) => Start::Record { output },
+                (None, _) => {
+                    let name = &state.name;
+                    return Err(section.wrong(&format!(
+                        "states.{name}.start is missing, and no record has it at this place: a number or \"fitted\" with a guess"
+                    )));
+                }
+            };
+            let derivative = self.of_library(bound, &state.derivative)?;
+            let (name, suspect) = (state.name.clone(), Some(bound.index));
+            self.model.states.push(State { name, unit, start, derivative, suspect });
+        }
+        given.map_or(Ok(()), |given| given.finish())
+    }
+
+    fn target(&self, text: &Text) -> Result<Target, SettingsError> {
+        let model = &self.model;
+        let name = &text.text;
+        let input = model.inputs.iter().position(|one| one.name == *name).map(Target::Input);
+        let states = model.states.iter().position(|one| one.suspect.is_none() && one.name == *name);
+        let defined = model.definitions.iter().position(|one| one.suspect.is_none() && one.name == *name);
+        let output = model.outputs.iter().position(|one| one.name == *name).map(Target::Output);
+        let all = input.or(states.map(Target::State)).or(defined.map(Target::Definition)).or(output);
+        all.ok_or_else(|| {
+            let why = format!("'{name}' is no input, state, definition or output of this model");
+            self.source.wrong_from(text.at, &why)
+        })
+    }
+}

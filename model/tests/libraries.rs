@@ -1,0 +1,164 @@
+//! Suspects of libraries: bound to names of a model, with its units, and refused with line and column.
+
+use crate::{first_values, read, refused, simulated};
+use model::{Change, Inputs, Program, Start, Target};
+
+/// A balance whose names are those of a library's numbers, too.
+const BALANCE: &str = r#"[inputs.speed]
+unit = "mm/s"
+[inputs.load]
+unit = "bar"
+[parameters]
+viscous = { unit = "N s/m", value = 2 }
+excess = { unit = "N", value = 7 }
+[define]
+friction = "viscous*speed"
+[outputs.force]
+unit = "N"
+value = "friction + excess"
+[[suspects]]
+use = "friction/stribeck"
+place = "friction"
+with.v = "speed - 1[mm/s]"
+[[suspects]]
+name = "more-viscous"
+use = "friction/viscous"
+place = "force"
+times = "-viscous/4[N s/m]"
+with.v = "speed"
+parameters.viscous = { unit = "N s/mm", value = 3, range = [0, 9], tolerance = 1 }
+"#;
+
+#[test]
+fn a_suspect_of_a_library_is_bound_to_names_of_the_model() {
+    let model = read(BALANCE);
+    let [stribeck, viscous] = &model.suspects[..] else { panic!("{:?}", model.suspects) };
+    assert_eq!(
+        (stribeck.name.as_str(), stribeck.library.as_deref()),
+        ("stribeck", Some("friction/stribeck"))
+    );
+    assert_eq!(
+        (stribeck.target, stribeck.change, stribeck.is_local),
+        (Target::Definition(0), Change::Add, true)
+    );
+    assert_eq!(stribeck.expression.text, "excess*sign(speed - 1[mm/s])*exp(-abs(speed - 1[mm/s])/velocity)");
+    assert_eq!(viscous.expression.text, "-viscous/4[N s/m]*(viscous*speed)");
+    let of = |suspect: usize| {
+        let own = model.parameters.iter().filter(move |one| one.suspect == Some(suspect));
+        own.map(|one| (one.name.as_str(), one.unit.text.as_str(), one.values_si[0])).collect::<Vec<_>>()
+    };
+    assert_eq!(of(0), [("excess", "N", 5.0), ("velocity", "mm/s", 0.002)]);
+    assert_eq!(of(1), [("viscous", "N s/mm", 3000.0)]);
+    // 5 N of its own excess, not the 7 N of the model; its own viscous, times the model's over 4.
+    let inputs = Inputs { time_s: &[0.0], samples_si: &[vec![0.003], vec![0.0]] };
+    let value = |suspects: &[usize]| {
+        let program = Program::new(&model, suspects).unwrap();
+        simulated(&program, &[], &inputs, &first_values(&model)).unwrap()[0].0
+    };
+    let alone = 2.0 * 0.003 + 7.0;
+    assert!((value(&[]) - alone).abs() < 1e-12);
+    assert!((value(&[0]) - (alone + 5.0 * (-1.0_f64).exp())).abs() < 1e-12);
+    assert!((value(&[1]) - (alone - 0.5 * 3000.0 * 0.003)).abs() < 1e-12);
+}
+
+#[test]
+fn a_number_has_the_unit_that_follows_from_what_is_bound() {
+    let rotary = BALANCE.replace("unit = \"N\"", "unit = \"N m\"").replace("N s/m\"", "N m s\"");
+    let rotary = rotary.replace("\"mm/s\"", "\"rad/s\"").replace("1[mm/s]", "1[rad/s]");
+    let rotary = rotary.split("[[suspects]]").next().unwrap().to_owned();
+    let linear = "[[suspects]]\nuse = \"damping/quadratic\"\nplace = \"friction\"\nwith.v = \"speed\"\n";
+    let model = read(&(rotary.clone() + linear));
+    // N m over (rad/s)^2.
+    assert_eq!(model.parameters[2].unit.text, "kg m^2");
+    let stribeck = linear.replace("damping/quadratic", "friction/stribeck");
+    let message = refused(&(rotary.clone() + &stribeck));
+    assert!(
+        message.contains(
+            "parameters.excess.value is missing: the library has none for this place, in kg m^2 s^-2"
+        ),
+        "{message}"
+    );
+    let given = "parameters.excess = { unit = \"N m\", value = 1 }\n\
+                 parameters.velocity = { unit = \"deg/s\", value = 5 }\n";
+    let model = read(&(rotary + &stribeck + given));
+    assert!((model.parameters[3].values_si[0] - 5.0_f64.to_radians()).abs() < 1e-15);
+}
+
+/// A lag at an input, and one at an output: each reads what its place is without it, in the equation of its state too.
+#[test]
+fn a_lag_follows_what_its_place_is_without_it() {
+    let model = read(
+        "[inputs.u]\nunit = \"V\"\n[outputs.y]\nunit = \"V\"\nvalue = \"2*u\"\n\
+         [[suspects]]\nname = \"actuator-lag\"\nuse = \"actuator/lag\"\nplace = \"u\"\nparameters.lag = { value = 0.5 }\n\
+         [[suspects]]\nname = \"sensor-lag\"\nuse = \"sensor/lag\"\nplace = \"y\"\nparameters.lag = { value = 0.5 }\n\
+         states.late = { start = 2 }\n",
+    );
+    assert_eq!(model.states[0].start, Start::Input { input: 0 });
+    assert_eq!(model.states[1].start, Start::Known { value_si: 2.0 });
+    let inputs = Inputs { time_s: &[0.0, 1.0], samples_si: &[vec![3.0, 3.0]] };
+    let mut values = first_values(&model);
+    values[1] = vec![1.0, 2.0];
+    for (suspect, start) in [(0, 2.0), (1, 2.0)] {
+        let program = Program::new(&model, &[suspect]).unwrap();
+        let ends = simulated(&program, &[], &inputs, &values).unwrap()[1].0;
+        // From its start to 6 V with 0.5 s; the relative tolerance of the integration is 1e-6.
+        assert!((ends - (6.0 + (start - 6.0) * (-2.0_f64).exp())).abs() < 1e-4, "{suspect}: {ends}");
+    }
+}
+
+#[test]
+fn a_suspect_of_a_library_that_cannot_be_used_is_refused_with_line_and_column() {
+    let mut wrong = Vec::new();
+    for (from, to, message) in [
+        (
+            "friction/stribeck",
+            "frictions/stribeck",
+            "model.toml:14:8: use: 'frictions' is no library; allowed is",
+        ),
+        (
+            "friction/stribeck",
+            "friction/stribek",
+            "model.toml:14:8: use: 'stribek' is not in friction; it has coulomb,",
+        ),
+        ("friction/stribeck", "friction", "use: '' is not in friction"),
+        ("with.v = \"speed - 1[mm/s]\"", "", "with.v is missing: sliding speed, usually in m/s"),
+        ("with.v = \"speed - 1[mm/s]\"", "with.w = \"speed\"", "with.v is missing"),
+        (
+            "with.v = \"speed\"",
+            "with = { v = \"speed\", x = \"1\" }",
+            "unknown key suspects[2].with.x; allowed is v",
+        ),
+        ("speed - 1[mm/s]", "sped", "model.toml:16:11: 'sped' is unknown here"),
+        ("speed - 1[mm/s]", "excess", "parameters.velocity.value is missing"),
+        ("{ unit = \"N s/mm\"", "{ unit = \"N\"", "more-viscous is in kg m s^-2, and this is in"),
+        (
+            "parameters.viscous",
+            "parameters.vicsous",
+            "unknown key suspects[2].parameters.vicsous; allowed is viscous",
+        ),
+        (
+            "value = 3, range",
+            "valeu = 3, range",
+            "unknown key suspects[2].parameters.viscous.valeu; allowed is unit, value,",
+        ),
+        ("with.v = \"speed\"", "with.v = \"speed\"\nadd = \"1\"", "unknown key suspects[2].add"),
+        (
+            "use = \"friction/viscous\"",
+            "use = \"actuator/gain\"",
+            "times: a factor or a replacement has none",
+        ),
+    ] {
+        assert!(BALANCE.contains(from), "{from}");
+        let found = refused(&BALANCE.replacen(from, to, 1));
+        if !found.contains(message) || !found.starts_with("model.toml:") {
+            wrong.push(format!("{from} -> {to}\n  {found}\n  {message}"));
+        }
+    }
+    let at_state = "[states.x]\nstart = 0\nderivative = \"0/1[s]\"\n[outputs.y]\nvalue = \"x\"\n\
+                    [[suspects]]\nuse = \"actuator/lag\"\nplace = \"x\"\n";
+    let found = refused(at_state);
+    if !found.contains("place: lag changes an input, a definition or an output") {
+        wrong.push(found);
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
