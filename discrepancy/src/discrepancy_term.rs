@@ -139,6 +139,8 @@ struct Term {
     precisions: Vec<f64>,
     offsets: Vec<f64>,
     windows: Vec<InputProducts>,
+    /// Whether each axis of a window counts as one in `nuisance`.
+    axis_by_axis: bool,
     measured: [bool; 2],
     /// The variables of each axis, balance, window and block.
     values: [[Vec<BlockValues>; 4]; 2],
@@ -156,9 +158,9 @@ impl Term {
         let mut places: Vec<(&GriddedRecord, usize)> = Vec::new();
         let mut from = 0;
         for part in engine.windows() {
-            let to = from + part.count() * engine.rows();
+            let to = from + part.count() * part.rows();
             let columns: Vec<&[f64]> = all.iter().map(|column| &column[from..to]).collect();
-            windows.extend(part.input_products(&rig, &columns)?);
+            windows.extend(part.input_products(&rig, &columns, engine.axis_by_axis())?);
             places.extend(part.starts().iter().map(|start| (part.record(), *start)));
             from = to;
         }
@@ -170,6 +172,7 @@ impl Term {
             precisions: prior_precisions(beside.placed),
             offsets: prior_deviations(&beside.factors, beside.placed),
             windows,
+            axis_by_axis: engine.axis_by_axis(),
             measured: places.first().map_or([false; 2], |(record, _)| record.measured),
             values,
         })
@@ -265,6 +268,14 @@ impl Term {
             scores.push(cross.row(0).iter().copied().collect::<Vec<f64>>());
             let among = inputs.transpose() * &window.gram[axis] * &inputs;
             information.push((cross.rows(1, cross.nrows() - 1).into_owned(), among));
+            if self.axis_by_axis {
+                // The input moves no reading of the other axis.
+                let other = 2 * at + 1 - axis;
+                let none = |(between, among): &(DMatrix<f64>, DMatrix<f64>)| (0.0 * between, 0.0 * among);
+                let last = information.last().expect("the axis has one");
+                information.insert(other, none(last));
+                scores.insert(other, vec![0.0; columns]);
+            }
         }
         self.nuisance.extended(&scores, &information)
     }
@@ -282,8 +293,9 @@ fn values_of(places: &[(&GriddedRecord, usize)], axis: usize, balance: usize) ->
 
 /// Replaces the force readings by simulated ones: a term over the force would correlate with the noise of its own readings.
 fn simulated_forces(engine: &Engine<'_>, simulated: &[f64], values: &mut [[Vec<BlockValues>; 4]; 2]) {
-    let (rows, mut window) = (engine.rows(), 0);
+    let mut window = 0;
     for part in engine.windows() {
+        let rows = part.rows();
         let width = part.outputs().len();
         for (output, (axis, channel)) in part.outputs().iter().enumerate().filter(|(_, of)| of.1 == FORCE) {
             let noise = part.record().noise[*axis][*channel];

@@ -6,14 +6,16 @@
 //!   C_j    = effect j at a probe - baseline
 //! ```
 //!
-//! All columns are whitened, with the start states of the windows projected out ([`crate::windows`]). Simulations run on all
+//! All columns are whitened, with the start states of the windows projected out ([`crate::windows`]). Where both axes are measured
+//! and their rods are not linked, each axis of a window is a window of its own, axis by axis in a column: a law that is missing
+//! on one axis says nothing about the noise of the other, whose weights it would take. Simulations run on all
 //! cores and are gathered in a fixed order, so that two runs have the same bits.
 
-use crate::fit::Products;
+use crate::fit::{self, Products};
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
 use crate::stats::order_statistic;
-use crate::windows::{ReferenceRun, VariableRanges, Windows, dot};
+use crate::windows::{ReferenceRun, VariableRanges, Windows, axis_by_axis, dot};
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -35,6 +37,8 @@ type Sensitivities = (RigParameters, [f64; COUNT], Vec<Vec<f64>>);
 pub struct Engine<'a> {
     windows: Vec<Windows<'a>>,
     rig: RigParameters,
+    /// Whether each axis of a window counts as a window.
+    axis_by_axis: bool,
     rows: usize,
     scaled_dof: Vec<f64>,
     /// Common variance factor of the noise, by the quietest windows.
@@ -47,11 +51,13 @@ impl<'a> Engine<'a> {
     /// An engine of some records of the same axes.
     pub fn new(records: &'a [GriddedRecord], rig: &RigParameters) -> Self {
         let windows: Vec<Windows<'a>> = records.par_iter().map(|record| Windows::new(record, rig)).collect();
-        let rows = windows.first().map_or(0, Windows::rows);
-        let scaled_dof = windows.iter().flat_map(Windows::dof).collect();
+        let axis_by_axis = windows.iter().all(Windows::axes_are_apart);
+        let rows = windows.first().map_or(0, Windows::rows) / if axis_by_axis { 2 } else { 1 };
+        let scaled_dof = windows.iter().flat_map(|windows| windows.dof(axis_by_axis)).collect();
         let mut engine = Engine {
             windows,
             rig: rig.clone(),
+            axis_by_axis,
             rows,
             scaled_dof,
             variance_factor: 1.0,
@@ -70,12 +76,13 @@ impl<'a> Engine<'a> {
             self.windows.par_iter().map(|windows| Windows::new(windows.record(), rig)).collect();
         let scaled_dof = windows
             .iter()
-            .flat_map(Windows::dof)
+            .flat_map(|windows| windows.dof(self.axis_by_axis))
             .map(|scaled_dof| scaled_dof * self.variance_factor)
             .collect();
         Engine {
             windows,
             rig: self.rig.clone(),
+            axis_by_axis: self.axis_by_axis,
             rows: self.rows,
             scaled_dof,
             variance_factor: self.variance_factor,
@@ -99,6 +106,19 @@ impl<'a> Engine<'a> {
     /// Numbers in a window.
     pub fn rows(&self) -> usize {
         self.rows
+    }
+
+    /// Whether each axis of a window counts as a window, the drive first.
+    pub(crate) fn axis_by_axis(&self) -> bool {
+        self.axis_by_axis
+    }
+
+    /// The loss of windows with these squares, and their degrees of freedom, on some axes where each counts as a window.
+    pub(crate) fn loss_on(&self, axes: [bool; 2], squares: &[f64]) -> (f64, f64) {
+        let counts = |at: &usize| !self.axis_by_axis || axes[at % 2];
+        let (squares, dof): (Vec<f64>, Vec<f64>) =
+            (0..squares.len()).filter(counts).map(|at| (squares[at], self.scaled_dof[at])).unzip();
+        (fit::loss(&squares, &dof), dof.iter().sum())
     }
 
     /// Degrees of freedom of each window times the common variance factor.
@@ -185,8 +205,13 @@ impl<'a> Engine<'a> {
         let mut at = 0;
         let mut all = Vec::with_capacity(simulated.len());
         for windows in &self.windows {
-            let length = windows.count() * self.rows;
-            all.extend(what(windows, &simulated[at..at + length], &from[at..at + length]));
+            let length = windows.count() * windows.rows();
+            let made = what(windows, &simulated[at..at + length], &from[at..at + length]);
+            if self.axis_by_axis {
+                made.chunks_exact(windows.rows()).for_each(|window| all.extend(axis_by_axis(window)));
+            } else {
+                all.extend(made);
+            }
             at += length;
         }
         all

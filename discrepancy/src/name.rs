@@ -15,6 +15,7 @@
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
 mod consistency;
+mod decision;
 mod elimination;
 mod explanations;
 mod gauss_newton;
@@ -32,15 +33,17 @@ use crate::estimator::RELINEARISED;
 use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 use consistency::{amplitude_variation, eliminate_inconsistent, prefer_consistent, prefer_large};
+pub use decision::NotExplained;
+use decision::{Decision, Searched, decide};
 pub(crate) use elimination::same;
-use elimination::{alternatives, eliminate_backward, shares, swap};
+use elimination::{alternatives, eliminate_backward, swap};
 pub use explanations::{Evidence, Explanation, ExplanationKind};
 use explanations::{Fits, explanations};
 use gauss_newton::{backtrack, fit_selected};
 use needed_parameters::with_needed;
 pub(crate) use needed_parameters::{is_off, off};
 use null_distribution::NullDistribution;
-pub(crate) use probabilities::probabilities;
+use plant::effects::sheet::Part;
 use rayon::prelude::*;
 use round::Round;
 use start_states::{RefitWithInitialStates, refit_with_starts};
@@ -68,15 +71,6 @@ const MIN_LOSS_SHARE_FIRST: f64 = 0.1;
 const MIN_LOSS_SHARE_FURTHER: f64 = 0.3;
 /// Smallest amplitude, as a share of the smallest change that occurs.
 const MIN_AMPLITUDE_RATIO: f64 = 0.85;
-/// Share of the loss after calibration that an explanation may leave: impostors for what was left out left 0.54 and more on seed
-/// 13, a development seed, and on the frozen record without `inclination`; all but two right names left 0 to 0.45.
-const MOST_LOSS_LEFT: f64 = 0.5;
-/// Share of the excess that a name beside effects without one needs: on seed 13 hidden effects took 0.11 to 0.86 of it, and
-/// effects named where only a background was hidden 0.04 to 0.12.
-const MIN_SHARE_BESIDE_SMALL: f64 = 0.2;
-/// Most baseline parameters that may be significantly off beside an effect: with more, it is an impostor that they carry.
-/// Chosen on draws of seed 4, a development seed.
-const MAX_PARAMETERS_OFF: usize = 3;
 /// Effects defined by their first number alone: a check valve without cracking pressure is a line resistance, and on linked rods
 /// damping alone absorbs the errors of the start states.
 const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
@@ -88,23 +82,6 @@ pub struct Alternative {
     pub fit: Refit,
     /// Share of the excess that it removes.
     pub share: f64,
-}
-
-/// Why a model with effects is no explanation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotExplained {
-    TooLittle,
-    TooManyParametersOff,
-}
-
-impl NotExplained {
-    /// In words, for its effects.
-    pub(crate) fn reason(self) -> &'static str {
-        match self {
-            NotExplained::TooLittle => "explains too little",
-            NotExplained::TooManyParametersOff => "explains it only beside too many parameters that are off",
-        }
-    }
 }
 
 #[derive(Debug)]
@@ -137,21 +114,10 @@ pub struct SelectionResult {
     pub amplitude_variation: Vec<f64>,
     /// Why the effects of the model are not named.
     pub not_explained: Option<NotExplained>,
+    /// Whether each effect of the model has a name.
+    pub is_named: Vec<bool>,
     /// What was compared, nothing first.
     pub explanations: Vec<Explanation>,
-}
-
-impl SelectionResult {
-    /// Whether the effect at this place of the model has a name.
-    pub fn is_named(&self, at: usize) -> bool {
-        is_named(&self.model, &self.shares, at)
-    }
-}
-
-/// Whether an effect of a model has a name: it is large, and beside small ones it takes much of the excess.
-fn is_named(model: &Refit, shares: &[f64], at: usize) -> bool {
-    let only_large = model.placed.iter().all(is_large);
-    is_large(&model.placed[at]) && (only_large || shares[at] >= MIN_SHARE_BESIDE_SMALL)
 }
 
 /// Selects the effects that are missing from the baseline.
@@ -201,7 +167,7 @@ pub fn name(
         let Some(best) = round.fits.first_mut() else { break };
         // The null distribution is drawn from the residual of the best model, since explained signal is not noise. No threshold
         // applies here: an effect that turns out unnecessary is eliminated at the end.
-        if !consistent && (number >= MAX_EFFECTS || !gains_enough(&model, best)) {
+        if !consistent && (number >= MAX_EFFECTS || !gains_enough(here, &model, best)) {
             break;
         }
         any_consistent |= consistent;
@@ -215,7 +181,7 @@ pub fn name(
         restarted = best_restarted.or(restarted);
     }
     let here = restarted.as_ref().unwrap_or(engine);
-    let first = rounds.first().and_then(|round| round.first()).cloned();
+    let all_rounds = rounds.clone();
     if lacks_fit(here, model.loss) {
         eliminate_inconsistent(here, &calibrated, &mut model, &mut rounds);
     } else {
@@ -225,30 +191,12 @@ pub fn name(
     threshold = null.threshold();
     let limits = limits_of(&null, &columns, threshold);
     let lacks_fit = lacks_fit(here, model.loss);
-    let shares_of = |model: &Refit, rounds: &[Vec<Refit>]| {
-        shares(model, rounds, &calibrated, (calibrated.fit.loss - model.loss).max(1e-9))
-    };
-    let mut shares = shares_of(&model, &rounds);
-    let any_named = (0..model.placed.len()).any(|at| is_named(&model, &shares, at));
     progress("weighing explanations");
     let fits = Fits { parameters: &calibrated.fit, model: &model, fitted: &fitted };
     let explanations = explanations(here, &linearisation, &columns, &fits);
-    let explains_too_little = lacks_fit && (!any_named || model.loss > MOST_LOSS_LEFT * calibrated.fit.loss);
-    if explains_too_little && let Some(first) = first {
-        // It comes nearest to what is outside the catalogue.
-        rounds = vec![vec![first.clone()]];
-        model = first;
-        shares = shares_of(&model, &rounds);
-    }
-    let explained = with_needed(here, &model);
-    let parameters_off = off(here, &explained).into_iter().filter(|off| *off).count();
-    let not_explained = if explains_too_little {
-        Some(NotExplained::TooLittle)
-    } else if !any_consistent && !model.placed.is_empty() && parameters_off > MAX_PARAMETERS_OFF {
-        Some(NotExplained::TooManyParametersOff)
-    } else {
-        None
-    };
+    let searched = Searched { model, rounds, all_rounds, lacks_fit, any_consistent };
+    let decision = decide(here, &calibrated, &explanations, searched);
+    let Decision { model, rounds, shares, is_named, explained, not_explained } = decision;
     let reported = if not_explained.is_some() {
         let restarted = engine.is_linked().then(|| engine.with_starts_under(&calibrated.rig(engine.rig())));
         with_needed(restarted.as_ref().unwrap_or(engine), &calibrated.fit)
@@ -279,6 +227,7 @@ pub fn name(
         lacks_fit,
         amplitude_variation,
         not_explained,
+        is_named,
         explanations,
     }
 }
@@ -299,10 +248,32 @@ fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.
-fn gains_enough(before: &Refit, after: &Refit) -> bool {
+fn gains_enough(engine: &Engine<'_>, before: &Refit, after: &Refit) -> bool {
     let gain = before.loss - after.loss;
     let share = if before.placed.is_empty() { MIN_LOSS_SHARE_FIRST } else { MIN_LOSS_SHARE_FURTHER };
-    gain > (share * before.loss).max(MIN_LOSS_REDUCTION)
+    gain > (share * loss_where_last_acts(engine, before, after)).max(MIN_LOSS_REDUCTION)
+}
+
+/// The axes that effects act on; both where there is none.
+fn axes_of(placed: &[EffectEstimate]) -> [bool; 2] {
+    [Part::Drive, Part::Load].map(|axis| {
+        placed.is_empty()
+            || placed.iter().any(|effect| {
+                let part = effect.candidate.place.part;
+                part == axis || matches!(part, Part::Linkage | Part::Supply)
+            })
+    })
+}
+
+/// The loss of a fit on some axes, its penalties included; the whole one where the axes are not judged apart.
+fn loss_on(engine: &Engine<'_>, axes: [bool; 2], fit: &Refit) -> f64 {
+    let of = |axes: [bool; 2]| engine.loss_on(axes, &fit.squares).0;
+    if engine.axis_by_axis() && axes != [true; 2] { fit.loss - of([true; 2]) + of(axes) } else { fit.loss }
+}
+
+/// The loss of a model on the axes that the last effect of another one acts on.
+fn loss_where_last_acts(engine: &Engine<'_>, model: &Refit, other: &Refit) -> f64 {
+    loss_on(engine, axes_of(other.placed.last().map_or(&[], std::slice::from_ref)), model)
 }
 
 /// Whether a model with this loss leaves more than noise.

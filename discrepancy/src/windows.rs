@@ -132,11 +132,28 @@ impl<'a> Windows<'a> {
         WINDOW * self.outputs.len()
     }
 
-    /// Degrees of freedom of each window.
-    pub fn dof(&self) -> Vec<f64> {
-        let rows = self.rows();
-        let valid = self.valid.chunks_exact(rows).map(|valid| valid.iter().filter(|valid| **valid).count());
-        valid.zip(&self.bases).map(|(valid, basis)| valid.saturating_sub(basis.len()).max(1) as f64).collect()
+    /// Whether the residuals of the axes have nothing to do with each other: both are measured, and their rods are not linked.
+    pub(crate) fn axes_are_apart(&self) -> bool {
+        self.record.measured == [true, true] && !self.record.linked
+    }
+
+    /// Degrees of freedom of each window, or of each axis in it.
+    pub(crate) fn dof(&self, axis_by_axis: bool) -> Vec<f64> {
+        let width = if axis_by_axis { CHANNELS } else { self.outputs.len() };
+        let groups = self.outputs.len() / width;
+        let of_group = |at: usize, group: usize| {
+            let in_group = |row: &usize| row / width % groups == group;
+            let valid = &self.valid[at * self.rows()..][..self.rows()];
+            let readings = (0..valid.len()).filter(in_group).filter(|row| valid[*row]).count();
+            let most = |direction: &&Vec<f64>| {
+                (0..direction.len()).filter(in_group).map(|row| direction[row].powi(2)).sum::<f64>() > 0.5
+            };
+            readings.saturating_sub(self.bases[at].iter().filter(most).count()).max(1) as f64
+        };
+        (0..self.count())
+            .flat_map(|at| (0..groups).map(move |group| (at, group)))
+            .map(|(at, group)| of_group(at, group))
+            .collect()
     }
 
     /// Noise-free readings of a rig over their noise.
@@ -237,6 +254,14 @@ impl<'a> Windows<'a> {
         let shown = plant.shown(&plant.truth(inputs));
         into.extend(self.outputs.iter().map(|(axis, at)| shown[*axis][*at] / self.record.noise[*axis][*at]));
     }
+}
+
+/// A window's values axis by axis, in place of period by period.
+pub(crate) fn axis_by_axis(window: &[f64]) -> Vec<f64> {
+    let of_axis = |axis: usize| {
+        window.chunks_exact(2 * CHANNELS).flat_map(move |period| &period[axis * CHANNELS..][..CHANNELS])
+    };
+    (0..2).flat_map(of_axis).copied().collect()
 }
 
 /// Projects values on the complement of an orthonormal basis.

@@ -9,7 +9,8 @@
 STUDY is a folder of `scripts/study` with records (`one records`), and with classes where `cosines` was run. --left-out takes the hidden effect and
 those alike out of the catalogue: then none of these is right. The program is the example `explanations` of the crate
 discrepancy: cargo build --release -p discrepancy --example explanations. --label takes the reports of a study that was run
-(`scripts/study run`, `one run`, `one leave-out`) under that label instead.
+(`scripts/study run`, `one run`, `one leave-out`) under that label instead. Rows with each_axis 0 are of programs that had one weight for
+both axes; of exact records, whose right explanation leaves nothing on either axis.
 
 Conditional logit (McFadden 1974): of a record, explanation j has the probability exp(w'x_j) / sum_k exp(w'x_k). The weights
 maximise the log-likelihood of the right explanations minus RIDGE |w|^2 / 2.
@@ -32,7 +33,7 @@ RIG = HERE.parents[1] / "plant" / "rig.toml"
 PROGRAM = HERE.parents[1] / "target" / "release" / "examples" / "explanations"
 
 EVIDENCE = ["loss_per_dof", "behind", "parameters_moved", "amplitude_variation", "smallest_amplitude", "small_beside", "share"]
-COLUMNS = ["seed", "draw", "left_out", "background", "hidden", "kind", "sets", "right", *EVIDENCE]
+COLUMNS = ["seed", "draw", "left_out", "background", "hidden", "kind", "sets", "right", *EVIDENCE, "each_axis"]
 # Cosine above which two effects count as one class, as in the study.
 TWIN_COSINE = 0.95
 
@@ -139,6 +140,7 @@ def judged(key: tuple[str, str, str], explanations: list[dict], truth: set[str],
                 "sets": " | ".join(" + ".join(names) for names in sets),
                 "right": str(int(right)),
                 **{field: "" if number is None else f"{number:.6g}" for field, number in numbers.items()},
+                "each_axis": "1",
             }
         )
     if all(row["right"] == "0" for row in made):
@@ -166,7 +168,8 @@ def append(made: list[Row]) -> None:
 
 # Regressors: constants of the kinds, then evidence on the scales on which the program decides; their names are those of weights.json.
 REGRESSORS = [
-    "parameters", "effects", "none_of_these", "selected", "behind", "excess", "moved", "parameters_alone", "variation", "amplitude",
+    "parameters", "effects", "none_of_these", "selected", "behind", "excess", "excess_of_effects", "moved", "parameters_alone",
+    "variation", "amplitude",
 ]  # fmt: skip
 # Of the normal prior of a weight, whose standard deviation is its inverse square root; and the probability of none of these whatever
 # the evidence says. Both minimise the cross-validated log loss of the draws of seed 15.
@@ -185,16 +188,18 @@ def regressors(row: Row, *, selected: bool) -> Vector:
         return [float(regressor == "none_of_these") for regressor in REGRESSORS]
     moved = float(row["parameters_moved"])
     amplitude = float(row["smallest_amplitude"] or 1)
+    excess = math.log1p(max(float(row["loss_per_dof"]), 0) / 0.08)
     return [
         float(kind == "parameters"),
         float(kind == "effects"),
         0.0,
         float(selected),
         math.log1p(float(row["behind"]) / 9),
-        math.log1p(max(float(row["loss_per_dof"]), 0) / 0.08),
+        excess,
+        excess if kind == "effects" else 0.0,
         moved,
         math.log(max(moved, 1e-3) / 0.1) if kind == "parameters" else 0.0,
-        math.log1p(float(row["amplitude_variation"] or 0) / 0.3),
+        math.log1p(float(row["amplitude_variation"] or 0) / 0.1),
         math.log(min(max(amplitude, 1), 10)),
     ]
 

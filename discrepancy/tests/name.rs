@@ -1,6 +1,6 @@
 //! Claims about naming, on records that the plant makes here with something hidden in it.
 
-use crate::record::{gridded, hiding};
+use crate::record::{both_gridded, gridded, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{ExplanationKind, SelectionResult, is_large, name};
@@ -167,6 +167,26 @@ fn what_is_no_candidate_is_outside_the_catalogue() {
     let hidden = hiding(&[("position-dependent-force", "drive", &[("spring_n", 30.0)])]);
     let found = found(&hidden, &["position-dependent-force"]);
     assert!(found.not_explained.is_some(), "named {:?}", names(&found));
+}
+
+/// Each axis has its own weights: with one for both, what is missing on the load took nine tenths of the drive's.
+#[test]
+fn what_is_missing_on_the_other_axis_hides_no_effect() {
+    let hidden = hiding(&[
+        ("valve-dead-zone", "drive", &[("dead_zone_percent", 1.0)]),
+        ("heat-exchange", "load", &[("coefficient_w_per_m2_k", 60.0)]),
+    ]);
+    let records = [both_gridded(&hidden, &RigParameters::baseline())];
+    assert!(records[0].measured == [true, true] && !records[0].linked);
+    let engine = Engine::new(&records, &RigParameters::baseline());
+    let without = ["heat-exchange".to_owned()];
+    let candidates = Candidate::all(&RigParameters::baseline(), [true, true], false, &without);
+    let found = name(&engine, candidates, &mut |_| ());
+    assert_eq!(found.not_explained, None);
+    assert_eq!(names(&found)[0], "valve-dead-zone drive");
+    let explanation = found.explanations.iter().find(|one| one.kind == ExplanationKind::Effects);
+    let evidence = explanation.and_then(|one| one.evidence).expect("of the dead zone");
+    assert!(found.lacks_fit && evidence.loss_per_dof < 0.1 && evidence.share > 0.9, "{evidence:?}");
 }
 
 #[test]

@@ -12,7 +12,8 @@
 //! between-study coefficient of variation.
 
 use super::{
-    EFFECT_PARAMETER_PENALTY, MIN_LOSS_REDUCTION, STEPS, is_large, lacks_fit, leading_key, relinearise,
+    EFFECT_PARAMETER_PENALTY, MIN_LOSS_REDUCTION, STEPS, is_large, lacks_fit, leading_key,
+    loss_where_last_acts, relinearise,
 };
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
@@ -41,7 +42,10 @@ pub(super) fn prefer_consistent(
 ) -> bool {
     let gain = |fit: &Refit| before.loss - fit.loss;
     let Some(most) = fits.first().map(gain) else { return false };
-    let needed = (MIN_LOSS_SHARE * before.loss).max(MIN_LOSS_REDUCTION).max(MIN_GAIN_SHARE * most);
+    let needed = |fit: &Refit| {
+        let share = MIN_LOSS_SHARE * loss_where_last_acts(engine, before, fit);
+        share.max(MIN_LOSS_REDUCTION).max(MIN_GAIN_SHARE * most)
+    };
     let is_consistent = |fit: &Refit| {
         let variation = amplitude_variation(engine, linearisation, fit);
         variation.and_then(|all| all.last().copied()).is_some_and(|variation| variation < MAX_VARIATION)
@@ -49,7 +53,7 @@ pub(super) fn prefer_consistent(
     let consistent: Vec<Refit> = fits
         .par_iter()
         .take(COMPARED)
-        .filter(|fit| gain(fit) > needed && is_consistent(fit))
+        .filter(|fit| gain(fit) > needed(fit) && is_consistent(fit))
         .cloned()
         .collect();
     let found = !consistent.is_empty();

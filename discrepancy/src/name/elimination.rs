@@ -1,7 +1,9 @@
 //! Backward elimination of effects, swaps between rounds, and alternatives.
 
 use super::null_distribution::NullDistribution;
-use super::{Alternative, EFFECT_PARAMETER_PENALTY, STEPS, THRESHOLD_FACTOR_SINGLE, relinearise};
+use super::{
+    Alternative, EFFECT_PARAMETER_PENALTY, STEPS, THRESHOLD_FACTOR_SINGLE, axes_of, loss_on, relinearise,
+};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Refit, linearise, refit_steps};
@@ -58,6 +60,19 @@ pub(super) fn swap(
     refits.truncate(usize::from(is_alike));
     refits.insert(0, came);
     *model = best;
+}
+
+/// Those of other fits whose loss differs from that of a fit by hardly anything.
+pub(super) fn close_alternatives<'a>(
+    fit: &Refit,
+    others: &'a [Refit],
+    calibrated: &Calibrated,
+) -> impl Iterator<Item = &'a Refit> {
+    let (loss, most, last) = (fit.loss, alike(fit, calibrated), fit.placed.last().cloned());
+    others.iter().filter(move |other| {
+        let is_it = other.placed.last().zip(last.as_ref()).is_some_and(|(other, last)| same(other, last));
+        !is_it && (other.loss - loss).abs() < most
+    })
 }
 
 /// Largest difference in loss at which an explanation is indistinguishable from the best.
@@ -139,17 +154,24 @@ pub(super) fn alternatives(
         .collect()
 }
 
-/// Share of the excess that each effect removed in the round in which it joined.
-pub(super) fn shares(model: &Refit, rounds: &[Vec<Refit>], calibrated: &Calibrated, excess: f64) -> Vec<f64> {
+/// Share of the excess on its axes that each effect removed in the round in which it joined.
+pub(super) fn shares(
+    engine: &Engine<'_>,
+    model: &Refit,
+    rounds: &[Vec<Refit>],
+    calibrated: &Calibrated,
+    excess: f64,
+) -> Vec<f64> {
     let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
     let mut before = calibrated.fit.loss;
     model
         .placed
         .iter()
         .enumerate()
-        .map(|(at, _)| {
+        .map(|(at, placed)| {
             let after = rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |fit| fit.loss);
-            let share = (before - after) / excess * whole;
+            let on_axes = loss_on(engine, axes_of(std::slice::from_ref(placed)), &calibrated.fit);
+            let share = (before - after) / excess * whole * (calibrated.fit.loss / on_axes);
             before = after;
             share.clamp(0.0, 1.0)
         })

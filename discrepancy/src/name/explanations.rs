@@ -10,7 +10,8 @@
 //! to the two have a cosine above [`ALIKE_COSINE`], parameters projected out. Losses are J of `refit`: minus twice the
 //! log-likelihood of the windows, priors and penalties included.
 
-use super::{amplitude_ratio, consistency::amplitude_variation, is_large, same};
+use super::probabilities::probabilities;
+use super::{amplitude_ratio, axes_of, consistency::amplitude_variation, is_large, loss_on, same};
 use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -38,7 +39,8 @@ pub enum ExplanationKind {
 /// What the records say about an explanation.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Evidence {
-    /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included.
+    /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included; on the axes
+    /// that its effects act on, where both are recorded and the rods are not linked.
     pub loss_per_dof: f64,
     /// Loss above that of the best explanation.
     pub behind: f64,
@@ -50,7 +52,7 @@ pub struct Evidence {
     pub smallest_amplitude: Option<f64>,
     /// Number of effects beside them that are too small to be named.
     pub small_beside: usize,
-    /// Share of the loss under parameters alone that it removes.
+    /// Share of the loss under parameters alone that it removes, on the same axes.
     pub share: f64,
 }
 
@@ -61,6 +63,10 @@ pub struct Explanation {
     /// Sets of effects that these records cannot tell apart, the best first.
     pub sets: Vec<Vec<EffectEstimate>>,
     pub evidence: Option<Evidence>,
+    /// Of the best set of effects, small ones beside them included.
+    pub(super) fit: Option<Refit>,
+    /// All sum to one.
+    pub(crate) probability: f64,
 }
 
 /// The fits that explanations are made of.
@@ -95,7 +101,8 @@ pub(super) fn explanations(
         small_beside: 0,
         share: (1.0 - loss / fits.parameters.loss.max(1e-9)).clamp(0.0, 1.0),
     };
-    let without_effects = |kind, evidence| Explanation { kind, sets: Vec::new(), evidence };
+    let without_effects =
+        |kind, evidence| Explanation { kind, sets: Vec::new(), evidence, fit: None, probability: 0.0 };
     let mut all = vec![
         without_effects(ExplanationKind::Nothing, Some(evidence(nothing, &[1.0; COUNT]))),
         without_effects(
@@ -110,7 +117,11 @@ pub(super) fn explanations(
             of_large.map(|(variation, _)| variation).fold(0.0, f64::max)
         });
         let named = large(best);
+        let axes = axes_of(&named);
+        let [left, before] = [best, fits.parameters].map(|fit| loss_on(engine, axes, fit));
         let evidence = Evidence {
+            loss_per_dof: left / engine.loss_on(axes, &best.squares).1,
+            share: (1.0 - left / before.max(1e-9)).clamp(0.0, 1.0),
             amplitude_variation: variations,
             smallest_amplitude: Some(named.iter().map(amplitude_ratio).fold(f64::INFINITY, f64::min)),
             small_beside: best.placed.len() - named.len(),
@@ -120,9 +131,13 @@ pub(super) fn explanations(
             kind: ExplanationKind::Effects,
             sets: class.iter().map(|fit| large(fit)).collect(),
             evidence: Some(evidence),
+            fit: Some(best.clone()),
+            probability: 0.0,
         }
     }));
     all.push(without_effects(ExplanationKind::NoneOfThese, None));
+    let probabilities = probabilities(&all);
+    all.iter_mut().zip(probabilities).for_each(|(one, probability)| one.probability = probability);
     all
 }
 

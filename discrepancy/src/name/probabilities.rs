@@ -16,7 +16,7 @@ static WEIGHTS: LazyLock<Weights> = LazyLock::new(|| {
 /// a variation that chance does not give.
 const BEHIND_SCALE: f64 = 9.0;
 const EXCESS_SCALE: f64 = 0.08;
-const VARIATION_SCALE: f64 = 0.3;
+const VARIATION_SCALE: f64 = 0.1;
 /// Above so many times the smallest amplitude that is named, a larger one counts no more.
 const LARGEST_RATIO: f64 = 10.0;
 /// Parameters that are moved by less are those of the rig file, and by so much they count as off.
@@ -34,6 +34,8 @@ struct Weights {
     selected: f64,
     behind: f64,
     excess: f64,
+    /// What effects leave: the laws of a catalogue are never exact.
+    excess_of_effects: f64,
     moved: f64,
     parameters_alone: f64,
     variation: f64,
@@ -43,7 +45,7 @@ struct Weights {
 }
 
 /// Of each explanation, in their order; they sum to one.
-pub(crate) fn probabilities(explanations: &[Explanation]) -> Vec<f64> {
+pub(super) fn probabilities(explanations: &[Explanation]) -> Vec<f64> {
     let selected = explanations.iter().position(|one| one.kind == ExplanationKind::Effects);
     let utilities: Vec<f64> = explanations
         .iter()
@@ -69,9 +71,11 @@ fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
         ExplanationKind::Nothing | ExplanationKind::NoneOfThese => 0.0,
     };
     let smallest = evidence.smallest_amplitude.unwrap_or(1.0);
+    let of_effects =
+        if explanation.kind == ExplanationKind::Effects { weights.excess_of_effects } else { 0.0 };
     of_kind
         + weights.behind * (evidence.behind / BEHIND_SCALE).ln_1p()
-        + weights.excess * (evidence.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
+        + (weights.excess + of_effects) * (evidence.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
         + weights.moved * evidence.parameters_moved
         + weights.variation * (evidence.amplitude_variation.unwrap_or(0.0) / VARIATION_SCALE).ln_1p()
         + weights.amplitude * smallest.clamp(1.0, LARGEST_RATIO).ln()
@@ -93,7 +97,7 @@ mod tests {
             share: 0.0,
         };
         let evidence = (kind != ExplanationKind::NoneOfThese).then_some(evidence);
-        Explanation { kind, sets: Vec::new(), evidence }
+        Explanation { kind, sets: Vec::new(), evidence, fit: None, probability: 0.0 }
     }
 
     #[test]

@@ -82,12 +82,12 @@ fn probabilities(explanations: &[Explanation]) -> String {
     )
 }
 
-/// As much of a name as a bar has room for; the table has all of it.
+/// As much of a name's end as a bar has room for: sets often begin with the same effect. The table has all of it.
 fn shortened(name: &str) -> String {
     const MOST: usize = 44;
-    match name.char_indices().nth(MOST) {
-        Some((end, _)) => format!("{}…", name[..end].trim_end()),
-        None => name.to_owned(),
+    match name.char_indices().nth_back(MOST - 1) {
+        Some((start, _)) if start > 0 => format!("…{}", name[start..].trim_start()),
+        _ => name.to_owned(),
     }
 }
 

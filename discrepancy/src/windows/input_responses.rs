@@ -61,12 +61,13 @@ pub(crate) struct InputProducts {
 }
 
 impl Windows<'_> {
-    /// The products of each judged window; `columns` are over all judged windows, as residuals are. `None` where an input brings
+    /// The products of each judged window; `columns` are over all judged windows, as an engine's residuals are. `None` where an input brings
     /// the rig into a state that it cannot be in.
     pub(crate) fn input_products(
         &self,
         rig: &RigParameters,
         columns: &[&[f64]],
+        axis_by_axis: bool,
     ) -> Option<Vec<InputProducts>> {
         let rows = self.rows();
         self.plants_at_windows(rig)
@@ -78,7 +79,10 @@ impl Windows<'_> {
                     cross: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
                 };
                 for axis in (0..2).filter(|axis| self.record.measured[*axis]) {
-                    let responses = self.responses(at, plant, axis)?;
+                    let mut responses = self.responses(at, plant, axis)?;
+                    if axis_by_axis {
+                        responses.iter_mut().for_each(|response| *response = super::axis_by_axis(response));
+                    }
                     let count = responses.len();
                     let mut gram = DMatrix::zeros(count, count);
                     for left in 0..count {

@@ -1,7 +1,7 @@
 //! Noise model: force spikes, sampling jitter, autocorrelated noise, and draws of it.
 
 use super::{FORCE, WINDOW, Windows, dot};
-use crate::gridded_record::GriddedRecord;
+use crate::gridded_record::{CHANNELS, GriddedRecord};
 use crate::stats::median;
 use plant::PERIOD_S;
 use rand_core::Rng;
@@ -49,12 +49,14 @@ impl Windows<'_> {
         noise
     }
 
-    /// Whitens a window: jitter, common to all readings of an instant, by (I + d d')^(-1/2) with d their rates times the jitter
+    /// Whitens a window: jitter, common to all readings of an instant (of an axis, where they are apart), by (I + d d')^(-1/2) with d their rates times the jitter
     /// over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
         let width = self.outputs.len();
         let sensitivities = &self.jitter_sensitivity[at * self.rows()..][..self.rows()];
-        for (readings, sensitivity) in window.chunks_exact_mut(width).zip(sensitivities.chunks_exact(width)) {
+        // What is missing on one axis must not spread to the other.
+        let group = if self.axes_are_apart() { CHANNELS } else { width };
+        for (readings, sensitivity) in window.chunks_exact_mut(group).zip(sensitivities.chunks_exact(group)) {
             let square = dot(sensitivity, sensitivity);
             if square > 1e-6 {
                 let share = dot(readings, sensitivity) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;

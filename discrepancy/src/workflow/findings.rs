@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{SelectionResult, is_large, off, probabilities, same};
+use crate::name::{SelectionResult, is_large, off, same};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
@@ -73,7 +73,7 @@ fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
         let amplitude_variation = found.amplitude_variation.get(index).copied();
         let effect =
             NamedEffect { amplitude_variation, ..named_effect(placed, errors, *share, alternatives) };
-        if found.not_explained.is_some() || found.is_named(index) {
+        if found.not_explained.is_some() || found.is_named[index] {
             named.push(effect)
         } else {
             small.push(effect)
@@ -146,7 +146,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let decision = if let Some(reason) = of_model.and(found.not_explained) {
                 reason.reason()
             } else if let Some(at) = of_model {
-                if found.is_named(at) { "named" } else { "part of the model, and too small to be named" }
+                if found.is_named[at] { "named" } else { "part of the model, and too small to be named" }
             } else if is_alike && found.not_explained.is_none() {
                 "explains as much as what is named"
             } else if alone.is_some_and(|fit| !is_large(&fit.placed[0])) {
@@ -177,10 +177,9 @@ pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> 
         effect: placed.candidate.sheet.name.to_owned(),
         place: Where::from(placed.candidate.place),
     };
-    let weighed = found.explanations.iter().zip(probabilities(&found.explanations));
-    let all = weighed.map(|(explanation, probability)| report::Explanation {
+    let all = found.explanations.iter().map(|explanation| report::Explanation {
         kind: explanation.kind,
-        probability,
+        probability: explanation.probability,
         sets: explanation.sets.iter().map(|set| set.iter().map(effect).collect()).collect(),
         evidence: explanation.evidence,
     });
