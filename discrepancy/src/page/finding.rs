@@ -99,7 +99,7 @@ fn effect(named: &NamedEffect) -> String {
     let sheet = sheet(&named.effect);
     if let Some(sheet) = sheet {
         text += &paragraph(&format!(
-            "{}. It explains {} of what the rig file leaves unexplained.",
+            "{}. It explains {} of what the rig file leaves unexplained there.",
             sentence(sheet.law),
             words::percent(named.share_explained)
         ));
