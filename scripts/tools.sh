@@ -17,7 +17,6 @@ uv_version=0.13.9
 zig_packages=(ziglang==0.17.1 cargo-zigbuild==0.24.1)
 # The oldest C library that packages run with: Debian 10, Ubuntu 18.10, RHEL 8. manylinux_2_28 is named after it.
 oldest_glibc=2.28
-cargo_fuzz_version=0.13.2
 cargo_cyclonedx_version=0.5.9
 # Linters of workflows and of packaging/Containerfile. Both wheels hold the program; that of actionlint is of its fork, since the
 # original's downloads it from elsewhere.
@@ -71,14 +70,6 @@ install_rt_tests() { need_program cyclictest rt-tests libnuma1; }
 install_stress_ng() {
     # shellcheck disable=SC2046 # a list of names
     need_program stress-ng stress-ng $(apt-cache depends stress-ng 2>/dev/null | sed -n 's/^ *Depends: \(lib[a-z0-9.+-]*\)$/\1/p')
-}
-
-# Builds the targets of fuzz/; unoptimised, since what takes time is what it starts.
-install_cargo_fuzz() {
-    install_compiler || return 1
-    [ -x "$tools/bin/cargo-fuzz" ] && "$tools/bin/cargo-fuzz" --version | grep -q "$cargo_fuzz_version" && return
-    CARGO_PROFILE_DEV_DEBUG=0 cargo install --quiet --locked --debug cargo-fuzz --version "$cargo_fuzz_version" --root "$tools" \
-        --target-dir "$tools/build"
 }
 
 # Writes bills of materials, for a release alone.
