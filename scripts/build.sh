@@ -1,8 +1,11 @@
 # shellcheck shell=bash
 # Sourced, with `root` set: how the programs are built, for all scripts alike.
 
-# build_programs PROGRAM… [-- OPTION…]: the programs as they ship. All packages are chosen whichever are built, so that what they
-# are made of has the same features every time, and is made once.
+# What ships. All of it is chosen whichever part is built, so that what it is made of has the same features every time, and is made
+# once.
+shipped=(-p emulator -p controller -p bench -p discrepancy -p campaign -p plant-fmu -p front)
+
+# build_programs PROGRAM… [-- OPTION…]: the programs as they ship.
 build_programs() {
     local chosen=()
     while [ $# -gt 0 ] && [ "$1" != -- ]; do
@@ -10,9 +13,7 @@ build_programs() {
         shift
     done
     # shellcheck disable=SC2154 # root is the sourcing script's
-    (cd "$root" && cargo build --release --locked --quiet -p emulator -p controller -p bench -p discrepancy -p campaign \
-        -p plant-fmu -p front \
-        "${chosen[@]}" "${@:2}")
+    (cd "$root" && cargo build --release --locked --quiet "${shipped[@]}" "${chosen[@]}" "${@:2}")
 }
 
 # portably COMMAND…: what cargo builds in it runs with the oldest C library that packages are for; after install_zig of tools.sh.
