@@ -85,18 +85,18 @@ find_program() {
     find_unpacked "$1" "$2"
 }
 
-# fetch_kernel NAME: leaves $cache/kernel-NAME with vmlinuz, version, package and the modules of $kernel_modules with
-# all they need; the other 300 MB are thrown away. Sets $kernel_version. "complete" is written last and names the
-# modules, so that a longer list fetches anew.
+# fetch_kernel NAME: leaves $cache/kernel-NAME with vmlinux, version, package and the modules of $kernel_modules with
+# all they need; the other 300 MB are thrown away. Sets $kernel_version. "complete" is written last and names what is there, so that
+# a longer list fetches anew.
 fetch_kernel() {
-    local folder=$cache/kernel-$1 meta=linux-image-amd64
+    local folder=$cache/kernel-$1 meta=linux-image-amd64 there="vmlinux ${kernel_modules[*]}"
     if [[ $1 == rt ]]; then meta=linux-image-rt-amd64; fi
-    if [[ ! -f $folder/complete || $(<"$folder/complete") != "${kernel_modules[*]}" ]]; then
+    if [[ ! -f $folder/complete || $(<"$folder/complete") != "$there" ]]; then
         rm -rf "$folder"
         from_archive unpack_kernel "$meta"
         prune_kernel "$cache/kernel-work/root" "$folder"
         rm -rf "$cache/kernel-work"
-        printf '%s\n' "${kernel_modules[*]}" >"$folder/complete"
+        printf '%s\n' "$there" >"$folder/complete"
     fi
     kernel_version=$(<"$folder/version")
 }
@@ -121,7 +121,9 @@ prune_kernel() {
     from=$tree/lib/modules/$version
     to=$folder/lib/modules/$version
     mkdir -p "$to"
-    cp "$tree/boot/vmlinuz-$version" "$folder/vmlinuz"
+    # Uncompressed, or the guest would unpack it at each boot: 4 s of a processor here.
+    kernel_of "$tree/boot/vmlinuz-$version" "$tree/payload" >"$folder/vmlinux"
+    [[ $(head -c 4 "$folder/vmlinux") == $'\x7fELF' ]] || fail "$exit_no_boot" "no ELF file in vmlinuz-$version"
     run_unpacked "$depmod" -b "$tree" "$version"
     mapfile -t modules < <(modules_with_dependencies "$from/modules.dep")
     for module in "${modules[@]}"; do
@@ -131,6 +133,18 @@ prune_kernel() {
     cp "$from"/modules.{order,builtin} "$to/"
     run_unpacked "$depmod" -b "$folder" "$version" 2>>"$cache/apt.log"
     printf '%s\n' "$version" >"$folder/version"
+}
+
+# kernel_of BZIMAGE BASE: the kernel in it on standard output. Its header (Documentation/arch/x86/boot.rst) has setup_sects,
+# payload_offset and payload_length; the payload ends with four bytes of its length unpacked. BASE names a file to be written.
+kernel_of() {
+    local sectors place packed
+    sectors=$(od -An -t u1 -j $((0x1f1)) -N 1 "$1")
+    read -r -a place < <(od -An -t u4 -j $((0x248)) -N 8 "$1")
+    packed=$2.xz
+    [[ $(od -An -t x1 -j $(((sectors + 1) * 512 + place[0])) -N 4 "$1") != ' 28 b5 2f fd' ]] || packed=$2.zst
+    tail -c +$(((sectors + 1) * 512 + place[0] + 1)) "$1" | head -c $((place[1] - 4)) >"$packed" || true # tail's pipe is closed
+    decompress "$packed"
 }
 
 # Newer Debian compresses modules, which the guest's busybox may not read.
