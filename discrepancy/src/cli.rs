@@ -34,6 +34,8 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Print a model file's equations, numbers, units and suspects; with records, which of them these can tell apart.
     Explain(ExplainArguments),
+    /// Write a first model file from the columns of a record: units from their names, inputs and outputs guessed.
+    New(NewArguments),
     /// List the ready suspects that model files use: laws, what they are bound to, numbers with unit and range.
     Suspects(SuspectsArguments),
     /// Propose the experiment that distinguishes the effects that a report could not.
@@ -110,6 +112,16 @@ pub struct ExplainArguments {
     /// Records that the model is fitted to.
     #[arg(long, num_args = 1..)]
     pub train: Vec<PathBuf>,
+}
+
+/// What a model file begins from.
+#[derive(Args, Clone, Debug)]
+pub struct NewArguments {
+    /// Record: a text table with names above its columns.
+    pub record: PathBuf,
+    /// The new model file; without it the text is printed.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
 }
 
 /// Which suspects are listed.

@@ -40,6 +40,8 @@ pub enum CommandError {
     #[error(transparent)]
     Model(#[from] model_file::ModelError),
     #[error(transparent)]
+    New(#[from] model_file::NewError),
+    #[error(transparent)]
     Folder(#[from] FolderError),
     #[error("{file}: {why}")]
     File { file: PathBuf, why: io::Error },
@@ -65,6 +67,7 @@ pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
         Command::Extend(arguments) => extend_command(arguments),
         Command::Verify(arguments) => verify_command(arguments),
         Command::Explain(arguments) => explain_command(arguments),
+        Command::New(arguments) => any_plant::new_command(&arguments.record, arguments.out.as_deref()),
         Command::Suspects(arguments) => libraries::suspects_command(arguments.name.as_deref()),
         Command::Next(arguments) => next_command(arguments),
     }

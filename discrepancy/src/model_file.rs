@@ -6,6 +6,7 @@
 //!
 //! | file | holds |
 //! |---|---|
+//! | `begin` | a first model file from the columns of a record |
 //! | `record` | a record as the model reads it |
 //! | `processing` | even grid, smoothed inputs, rates, rows |
 //! | `filter` | zero-phase low passes |
@@ -23,6 +24,7 @@
 //!
 //! Nothing of a held-out record is read before the terms are chosen and fitted. Keys and figures: `docs/model-files.md`.
 
+mod begin;
 mod cuts;
 mod explain;
 mod extended;
@@ -38,6 +40,7 @@ mod select;
 mod starts;
 mod structure;
 
+pub use begin::{NewError, new_model};
 pub use explain::explain;
 pub use extended::{ExtendError, ReportedModel, extended};
 pub use held_out::JudgeError;

@@ -103,16 +103,15 @@ fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, S
     if let Some(column) = section.text("time")? {
         layout.time_column = column.text;
     }
+    let unit = unit(&mut section, source)?;
     if section.has("unit") {
-        let unit = unit(&mut section, source)?;
         if unit.dimension != Dimension::TIME {
             return Err(section.wrong_at("unit", "unit: no unit of time; allowed is s, ms, us, min, h"));
         }
         layout.time_unit_s = unit.factor;
     }
-    if section.has("period_s") {
-        layout.period_s = Some(one_or(&mut section, "period_s", 1.0, [1e-9, 1e6])?);
-    }
+    let period_s = one_or(&mut section, "period_s", 1.0, [1e-9, 1e6])?;
+    layout.period_s = section.has("period_s").then_some(period_s);
     if let Some(separator) = section.text("separator")? {
         layout.separator = separator.text;
     }

@@ -3,6 +3,7 @@
 mod files;
 mod integration;
 mod libraries;
+mod schema;
 
 #[global_allocator]
 static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;

@@ -1,8 +1,8 @@
 //! `close` and `name` of a model file of any plant.
 
 use super::{CommandError, Exit, NameArguments, print, progress};
-use crate::folder::Folder;
-use crate::model_file::{ClosedModel, ModelReport, close};
+use crate::folder::{self, Folder};
+use crate::model_file::{ClosedModel, ModelReport, close, new_model};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -39,6 +39,23 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
         _ if records.read.strict && !tests.is_empty() && !closed.is_confirmed() => Exit::BoundBroken,
         _ => Exit::Good,
     })
+}
+
+/// `new`: a first model file, printed or written where nothing stands yet.
+pub(super) fn new_command(record: &Path, out: Option<&Path>) -> Result<Exit, CommandError> {
+    let text = new_model(record)?;
+    let Some(out) = out else {
+        print(&text)?;
+        return Ok(Exit::Good);
+    };
+    if out.exists() {
+        return Err(CommandError::BadData(format!(
+            "--out {}: there is a file already: name another",
+            out.display()
+        )));
+    }
+    folder::write(out, &text)?;
+    Ok(Exit::Good)
 }
 
 /// What a person reads first.

@@ -306,8 +306,9 @@ impl Reader<'_> {
             let table = given.as_mut().map(|given| given.section(&state.name)).transpose()?.flatten();
             let start = match (table, bound.target) {
                 (Some(mut table), _) => {
+                    let given = super::unit(&mut table, self.source)?;
                     if table.has("unit") {
-                        unit = super::unit(&mut table, self.source)?;
+                        unit = given;
                     }
                     let start = self.start(&mut table, &unit)?;
                     table.finish()?;
