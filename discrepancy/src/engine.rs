@@ -6,10 +6,10 @@
 //!   C_j    = effect j at a probe - baseline
 //! ```
 //!
-//! All columns are whitened, with the start states of the windows projected out ([`crate::windows`]). Where both axes are measured
-//! and their rods are not linked, each axis of a window is a window of its own, axis by axis in a column: a law that is missing
-//! on one axis says nothing about the noise of the other, whose weights it would take. Simulations run on all
-//! cores and are gathered in a fixed order, so that two runs have the same bits.
+//! All columns are whitened, with the start states of the windows projected out ([`crate::windows`]). Where both axes are
+//! measured and their rods are not linked, each axis of a window is a window of its own, axis by axis in a column: a law that is
+//! missing on one axis says nothing about the noise of the other, whose weights it would take. Simulations run on all cores and
+//! are gathered in a fixed order, so that two runs have the same bits.
 
 use crate::fit::{self, Products};
 use crate::gridded_record::GriddedRecord;

@@ -1,4 +1,4 @@
-//! What is named: the set of effects that is more probable than not. Where none is, what the search selected, by rules of its own.
+//! What is named: the set of effects that is more probable than not; where none is, what the search selected, by its own rules.
 //!
 //! ```text
 //!   probability of one half and more
@@ -21,8 +21,8 @@ const DECIDES: f64 = 0.5;
 /// more on seeds 15 and 3769683697404522, development seeds, right ones had 0.00 to 0.57, leaks that took over what was left of a
 /// background 1.1 to 1.6.
 const MOST_VARIATION: f64 = 0.75;
-/// Share of the loss after calibration that an explanation may leave on its axes: impostors for what was left out left 0.54 and more on seed
-/// 13, a development seed, and on the frozen record without `inclination`; all but two right names left 0 to 0.45.
+/// Share of the loss after calibration that an explanation may leave on its axes: impostors for what was left out left 0.54 and
+/// more on seed 13, a development seed, and on the frozen record without `inclination`; all but two right names left 0 to 0.45.
 const MOST_LOSS_LEFT: f64 = 0.5;
 /// Share of the excess that a name beside effects without one needs: on seed 13 hidden effects took 0.11 to 0.86 of it, and
 /// effects named where only a background was hidden 0.04 to 0.12.

@@ -61,8 +61,8 @@ pub(crate) struct InputProducts {
 }
 
 impl Windows<'_> {
-    /// The products of each judged window; `columns` are over all judged windows, as an engine's residuals are. `None` where an input brings
-    /// the rig into a state that it cannot be in.
+    /// The products of each judged window; `columns` are over all judged windows, as an engine's residuals are. `None` where an
+    /// input brings the rig into a state that it cannot be in.
     pub(crate) fn input_products(
         &self,
         rig: &RigParameters,

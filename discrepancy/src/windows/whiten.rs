@@ -49,8 +49,8 @@ impl Windows<'_> {
         noise
     }
 
-    /// Whitens a window: jitter, common to all readings of an instant (of an axis, where they are apart), by (I + d d')^(-1/2) with d their rates times the jitter
-    /// over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
+    /// Whitens a window: jitter, common to all readings of an instant (of an axis, where they are apart), by (I + d d')^(-1/2)
+    /// with d their rates times the jitter over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
         let width = self.outputs.len();
         let sensitivities = &self.jitter_sensitivity[at * self.rows()..][..self.rows()];
