@@ -11,6 +11,7 @@
 //!
 //! The coordinates of an effect that the rig file already has count from the file's numbers.
 
+use crate::suspects::Suspect;
 use plant::Axis;
 use plant::RigParameters;
 use plant::effects::SHEETS;
@@ -41,6 +42,8 @@ const MOST_KEYS: usize = 6;
 pub struct Candidate {
     pub sheet: &'static Sheet,
     pub place: Place,
+    /// The suspect that it is of; `None` for an effect of the catalogue.
+    pub suspect: Option<&'static Suspect>,
     /// Numbers of its keys in the rig file, in the file's units; `None` where it is not on there.
     present: Option<[f64; MOST_KEYS]>,
 }
@@ -118,6 +121,25 @@ impl Candidate {
             .collect()
     }
 
+    /// The suspects that records of these axes can show.
+    pub fn of_suspects(
+        rig: &RigParameters,
+        measured: [bool; 2],
+        suspects: &[&'static Suspect],
+    ) -> Vec<Candidate> {
+        let one = |suspect: &&'static Suspect| {
+            let here = rig.terms().iter().find(|term| term.is_same(&suspect.declared));
+            let present = here.map(|term| {
+                let mut numbers = [0.0; MOST_KEYS];
+                numbers.iter_mut().zip(term.numbers()).for_each(|(own, number)| *own = number.value());
+                numbers
+            });
+            Candidate { sheet: &suspect.sheet, place: suspect.place, suspect: Some(suspect), present }
+        };
+        let shown = |suspect: &&&'static Suspect| measured[suspect.declared.axis().index()];
+        suspects.iter().filter(shown).map(one).collect()
+    }
+
     fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
         let effect = rig.effects().iter().find(|effect| effect.name == sheet.name && effect.place == place);
         let present = effect.map(|effect| {
@@ -125,7 +147,7 @@ impl Candidate {
             numbers[..effect.numbers.len()].copy_from_slice(&effect.numbers);
             numbers
         });
-        Candidate { sheet, place, present }
+        Candidate { sheet, place, suspect: None, present }
     }
 
     fn scale(&self, key: usize) -> Scale {
@@ -211,6 +233,9 @@ impl Candidate {
     /// [`ParameterError`] when the numbers do not fit together.
     pub fn rig(&self, rig: &RigParameters, coordinates: &[f64]) -> Result<RigParameters, ParameterError> {
         let numbers = self.effect_parameters(coordinates);
+        if let Some(suspect) = self.suspect {
+            return Ok(rig.with_term(&suspect.declared.with(&numbers)?));
+        }
         let named: Vec<(&str, f64)> =
             self.sheet.keys.iter().map(|key| key.name).zip(numbers.iter().copied()).collect();
         rig.with_effect(self.sheet.name, &self.place.to_string(), &named)
@@ -275,6 +300,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_suspect_is_a_candidate_whose_origin_is_the_rig_without_it() {
+        let text = "[[suspects]]\nname = \"bump\"\nplace = \"drive.force\"\nadd = \"-f*exp(-min((x - c)^2/w^2, 50))\"\n\
+                    parameters.f = { unit = \"N\", range = [-100, 100], prior = 40 }\n\
+                    parameters.c = { unit = \"mm\", value = 250, range = [0, 500] }\n\
+                    parameters.w = { unit = \"mm\", value = 50, range = [20, 200] }\n";
+        let suspects = crate::suspects::read(text, "s.toml").unwrap();
+        let rig = RigParameters::baseline();
+        let all = |rig: &RigParameters, measured| Candidate::of_suspects(rig, measured, &suspects);
+        assert!(all(&rig, [false, true]).is_empty());
+        let candidate = all(&rig, [true, false])[0];
+        assert_eq!(candidate.name(), "bump drive");
+        assert_eq!([0, 1, 2].map(|key| candidate.is_shape(key)), [false, true, true]);
+        assert_eq!(candidate.effect_parameters(&candidate.origin()), [0.0, 250.0, 50.0]);
+        assert_eq!(candidate.effect_parameters(&[1.0, 0.0, 0.0])[0], 40.0);
+        assert_eq!(candidate.probes(), [[0.3, 0.0, 0.0]]);
+        let with = candidate.rig(&rig, &[0.5, 0.1, 0.0]).unwrap();
+        assert_eq!(with.terms()[0].numbers()[0].value(), 20.0);
+        let here = all(&with, [true, false])[0];
+        assert!(here.is_present());
+        assert_eq!(here.rig(&with, &here.origin()).unwrap(), with);
     }
 
     #[test]

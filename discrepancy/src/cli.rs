@@ -91,6 +91,9 @@ pub struct NameArguments {
     /// An effect that is no candidate; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     pub without: Vec<String>,
+    /// File of suspects beside the rig file: terms as expressions that may be missing, candidates beside the effects.
+    #[arg(long, value_name = "FILE")]
+    pub suspects: Option<PathBuf>,
 }
 
 /// What the whole workflow is given.

@@ -19,6 +19,7 @@ use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
 use crate::refit::Linearisation;
 use crate::report::{Misfit, Objection, Report, Verdict, Verification};
+use crate::suspects::{self, Suspect};
 use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
 use crate::{locate, model_file, page, verify};
 use plant::effects::{SHEETS, sheet};
@@ -88,7 +89,7 @@ fn progress() -> impl FnMut(&str) {
 }
 
 fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
-    let NameArguments { records, without } = arguments;
+    let NameArguments { records, without, suspects } = arguments;
     threads(records.threads);
     known_effects(without)?;
     tests.iter().try_for_each(|test| is_there(test))?;
@@ -97,12 +98,18 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         .map_err(|why| CommandError::File { file: records.rig.clone(), why })?;
     if model_file::is_model_file(&text) {
         current_form(&records.rig, &text)?;
+        if let Some(file) = suspects {
+            return Err(CommandError::BadData(format!(
+                "--suspects {}: beside a rig file alone; a model file has its own [[suspects]]",
+                file.display()
+            )));
+        }
         return any_plant::close_command(arguments, tests);
     }
     let model = PathBuf::from("rig.toml");
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
-    let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests).chain(&records.read.mapping);
-    let out = Folder::open(&out, inputs)?;
+    let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests);
+    let out = Folder::open(&out, inputs.chain(&records.read.mapping).chain(suspects))?;
     // Reported before a minute of work.
     for name in [Path::new("report.json"), Path::new("report.html"), &model] {
         out.file(name)?;
@@ -114,6 +121,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         test: one_test(tests)?,
         options: records.read.options(),
         without: without.clone(),
+        suspects: suspects.as_ref().map_or(Ok(Vec::new()), |file| read_suspects(file))?,
     };
     let outcome = close(&task, &mut progress)?;
     let Outcome { report, extended, pictures, experiment, not_judged } = &outcome;
@@ -180,6 +188,13 @@ fn known_effects(without: &[String]) -> Result<(), CommandError> {
     let Some(name) = without.iter().find(|name| sheet(name).is_none()) else { return Ok(()) };
     let known = SHEETS.iter().map(|sheet| sheet.name).collect::<Vec<_>>().join(", ");
     Err(CommandError::UnknownEffect { name: name.clone(), known })
+}
+
+/// The suspects of a file beside a rig file.
+fn read_suspects(file: &Path) -> Result<Vec<&'static Suspect>, CommandError> {
+    let text =
+        std::fs::read_to_string(file).map_err(|why| CommandError::File { file: file.to_owned(), why })?;
+    Ok(suspects::read(&text, &file.display().to_string()).map_err(WorkflowError::from)?)
 }
 
 /// Refuses a missing held-out record before the work, without opening it.

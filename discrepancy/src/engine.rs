@@ -160,7 +160,7 @@ impl<'a> Engine<'a> {
     /// The same for several rigs that differ in baseline numbers, on all cores and in batches.
     fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
         // Rigs with effects do not run in lanes and are distributed one by one.
-        let alone = rigs.iter().any(|rig| !rig.effects().is_empty());
+        let alone = rigs.iter().any(|rig| !(rig.effects().is_empty() && rig.terms().is_empty()));
         let to_each = rigs.len().div_ceil(rayon::current_num_threads());
         let at_once = if alone { 1 } else { to_each.clamp(1, Batch::GROUP) };
         let simulate = |rigs: &[RigParameters]| {

@@ -17,11 +17,13 @@
 mod edits;
 mod parameters;
 
-use crate::report::{Quantity, decimals};
+use crate::report::{DeclaredSuspect, NamedEffect, Quantity, decimals};
 use edits::Edits;
+use plant::effects::declared::Number;
 use plant::effects::sheet::{EffectKey, Sheet};
 use plant::effects::tabulated::Tabulated;
 use plant::effects::{SHEETS, sheet};
+use plant::parameters::suspects;
 use plant::{Axis, ParameterError, RigParameters};
 use toml_edit::Document;
 
@@ -130,6 +132,46 @@ pub(crate) fn add_tables(
         what: "a table".to_owned(),
         reason: error.message().lines().last().unwrap_or_default().to_owned(),
     })?;
+    RigParameters::from_toml(&text, file).map_err(ExtendError::Refused)?;
+    Ok(text)
+}
+
+/// The rig file with these named suspects as terms: new ones at its end, the numbers of those that it has already in their place.
+pub(crate) fn add_terms(
+    rig_text: &str,
+    file: &str,
+    named: &[(&NamedEffect, &DeclaredSuspect)],
+    records: &[String],
+) -> Result<String, ExtendError> {
+    let mut text = rig_text.to_owned();
+    for (effect, suspect) in named {
+        let what = format!("{} at {}", suspect.effect, suspect.adds_to);
+        let declared = suspects(&suspect.declaration, "report.json").map_err(ExtendError::Rig)?.remove(0);
+        let values: Vec<f64> = effect.parameters.iter().map(|number| number.value).collect();
+        let term = declared.with(&values).map_err(ExtendError::Refused)?;
+        let layout = |reason: &str| ExtendError::Layout {
+            file: file.to_owned(),
+            what: what.clone(),
+            reason: reason.lines().last().unwrap_or_default().to_owned(),
+        };
+        let document = Document::parse(text.as_str()).map_err(|error| layout(error.message()))?;
+        let mut edits = Edits::new(&text);
+        let errors = |(number, quantity): (&Number, &Quantity)| {
+            let value = quantity_text(quantity.value, quantity.standard_error, number.unit());
+            format!("{} = {value}", number.name())
+        };
+        let found: Vec<String> = term.numbers().iter().zip(&effect.parameters).map(errors).collect();
+        let comment = format!("Found{}: {}.", source(records), found.join(", "));
+        if !edits.renew_term(&document, &term, &comment) {
+            edits.append_text(&format!(
+                "\n# What no effect of the catalogue is, as a declared term.\n# {comment}\n"
+            ));
+            edits.append_text(&term.toml("terms"));
+        }
+        let extended = edits.applied();
+        Document::parse(extended.as_str()).map_err(|error| layout(error.message()))?;
+        text = extended;
+    }
     RigParameters::from_toml(&text, file).map_err(ExtendError::Refused)?;
     Ok(text)
 }

@@ -54,6 +54,7 @@ pub mod report;
 pub(crate) mod screen;
 pub(crate) mod sensor_inverse;
 pub(crate) mod stats;
+pub mod suspects;
 pub(crate) mod tabulate;
 pub(crate) mod unknown_inputs;
 pub(crate) mod verify;

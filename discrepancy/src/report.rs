@@ -3,10 +3,12 @@
 //! Lists have a deterministic order, and nothing depends on time, threads or machine: two runs write the same bytes. Only `gap`
 //! and `verification` know the held-out record.
 
+mod declared;
 mod objection;
 
 use crate::estimator::Convergence;
 use crate::name::{Evidence, ExplanationKind};
+pub use declared::DeclaredSuspect;
 pub(crate) use objection::Objection;
 use plant::effects::sheet::{Part, Place};
 use serde::{Deserialize, Serialize};
@@ -66,6 +68,9 @@ pub struct Report {
     pub misfit: BTreeMap<String, Misfit>,
     /// Further figures of the held-out record; null without `--test`.
     pub verification: Option<Verification>,
+    /// Suspects of a file beside the rig file; absent without one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub suspects: Vec<DeclaredSuspect>,
     /// All candidates, the best first.
     pub candidates: Vec<Candidate>,
     /// All explanations that were weighed: nothing, parameters, sets of effects with the reported one first, none of these.

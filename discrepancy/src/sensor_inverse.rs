@@ -5,9 +5,11 @@
 //! ```
 //!
 //! Windows start from recorded readings. If the simulated rig has a sensor with delay, gain or offset, the true state differs
-//! from the reading; the start state is corrected by the inverse of the sensor. Source: effects.md, Sensors.
+//! from the reading; the start state is corrected by the inverse of the sensor. A declared term of a reading is taken off at the
+//! reading itself, which is right to the first order of the term. Source: effects.md, Sensors.
 
 use crate::gridded_record::{AxisState, GriddedRecord};
+use plant::effects::declared::{Declared, Target};
 use plant::effects::sheet::{Element, Part};
 use plant::{Axis, PERIOD_S, RigParameters};
 
@@ -27,9 +29,11 @@ impl Reading {
 }
 
 /// Inverse of the position and pressure sensors of each axis.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct SensorInverse {
     axes: [[Reading; 3]; 2],
+    /// Terms of readings that the rig declares.
+    declared: Vec<Declared>,
     stroke_m: f64,
     is_true: bool,
 }
@@ -64,8 +68,11 @@ impl SensorInverse {
                 _ => {}
             }
         }
-        let is_true = axes.iter().flatten().all(|reading| *reading == Reading::TRUE);
-        SensorInverse { axes, stroke_m: rig.cylinder().stroke_m, is_true }
+        let of_readings = [Target::Position, Target::PressureA, Target::PressureB];
+        let declared: Vec<Declared> =
+            rig.terms().iter().filter(|term| of_readings.contains(&term.target())).cloned().collect();
+        let is_true = declared.is_empty() && axes.iter().flatten().all(|reading| *reading == Reading::TRUE);
+        SensorInverse { axes, declared, stroke_m: rig.cylinder().stroke_m, is_true }
     }
 
     /// True states whose readings are those of the record at a period; `starts` are its estimated points there.
@@ -97,6 +104,28 @@ impl SensorInverse {
                 a.undo(later(a, &|point| point.pressures_pa[0])),
                 b.undo(later(b, &|point| point.pressures_pa[1])),
             ];
+        }
+        for term in &self.declared {
+            let i = term.axis().index();
+            let at = |period: usize| {
+                let (point, inputs) = (&record.points[period][i], &record.inputs[period]);
+                let ([a, b], valve) = (point.pressures_pa, inputs.valve[i]);
+                let time_s = period as f64 * PERIOD_S;
+                term.value(&[point.extension_m, point.rod_velocity_m_per_s, a, b, valve, valve, time_s, 0.0])
+            };
+            let (now, next) = (at(period), at((period + 1).min(record.len() - 1)));
+            match term.target() {
+                Target::PressureA => points[i].pressures_pa[0] -= now,
+                Target::PressureB => points[i].pressures_pa[1] -= now,
+                _ => {
+                    // The sensor reads the rig's coordinate.
+                    let along = if term.axis() == Axis::Load { -1.0 } else { 1.0 };
+                    points[i].extension_m = (points[i].extension_m - along * now).clamp(0.0, self.stroke_m);
+                    if points[i].rod_velocity_m_per_s != 0.0 {
+                        points[i].rod_velocity_m_per_s -= along * (next - now) / PERIOD_S;
+                    }
+                }
+            }
         }
         points
     }

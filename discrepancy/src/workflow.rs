@@ -14,7 +14,7 @@ mod reported;
 use crate::check::{Checked, check};
 use crate::discrepancy_term::{Beside, located_term};
 use crate::engine::Engine;
-use crate::extend::{Addition, ExtendError, add_tables, extend};
+use crate::extend::{Addition, ExtendError, add_tables, add_terms, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::locate::{UnknownSeries, locate};
 use crate::model_file::is_model_file;
@@ -25,6 +25,7 @@ use crate::page::Pictures;
 use crate::parameters::COUNT;
 use crate::refit::{Refit, rig_of};
 use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Next, Report, Verdict};
+use crate::suspects::Suspect;
 use crate::tabulate::{tables, tabulate};
 use crate::verify::{drawn, verify};
 pub use explained::explained;
@@ -48,6 +49,8 @@ pub struct Task {
     pub options: ReadOptions,
     /// Effects excluded from the candidates.
     pub without: Vec<String>,
+    /// Candidates beside the catalogue.
+    pub suspects: Vec<&'static Suspect>,
 }
 
 /// Outputs of the workflow.
@@ -176,6 +179,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     let mut report = report_of(&engine, &found);
     report.inputs = inputs;
     report.checks = checks;
+    report.suspects = task.suspects.iter().map(|suspect| report::DeclaredSuspect::of(suspect)).collect();
     progress("locating");
     // Under the rig file's own values, whatever the verdict: parameters that were fitted without the effect absorb it.
     let located = locate(rig, &records, progress);
@@ -327,13 +331,19 @@ fn is_copy(one: &Path, other: &Path) -> bool {
 /// # Errors
 /// [`ExtendError`] when it names what a rig cannot have.
 pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, ExtendError> {
-    let additions: Vec<Addition> = reported.named.iter().chain(&reported.small).map(addition).collect();
+    let effects = || reported.named.iter().chain(&reported.small);
+    let suspect = |effect: &NamedEffect| reported.suspects.iter().find(|own| own.is(effect));
+    let of_catalogue = effects().filter(|effect| suspect(effect).is_none());
+    let additions: Vec<Addition> = of_catalogue.map(addition).collect();
+    let terms: Vec<(&NamedEffect, &report::DeclaredSuspect)> =
+        effects().filter_map(|effect| Some((effect, suspect(effect)?))).collect();
     let changed = [&reported.parameters[..], &reported.insignificant].concat();
     let mass_axis = mass_axis(reported.measured());
     let text =
         extend(&rig_file.text, &rig_file.file, &additions, &changed, mass_axis, &reported.inputs.train)?;
-    let terms = reported.outside.as_ref().map_or(&[][..], |outside| &outside.tables);
-    add_tables(&text, &rig_file.file, &tables(terms), &reported.inputs.train)
+    let text = add_terms(&text, &rig_file.file, &terms, &reported.inputs.train)?;
+    let tables_of = reported.outside.as_ref().map_or(&[][..], |outside| &outside.tables);
+    add_tables(&text, &rig_file.file, &tables(tables_of), &reported.inputs.train)
 }
 
 /// Proposes an experiment for an ambiguous report; `None` when it is not ambiguous.

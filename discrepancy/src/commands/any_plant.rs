@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
-    let NameArguments { records, without } = arguments;
+    let NameArguments { records, without, .. } = arguments;
     let given = [
         ("--mapping", records.read.mapping.is_some(), "[record] of the model file says how records are read"),
         ("--without", !without.is_empty(), "take the suspect out of the model file"),

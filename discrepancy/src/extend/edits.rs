@@ -1,9 +1,10 @@
 //! Edits of a text at the spans that its parser gives; everything between them keeps its bytes.
 
 use super::{Addition, key_comment, written};
+use plant::effects::declared::Declared;
 use plant::effects::sheet::Sheet;
 use std::ops::Range;
-use toml_edit::{Document, Item, TableLike};
+use toml_edit::{Document, Item, Table, TableLike};
 
 /// What is to be done to a text.
 pub(super) struct Edits<'t> {
@@ -138,6 +139,26 @@ impl<'t> Edits<'t> {
         let at = span.start + inside.len();
         let comma = if has_others && !inside.ends_with(',') { "," } else { "" };
         self.edits.push((at..at, format!("{comma} {pair}")));
+    }
+
+    /// Other numbers for a term that the file has; `false` where it has none of this name and place.
+    pub(super) fn renew_term(&mut self, document: &Document<&str>, term: &Declared, comment: &str) -> bool {
+        let terms = document.get("terms").and_then(Item::as_array_of_tables);
+        let place = term.place();
+        let is_it = |table: &&Table| {
+            let text = |key: &str| table.get(key).and_then(Item::as_str);
+            text("name") == Some(term.name()) && text("place") == Some(place.as_str())
+        };
+        let Some(table) = terms.and_then(|terms| terms.iter().find(is_it)) else { return false };
+        for number in term.numbers() {
+            let parameter = table.get("parameters").and_then(|all| all.as_table_like()?.get(number.name()));
+            let value = parameter.and_then(|parameter| parameter.as_table_like()?.get("value")?.span());
+            value.into_iter().for_each(|span| self.replace(span, written(number.value())));
+        }
+        if let Some(name) = table.get("name").and_then(Item::span) {
+            self.comment_above(name.start, comment);
+        }
+        true
     }
 
     /// Text at the end of the file, with the file's line ends.

@@ -360,3 +360,44 @@ fn a_number_of_the_file_is_refused_where_it_is_none() {
         assert!(refused(&both).contains("changed twice"));
     }
 }
+
+const EDDY: &str = "[[suspects]]\nname = \"eddy\"\nplace = \"drive.force\"\nadd = \"-(c0 + c1*x)*v\"\n\
+    parameters.c0 = { unit = \"N s/m\", range = [0, 200] }\nparameters.c1 = { unit = \"N s/m^2\", range = [-500, 500] }\n";
+
+/// The report's words for the suspect with these numbers.
+fn eddy(c0: f64, c1: f64) -> (NamedEffect, DeclaredSuspect) {
+    let suspect = DeclaredSuspect::of(crate::suspects::read(EDDY, "s.toml").expect("good")[0]);
+    let number = |name: &str, value, unit: &str| quantity(name, value, unit, Some(0.0));
+    let effect = NamedEffect {
+        effect: suspect.effect.clone(),
+        place: suspect.place.clone(),
+        parameters: vec![number("c0", c0, "N s/m"), number("c1", c1, "N s/m^2")],
+        share_explained: 0.9,
+        amplitude_variation: None,
+        alternatives: Vec::new(),
+    };
+    (effect, suspect)
+}
+
+#[test]
+fn a_named_suspect_stands_at_the_end_as_a_term_and_another_close_renews_its_numbers() {
+    let extended = |text: &str, (effect, suspect): &(NamedEffect, DeclaredSuspect)| {
+        add_terms(text, "rig.toml", &[(effect, suspect)], &records())
+    };
+    for text in [RigParameters::BASELINE_TOML, &RigParameters::BASELINE_TOML.replace('\n', "\r\n")] {
+        let one = extended(text, &eddy(41.5, 100.0 / 3.0)).unwrap();
+        assert!(one.starts_with(text) && one.contains("# Found from a.csv, b.csv: c0 = 41.5"), "{one}");
+        assert!(!text.contains('\r') || one.matches('\n').count() == one.matches("\r\n").count());
+        let numbers = |text: &str| -> Vec<f64> {
+            let rig = RigParameters::from_toml(text, "rig.toml").unwrap();
+            assert_eq!(rig.terms().len(), 1);
+            rig.terms()[0].numbers().iter().map(Number::value).collect()
+        };
+        assert_eq!(numbers(&one), [41.5, 100.0 / 3.0]);
+        let two = extended(&one, &eddy(50.25, -1.5)).unwrap();
+        assert_eq!(numbers(&two), [50.25, -1.5]);
+        assert_eq!(two.lines().count(), one.lines().count() + 1, "the comment");
+    }
+    let error = extended(RigParameters::BASELINE_TOML, &eddy(900.0, 0.0)).unwrap_err().to_string();
+    assert!(error.contains("c0 = 900: allowed are 0 to 200"), "{error}");
+}

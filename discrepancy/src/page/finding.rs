@@ -34,7 +34,7 @@ pub(super) fn finding(report: &Report) -> String {
         text += &candidates::limits_table(report);
     }
     for named in &report.named {
-        text += &effect(named);
+        text += &effect(report, named);
     }
     if !report.small.is_empty() {
         text += &heading("Smaller effects");
@@ -44,10 +44,7 @@ pub(super) fn finding(report: &Report) -> String {
         );
         let row = |small: &NamedEffect| {
             vec![
-                Cell::About(
-                    small.effect.clone(),
-                    sheet(&small.effect).map_or("", |sheet| sheet.law).to_owned(),
-                ),
+                Cell::About(small.effect.clone(), law(report, small).unwrap_or_default()),
                 text_cell(words::place(&small.effect, &small.place)),
                 text_cell(words::numbers(small)),
                 number(words::percent(small.share_explained)),
@@ -80,7 +77,7 @@ pub(super) fn finding(report: &Report) -> String {
     }
     if let Some(nearest) = &report.nearest {
         text += &heading("The nearest effect of the catalogue");
-        text += &effect(nearest);
+        text += &effect(report, nearest);
     }
     if let Some(remaining) = &report.remaining {
         text += &heading("What is left");
@@ -93,14 +90,20 @@ pub(super) fn finding(report: &Report) -> String {
     text
 }
 
-fn effect(named: &NamedEffect) -> String {
+/// The law of an effect of the catalogue, or of a suspect beside it.
+fn law(report: &Report, effect: &NamedEffect) -> Option<String> {
+    let suspect = report.suspects.iter().find(|suspect| suspect.is(effect));
+    let declared = suspect.map(|suspect| format!("adds {} to {}", suspect.add, suspect.adds_to));
+    declared.or_else(|| Some(sheet(&effect.effect)?.law.to_owned()))
+}
+
+fn effect(report: &Report, named: &NamedEffect) -> String {
     let place = words::place(&named.effect, &named.place);
     let mut text = heading(&format!("{} at the {place}", named.effect));
-    let sheet = sheet(&named.effect);
-    if let Some(sheet) = sheet {
+    if let Some(law) = law(report, named) {
         text += &paragraph(&format!(
             "{}. It explains {} of what the rig file leaves unexplained there.",
-            sentence(sheet.law),
+            sentence(&law),
             words::percent(named.share_explained)
         ));
     }
@@ -115,9 +118,9 @@ fn effect(named: &NamedEffect) -> String {
     if !named.alternatives.is_empty() {
         text += &paragraph("These records do not distinguish it from:");
         let row = |other: &NamedEffect| {
-            let law = plant::effects::sheet(&other.effect).map_or("", |sheet| sheet.law);
+            let law = law(report, other).unwrap_or_default();
             vec![
-                Cell::About(other.effect.clone(), law.to_owned()),
+                Cell::About(other.effect.clone(), law),
                 text_cell(words::place(&other.effect, &other.place)),
                 text_cell(words::numbers(other)),
                 number(words::percent(other.share_explained)),

@@ -61,7 +61,8 @@ impl Windows<'_> {
     pub fn pass(&self, rig: &RigParameters) -> ReferenceRun {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
         let inverse = SensorInverse::of(rig);
-        let remembers = !rig.effects().is_empty();
+        // A declared term may count the time.
+        let remembers = !(rig.effects().is_empty() && rig.terms().is_empty());
         let mut reference_run =
             ReferenceRun { simulated: Vec::with_capacity(self.readings.len()), ..ReferenceRun::default() };
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {

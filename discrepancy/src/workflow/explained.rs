@@ -36,5 +36,8 @@ pub(super) fn searched_for(
     progress: &mut dyn FnMut(&str),
 ) -> SelectionResult {
     let linked = records.iter().any(|record| record.linked);
-    name(engine, Candidate::all(engine.rig(), records[0].measured, linked, &task.without), progress)
+    let (rig, measured) = (engine.rig(), records[0].measured);
+    let mut candidates = Candidate::all(rig, measured, linked, &task.without);
+    candidates.extend(Candidate::of_suspects(rig, measured, &task.suspects));
+    name(engine, candidates, progress)
 }

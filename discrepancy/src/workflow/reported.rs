@@ -1,6 +1,6 @@
 //! The part of a report that later steps read back from its file.
 
-use crate::report::{InputFiles, NamedEffect, Quantity, Report, TableTerm};
+use crate::report::{DeclaredSuspect, InputFiles, NamedEffect, Quantity, Report, TableTerm};
 use plant::Axis;
 
 /// Effects and parameters of a report.
@@ -17,6 +17,9 @@ pub struct Reported {
     #[serde(default, rename = "carried")]
     pub(crate) insignificant: Vec<Quantity>,
     pub inputs: InputFiles,
+    /// Suspects beside the catalogue.
+    #[serde(default)]
+    pub suspects: Vec<DeclaredSuspect>,
     /// Term outside the catalogue.
     #[serde(default)]
     pub outside: Option<ReportedOutside>,
@@ -30,6 +33,7 @@ impl From<&Report> for Reported {
             parameters: report.parameters.clone(),
             insignificant: report.insignificant.clone(),
             inputs: report.inputs.clone(),
+            suspects: report.suspects.clone(),
             outside: report
                 .outside
                 .as_ref()

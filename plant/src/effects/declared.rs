@@ -23,7 +23,7 @@
 //!
 //! Source: the file that declares it.
 
-use super::sheet::{Element, PlaceKind};
+use super::sheet::{Element, Part, Place, PlaceKind};
 use super::tabulated::{MOST_FLOW_NL_PER_MIN, MOST_FORCE_N, Seen, neither_empties_nor_bursts};
 use crate::parameters::table::Unit;
 use crate::parameters::{ParameterError, RigParameters};
@@ -244,10 +244,23 @@ impl Declared {
         &self.twins
     }
 
+    /// Its place, as of an effect: the axis of a force, the chamber of a flow, the sensor of a reading.
+    #[must_use]
+    pub fn at(&self) -> Place {
+        let part = if self.axis == Axis::Drive { Part::Drive } else { Part::Load };
+        Place { part, element: self.target.element() }
+    }
+
     /// Whether two stand for one term, with whatever numbers.
     #[must_use]
     pub fn is_same(&self, other: &Declared) -> bool {
-        self.name == other.name && self.axis == other.axis && self.target == other.target
+        self.name == other.name && self.at() == other.at()
+    }
+
+    /// Its value, in SI, at these values of [`VARIABLES`].
+    #[must_use]
+    pub fn value(&self, at: &[f64; VARIABLES.len()]) -> f64 {
+        self.formula.value(at)
     }
 
     /// The same with other values of its numbers, in the units of the file.

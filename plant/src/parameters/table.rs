@@ -67,6 +67,8 @@ pub enum Unit {
     NewtonPerBar,
     /// W/(m^2 K).
     WattPerSquareMetreKelvin,
+    /// As a declared term writes it; the term computes in it.
+    Written(&'static str),
 }
 
 impl Unit {
@@ -89,6 +91,7 @@ impl Unit {
     /// The unit's name as the file and the messages print it.
     pub fn name(self) -> &'static str {
         match self {
+            Unit::Written(name) => name,
             Unit::One => "",
             Unit::Bits => "bits",
             Unit::Bar => "bar",
