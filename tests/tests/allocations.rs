@@ -1,5 +1,5 @@
 //! The 1 ms path of both shipped programs allocates nothing: ten seconds and more on a real bus after the first of warm-up, of a
-//! drive alone, and of linked axes with force control and every chain at work.
+//! drive alone with declared terms in its rig, and of linked axes with force control and every chain at work.
 //!
 //! The programs are built once more, with the allocator that counts inside the 1 ms path; nothing else differs. That this
 //! counter does count is proven where it lives: `realtime/tests/allocations.rs`,
@@ -50,13 +50,34 @@ from_s = 4.0
 to_s = 8.0
 "#;
 
+/// A declared term of each kind, too small to disturb.
+const TERMS: &str = r#"
+[[terms]]
+name = "eddy-brake"
+place = "drive.force"
+add = "-(c0 + c1*x)*v"
+parameters.c0 = { unit = "N s/m", value = 5, range = [0, 200] }
+parameters.c1 = { unit = "N s/m^2", value = 10 }
+[[terms]]
+name = "drift"
+place = "load.pressure-a-reading"
+add = "2[Pa]*sin(t/1[s]) + 1e-4*max(p_a, p_b) + 3[Pa]*u*s"
+[[terms]]
+name = "seep"
+place = "load.flow-b"
+add = "-1e-9[kg/(s Pa)]*max(p_b - 1[bar], 0)/10"
+"#;
+
 #[test]
 fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let faults = scene.write("faults.toml", FAULTS);
+    let shipped = std::fs::read_to_string(scene.path("rig.toml")).expect("the scene has one");
+    let rig = scene.write("declared.toml", &(shipped + TERMS));
     let emulator = scene
         .emulator(Pace::Real)
+        .rig(&rig)
         .build(Build::CountingAllocations)
         .with(&format!("--full-timing --faults {}", faults.display()))
         .with(&format!("--telemetry {}", scene.path("telemetry").display()))

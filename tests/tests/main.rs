@@ -61,6 +61,7 @@ mod soak;
 mod socketcan_answers;
 mod socketcan_hostile;
 mod socketcan_programs;
+mod suspects;
 mod telemetry;
 mod tidy;
 mod two_processes;
