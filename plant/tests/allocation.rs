@@ -118,7 +118,8 @@ fn declared() -> RigParameters {
         .map(|(axis, target)| {
             let place = format!("{}.{}", axis.name(), target.name());
             format!(
-                "[[terms]]\nname = \"a\"\nplace = \"{place}\"\nadd = \"1e-5[{}]*{over}\"\n",
+                "[[terms]]\nname = \"{}\"\nplace = \"{place}\"\nadd = \"1e-5[{}]*{over}\"\n",
+                target.name(),
                 target.unit()
             )
         })
