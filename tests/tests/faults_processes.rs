@@ -126,15 +126,16 @@ fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let (mut emulator, mut controller) = under_way(&scene);
-    emulator.signal(Signal::STOP);
+    emulator.stop();
+    // A loaded machine may have kept the sensors back before: what the controller says is no measure of the time.
+    std::thread::sleep(STOPPED);
     controller.wait_for("no sensors for 0.2 s");
-    std::thread::sleep(STOPPED / 10);
     emulator.signal(Signal::CONT);
     emulator.wait_for("woke late");
     let (summary, _) = end(&scene, emulator);
     let _ = controller.wait().expect_code(0);
     let skipped = count(&summary, "/skipped");
-    // It was stopped for 200 ms at least, since a controller waited for so long; that is a claim of cause, not of speed.
+    // It stood still for 200 ms at least.
     assert!(skipped >= 150, "{skipped} cycles skipped");
     assert!(count(&summary, "/overruns") >= 1);
     assert_eq!(count(&summary, "/frames_lost_at_rig"), 0, "nothing was lost at the rig");
