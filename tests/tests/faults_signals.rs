@@ -32,7 +32,9 @@ fn expect_complete(scene: &Scene, pace: Pace, signal: Signal) {
     assert_eq!(bus_log(&scene.path("emulator/bus.log")).len() as u64, frames, "lines of bus.log, {at}");
     let report = json(&scene.path("controller/controller.json"));
     let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
-    assert_eq!(count(&report, "/cycles_answered"), rows as u64, "rows of controller-drive.csv, {at}");
+    // Of the drive: on a loaded machine its sensors of a cycle may be overtaken while the load's are answered.
+    let answered = count(&report, "/axes/drive/cycles_answered");
+    assert_eq!(answered, rows as u64, "rows of controller-drive.csv, {at}");
     if pace == Pace::Real {
         for hlog in ["emulator/emulator.hlog", "controller/controller.hlog"] {
             assert!(scene.path(hlog).exists(), "{hlog} is missing, {at}");
