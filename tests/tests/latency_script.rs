@@ -99,8 +99,8 @@ fn claims_are_judged_gaps_are_recorded_and_the_page_gets_the_table() {
     latency.args(["--pairs", "1", "--seconds", "1", "--claims", "--probe", "--write"]);
     let ended = Running::start("airbench latency", &mut latency).wait();
     let run = root.join("out/pair-01/run");
-    // One pair resolves no claim; a reference that was not measured breaks it. A claim about the spinning runs has no reference: a
-    // machine that takes their core away for long breaks it, which a message says.
+    // One pair resolves no claim; a reference that was not measured breaks it. A claim about the spinning runs has no reference:
+    // a machine that takes their core away for long breaks it, which a message says.
     let breaks = ended.stderr.contains("a claim about the spinning runs is broken");
     let ended = ended.expect_code(if run.join("cyclictest.json").exists() && !breaks { 0 } else { 1 });
     assert!(ended.stdout.contains("is not resolved, neither kept nor broken"), "{}", ended.stdout);
