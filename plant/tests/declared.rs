@@ -1,9 +1,10 @@
 //! Declared terms in the rig file and in the plant: read as written, refused with reasons, the same as an effect of that law.
 
+use crate::tabulated::{inputs, run};
 use plant::effects::declared::Target;
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::parameters::suspects;
-use plant::{Axis, Inputs, Plant, RigParameters, Setup};
+use plant::{Axis, Plant, RigParameters, Setup};
 
 /// A rig with terms: place, expression and numbers of each.
 fn with(terms: &[(&str, &str, &str)]) -> RigParameters {
@@ -16,18 +17,6 @@ fn text(terms: &[(&str, &str, &str)]) -> String {
     };
     let terms: String = terms.iter().enumerate().map(one).collect();
     format!("{}{terms}", RigParameters::BASELINE_TOML)
-}
-
-fn inputs(period: i32) -> Inputs {
-    let phase = f64::from(period) * 4e-3;
-    Inputs { valve: [0.5 * phase.sin(), 0.4 * phase.cos()], ..Inputs::default() }
-}
-
-/// Two seconds of strokes of both axes.
-fn run(rig: &RigParameters) -> Plant {
-    let mut plant = Plant::new(rig, &Setup::default()).expect("good");
-    (0..2000).for_each(|period| plant.step(&inputs(period)));
-    plant
 }
 
 /// Both come to the same state but for rounding.

@@ -12,13 +12,13 @@ fn with(lines: &str) -> String {
     format!("{}{lines}\n", RigParameters::BASELINE_TOML)
 }
 
-fn inputs(period: i32) -> Inputs {
+pub(crate) fn inputs(period: i32) -> Inputs {
     let phase = f64::from(period) * 4e-3;
     Inputs { valve: [0.5 * phase.sin(), 0.4 * phase.cos()], ..Inputs::default() }
 }
 
 /// Two seconds of strokes of both axes.
-fn run(rig: &RigParameters) -> Plant {
+pub(crate) fn run(rig: &RigParameters) -> Plant {
     let mut plant = Plant::new(rig, &Setup::default()).expect("good");
     (0..2000).for_each(|period| plant.step(&inputs(period)));
     plant

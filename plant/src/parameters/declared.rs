@@ -54,8 +54,8 @@ pub(super) fn read(text: &str, file: &str, key: &str) -> Result<Vec<Declared>, P
         let mut reader = Reader { source: &source, is_suspect: key == "suspects" };
         let at = section.at("name");
         let term = reader.term(section)?;
-        if all.iter().any(|other| other.is_same(&term)) {
-            let why = format!("name: {} is at {} already", term.name, term.place());
+        if let Some(other) = all.iter().find(|other| other.is_same(&term)) {
+            let why = format!("name: {} is at {} already", term.name, other.place());
             return Err(source.wrong_from(at, &why).into());
         }
         all.push(term);
