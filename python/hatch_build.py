@@ -16,6 +16,8 @@ FILES = {
     "latency/bounds.toml": "data/latency-bounds.toml",
     "latency/bounds-spin.toml": "data/latency-bounds-spin.toml",
     "campaign/campaigns": "data/campaigns",
+    "docs/model-file.schema.json": "data/model-file.schema.json",
+    "docs/model-report.schema.json": "data/model-report.schema.json",
 }
 
 

@@ -10,6 +10,7 @@ from airbench_hil.campaigns import Campaign, campaign
 from airbench_hil.controllers import Elf, Own, Process, Python, Sensors
 from airbench_hil.errors import (
     AirbenchError,
+    BadModel,
     BadRecords,
     ExpectationFailed,
     NotAnswered,
@@ -21,6 +22,7 @@ from airbench_hil.errors import (
     SignalUnknown,
 )
 from airbench_hil.faults import Fault
+from airbench_hil.models import Missing, ModelFile, ModelNumber, ModelReport, close_model
 from airbench_hil.report import Effect, Gap, Number, Report, close
 from airbench_hil.rig import Rig
 from airbench_hil.run import Run
@@ -28,7 +30,7 @@ from airbench_hil.run import Run
 __version__ = "0.1.0"
 
 __all__ = [
-    "AirbenchError", "BadRecords", "Campaign", "Effect", "Elf", "ExpectationFailed", "Fault", "Gap", "NotAnswered", "NotSeen", "Number",
-    "Own", "Process", "ProgramFailed", "ProgramNotFound", "Python", "Refused", "Report", "Rig", "RigEnded", "Run", "Sensors",
-    "SignalUnknown", "campaign", "close",
+    "AirbenchError", "BadModel", "BadRecords", "Campaign", "Effect", "Elf", "ExpectationFailed", "Fault", "Gap", "Missing", "ModelFile",
+    "ModelNumber", "ModelReport", "NotAnswered", "NotSeen", "Number", "Own", "Process", "ProgramFailed", "ProgramNotFound", "Python",
+    "Refused", "Report", "Rig", "RigEnded", "Run", "Sensors", "SignalUnknown", "campaign", "close", "close_model",
 ]

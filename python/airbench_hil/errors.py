@@ -46,6 +46,18 @@ class BadRecords(ProgramFailed):
         self.report = report
 
 
+class BadModel(AirbenchError):
+    """A model file or its report does not fit its schema; the text has the file, and a line for each place that is wrong.
+
+    :ivar file: what was read.
+    :ivar errors: those lines.
+    """
+
+    def __init__(self, file: Path, errors: list[str]) -> None:
+        super().__init__("\n".join(f"{file}: {error}" for error in errors))
+        self.file, self.errors = file, errors
+
+
 class RigEnded(AirbenchError):
     """The run is over, and something was asked that needs it to go on."""
 

@@ -21,6 +21,8 @@ _FILES = {
     "experiments": ("data/experiments", "controller/experiments"),
     "programs": ("data/programs", "controller/programs"),
     "campaigns": ("data/campaigns", "campaign/campaigns"),
+    "model-file.schema.json": ("data/model-file.schema.json", "docs/model-file.schema.json"),
+    "model-report.schema.json": ("data/model-report.schema.json", "docs/model-report.schema.json"),
 }
 
 
@@ -72,7 +74,7 @@ def front() -> NoReturn:
 
 
 def file(name: str) -> Path:
-    """A file or folder of the rig: "rig.toml", "rig.dbc", "experiments", "programs" or "campaigns".
+    """A file or folder of the rig, such as "rig.toml", "rig.dbc", "experiments", "programs" or "campaigns".
 
     :raises ProgramNotFound: neither the package nor a checkout has it.
     """

@@ -25,8 +25,8 @@ def several(records: Record | Sequence[Record]) -> list[Record]:
     return list(given) if isinstance(given, (list, tuple)) else [given]
 
 
-def file(record: Record, place: Path) -> Path:
-    """The file of a record; `place` without its ending is where one is written that is none yet.
+def file(record: Record, place: Path, time: str = "time_s") -> Path:
+    """The file of a record; `place` without its ending is where one is written that is none yet, with that column of the time.
 
     Every stamp of every channel of an MDF makes a row; what was not sampled at it stays empty, and nothing is interpolated.
 
@@ -40,16 +40,16 @@ def file(record: Record, place: Path) -> Path:
     comments: Sequence[str] = ()
     if hasattr(given, "to_dataframe"):
         frame = given.to_dataframe(time_from_zero=True, use_interpolation=False)
-        frame.index.name = "time_s"
+        frame.index.name = time
         # As `Run.mdf` puts it there.
         comments = re.findall(r"^(?:<TX>)?(# \w+=.*?)(?:</TX>)?$", given.header.comment, re.MULTILINE)
     elif hasattr(given, "to_csv") and hasattr(given, "columns"):
         frame, comments = given, given.attrs.get("comments", ())
     else:
         raise ValueError(f"record {given!r}: a file, a Run, a frame of pandas or an MDF of asammdf")
-    has_time = "time_s" in frame.columns
-    if not has_time and frame.index.name != "time_s":
-        raise ValueError(f"the frame has neither a column nor an index time_s; it has {', '.join(map(str, frame.columns))}")
+    has_time = time in frame.columns
+    if not has_time and frame.index.name != time:
+        raise ValueError(f"the frame has neither a column nor an index {time}; it has {', '.join(map(str, frame.columns))}")
     path = place.with_suffix(".csv")
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", encoding="utf-8", newline="") as out:

@@ -99,10 +99,13 @@ class Report:
         """Opens the folder of any report.
 
         :raises FileNotFoundError: there is no report.json in it.
+        :raises ValueError: it is the report of a model file.
         """
         self.folder = Path(folder)
         self.data: dict[str, Any] = json.loads((self.folder / "report.json").read_text(encoding="utf-8"))
         """All of report.json."""
+        if "headline" in self.data and "summary" not in self.data:
+            raise ValueError(f"{self.folder}: the report of a model file: read it with ModelReport, and close it with close_model")
         self.verdict: Verdict = self.data["verdict"]
         self.summary: str = self.data["summary"]
         """The verdict in a sentence or two."""
@@ -226,7 +229,7 @@ def close(
 ) -> Report:
     """Finds which effect the model lacks against measured records, and writes the extended model: `discrepancy close`.
 
-    :param rig: the model: a rig file, a `Rig` (its file), or a model file of one balance; None: the shipped rig.toml.
+    :param rig: the model: a rig file or a `Rig` (its file); None: the shipped rig.toml. A model file is closed by `close_model`.
     :param train: records to fit: files, `Run` objects, frames of pandas, or MDF objects of asammdf.
     :param test: a record that is used only to judge the model.
     :param out: folder of the results; None: a new one in ./runs.
