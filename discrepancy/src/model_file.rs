@@ -17,6 +17,7 @@
 //! | `select` | which suspects are taken |
 //! | `held_out` | both models on records that were not used |
 //! | `structure` | which suspects can be told apart, before any fit |
+//! | `sensors` | which state, measured, would tell suspects apart |
 //! | `report` | the report |
 //! | `explain` | equations, units, suspects in words |
 //! | `page` | the page |
@@ -37,6 +38,7 @@ mod processing;
 mod record;
 mod report;
 mod select;
+mod sensors;
 mod starts;
 mod structure;
 

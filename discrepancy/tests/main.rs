@@ -1,5 +1,6 @@
 //! The integration tests of `discrepancy`, one executable.
 
+mod advice;
 mod bad_records;
 mod balances;
 mod bus_log;

@@ -319,6 +319,19 @@ impl Model {
         format!("{}:{line}:{column}", self.file.display())
     }
 
+    /// The same model with a state as its last output, called as the state; `None` where the file is full.
+    #[must_use]
+    pub fn measuring(&self, state: usize) -> Option<Self> {
+        let mut other = self.clone();
+        let State { name, unit, derivative, .. } = &self.states[state];
+        let root = other.nodes.name(name, derivative.at).ok()?;
+        let value = Expression { text: name.clone(), root, at: derivative.at };
+        let (name, column, unit) = (name.clone(), name.clone(), unit.clone());
+        let (scale, noise_si, model_error_si) = (1.0, None, 0.0);
+        other.outputs.push(Output { name, column, scale, unit, value, noise_si, model_error_si });
+        Some(other)
+    }
+
     /// The SI unit of a definition, as it follows from what it is made of.
     #[must_use]
     pub fn definition_unit(&self, index: usize) -> Unit {

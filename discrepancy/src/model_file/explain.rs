@@ -2,7 +2,7 @@
 
 use super::record::Measured;
 use super::report::{place, significant, term};
-use super::structure::{Structure, structure};
+use super::structure::{Advice, Structure, structure};
 use super::{ModelError, read, select};
 use model::{Model, Parameter, Program, Rows, Smoothing, Solver, Start};
 use std::fmt::Write as _;
@@ -159,7 +159,8 @@ fn structure_in_words(structure: &Structure) -> String {
         let [one, other] = &twins.suspects;
         format!("{one} and {other}: the same to these records (cosine {:.3})", twins.cosine)
     });
-    let mut lines: Vec<String> = undetermined.chain(hidden).chain(twins).collect();
+    let advice = structure.advice.iter().map(Advice::in_words);
+    let mut lines: Vec<String> = undetermined.chain(hidden).chain(twins).chain(advice).collect();
     if lines.is_empty() {
         lines.push("every number, and every suspect from each other".into());
     }

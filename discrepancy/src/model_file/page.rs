@@ -204,6 +204,13 @@ fn structure(report: &ModelReport) -> String {
         let [one, other] = &twins.suspects;
         format!("{one} and {other} do the same to these records (cosine {:.3}).", twins.cosine)
     });
-    let all: Vec<String> = undetermined.chain(hidden).chain(twins).collect();
+    let advice = structure.advice.iter().map(|advice| sentence(&advice.in_words()));
+    let all: Vec<String> = undetermined.chain(hidden).chain(twins).chain(advice).collect();
     pagekit::markup::list(&all, "Every number, and every suspect from each other.")
+}
+
+/// With a capital and a full stop.
+fn sentence(words: &str) -> String {
+    let (first, rest) = words.split_at(1);
+    format!("{}{rest}.", first.to_uppercase())
 }

@@ -12,6 +12,7 @@
 use super::fit::Fitting;
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
+use super::sensors;
 use model::{Failure, Program};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -31,6 +32,8 @@ pub struct Structure {
     pub hidden: Vec<String>,
     /// Suspects that do the same to these records, with the cosine.
     pub twins: Vec<Twins>,
+    /// For each of these what would have to be measured beside; none where all states are.
+    pub advice: Vec<Advice>,
 }
 
 /// Two suspects that do the same.
@@ -40,39 +43,106 @@ pub struct Twins {
     pub cosine: f64,
 }
 
+/// What would show a suspect, or tell two apart.
+#[derive(Clone, Debug, Serialize)]
+pub struct Advice {
+    pub suspects: Vec<String>,
+    /// States, of which a sensor of one would do; empty where none does.
+    pub measure: Vec<String>,
+}
+
+impl Advice {
+    /// A line of a report.
+    pub(crate) fn in_words(&self) -> String {
+        let measure = self.measure.join(" or ");
+        match (self.suspects.as_slice(), self.measure.is_empty()) {
+            ([one, other], false) => {
+                format!("to tell {one} and {other} apart you would need a sensor of {measure}")
+            }
+            ([one, other], true) => format!("no sensor of a state would tell {one} and {other} apart"),
+            (all, false) => format!("to see {} you would need a sensor of {measure}", all.join(" and ")),
+            (all, true) => format!("no sensor of a state would show {}", all.join(" and ")),
+        }
+    }
+}
+
 pub(crate) fn structure(baseline: &Fitted<'_>) -> Structure {
     let (fitting, point) = (&baseline.fitting, &baseline.point);
     let model = fitting.model;
     let errors = standard_errors(&baseline.normal);
     let undetermined = fitting.unknowns.iter().zip(errors).filter(|(_, error)| error.is_none());
     let undetermined = undetermined.map(|(unknown, _)| fitting.name_of(unknown)).collect();
-    let (mut hidden, mut seen) = (Vec::new(), Vec::new());
     let scale: Vec<f64> = (0..model.outputs.len())
         .map(|output| fitting.variance(output, point.squares[output]).sqrt().recip())
         .collect();
-    let Ok((columns, base)) = columns(fitting, &point.values_si, &scale) else { return Structure::default() };
-    for (index, suspect) in
-        model.suspects.iter().enumerate().filter(|(_, suspect)| !suspect.is_decoy && !suspect.is_term)
-    {
-        let Ok(changed) = changed(baseline, index, &scale) else { continue };
-        let change: DVector<f64> = changed - &base;
-        let rest = &change - &columns * projected(&columns, &change);
-        if rest.norm() <= HIDDEN * change.norm() {
-            hidden.push(suspect.name.clone());
-        } else {
-            seen.push((suspect.name.clone(), rest.normalize()));
-        }
+    let is_asked = |suspect: &model::Suspect| !suspect.is_decoy && !suspect.is_term;
+    let asked: Vec<usize> = (0..model.suspects.len()).filter(|one| is_asked(&model.suspects[*one])).collect();
+    let Ok(seen) = seen(fitting, (&baseline.suspects, &point.values_si), &scale, &asked) else {
+        return Structure { undetermined, ..Structure::default() };
+    };
+    let name = |suspect: usize| model.suspects[suspect].name.clone();
+    let hidden: Vec<usize> = seen.iter().filter(|one| one.is_hidden()).map(|one| one.suspect).collect();
+    let twins = twins(&seen);
+    let confused: Vec<Vec<usize>> =
+        hidden.iter().map(|one| vec![*one]).chain(twins.iter().map(|(pair, _)| pair.to_vec())).collect();
+    let advice = sensors::advice(baseline, &scale, &confused);
+    Structure {
+        undetermined,
+        hidden: hidden.into_iter().map(name).collect(),
+        twins: twins.into_iter().map(|(pair, cosine)| Twins { suspects: pair.map(name), cosine }).collect(),
+        advice,
     }
+}
+
+/// What a suspect does to the outputs that the model's own numbers cannot do.
+pub(super) struct Seen {
+    pub(super) suspect: usize,
+    /// Share of its change that is left, and its direction.
+    pub(super) share: f64,
+    direction: DVector<f64>,
+}
+
+impl Seen {
+    fn is_hidden(&self) -> bool {
+        self.share <= HIDDEN
+    }
+}
+
+/// Of what two suspects do.
+pub(super) fn cosine(one: &Seen, other: &Seen) -> f64 {
+    one.direction.dot(&other.direction).abs()
+}
+
+/// Pairs that do the same, with their cosines; of suspects that are seen at all.
+fn twins(seen: &[Seen]) -> Vec<([usize; 2], f64)> {
+    let seen: Vec<&Seen> = seen.iter().filter(|one| !one.is_hidden()).collect();
     let mut twins = Vec::new();
-    for (place, (name, one)) in seen.iter().enumerate() {
-        for (other_name, other) in &seen[place + 1..] {
-            let cosine = one.dot(other).abs();
+    for (place, one) in seen.iter().enumerate() {
+        for other in &seen[place + 1..] {
+            let cosine = cosine(one, other);
             if cosine > TWINS {
-                twins.push(Twins { suspects: [name.clone(), other_name.clone()], cosine });
+                twins.push(([one.suspect, other.suspect], cosine));
             }
         }
     }
-    Structure { undetermined, hidden, twins }
+    twins
+}
+
+/// What these suspects do, each beside the model with what was `taken`; one that cannot be simulated is left out.
+pub(super) fn seen(
+    fitting: &Fitting<'_>,
+    (taken, values_si): (&[usize], &[f64]),
+    scale: &[f64],
+    asked: &[usize],
+) -> Result<Vec<Seen>, Failure> {
+    let (columns, base) = columns(fitting, values_si, scale)?;
+    let of = |suspect: &usize| {
+        let change = changed(fitting, (taken, values_si), *suspect, scale).ok()? - &base;
+        let rest = &change - &columns * projected(&columns, &change);
+        let share = if change.norm() > 0.0 { rest.norm() / change.norm() } else { 0.0 };
+        Some(Seen { suspect: *suspect, share, direction: rest.normalize() })
+    };
+    Ok(asked.iter().filter_map(of).collect())
 }
 
 /// Coefficients of the columns that come nearest to a change.
@@ -93,9 +163,13 @@ fn columns(
 }
 
 /// Scaled outputs with a suspect at its first values, all other numbers as they are.
-fn changed(baseline: &Fitted<'_>, suspect: usize, scale: &[f64]) -> Result<DVector<f64>, Failure> {
-    let fitting = &baseline.fitting;
-    let mut suspects = baseline.suspects.clone();
+fn changed(
+    fitting: &Fitting<'_>,
+    (taken, values_si): (&[usize], &[f64]),
+    suspect: usize,
+    scale: &[f64],
+) -> Result<DVector<f64>, Failure> {
+    let mut suspects = taken.to_vec();
     suspects.push(suspect);
     let program = Program::new(fitting.model, &suspects).expect("all suspects together were compiled");
     let extended = Fitting::new(fitting.model, program, fitting.records, &suspects);
@@ -103,7 +177,7 @@ fn changed(baseline: &Fitted<'_>, suspect: usize, scale: &[f64]) -> Result<DVect
     let values: Vec<f64> = extended
         .unknowns
         .iter()
-        .map(|unknown| known(unknown.what).map_or(unknown.start_si, |place| baseline.point.values_si[place]))
+        .map(|unknown| known(unknown.what).map_or(unknown.start_si, |place| values_si[place]))
         .collect();
     Ok(DVector::from_vec(extended.sensitivities(&values, scale)?.1))
 }

@@ -1,0 +1,99 @@
+//! Which state, measured, would show a suspect that hides, or tell two apart that do the same.
+//!
+//! Each state that no output reports is added as one, with a sensor that is as good as those there are: its noise over the
+//! variation of the state is the least that the model leaves of an output over that output's variation. The sensitivities are
+//! those of the model at its fit, so that nothing is fitted.
+
+use super::fit::Fitting;
+use super::record::Measured;
+use super::select::Fitted;
+use super::structure::{Advice, Seen, cosine, seen};
+use crate::stats::mean_and_variance;
+use model::{Model, Program};
+
+/// Variance over the square of the mean of a state that rests, up to rounding.
+const RESTS: f64 = 1e-20;
+
+/// A sensor that helps is no close call: cosine of two suspects at most, and share of a suspect that is seen at least. Choices,
+/// well beyond the bounds of what counts as a twin (0.98) and as hidden (0.05).
+const APART: f64 = 0.9;
+const SHOWN: f64 = 0.2;
+
+/// For each of `confused`, one suspect that hides or two that are twins, the states that would help; nothing where all states are
+/// measured.
+pub(super) fn advice(baseline: &Fitted<'_>, scale: &[f64], confused: &[Vec<usize>]) -> Vec<Advice> {
+    let model = baseline.fitting.model;
+    let is_measured = |name: &str| model.outputs.iter().any(|output| output.value.text == name);
+    let states = model.states.iter().enumerate();
+    let unmeasured = states.filter(|(_, state)| state.suspect.is_none() && !is_measured(&state.name));
+    let unmeasured: Vec<usize> = unmeasured.map(|(index, _)| index).collect();
+    if confused.is_empty() || unmeasured.is_empty() {
+        return Vec::new();
+    }
+    let name = |suspect: &usize| model.suspects[*suspect].name.clone();
+    let mut advice: Vec<Advice> = confused
+        .iter()
+        .map(|suspects| Advice { suspects: suspects.iter().map(name).collect(), measure: Vec::new() })
+        .collect();
+    for state in unmeasured {
+        let Some(seen) = with_sensor(baseline, scale, state, confused) else { continue };
+        for (suspects, advice) in confused.iter().zip(&mut advice) {
+            if is_solved(&seen, suspects) {
+                advice.measure.push(model.states[state].name.clone());
+            }
+        }
+    }
+    advice
+}
+
+/// Whether all of these are seen, and are apart.
+fn is_solved(seen: &[Seen], suspects: &[usize]) -> bool {
+    let of = |suspect: &usize| seen.iter().find(|one| one.suspect == *suspect && one.share > SHOWN);
+    let all: Option<Vec<&Seen>> = suspects.iter().map(of).collect();
+    all.is_some_and(|all| all.windows(2).all(|pair| cosine(pair[0], pair[1]) < APART))
+}
+
+/// What the suspects in question do to the outputs and to a state; `None` where it cannot be computed, or the state rests.
+fn with_sensor(
+    baseline: &Fitted<'_>,
+    scale: &[f64],
+    state: usize,
+    confused: &[Vec<usize>],
+) -> Option<Vec<Seen>> {
+    let measuring: Model = baseline.fitting.model.measuring(state)?;
+    let records: Vec<Measured> = baseline.fitting.records.iter().map(with_one_more).collect();
+    let taken = &baseline.suspects;
+    let program = Program::new(&measuring, taken).ok()?;
+    let fitting = Fitting::new(&measuring, program, &records, taken);
+    let values_si = &baseline.point.values_si;
+    let said = fitting.residuals(values_si).ok()?;
+    let state: Vec<f64> =
+        said.into_iter().filter_map(|mut record| record.pop()).flat_map(|[_, x]| x).collect();
+    let (mean, variance) = mean_and_variance(&state);
+    if variance.is_nan() || variance <= RESTS * mean * mean {
+        return None;
+    }
+    let noise = least_noise(baseline, scale) * variance.sqrt();
+    let scale: Vec<f64> = scale.iter().copied().chain([1.0 / noise]).collect();
+    let mut asked: Vec<usize> = confused.iter().flatten().copied().collect();
+    asked.sort_unstable();
+    asked.dedup();
+    seen(&fitting, (taken, values_si), &scale, &asked).ok()
+}
+
+/// The least that is left of an output over its variation.
+fn least_noise(baseline: &Fitted<'_>, scale: &[f64]) -> f64 {
+    let records = baseline.fitting.records;
+    let of = |(output, scale): (usize, &f64)| {
+        let measured = records.iter().flat_map(|record| record.outputs[output].iter().flatten().copied());
+        1.0 / (scale * mean_and_variance(&measured.collect::<Vec<f64>>()).1.sqrt())
+    };
+    scale.iter().enumerate().map(of).fold(1.0, f64::min)
+}
+
+/// A record with a further output, measured at each row.
+fn with_one_more(record: &Measured) -> Measured {
+    let mut record = record.clone();
+    record.outputs.push(vec![Some(0.0); record.time_s.len()]);
+    record
+}
