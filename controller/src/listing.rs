@@ -1,7 +1,7 @@
 //! The list of all algorithms and of all parameters, for people.
 
+use crate::cli::{A2lArguments, OneAxis};
 use crate::run::RunError;
-use ::controller::cli::{A2lArguments, OneAxis};
 use algorithms::SHIPPED;
 use axis_control::axis::AxisController;
 use axis_control::chains::{force, matching, settled};

@@ -1,49 +1,5 @@
-//! Process 2, the program of the axis controllers: command line, runs on a bus and rehearsals, records.
-//!
-//! | file | holds |
-//! |---|---|
-//! | [`controller::cli`], [`listing`] | command line, and the commands that print |
-//! | [`run`], [`pace`] | a run: threads; the node goes on frames or the barrier, and leaves the bus |
-//! | [`rehearse`] | the command of a rehearsal |
-//! | [`timing`] | when everything of a cycle happened; histograms, timing tables, flight recorder |
-//! | [`recording`], [`report`] | tables and report of a run |
-//! | [`reload`] | numbers of changed program files, taken over while running |
+//! Process 2: the axis controllers behind a bus.
 
-mod listing;
-mod pace;
-mod recording;
-mod rehearse;
-mod reload;
-mod report;
-mod run;
-mod timing;
-
-use crate::run::RunError;
-use clap::Parser;
-use controller::cli::{Cli, Command};
-use plugin::command;
-use std::process::ExitCode;
-
-/// The controllers of a process, each within reach of XCP where that is asked for.
-type Node = axis_control::node::ControllerNode<xcp::port::Port>;
-
-#[cfg(feature = "count-allocations")]
-#[global_allocator]
-static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;
-
-fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        Command::Run(arguments) => run::run(&arguments),
-        Command::Rehearse(arguments) => rehearse::run(&arguments),
-        Command::Algorithms => Ok(listing::print()),
-        Command::Parameters(files) => listing::print_parameters(&files),
-        Command::A2l(arguments) => listing::print_a2l(&arguments),
-        Command::CheckLibrary(library) => command::check_library(&library.file).map_err(RunError::from),
-        Command::ProbeLibrary(library) => Ok(command::probe_library(&library.file)),
-    };
-    let exit = result.unwrap_or_else(|error| {
-        eprintln!("controller: {error}");
-        error.exit()
-    });
-    exit.into()
+fn main() -> std::process::ExitCode {
+    controller::main()
 }

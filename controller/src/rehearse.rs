@@ -2,13 +2,13 @@
 //!
 //! It leaves what a run on a bus leaves, save for what only a bus has: no `bus.log`, no latencies.
 
+use crate::cli::RehearseArguments;
 use crate::recording::{Tables, sentence};
 use crate::report::{self, Report};
 use crate::run::RunError;
 use algorithms::guard::{STUCK, Stuck};
 use axis_control::node::News;
 use axis_control::setup::Inputs;
-use controller::cli::RehearseArguments;
 use nominal::Axis;
 use protocol::bus::BusCounters;
 use protocol::exit::Exit;

@@ -1,6 +1,7 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
 use crate::Node;
+use crate::cli::{Axes, Pace, RunArguments};
 use crate::pace::{self, End, RunContext, RunOutcome};
 use crate::recording::{Tables, Writer, Written};
 use crate::reload::Reloader;
@@ -11,13 +12,12 @@ use algorithms::guard::STUCK;
 use axis_control::axis::AxisController;
 use axis_control::node::{Change, ControllerNode, Outlets};
 use axis_control::setup::{InputError, Inputs, Mode};
-use controller::cli::{Axes, Pace, RunArguments};
 use crossbeam_channel::{Sender, bounded};
 use nominal::Axis;
 use plugin::PluginError;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
-use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, Request};
+use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, Request, allocations};
 use runlog::controller_report::IgnoredFrames;
 use runlog::flight_dump;
 use runlog::run_folder::{SCHEMA_VERSION, clear, controller_results, write_json};
@@ -325,7 +325,7 @@ fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit,
         frames_late: sum(|axis| axis.sensors_late),
         frames_duplicate: sum(|axis| axis.sensors_duplicate),
         timing: written.timing.unwrap_or_default(),
-        allocations_in_cycle: outcome.allocations.filter(|_| cfg!(feature = "count-allocations")),
+        allocations_in_cycle: outcome.allocations.filter(|_| allocations::is_registered()),
         records_dropped: Some(finished.records_dropped),
         sensors_before_start: outcome.stopwatch.before_start,
         timing_dropped: outcome.stopwatch.dropped,

@@ -6,7 +6,7 @@ use crate::pace::End;
 use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
 use protocol::exit::Exit;
-use realtime::{Percentiles, Recorder as Histogram};
+use realtime::{Percentiles, Recorder as Histogram, allocations};
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use runlog::summary::Summary;
 use std::path::Path;
@@ -102,7 +102,7 @@ fn summarise(
         flight: timing.flight,
         wall_clock_steps: rig_timing.wall_clock_steps,
         vitals: timing.vitals,
-        allocations_in_cycle: paced.allocations.filter(|_| cfg!(feature = "count-allocations")),
+        allocations_in_cycle: paced.allocations.filter(|_| allocations::is_registered()),
         records_dropped: Some(figures.records_dropped),
         ended_because,
         passed: Some(passed),

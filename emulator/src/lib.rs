@@ -15,7 +15,7 @@
 //! | [`console`] | what a person types |
 //! | [`telemetry`] | who looks on |
 //! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
-//! | [`run`], [`inputs`], [`host_thread`], [`cli`] | around it |
+//! | [`run`], [`inputs`], [`host_thread`], [`cli`], [`program`] | around it |
 
 pub mod bus_load;
 pub mod catalogue;
@@ -29,6 +29,7 @@ pub mod host_thread;
 pub mod inputs;
 pub mod node;
 pub mod pace;
+pub mod program;
 pub mod recording;
 mod rig;
 pub mod run;

@@ -28,6 +28,7 @@ use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampCl
 use protocol::exit::Exit;
 use realtime::{
     Clock, Continued, Freeze, Grants, Interrupt, Machine, MonotonicClock, PeriodicConfig, Request,
+    allocations,
 };
 use runlog::flight_dump::{self, Log};
 use runlog::run_folder::{SCHEMA_VERSION, clear_results, write_json};
@@ -380,7 +381,7 @@ fn describe(
         schema_version: SCHEMA_VERSION,
         emulator_command_line: std::env::args().collect(),
         emulator_version: env!("CARGO_PKG_VERSION").into(),
-        counts_allocations: cfg!(feature = "count-allocations"),
+        counts_allocations: allocations::is_registered(),
         started_unix_s: started.unix_s,
         pace: arguments.pace.to_string(),
         bus: arguments.bus.to_string(),

@@ -1,17 +1,12 @@
 //! An allocator that counts, for the proof that a cycle allocates nothing.
 //!
 //! A call to the allocator inside the 1 ms path can take a lock, fault a page or ask the kernel for memory; it shows as
-//! one late cycle in a million. Reading the code for hidden allocations misses those in libraries. So a binary may
-//! register [`CountingAllocator`] (behind its feature `count-allocations`), the real-time thread opens a [`watch`] once
-//! it has warmed up, and [`counted`] must then stay 0.
+//! one late cycle in a million. Reading the code for hidden allocations misses those in libraries. So a program may
+//! register [`CountingAllocator`] (those of `tests/counting/` do), the real-time thread opens a [`watch`] once it has
+//! warmed up, and [`counted`] must then stay 0.
 //!
-//! ```text
-//! #[cfg(feature = "count-allocations")]
-//! #[global_allocator]
-//! static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;
-//! ```
 //! A freed block counts too: giving memory back takes the same locks. Without the registration nothing is counted and
-//! [`counted`] is 0, which then proves nothing.
+//! [`counted`] is 0, which then proves nothing; [`is_registered`] tells the two apart.
 //!
 //! # Source
 //! The contract of `std::alloc::GlobalAlloc`: an allocator must not unwind and must not allocate through itself.
@@ -24,10 +19,13 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::marker::PhantomData;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Calls counted since the start or the last [`reset`], of all threads together.
 static COUNTED: AtomicU64 = AtomicU64::new(0);
+
+/// Whether a call has come through [`CountingAllocator`]; the first comes before `main`.
+static REGISTERED: AtomicBool = AtomicBool::new(false);
 
 thread_local! {
     /// How many watches this thread holds. Const and without a destructor, so that reading it never allocates.
@@ -67,6 +65,9 @@ unsafe impl GlobalAlloc for CountingAllocator {
 }
 
 fn count_if_watched() {
+    if !REGISTERED.load(Ordering::Relaxed) {
+        REGISTERED.store(true, Ordering::Relaxed);
+    }
     // At the very end of a thread its locals may be gone: then nobody watches.
     if WATCHES.try_with(Cell::get).is_ok_and(|watches| watches > 0) {
         COUNTED.fetch_add(1, Ordering::Relaxed);
@@ -96,6 +97,11 @@ impl Drop for Watch {
 /// Calls to the allocator that watched threads have made.
 pub fn counted() -> u64 {
     COUNTED.load(Ordering::Relaxed)
+}
+
+/// Whether this program's allocator counts.
+pub fn is_registered() -> bool {
+    REGISTERED.load(Ordering::Relaxed)
 }
 
 /// Starts counting at 0 again.

@@ -118,7 +118,7 @@ pub struct Summary<E = NotedEvent> {
     pub wall_clock_steps: Vec<WallClockStep>,
     /// What the kernel counted of the loop's thread after the first second.
     pub vitals: VitalTotals,
-    /// Allocations in the 1 ms path after the first second; null unless built with `count-allocations`.
+    /// Allocations in the 1 ms path after the first second; null unless the program counts them.
     pub allocations_in_cycle: Option<u64>,
     /// Records that did not reach the files because a queue was full.
     pub records_dropped: Option<u64>,

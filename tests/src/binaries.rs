@@ -1,8 +1,8 @@
 //! Where the programs under test are: given by the environment, else built once as they ship.
 //!
-//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped, `bench`,
-//! `discrepancy`, `campaign` and `airbench`; a script that has built them sets these. Without them cargo builds the release
-//! profile, and says itself where the results are.
+//! `AIRBENCH_BIN_DIR` names a folder that holds `emulator`, `controller`, `bench`, `discrepancy`, `campaign` and `airbench`, and
+//! `counting-emulator` and `counting-controller` of `tests/counting/`; a script that has built them sets it. Without it cargo
+//! builds the release profile, and says itself where the results are.
 
 use crate::process::{Ended, Running};
 use std::ffi::OsStr;
@@ -67,19 +67,14 @@ pub fn install(contents: &[u8], path: &Path) {
 
 /// The executable of `program` in `build`, which is made if nobody has.
 pub fn executable(program: Program, build: Build) -> PathBuf {
-    static SHIPPED: OnceLock<PathBuf> = OnceLock::new();
-    static COUNTING: OnceLock<PathBuf> = OnceLock::new();
-    let folder = match build {
-        Build::Shipped => SHIPPED.get_or_init(|| folder("AIRBENCH_BIN_DIR", &[])),
-        Build::CountingAllocations => COUNTING.get_or_init(|| {
-            folder(
-                "AIRBENCH_COUNTING_BIN_DIR",
-                &["--features", "emulator/count-allocations,controller/count-allocations"],
-            )
-        }),
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let folder =
+        FOLDER.get_or_init(|| std::env::var_os("AIRBENCH_BIN_DIR").map_or_else(self::build, PathBuf::from));
+    let path = match build {
+        Build::Shipped => folder.join(program.name()),
+        Build::CountingAllocations => folder.join(format!("counting-{}", program.name())),
     };
-    let path = folder.join(program.name());
-    assert!(path.is_file(), "{} is no program; build it, or unset AIRBENCH_*BIN_DIR", path.display());
+    assert!(path.is_file(), "{} is no program; build it, or unset AIRBENCH_BIN_DIR", path.display());
     path
 }
 
@@ -110,32 +105,15 @@ pub fn script(name: &str, arguments: &[&str], limit: Duration) -> Ended {
     Running::start(&format!("scripts/{name}"), &mut command).wait_within(limit)
 }
 
-fn folder(variable: &str, features: &[&str]) -> PathBuf {
-    std::env::var_os(variable).map_or_else(|| build(features), PathBuf::from)
-}
-
-/// Builds the programs and asks cargo where it put them. With features, into a target folder of its own: else each
-/// build would throw the other's results away.
-fn build(features: &[&str]) -> PathBuf {
+/// Builds the programs and asks cargo where it put them.
+fn build() -> PathBuf {
     let mut cargo = Command::new(option_env!("CARGO").unwrap_or("cargo"));
     cargo.current_dir(workspace()).args(["build", "--release", "--message-format=json-render-diagnostics"]);
-    // Only these two count their allocations.
-    let counting = [Program::Emulator, Program::Controller];
-    let [emulator, controller] = counting;
-    let all =
-        [emulator, controller, Program::Bench, Program::Discrepancy, Program::Campaign, Program::Airbench];
-    for program in if features.is_empty() { &all[..] } else { &counting[..] } {
-        let package = if *program == Program::Airbench { "front" } else { program.name() };
-        cargo.args(["--package", package, "--bin", program.name()]);
-    }
-    if features.is_empty() {
-        // What `bench export-fmu` packs.
-        cargo.args(["--package", "plant-fmu", "--lib"]);
-    }
-    if !features.is_empty() {
-        let target =
-            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
-        cargo.args(features).arg("--target-dir").arg(target.join("counting-allocations"));
+    // `plant-fmu` is what `bench export-fmu` packs.
+    for package in
+        ["emulator", "controller", "bench", "discrepancy", "campaign", "front", "counting", "plant-fmu"]
+    {
+        cargo.args(["--package", package]);
     }
     let built = cargo.stderr(Stdio::inherit()).output().expect("cargo starts");
     assert!(built.status.success(), "the programs do not build: {}", built.status);

@@ -2,9 +2,9 @@
 
 use super::queues::TimingQueues;
 use super::{Outlets, Stopwatch};
+use crate::cli::RunArguments;
 use crate::report;
 use crate::run::RunError;
-use controller::cli::RunArguments;
 use crossbeam_channel::bounded;
 use protocol::bus::BusUrl;
 use realtime::{Clock, Freeze, Instant, MonotonicClock};

@@ -1,10 +1,10 @@
 //! Rows and waits of wake-ups played on a clock that belongs to the test.
 
 use super::*;
+use crate::cli::{Cli, Command};
 use axis_control::node::{self, ControllerNode};
 use axis_control::setup::{Inputs, Mode};
 use clap::Parser;
-use controller::cli::{Cli, Command};
 use crossbeam_channel::{Receiver, bounded};
 use protocol::bus::control::Role;
 use protocol::bus::{BusCounters, BusError, Received, SendError};
