@@ -3,7 +3,7 @@
 //! It keeps no table of its own: what it does is read off the bus, and its set-point is computed a second time here.
 
 use crate::binaries::workspace;
-use crate::foreign_python::{python, tools_path};
+use crate::foreign_python::{light_path, python, tools_path};
 use protocol::can::CanFrame;
 use protocol::frames::{ECHO_RANGE, Frame, MainChainState};
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,6 +35,7 @@ pub fn build(folder: &Path, options: &[&str]) -> PathBuf {
     let mut make = Command::new("make");
     make.arg("-C").arg(workspace().join("tests/firmware")).args(options);
     make.env("PATH", tools_path())
+        .env("PYTHONPATH", light_path())
         .arg(format!("BUILD={}", folder.display()))
         .arg(format!("PYTHON={}", python().display()));
     let built = make.output().expect("make is installed");

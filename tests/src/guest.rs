@@ -5,7 +5,7 @@
 //! accounted for, never how fast anything was.
 
 use crate::binaries::workspace;
-use crate::foreign_python::python;
+use crate::foreign_python::{light_path, python};
 use crate::process::Running;
 use crate::records::{count, json};
 use protocol::can::CanFrame;
@@ -182,7 +182,13 @@ pub fn link(links: &Value, interface: &str) -> Value {
 pub fn compare_candump(log: &Path, run: &Path) -> Result<String, String> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/compare_candump.py");
     let mut command = Command::new(python());
-    command.args(["-W", "error"]).arg(script).arg(workspace().join("protocol/rig.dbc")).arg(log).arg(run);
+    command
+        .env("PYTHONPATH", light_path())
+        .args(["-W", "error"])
+        .arg(script)
+        .arg(workspace().join("protocol/rig.dbc"))
+        .arg(log)
+        .arg(run);
     let output = command.output().expect("Python starts");
     let [reported, complaint] =
         [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());

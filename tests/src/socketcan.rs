@@ -1,7 +1,7 @@
 //! Programs of SocketCAN: what they answer on vcan, recorded in `tests/expected/socketcan`, and `bench can` as a process.
 
 use crate::binaries::{Program, workspace};
-use crate::foreign_python::{python, tools_path};
+use crate::foreign_python::{light_path, python, tools_path};
 use crate::process::Running;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -81,6 +81,7 @@ pub fn payload() -> &'static Path {
         let folder = workspace().join("target/socketcan-payload");
         let mut payload = Command::new(sources().join("payload.sh"));
         payload.arg(&folder).env("PYTHON", python()).env("PATH", tools_path());
+        payload.env("PYTHONPATH", light_path());
         let made = payload.output().expect("bash is installed");
         assert!(made.status.success(), "the payload is not made:\n{}", String::from_utf8_lossy(&made.stderr));
         folder
@@ -102,6 +103,7 @@ pub fn built(program: &'static str) -> PathBuf {
 /// `bench can` on the bus of a scene, with options separated by spaces, and a command.
 pub fn guest(scene: &Scene, options: &str, command: &[impl AsRef<OsStr>]) -> Command {
     let mut can = Program::Bench.command();
+    can.env("PYTHONPATH", light_path());
     can.args(["can", "--bus", &scene.url()]).args(options.split_whitespace()).arg("--").args(command);
     can
 }

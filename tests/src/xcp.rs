@@ -1,7 +1,7 @@
 //! Clients of the controllers' XCP: one of our own, packet by packet over a [`Peer`], and the foreign one in Python.
 
 use crate::binaries::{Program, workspace};
-use crate::foreign_python::python;
+use crate::foreign_python::{light_path, python};
 use crate::peer::{Packet, Peer};
 use crate::process::{Ended, PATIENCE, Running};
 use crate::records::json;
@@ -94,7 +94,7 @@ impl Foreign {
         let scripts = workspace().join("tests/python");
         let seen = scene.path(&format!("seen-{axis}.json"));
         let mut command = Command::new(python());
-        command.env("PYTHONPATH", workspace().join("python")).arg(scripts.join("xcp_client.py"));
+        command.env("PYTHONPATH", light_path()).arg(scripts.join("xcp_client.py"));
         command.arg(scenario).arg(scene.socket()).arg(scene.path(folder)).arg(axis).arg(&seen);
         if member {
             command.arg(format!("client-{axis}"));

@@ -13,7 +13,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned_in};
-use system_tests::foreign_python::{run_script_of, tools_path};
+use system_tests::foreign_python::{light_path, run_script_of, tools_path};
 use system_tests::launch::Pace;
 use system_tests::process::Running;
 use system_tests::records::{bus_log, count, count_of_id, json};
@@ -47,7 +47,7 @@ fn mcu(scene: &Scene) -> Running {
 
 fn mcu_command(scene: &Scene) -> Command {
     let mut command = Command::new(workspace().join("scripts/mcu"));
-    command.arg("--elf").arg(elf()).arg("--bus").arg(scene.url());
+    command.env("PYTHONPATH", light_path()).arg("--elf").arg(elf()).arg("--bus").arg(scene.url());
     command.arg("--report").arg(scene.path("mcu.json"));
     command
 }
@@ -228,6 +228,7 @@ fn noise_does_not_move_it_and_sensor_loss_and_the_emergency_stop_shut_its_valve_
 fn the_check_of_controllers_passes_it() {
     let scene = scene("");
     let mut check = Program::Bench.command();
+    check.env("PYTHONPATH", light_path());
     check.args(["check-controller", "--pace", "lockstep", "--seconds", "1", "--junit"]);
     check.arg(scene.path("result.xml")).arg("--").arg(workspace().join("scripts/mcu"));
     check.arg("--elf").arg(elf()).args(["--bus", "{bus}"]);

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 use system_tests::door::{Door, DoorClient};
-use system_tests::foreign_python::python;
+use system_tests::foreign_python::{light_path, python};
 use system_tests::launch::Pace;
 use system_tests::peer::{Packet, Peer};
 use system_tests::process::{PATIENCE, Running, wait_until};
@@ -26,6 +26,7 @@ fn frames(log: &Path) -> Vec<String> {
 /// A program of python-can, or another module, with Ctrl-C as a terminal would have it.
 fn python_module(module: &str, arguments: &[String]) -> Command {
     let mut command = Command::new("env");
+    command.env("PYTHONPATH", light_path());
     command.arg("--default-signal=INT").arg(python()).args(["-m", module]).args(arguments);
     command
 }
@@ -105,7 +106,10 @@ fn python_can_sends_to_the_bus_and_to_the_other_clients() {
          \x20   got = bus.recv(30)\n\
          \x20   print(hex(got.arbitration_id), got.is_extended_id, got.data.hex())\n"
     );
-    let sender = Running::start("python", Command::new(python()).args(["-c", &script]));
+    let sender = Running::start(
+        "python",
+        Command::new(python()).env("PYTHONPATH", light_path()).args(["-c", &script]),
+    );
     for expected in ["123#01A0", "00000123#"] {
         assert_eq!(next_on(&peer).to_string(), expected);
     }

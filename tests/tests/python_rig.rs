@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::firmware;
-use system_tests::foreign_python::{of, tools_path};
+use system_tests::foreign_python::{light_path, of, tools_path};
 use system_tests::process::{Ended, Running};
 use system_tests::turn;
 
@@ -87,6 +87,7 @@ fn the_example_suite_holds_our_controller_and_the_firmware_against_their_require
     let mut suite = on_two_workers();
     suite
         .current_dir(workspace().join("docs/examples/pytest"))
+        .env("PYTHONPATH", light_path())
         .env("AIRBENCH_FIRMWARE", folder.path().join("firmware"));
     for (option, place) in [("runs", "runs"), ("traceability", "traceability")] {
         suite.arg(format!("--airbench-{option}={}", folder.path().join(place).display()));
