@@ -62,6 +62,8 @@ pub struct GriddedRecord {
     pub(crate) jitter_s: f64,
     /// Periods without a known command or without a smoothed state.
     pub(crate) excluded_periods: Vec<bool>,
+    /// Periods of the whole record in which the blocks of a subsample begin; none of a whole record.
+    pub(crate) blocks: Vec<usize>,
 }
 
 /// Mechanical state and pressures of an axis, along its extension.

@@ -110,7 +110,7 @@ impl SensorInverse {
             let at = |period: usize| {
                 let (point, inputs) = (&record.points[period][i], &record.inputs[period]);
                 let ([a, b], valve) = (point.pressures_pa, inputs.valve[i]);
-                let time_s = period as f64 * PERIOD_S;
+                let time_s = record.since_start(period) as f64 * PERIOD_S;
                 term.value(&[point.extension_m, point.rod_velocity_m_per_s, a, b, valve, valve, time_s, 0.0])
             };
             let (now, next) = (at(period), at((period + 1).min(record.len() - 1)));

@@ -189,7 +189,7 @@ impl<'a> Windows<'a> {
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             for (at, inverse) in inverse.iter().enumerate() {
                 let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
-                set_state(batch.plant_mut(at), self.record, &points);
+                set_state(batch.plant_mut(at), self.record, start, &points);
             }
             let judged = self.starts.get(next) == Some(&start);
             next += usize::from(judged);

@@ -104,6 +104,14 @@ impl Plant {
         Plant { rig: Arc::new(rig.clone()), integrator, effects, state, faults, valves, spare }
     }
 
+    /// Sets the time that declared terms read as `t`, in periods; nothing else changes. A plant begins at 0.
+    pub fn set_time(&mut self, periods: u64) {
+        let substeps = u64::from(self.integrator.substeps());
+        if let Some(effects) = &mut self.effects {
+            effects.memory.substeps = periods * substeps;
+        }
+    }
+
     /// Advances by exactly 1 ms with the inputs held.
     ///
     /// The caller has rounded the commands to what the wire can carry ([`crate::quantise_valve`]) and refused NaN. While

@@ -35,12 +35,14 @@ impl GriddedRecord {
             samples: Vec::new(),
             points: Vec::new(),
             excluded_periods: Vec::new(),
+            blocks: Vec::new(),
             ..self.clone()
         };
         for chosen in 0..wanted {
             // The middle block of each of `wanted` equal parts.
             let block = (2 * chosen + 1) * blocks / (2 * wanted);
             let places = block * BLOCK * WINDOW..(block + 1) * BLOCK * WINDOW;
+            part.blocks.push(places.start);
             part.inputs.extend_from_slice(&self.inputs[places.clone()]);
             part.samples.extend_from_slice(&self.samples[places.clone()]);
             part.points.extend_from_slice(&self.points[places.clone()]);
@@ -49,6 +51,12 @@ impl GriddedRecord {
             part.excluded_periods[began..began + WINDOW].fill(true);
         }
         Some(part)
+    }
+
+    /// Periods from the first row of the whole record to a period of this one.
+    pub(crate) fn since_start(&self, period: usize) -> usize {
+        let first = self.blocks.get(period / (BLOCK * WINDOW));
+        first.map_or(period, |first| first + period % (BLOCK * WINDOW))
     }
 }
 
@@ -78,6 +86,8 @@ mod tests {
         let began: Vec<f64> =
             part.inputs.iter().step_by(BLOCK * WINDOW).map(|inputs| inputs.valve[0]).collect();
         assert_eq!(began, [4800.0, 16_800.0, 28_800.0, 40_800.0]);
+        assert_eq!([0, 2399, 2400, 7201].map(|at| part.since_start(at)), [4800, 7199, 16_800, 40_801]);
+        assert_eq!(all.since_start(7201), 7201);
         let lead_in = part.excluded_periods.iter().filter(|gap| **gap).count();
         assert_eq!(lead_in, 4 * WINDOW);
         assert!((0..4).all(|block| part.excluded_periods[block * BLOCK * WINDOW]

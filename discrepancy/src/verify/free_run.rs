@@ -25,7 +25,7 @@ pub(super) fn free_run(record: &GriddedRecord, rig: &RigParameters) -> FreeRun {
     let mut plant =
         Plant::in_state(rig, &first_state(record, rig)).expect("a start state is one of the rig's");
     let at_rest = record.points[0].map(|point| AxisState { rod_velocity_m_per_s: 0.0, ..point });
-    set_state(&mut plant, record, &at_rest);
+    set_state(&mut plant, record, 0, &at_rest);
     let stroke_m = rig.cylinder().stroke_m;
     let highest_pa = HIGHEST * plant.supply_pressure_pa();
     let mut errors = [[(0.0, 0_usize); CHANNELS]; 2];

@@ -3,19 +3,22 @@
 use super::*;
 use crate::gridded_record::AxisState;
 use crate::next::divergence::noise_with_rounding;
-use crate::windows::first_state;
+use crate::windows::{Windows, first_state};
 use plant::{Inputs, Plant, Sensors};
 
 /// A record of 3 s made by a rig: the drive, out and back by half-open valves, with its sensors' noise.
 fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRecord {
-    const PERIODS: usize = 3000;
+    record_over(3000, rig, baseline, seed)
+}
+
+fn record_over(periods: usize, rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRecord {
     let mut record = GriddedRecord {
         name: "made".to_owned(),
         measured: [true, false],
-        inputs: vec![Inputs::default(); PERIODS],
+        inputs: vec![Inputs::default(); periods],
         points: vec![[AxisState { extension_m: 0.1, ..AxisState::default() }; 2]],
         noise: [noise_with_rounding(baseline), [0.0; CHANNELS]],
-        excluded_periods: vec![false; PERIODS],
+        excluded_periods: vec![false; periods],
         ..GriddedRecord::default()
     };
     for (period, inputs) in record.inputs.iter_mut().enumerate() {
@@ -118,4 +121,36 @@ fn traces_hold_the_whole_record_and_nothing_where_it_is_not_judged() {
     assert!(pressure.measured[555].is_nan() && pressure.after_residual[555].is_nan());
     assert!(!pressure.before[555].is_nan());
     assert!((pressure.before[700] - pressure.measured[700]).abs() < 8.0 * pressure.noise);
+}
+
+#[test]
+fn a_law_over_time_goes_on_in_the_time_of_the_whole_record_where_a_part_is_searched() {
+    let rig = RigParameters::baseline();
+    let law = "[[terms]]\nname = \"fades\"\nplace = \"drive.force\"\nadd = \"-5[N/s]*t\"\n";
+    let text = format!("{}{law}", RigParameters::BASELINE_TOML);
+    let truth = RigParameters::from_toml(&text, "rig.toml").unwrap_or_else(|error| panic!("{error}"));
+    let all = record_over(9600, &truth, &rig, 5);
+    let part = all.thinned(0.5).expect("two blocks of four");
+    let by_itself = GriddedRecord { blocks: Vec::new(), ..part.clone() };
+    let whole = Windows::new(&all, &truth);
+    let of_whole = whole.simulate(&truth);
+    let since_start = |start: &usize| part.since_start(*start);
+    // Largest difference from the windows of the whole record, in standard deviations of the noise.
+    let difference = |record: &GriddedRecord| {
+        let windows = Windows::new(record, &truth);
+        let simulated = windows.simulate(&truth);
+        let of_window = |(at, start): (usize, &usize)| {
+            let place =
+                whole.starts().iter().position(|other| *other == since_start(start)).expect("in both");
+            let rows = windows.rows();
+            let [one, other] = [&of_whole[place * rows..][..rows], &simulated[at * rows..][..rows]];
+            one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+        };
+        let all: Vec<f64> = windows.starts().iter().enumerate().map(of_window).collect();
+        assert_eq!(all.len(), 10);
+        all.into_iter().fold(0.0, f64::max)
+    };
+    let [kept, lost] = [difference(&part), difference(&by_itself)];
+    // What a window has not forgotten of the one before, against 12 to 24 N.
+    assert!(kept < 3.0 && lost > 100.0, "{kept} {lost}");
 }

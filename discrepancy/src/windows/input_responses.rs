@@ -109,7 +109,7 @@ impl Windows<'_> {
         let mut plants = Vec::with_capacity(self.starts.len());
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
-            set_state(&mut plant, self.record, &points);
+            set_state(&mut plant, self.record, start, &points);
             if self.starts.get(plants.len()) == Some(&start) {
                 plants.push(plant.clone());
             }

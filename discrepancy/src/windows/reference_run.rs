@@ -67,7 +67,7 @@ impl Windows<'_> {
             ReferenceRun { simulated: Vec::with_capacity(self.readings.len()), ..ReferenceRun::default() };
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
-            super::set_state(&mut plant, self.record, &points);
+            super::set_state(&mut plant, self.record, start, &points);
             let judged = self.starts.get(reference_run.ranges_of_windows.len()) == Some(&start);
             let state = *plant.state();
             let mut ranges = VariableRanges::EMPTY;

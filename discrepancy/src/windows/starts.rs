@@ -187,7 +187,7 @@ impl Windows<'_> {
         if let Some((axis, number)) = nudged {
             points[axis] = points[axis].nudged(number);
         }
-        set_state(plant, self.record, &points);
+        set_state(plant, self.record, start, &points);
     }
 
     /// Sensitivities of the readings to each number of the start state, per prior standard deviation.
@@ -272,10 +272,11 @@ pub(crate) fn state_at(plant: &Plant, points: &[AxisState; 2], measured: [bool; 
     state
 }
 
-/// Sets the measured axes of a plant to these points.
-pub(crate) fn set_state(plant: &mut Plant, record: &GriddedRecord, points: &[AxisState; 2]) {
+/// Sets the measured axes of a plant to these points, and its time to that of a period of the record.
+pub(crate) fn set_state(plant: &mut Plant, record: &GriddedRecord, period: usize, points: &[AxisState; 2]) {
     let state = state_at(plant, points, record.measured);
     plant.go_on_in(&state).expect("the points of a record are states of the rig");
+    plant.set_time(record.since_start(period) as u64);
 }
 
 /// Orthonormal basis of some columns, without directions below one standard deviation.
