@@ -12,6 +12,7 @@
 //! | `filter` | zero-phase low passes |
 //! | `fit` | output-error fit by the one Gauss-Newton |
 //! | `normal` | normal equations, steps, standard errors |
+//! | `covariance` | standard errors beside coloured residuals and a law that is only near |
 //! | `cuts` | rows in blocks of time, and in bands |
 //! | `starts` | from where a fit starts |
 //! | `select` | which suspects are taken |
@@ -26,6 +27,7 @@
 //! Nothing of a held-out record is read before the terms are chosen and fitted. Keys and figures: `docs/model-files.md`.
 
 mod begin;
+mod covariance;
 mod cuts;
 mod explain;
 mod extended;

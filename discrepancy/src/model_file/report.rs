@@ -1,5 +1,6 @@
 //! The report of a model file, in the model's own names and units.
 
+use super::covariance;
 use super::fit::Fitting;
 use super::held_out::{Judged, Traces};
 use super::normal::standard_errors;
@@ -48,7 +49,7 @@ pub struct Number {
     pub suspect: Option<String>,
     pub unit: String,
     pub value: f64,
-    /// `None` where the records do not determine it.
+    /// By coloured residuals or by blocks of time, the larger; `None` where the records do not determine it.
     pub standard_error: Option<f64>,
     /// Fitted without what was named.
     pub baseline: Option<f64>,
@@ -268,14 +269,15 @@ pub(crate) fn term(model: &Model, suspect: usize) -> String {
     }
 }
 
-/// Numbers of a fit; their errors count what a coloured residual is worth.
+/// Numbers of a fit; their errors are the larger of what a coloured residual is worth and of the jackknife over blocks of time.
 fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
     let fitting = &fitted.fitting;
     let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();
     let inflation = (counts / fitted.effective.iter().sum::<f64>().max(1.0)).max(1.0).sqrt();
     let errors = standard_errors(&fitted.normal);
-    let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors);
-    all.map(|((unknown, value), error)| {
+    let of_blocks = covariance::of_blocks(&fitted.steps);
+    let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors.into_iter().zip(&of_blocks));
+    all.map(|((unknown, value), (error, of_blocks))| {
         let unit = fitting.unit_of(unknown);
         let before = baseline.fitting.unknowns.iter().position(|other| other.what == unknown.what);
         Number {
@@ -283,7 +285,7 @@ fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
             suspect: fitting.suspect_of(unknown).map(|suspect| fitting.model.suspects[suspect].name.clone()),
             unit: unit.text.clone(),
             value: value / unit.factor,
-            standard_error: error.map(|error| error * inflation / unit.factor),
+            standard_error: error.map(|error| (error * inflation).max(*of_blocks) / unit.factor),
             baseline: before.map(|place| baseline.point.values_si[place] / unit.factor),
             is_at_bound: unknown.range_si.contains(value),
         }

@@ -19,13 +19,15 @@
 //!
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
-use super::fit::{Fitting, Point, What};
+use super::covariance;
+use super::fit::{Fitting, OfRecord, Point, What};
 use super::normal::{Normal, solved};
 use super::record::Measured;
 use super::starts;
 use crate::estimator::Convergence;
 use crate::stats::mean;
 use model::{Failure, Model, Program};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// Most terms that are taken.
@@ -55,6 +57,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) convergence: Convergence,
     /// Squares that each fold in time has under the fit without it, output by output.
     folds: Folds,
+    /// What the fit moves by without each of them.
+    pub(crate) steps: Vec<DVector<f64>>,
     /// The same in bands of each of what the model's folds go over.
     bands: Vec<Folds>,
     /// Squares of the rows that judge, of each output.
@@ -218,7 +222,7 @@ pub(crate) fn fitted<'a>(
     let normal = fitting.sum(&normals, &point);
     let bands = (0..model.rows.folds.len()).map(|fold| {
         let normals = fitting.normals(&point.values_si, &fitting.in_bands(fold))?;
-        Ok(folds(&normals, &normal, &fitting, &point))
+        Ok(folds(&normals, &steps(&normals, &normal, &fitting, &point)))
     });
     let bands = bands.collect::<Result<Vec<_>, Failure>>()?;
     let judged =
@@ -226,10 +230,15 @@ pub(crate) fn fitted<'a>(
             sum.iter_mut().zip(block).for_each(|(sum, normal)| *sum += normal.squares);
             sum
         });
-    let effective = effective(&fitting, &point)?;
+    let residuals = series(&fitting, &point)?;
+    let effective = (0..model.outputs.len())
+        .map(|output| independent(&residuals[output], fitting.count(output)))
+        .collect();
+    let steps = steps(&normals, &normal, &fitting, &point);
     Ok(Fitted {
         suspects: suspects.to_vec(),
-        folds: folds(&normals, &normal, &fitting, &point),
+        folds: folds(&normals, &steps),
+        steps,
         bands,
         judged,
         fitting,
@@ -240,8 +249,8 @@ pub(crate) fn fitted<'a>(
     })
 }
 
-/// Squares of each fold under the fit without it; the last block is no fold.
-fn folds(normals: &[Vec<Normal>], all: &Normal, fitting: &Fitting<'_>, point: &Point) -> Vec<Vec<f64>> {
+/// What the fit moves by without each block, by one linear step; the last block is no fold.
+fn steps(normals: &[Vec<Normal>], all: &Normal, fitting: &Fitting<'_>, point: &Point) -> Vec<DVector<f64>> {
     let is_free: Vec<bool> = fitting
         .unknowns
         .iter()
@@ -255,44 +264,37 @@ fn folds(normals: &[Vec<Normal>], all: &Normal, fitting: &Fitting<'_>, point: &P
             rest.matrix -= &normal.matrix * weight;
             rest.slope -= &normal.slope * weight;
         }
-        let step = solved(&rest, &is_free, 0.0);
-        let squares = |normal: &Normal| {
-            let quadratic = step.dot(&(&normal.matrix * &step));
-            (normal.squares - 2.0 * step.dot(&normal.slope) + quadratic).max(0.0)
-        };
-        block.iter().map(squares).collect()
+        solved(&rest, &is_free, 0.0)
     };
     normals[..normals.len() - 1].iter().map(without).collect()
 }
 
-/// Independent samples that the residual of each output is worth.
-fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> {
+/// Squares of each fold under the fit without it.
+fn folds(normals: &[Vec<Normal>], steps: &[DVector<f64>]) -> Folds {
+    let of_block = |(block, step): (&Vec<Normal>, &DVector<f64>)| {
+        let squares = |normal: &Normal| {
+            let quadratic = step.dot(&(&normal.matrix * step));
+            (normal.squares - 2.0 * step.dot(&normal.slope) + quadratic).max(0.0)
+        };
+        block.iter().map(squares).collect()
+    };
+    normals.iter().zip(steps).map(of_block).collect()
+}
+
+/// What is left of each output, record by record, where something was measured.
+fn series(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<Vec<Vec<f64>>>, Failure> {
     let residuals = fitting.residuals(&point.values_si)?;
     let of_output = |output: usize| {
-        let series: Vec<Vec<f64>> = residuals
-            .iter()
-            .map(|record| record[output][0].iter().copied().filter(|value| value.is_finite()).collect())
-            .collect();
-        independent(&series, fitting.count(output))
+        let measured =
+            |record: &OfRecord| record[output][0].iter().copied().filter(|value| value.is_finite()).collect();
+        residuals.iter().map(measured).collect()
     };
     Ok((0..fitting.model.outputs.len()).map(of_output).collect())
 }
 
 /// Samples over the sum of their autocorrelations until one is not positive.
 fn independent(series: &[Vec<f64>], count: f64) -> f64 {
-    let squares: f64 = series.iter().flatten().map(|value| value * value).sum();
-    let longest = series.iter().map(Vec::len).max().unwrap_or(0) / 4;
-    let mut sum = 0.0;
-    for lag in 1..longest {
-        let products = |values: &Vec<f64>| -> f64 {
-            values.iter().skip(lag).zip(values).map(|(late, early)| late * early).sum()
-        };
-        let products: f64 = series.iter().map(products).sum();
-        if products <= 0.0 {
-            break;
-        }
-        sum += products / squares.max(f64::MIN_POSITIVE);
-    }
+    let sum: f64 = covariance::autocorrelation(series).iter().sum();
     (count / (1.0 + 2.0 * sum)).max(2.0)
 }
 
