@@ -94,6 +94,9 @@ pub struct NameArguments {
     /// File of suspects beside the rig file: terms as expressions that may be missing, candidates beside the effects.
     #[arg(long, value_name = "FILE")]
     pub suspects: Option<PathBuf>,
+    /// Of a model file: where no suspect is named, search for terms that none of them describes.
+    #[arg(long)]
+    pub discover: bool,
 }
 
 /// What the whole workflow is given.

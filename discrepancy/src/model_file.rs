@@ -16,6 +16,7 @@
 //! | `cuts` | rows in blocks of time, and in bands |
 //! | `starts` | from where a fit starts |
 //! | `select` | which suspects are taken |
+//! | `discover` | a search for what no suspect describes |
 //! | `held_out` | both models on records that were not used |
 //! | `structure` | which suspects can be told apart, before any fit |
 //! | `sensors` | which state, measured, would tell suspects apart |
@@ -29,6 +30,7 @@
 mod begin;
 mod covariance;
 mod cuts;
+mod discover;
 mod explain;
 mod extended;
 mod filter;
@@ -45,6 +47,7 @@ mod starts;
 mod structure;
 
 pub use begin::{NewError, new_model};
+pub use discover::DiscoveredTerm;
 pub use explain::explain;
 pub use extended::{ExtendError, ReportedModel, extended};
 pub use held_out::JudgeError;
@@ -122,12 +125,51 @@ pub fn close(
     tests: &[PathBuf],
     progress: &mut dyn FnMut(&str),
 ) -> Result<ClosedModel, ModelError> {
+    closed(file, (train, tests), false, progress)
+}
+
+/// The same, and where no suspect is named a search for terms that none of them describes.
+///
+/// # Errors
+/// As [`close`].
+pub fn close_searching(
+    file: &Path,
+    train: &[PathBuf],
+    tests: &[PathBuf],
+    progress: &mut dyn FnMut(&str),
+) -> Result<ClosedModel, ModelError> {
+    closed(file, (train, tests), true, progress)
+}
+
+fn closed(
+    file: &Path,
+    (train, tests): (&[PathBuf], &[PathBuf]),
+    is_searching: bool,
+    progress: &mut dyn FnMut(&str),
+) -> Result<ClosedModel, ModelError> {
     let model = read(file)?;
     let records = train.iter().map(|path| Measured::read(&model, path)).collect::<Result<Vec<_>, _>>()?;
     let found = select::search(&model, &records, progress)?;
     progress("structure");
     let structure = structure::structure(&found.baseline);
-    let mut report = report::report(file, &found, &structure);
+    let grown = (is_searching && found.taken.is_empty()).then(|| discover::grown(&found.baseline));
+    let (found, mut report) = match &grown {
+        None => {
+            let report = report::report(file, &found, &structure);
+            (found, report)
+        }
+        Some(Err(why)) => {
+            let mut report = report::report(file, &found, &structure);
+            report.notes.push(format!("nothing was searched: {why}"));
+            (found, report)
+        }
+        Some(Ok(grown)) => {
+            let discovery = discover::search(grown, &records, found, progress)?;
+            let mut report = report::report(file, &discovery.found, &structure);
+            report.describe(&discovery);
+            (discovery.found, report)
+        }
+    };
     let held_out = judged(&model, &found, tests, progress);
     let (traces, not_judged): (Vec<Traces>, _) = match held_out {
         Ok(None) => (held_out::trained(&found)?, None),
@@ -139,7 +181,7 @@ pub fn close(
         Err(why) => (held_out::trained(&found)?, Some(why)),
     };
     let page = page::page(&model, &report, &traces, not_judged.as_deref());
-    let is_named = !report.named.is_empty();
+    let is_named = !report.named.is_empty() || !report.discovered.is_empty();
     let extended = is_named.then(|| extended(model.text(), &ReportedModel::from(&report)).ok()).flatten();
     Ok(ClosedModel { report, not_judged, page, extended })
 }

@@ -6,6 +6,7 @@ mod balances;
 mod bus_log;
 mod calibrate;
 mod chamber;
+mod discover;
 mod locate;
 mod model_files;
 mod name;

@@ -2,7 +2,7 @@
 
 use super::{CommandError, Exit, NameArguments, print, progress};
 use crate::folder::{self, Folder};
-use crate::model_file::{ClosedModel, ModelReport, close, new_model};
+use crate::model_file::{ClosedModel, ModelReport, close, close_searching, new_model};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +22,7 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
         out.file(name)?;
     }
     let mut progress = progress();
+    let close = if arguments.discover { close_searching } else { close };
     let closed = close(&records.rig, &records.train, tests, &mut progress)?;
     print(&in_words(&closed.report))?;
     if let Some(why) = &closed.not_judged {

@@ -22,12 +22,21 @@ pub enum ExtendError {
 #[derive(Debug, Deserialize)]
 pub struct ReportedModel {
     named: Vec<ReportedName>,
+    /// Absent in reports of before 0.1.0.
+    #[serde(default)]
+    discovered: Vec<ReportedTerm>,
     parameters: Vec<ReportedNumber>,
 }
 
 #[derive(Debug, Deserialize)]
 struct ReportedName {
     suspect: String,
+}
+
+#[derive(Debug, Deserialize)]
+struct ReportedTerm {
+    name: String,
+    text: String,
 }
 
 #[derive(Debug, Deserialize)]
@@ -48,7 +57,11 @@ impl From<&super::ModelReport> for ReportedModel {
             value: number.value,
             is_at_bound: number.is_at_bound,
         });
-        Self { named: named.collect(), parameters: parameters.collect() }
+        let discovered = report
+            .discovered
+            .iter()
+            .map(|one| ReportedTerm { name: one.name.clone(), text: one.text.clone() });
+        Self { named: named.collect(), discovered: discovered.collect(), parameters: parameters.collect() }
     }
 }
 
@@ -73,10 +86,22 @@ pub fn extended(text: &str, report: &ReportedModel) -> Result<String, ExtendErro
         let mut term = suspects.get(place).expect("it was found").clone();
         suspects.remove(place);
         put(&mut term, report, Some(suspect));
-        let terms = document.entry("terms").or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
-        terms.as_array_of_tables_mut().ok_or(ExtendError::Form)?.push(term);
+        push(&mut document, term)?;
+    }
+    for ReportedTerm { name, text } in &report.discovered {
+        let text: DocumentMut = text.parse()?;
+        let first = text.get("suspects").and_then(Item::as_array_of_tables).and_then(|all| all.get(0));
+        let mut term = first.ok_or(ExtendError::Form)?.clone();
+        put(&mut term, report, Some(name));
+        push(&mut document, term)?;
     }
     Ok(document.to_string())
+}
+
+fn push(document: &mut DocumentMut, term: Table) -> Result<(), ExtendError> {
+    let terms = document.entry("terms").or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
+    terms.as_array_of_tables_mut().ok_or(ExtendError::Form)?.push(term);
+    Ok(())
 }
 
 /// Writes fitted numbers over the values of a table's parameters. One at an end of its range keeps that of the file.

@@ -29,6 +29,7 @@ pub(crate) fn page(
     let sections = [
         ("records", "Measured, and both models", pictures(model, report, traces)),
         ("named", "What is missing", named(report)),
+        ("discovered", "What a search found", discovered(report)),
         ("held-out", "On held-out records", left("Held-out records", &report.held_out)),
         ("training", "On the training records", left("Training records", &report.training)),
         ("suspects", "Suspects, the most likely first", suspects(&report.suspects)),
@@ -133,6 +134,23 @@ fn named(report: &ModelReport) -> String {
         ]
     });
     table("What is missing", &["suspect", "place", "term", "of what is left, on folds", "as good"], rows)
+}
+
+fn discovered(report: &ModelReport) -> String {
+    let rows = report.discovered.iter().map(|one| {
+        let others = if one.alternatives.is_empty() { "none".into() } else { one.alternatives.join("; ") };
+        vec![
+            Cell::Sentence(report.in_words(one)),
+            Cell::Sentence(one.term.clone()),
+            words(one.variables.join(", ")),
+            number(format!("{:.1} %", one.share_explained * 100.0)),
+            number(format!("{:.0} %", one.stability * 100.0)),
+            Cell::Sentence(others),
+        ]
+    });
+    let heads =
+        ["term", "how it stands there", "reads", "of what is left, on folds", "best in halves", "as good"];
+    table("Terms that no suspect describes", &heads, rows)
 }
 
 fn left(label: &str, all: &[Left]) -> String {

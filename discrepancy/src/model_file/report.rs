@@ -1,6 +1,7 @@
 //! The report of a model file, in the model's own names and units.
 
 use super::covariance;
+use super::discover::DiscoveredTerm;
 use super::fit::Fitting;
 use super::held_out::{Judged, Traces};
 use super::normal::standard_errors;
@@ -35,6 +36,8 @@ pub struct ModelReport {
     /// What is left on each held-out record.
     pub held_out: Vec<Left>,
     pub named: Vec<Named>,
+    /// Where nothing was named and a search was asked for: terms that no suspect describes.
+    pub discovered: Vec<DiscoveredTerm>,
     /// Every suspect beside the model alone, the most likely first.
     pub suspects: Vec<Judgement>,
     pub structure: Structure,
@@ -196,6 +199,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         training: training.collect(),
         held_out: Vec::new(),
         named,
+        discovered: Vec::new(),
         suspects,
         structure: structure.clone(),
         notes,
@@ -209,7 +213,7 @@ impl ModelReport {
             .iter()
             .map(|one| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows))
             .collect();
-        if self.named.is_empty() {
+        if self.named.is_empty() && self.discovered.is_empty() {
             return;
         }
         let worse: Vec<&Left> =

@@ -31,7 +31,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// Most terms that are taken.
-const MOST_TERMS: usize = 3;
+pub(super) const MOST_TERMS: usize = 3;
 /// Least share of the power left out that a term must explain on folds in time; on bands half of it.
 const SHARE_FLOOR: f64 = 0.1;
 /// Clustered standard errors that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
@@ -41,9 +41,9 @@ const T_BANDS: f64 = 2.0;
 const T_APART: f64 = 3.0;
 /// Twice the difference of log likelihoods that does the same. "Very strong" is 10 for twice the log Bayes factor [Kass, Raftery
 /// 1995, JASA 90(430)], which this difference approximates for equal numbers of parameters only.
-const GAIN_APART: f64 = 10.0;
+pub(super) const GAIN_APART: f64 = 10.0;
 /// Below this it says nothing at all.
-const SAME: f64 = 2.0;
+pub(super) const SAME: f64 = 2.0;
 
 /// Squares of folds, output by output.
 type Folds = Vec<Vec<f64>>;
@@ -213,10 +213,23 @@ pub(crate) fn fitted<'a>(
     suspects: &[usize],
     from: Option<&Fitted<'a>>,
 ) -> Result<Fitted<'a>, Failure> {
+    let starts = |fitting: &Fitting<'a>| {
+        starts::starts(fitting, suspects, from.map(|from| (&from.fitting, &from.point)))
+    };
+    fitted_from(model, records, suspects, starts)
+}
+
+/// The same from given starts.
+pub(crate) fn fitted_from<'a>(
+    model: &'a Model,
+    records: &'a [Measured],
+    suspects: &[usize],
+    starts: impl Fn(&Fitting<'a>) -> Vec<Vec<f64>>,
+) -> Result<Fitted<'a>, Failure> {
     let program =
         Program::new(model, suspects).expect("all suspects together were compiled when the file was read");
     let fitting = Fitting::new(model, program, records, suspects);
-    let starts = starts::starts(&fitting, suspects, from.map(|from| (&from.fitting, &from.point)));
+    let starts = starts(&fitting);
     let (point, convergence) = fitting.fit_from(starts)?;
     let normals = fitting.normals(&point.values_si, &fitting.in_time())?;
     let normal = fitting.sum(&normals, &point);
@@ -321,7 +334,7 @@ fn clustered_t(differences: &[f64]) -> f64 {
     mean / (variance / count).sqrt().max(f64::MIN_POSITIVE)
 }
 
-fn judge(
+pub(super) fn judge(
     found: &Found<'_>,
     after: &Fitted<'_>,
     suspect: usize,
@@ -408,7 +421,7 @@ fn judge(
 
 impl Evaluation {
     /// Twice a log likelihood ratio, less what chance is granted.
-    fn worth(&self) -> f64 {
+    pub(super) fn worth(&self) -> f64 {
         self.gain - self.penalty
     }
 }

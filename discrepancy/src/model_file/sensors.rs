@@ -92,7 +92,7 @@ fn least_noise(baseline: &Fitted<'_>, scale: &[f64]) -> f64 {
 }
 
 /// A record with a further output, measured at each row.
-fn with_one_more(record: &Measured) -> Measured {
+pub(super) fn with_one_more(record: &Measured) -> Measured {
     let mut record = record.clone();
     record.outputs.push(vec![Some(0.0); record.time_s.len()]);
     record

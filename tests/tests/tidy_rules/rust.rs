@@ -284,6 +284,7 @@ const DIMENSIONLESS: &[&str] = &[
     "loss_per_dof",          // of a fit
     "behind",                // difference of losses
     "parameters_moved",      // a count in part
+    "stability",             // share of halves of a record
     "smallest_amplitude",    // over the smallest that is named
     "size",                  // of a drawing, in its own units
     "values",                // of parameters, each with its own unit

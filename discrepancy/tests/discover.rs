@@ -1,0 +1,140 @@
+//! A term that no suspect of the file describes, found by the search of terms; records by another integrator.
+//!
+//! ```text
+//!   1.2 v' = force - 50 x - 1.3 v - hidden(x, v, low)        x' = v        low' = (x - low)/0.8 s
+//! ```
+
+use discrepancy::model_file::{ClosedModel, close, close_searching, read};
+use discrepancy::report::Verdict;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const OSCILLATOR: &str = r#"
+[fit]
+starts = 0
+[inputs.force]
+column = "force_N"
+unit = "N"
+[parameters]
+mass = { unit = "kg", value = 1.5, range = [0.1, 10] }
+stiffness = { unit = "N/m", value = 60, range = [1, 1000] }
+damping = { unit = "N s/m", value = 1, range = [0, 50] }
+[states.x]
+unit = "m"
+start = 0
+derivative = "v"
+[states.v]
+unit = "m/s"
+start = 0
+derivative = "(force - stiffness*x - damping*v)/mass"
+[outputs.position]
+column = "x_mm"
+unit = "mm"
+value = "x"
+[[suspects]]
+name = "offset"
+place = "position"
+add = "o"
+parameters.o = { unit = "mm", value = 1, range = [-100, 100] }
+"#;
+
+/// 16 s at 50 Hz by 40 steps of leapfrog between two samples, noise of about 0.4 mm, a force that jumps.
+fn record(mut seed: u64, hidden: fn(f64, f64, f64) -> f64) -> String {
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+    };
+    let mut text = "t_s,force_N,x_mm\n".to_owned();
+    let (mut x, mut v, mut low, mut force) = (0.0, 0.0, 0.0, 0.0);
+    for row in 0..800 {
+        if row % 35 == 0 {
+            force = 24.0 * random();
+        }
+        text += &format!("{},{force},{}\n", f64::from(row) * 0.02, x * 1e3 + random() + random());
+        for _ in 0..40 {
+            let rate = |x: f64, v: f64| (force - 50.0 * x - 1.3 * v - hidden(x, v, low)) / 1.2;
+            v += 2.5e-4 * rate(x, v);
+            x += 5e-4 * v;
+            v += 2.5e-4 * rate(x, v);
+            low += 5e-4 * (x - low) / 0.8;
+        }
+    }
+    text
+}
+
+type Close = fn(
+    &Path,
+    &[PathBuf],
+    &[PathBuf],
+    &mut dyn FnMut(&str),
+) -> Result<ClosedModel, discrepancy::model_file::ModelError>;
+
+fn closed(folder: &Path, close: Close, hidden: fn(f64, f64, f64) -> f64) -> ClosedModel {
+    let file = |name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let model = file("oscillator.toml", OSCILLATOR);
+    let train = [file("train.csv", &record(1, hidden))];
+    let test = [file("test.csv", &record(3, hidden))];
+    close(&model, &train, &test, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written() {
+    let folder = tempfile::tempdir().unwrap();
+    // A damper that grips away from the middle.
+    let closed = closed(folder.path(), close_searching, |x, v, _| 60.0 * x * x * v);
+    let report = &closed.report;
+    assert_eq!((report.verdict, report.confirmed), (Verdict::OutsideCatalogue, Some(true)), "{report:#?}");
+    let term = &report.discovered[0];
+    assert_eq!(
+        (term.place.as_str(), term.variables.join(",")),
+        ("equation of v", "x,v".to_owned()),
+        "{term:?}"
+    );
+    assert!(term.stability >= 0.6 && closed.page.contains("What a search found"), "{term:?}");
+    let extended = folder.path().join("extended.toml");
+    fs::write(&extended, closed.extended.unwrap()).unwrap();
+    let extended = read(&extended).unwrap_or_else(|error| panic!("{error}"));
+    let found = extended.suspects.iter().position(|one| one.is_term && one.name == term.name).unwrap();
+    let k = extended.parameters.iter().find(|one| one.suspect == Some(found)).unwrap();
+    assert!(k.values_si[0] < 0.0, "it brakes: {k:?}");
+}
+
+#[test]
+fn a_term_with_memory_is_found_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    // The spring is the harder, the further it was out on one side of late.
+    let report = closed(folder.path(), close_searching, |x, _, low| 60.0 * low * x).report;
+    assert_eq!((report.verdict, report.confirmed), (Verdict::OutsideCatalogue, Some(true)), "{report:#?}");
+    let term = &report.discovered[0];
+    assert_eq!(
+        (term.place.as_str(), term.variables.join(",")),
+        ("equation of v", "x".to_owned()),
+        "{term:?}"
+    );
+    let number = |name: &str| report.parameters.iter().find(|one| one.name == name).unwrap();
+    let lag = number("lag_found");
+    let error = lag.standard_error.unwrap();
+    assert!((lag.value - 0.8).abs() < 4.0 * error + 0.01, "{lag:?}");
+    assert!(
+        number("k_found").standard_error.is_some_and(|error| error < 0.1 * number("k_found").value.abs())
+    );
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = closed(folder.path(), close_searching, |_, _, _| 0.0).report;
+    assert_eq!((report.verdict, report.discovered.len()), (Verdict::NothingMissing, 0), "{report:#?}");
+    assert!(report.notes.iter().any(|note| note.contains("0 taken")), "{:?}", report.notes);
+}
+
+#[test]
+fn nothing_is_searched_that_was_not_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = closed(folder.path(), close, |x, v, _| 60.0 * x * x * v).report;
+    assert!(report.discovered.is_empty() && report.notes.is_empty(), "{report:#?}");
+}
