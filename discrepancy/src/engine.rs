@@ -16,6 +16,7 @@ use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
 use crate::stats::order_statistic;
 use crate::windows::{ReferenceRun, VariableRanges, Windows, axis_by_axis, dot};
+use plant::effects::leave_laws_alone;
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -159,8 +160,8 @@ impl<'a> Engine<'a> {
 
     /// The same for several rigs that differ in baseline numbers, on all cores and in batches.
     fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
-        // Rigs with effects do not run in lanes and are distributed one by one.
-        let alone = rigs.iter().any(|rig| !(rig.effects().is_empty() && rig.terms().is_empty()));
+        // Rigs with other laws do not run in lanes and are distributed one by one.
+        let alone = !rigs.iter().all(leave_laws_alone);
         let to_each = rigs.len().div_ceil(rayon::current_num_threads());
         let at_once = if alone { 1 } else { to_each.clamp(1, Batch::GROUP) };
         let simulate = |rigs: &[RigParameters]| {

@@ -28,6 +28,7 @@ mod terms;
 use crate::parameters::RigParameters;
 use crate::state::Axis;
 pub(crate) use acting::Effects;
+use acting::act_in_no_step;
 use declared::{DeclaredTerms, Target};
 pub(crate) use replaced::{dead_volumes_m3, linkage};
 pub(crate) use sheet::OpenBalance;
@@ -201,7 +202,7 @@ impl AxisEffects {
 }
 
 /// Which laws of an axis have effects in them; the others are the baseline's.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Touched {
     pub(crate) spool: bool,
     pub(crate) air: bool,
@@ -243,6 +244,13 @@ impl AxisEffects {
         self.each_term(&balance, |_, term| sum += term);
         sum
     }
+}
+
+/// Whether the baseline's laws move a plant of this rig: nothing is added to it, or what changes constants and readings alone.
+#[must_use]
+pub fn leave_laws_alone(rig: &RigParameters) -> bool {
+    let on = AxisEffects::of(rig);
+    act_in_no_step(&on, &Touched::of(&on))
 }
 
 /// The sheet of an effect by its name.

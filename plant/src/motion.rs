@@ -128,10 +128,11 @@ impl Motion {
         self.stroke_m
     }
 
-    /// Whether a resting axis under this force stays, force in N without any friction.
+    /// Whether a resting axis under this force stays, force in N without any friction; the break-away level is that of its
+    /// direction.
     #[inline(always)]
-    pub(crate) fn holds(&self, extension: f64, force: f64, levels: &Levels) -> bool {
-        force.abs() <= levels.break_away_n[side(force)] || self.pressed(extension, force)
+    pub(crate) fn holds(&self, extension: f64, force: f64, break_away_n: f64) -> bool {
+        force.abs() <= break_away_n || self.pressed(extension, force)
     }
 
     /// Whether a force presses an axis against an end of its stroke.
@@ -168,7 +169,7 @@ impl Motion {
         for _ in 0..3 {
             let direction = if place.velocity != 0.0 {
                 place.velocity.signum()
-            } else if self.holds(place.extension, force, levels) {
+            } else if self.holds(place.extension, force, levels.break_away_n[side(force)]) {
                 return place;
             } else {
                 force.signum()

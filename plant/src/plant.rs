@@ -121,11 +121,12 @@ impl Plant {
     /// In debug builds, if a command is not in [-1, 1] or a hand's force not finite: a bug of the caller.
     pub fn step(&mut self, inputs: &Inputs) {
         let held = self.hold(inputs);
-        if let Some(effects) = &mut self.effects {
-            effects.begin_period(held.command.to_array());
-            self.integrator.advance(effects.as_mut(), &mut self.state, held);
-        } else {
-            self.integrator.advance(&mut Baseline, &mut self.state, held);
+        match &mut self.effects {
+            Some(effects) if !effects.leave_laws_alone() => {
+                effects.begin_period(held.command.to_array());
+                self.integrator.advance(effects.as_mut(), &mut self.state, held);
+            }
+            _ => self.integrator.advance(&mut Baseline, &mut self.state, held),
         }
     }
 
@@ -160,7 +161,7 @@ impl Plant {
 
     /// Whether the baseline's laws move it, which many rigs can be moved by at once.
     pub(crate) fn is_baseline(&self) -> bool {
-        self.effects.is_none()
+        self.effects.as_ref().is_none_or(|effects| effects.leave_laws_alone())
     }
 
     /// Goes to where a batch has moved it.

@@ -287,7 +287,7 @@ impl Forces {
                 }
             } else if place.velocity != 0.0 {
                 sliding_n = -levels.sliding_n[side(place.velocity)] * place.velocity.signum();
-            } else if motion.holds(place.extension, force, &levels) {
+            } else if motion.holds(place.extension, force, levels.break_away_n[side(force)]) {
                 holding_n = -force;
             } else {
                 sliding_n = -levels.sliding_n[side(force)] * force.signum();

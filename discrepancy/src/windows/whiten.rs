@@ -95,6 +95,11 @@ impl Windows<'_> {
                 let to = (at + SPIKE_REACH + 1).min(series.len());
                 let near = &mut near[..to - from];
                 near.copy_from_slice(&series[from..to]);
+                let ends = |(low, high): (f64, f64), value: &f64| (low.min(*value), high.max(*value));
+                let (low, high) = near.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+                if high - low <= limit {
+                    continue; // the median is as near as that
+                }
                 let Some(median) = median(near) else { continue };
                 if (series[at] - median).abs() > limit {
                     values[at * width + output] = median;

@@ -9,6 +9,7 @@
 use super::air::HeatAt;
 use super::declared::DeclaredAt;
 use super::flows::PortsAt;
+use super::friction::direction_of;
 use super::memory::{Memory, Moving};
 use super::presliding::Bristle;
 use super::replaced::linkage_terms;
@@ -42,6 +43,8 @@ pub(crate) struct Effects {
     outlets: [[Outlet; 2]; 2],
     /// Whether friction is the baseline's on both axes; most effects leave it so, and its own laws cost three times as much.
     baseline_friction: bool,
+    /// Whether the baseline's laws move the rig: no effect, table, term or fault acts in a step.
+    baseline_laws: bool,
 }
 
 /// Below this speed an axis on bristles counts as resting: far below what moves it a sensor's step in a second. A guess.
@@ -72,8 +75,10 @@ impl Effects {
             friction_factors: [1.0; 2],
             outlets: Default::default(),
             baseline_friction: false,
+            baseline_laws: false,
         });
         effects.baseline_friction = effects.has_baseline_friction();
+        effects.baseline_laws = effects.has_baseline_laws();
         effects.move_with(of);
         let forces = Forces::at(of, Some(&effects), &Lanes::load(state), Pair::both(0.0), state.linked);
         for (axis, channels) in effects.memory.channels.iter_mut().enumerate() {
@@ -101,6 +106,17 @@ impl Effects {
             }
         }
         self.baseline_friction = self.has_baseline_friction();
+        self.baseline_laws = self.has_baseline_laws();
+    }
+
+    /// Whether the baseline's laws move the rig; nothing is remembered then.
+    pub(crate) fn leave_laws_alone(&self) -> bool {
+        self.baseline_laws
+    }
+
+    fn has_baseline_laws(&self) -> bool {
+        let leaks = (0..2).any(|axis| self.leaks(axis));
+        act_in_no_step(&self.on, &self.touched) && self.baseline_friction && !leaks
     }
 
     fn has_baseline_friction(&self) -> bool {
@@ -268,6 +284,12 @@ impl Effects {
     }
 }
 
+/// Whether effects change constants and what sensors show at an instant, and nothing else.
+pub(crate) fn act_in_no_step(on: &[AxisEffects; 2], touched: &[Touched; 2]) -> bool {
+    let declared = on.iter().any(|on| on.declared.any());
+    !declared && touched.iter().all(|touched| *touched == Touched::default())
+}
+
 /// What tables are over in a step; speed and spool are those at its beginning.
 fn seen(at: At<'_>, middle: &Middle, axis: usize) -> Seen {
     let lane = |pair: Pair| pair.to_array()[axis];
@@ -328,7 +350,7 @@ impl Laws for Effects {
                 return 0.0;
             }
             let speed = self.middle_speed(of, axis, &rubbing, velocity, push, at.span.span_s);
-            -velocity.signum() * self.levels(of, axis, &rubbing, speed).sliding_n[side(velocity)]
+            -velocity.signum() * self.sliding_n(of, axis, &rubbing, speed, direction_of(velocity))
         });
         Pair::new(drive, load).where_true(moving)
     }
@@ -342,7 +364,7 @@ impl Laws for Effects {
             let axis_states = &self.memory.moving.axes[axis];
             let force = force.to_array()[axis];
             let rubbing = self.rubbing(of, axis, middle, axis_states);
-            -force.signum() * self.levels(of, axis, &rubbing, 0.0).sliding_n[side(force)]
+            -force.signum() * self.sliding_n(of, axis, &rubbing, 0.0, direction_of(force))
         });
         Pair::new(drive, load).where_true(starts)
     }
@@ -353,9 +375,12 @@ impl Laws for Effects {
         }
         let of = at.of;
         let [drive, load] = [0, 1].map(|axis| {
+            if at.from.velocity.to_array()[axis] != 0.0 {
+                return f64::INFINITY; // it moves
+            }
             let axis_states = &self.memory.moving.axes[axis];
             let rubbing = self.rubbing(of, axis, middle, axis_states);
-            self.levels(of, axis, &rubbing, 0.0).break_away_n[side(force.to_array()[axis])]
+            self.break_away_n(of, axis, &rubbing, direction_of(force.to_array()[axis]))
         });
         Pair::new(drive, load)
     }
@@ -374,8 +399,8 @@ impl Laws for Effects {
             return Baseline.holds(at, middle, axis, force);
         }
         let rubbing = self.rubbing(at.of, axis, middle, &self.memory.moving.axes[axis]);
-        let levels = self.levels(at.of, axis, &rubbing, 0.0);
-        at.of.motion.holds(at.from.place(axis).extension, force, &levels)
+        let break_away_n = self.break_away_n(at.of, axis, &rubbing, direction_of(force));
+        at.of.motion.holds(at.from.place(axis).extension, force, break_away_n)
     }
 
     fn advance(&self, at: At<'_>, middle: &Middle, carried: &mut Moving, axis: usize, force: f64) -> Place {

@@ -358,6 +358,11 @@ impl DeclaredTerms {
         }
     }
 
+    /// Whether there are any.
+    pub(crate) fn any(&self) -> bool {
+        !self.terms.is_empty()
+    }
+
     /// Whether any adds to a target.
     pub(crate) fn adds(&self, target: Target) -> bool {
         self.terms.iter().any(|(own, _)| *own == target)

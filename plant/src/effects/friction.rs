@@ -23,6 +23,11 @@ pub(crate) struct Rubbing {
 /// Place of a direction in [`Levels`] as a sign.
 const DIRECTIONS: [f64; 2] = [1.0, -1.0];
 
+/// The direction of a speed or a force, as a sign; that of 0 is extending.
+pub(super) fn direction_of(value: f64) -> f64 {
+    DIRECTIONS[side(value)]
+}
+
 impl Effects {
     /// Terms of the sliding level in a direction (1 extending, -1 retracting) at a speed.
     pub(crate) fn sliding_level(
@@ -56,9 +61,20 @@ impl Effects {
         at: &Rubbing,
         direction: f64,
     ) -> BreakAwayLevel {
+        self.break_away_beside(of, axis, at, direction, self.sliding_level(of, axis, at, 0.0, direction))
+    }
+
+    /// The same where the terms of the sliding level at rest are known.
+    fn break_away_beside(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        at: &Rubbing,
+        direction: f64,
+        sliding: SlidingLevel,
+    ) -> BreakAwayLevel {
         let on = &self.on[axis];
         let file = of.motion.levels().break_away_n[0];
-        let sliding = self.sliding_level(of, axis, at, 0.0, direction);
         BreakAwayLevel {
             friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
             pressure_dependent_friction: sliding.pressure_dependent_friction,
@@ -85,26 +101,40 @@ impl Effects {
         sound.max(0.0) * self.friction_factors[axis]
     }
 
-    /// All levels of an axis at a speed, both directions; none below 0, none easier to break away than to slide.
-    pub(crate) fn levels(&self, of: &Integrator, axis: usize, at: &Rubbing, speed: f64) -> Levels {
-        let file = *of.motion.levels();
-        let factor = self.friction_factors[axis];
-        if !self.touched[axis].friction {
-            return Levels {
-                sliding_n: file.sliding_n.map(|level| level * factor),
-                break_away_n: file.break_away_n.map(|level| level * factor),
-                viscous_n_s_per_m: file.viscous_n_s_per_m.map(|level| level * factor),
-            };
-        }
-        let sliding = |speed, direction| {
-            self.sliding_level(of, axis, at, speed, direction).sum(file.sliding_n[0]).max(0.0) * factor
+    /// Level of sliding friction of an axis in a direction (1 extending, -1 retracting) at a speed, N, not below 0.
+    pub(crate) fn sliding_n(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        at: &Rubbing,
+        speed: f64,
+        direction: f64,
+    ) -> f64 {
+        let file = of.motion.levels().sliding_n[0];
+        let level = if self.touched[axis].friction {
+            self.sliding_level(of, axis, at, speed, direction).sum(file).max(0.0)
+        } else {
+            file
         };
+        level * self.friction_factors[axis]
+    }
+
+    /// Break-away level of an axis in a direction, N: not easier than to slide.
+    pub(crate) fn break_away_n(&self, of: &Integrator, axis: usize, at: &Rubbing, direction: f64) -> f64 {
+        let (file, factor) = (of.motion.levels(), self.friction_factors[axis]);
+        if !self.touched[axis].friction {
+            return file.break_away_n[0] * factor;
+        }
+        let sliding = self.sliding_level(of, axis, at, 0.0, direction);
+        let level = self.break_away_beside(of, axis, at, direction, sliding).sum(file.break_away_n[0]);
+        (level * factor).max(sliding.sum(file.sliding_n[0]).max(0.0) * factor)
+    }
+
+    /// All levels of an axis at a speed, both directions.
+    pub(crate) fn levels(&self, of: &Integrator, axis: usize, at: &Rubbing, speed: f64) -> Levels {
         Levels {
-            sliding_n: DIRECTIONS.map(|direction| sliding(speed, direction)),
-            break_away_n: DIRECTIONS.map(|direction| {
-                let level = self.break_away_level(of, axis, at, direction).sum(file.break_away_n[0]) * factor;
-                level.max(sliding(0.0, direction))
-            }),
+            sliding_n: DIRECTIONS.map(|direction| self.sliding_n(of, axis, at, speed, direction)),
+            break_away_n: DIRECTIONS.map(|direction| self.break_away_n(of, axis, at, direction)),
             viscous_n_s_per_m: DIRECTIONS.map(|direction| self.viscous(of, axis, direction)),
         }
     }
@@ -144,14 +174,13 @@ impl Effects {
         speed: f64,
         force_n: f64,
     ) -> Under {
-        let levels = self.levels(of, axis, rubbing, speed);
-        let direction = side(if velocity == 0.0 { force_n } else { velocity });
+        let direction = direction_of(if velocity == 0.0 { force_n } else { velocity });
         Under {
             force_n,
             mass_kg: of.motion.mass_kg(axis),
-            viscous_n_s_per_m: levels.viscous_n_s_per_m[direction],
-            sliding_n: levels.sliding_n[direction],
-            break_away_n: levels.break_away_n[direction],
+            viscous_n_s_per_m: self.viscous(of, axis, direction),
+            sliding_n: self.sliding_n(of, axis, rubbing, speed, direction),
+            break_away_n: self.break_away_n(of, axis, rubbing, direction),
         }
     }
 
@@ -183,10 +212,9 @@ impl Effects {
         if self.on[axis].stribeck_friction.is_none() {
             return velocity.abs();
         }
-        let levels = self.levels(of, axis, rubbing, velocity.abs());
         let direction = if velocity == 0.0 { push.signum() } else { velocity.signum() };
-        let friction =
-            levels.sliding_n[side(direction)] + levels.viscous_n_s_per_m[side(direction)] * velocity.abs();
+        let friction = self.sliding_n(of, axis, rubbing, velocity.abs(), direction_of(direction))
+            + self.viscous(of, axis, direction_of(direction)) * velocity.abs();
         let acceleration = (push * direction - friction) / of.motion.mass_kg(axis);
         (velocity.abs() + acceleration * span_s / 2.0).max(0.0)
     }

@@ -74,6 +74,9 @@ impl Effect for StribeckFriction {
 impl StribeckFriction {
     /// What sliding friction has above its level at this speed, m/s, not negative; N.
     pub(crate) fn term(&self, speed_m_per_s: f64) -> f64 {
+        if speed_m_per_s == 0.0 {
+            return self.excess_n;
+        }
         self.excess_n * libm::exp(-libm::pow(speed_m_per_s / self.velocity_m_per_s, self.exponent))
     }
 }

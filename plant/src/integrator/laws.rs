@@ -182,7 +182,7 @@ impl<P: Axes> Laws<P> for Baseline {
 
     #[inline(always)]
     fn holds(&self, at: At<'_, P>, _: &Middle<P>, axis: usize, force: f64) -> bool {
-        at.of.motion.holds(at.from.place(axis).extension, force, at.of.motion.levels())
+        at.of.motion.holds(at.from.place(axis).extension, force, at.of.motion.levels().break_away_n[0])
     }
 
     #[inline(always)]
