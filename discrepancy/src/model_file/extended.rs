@@ -3,7 +3,7 @@
 //! Numbers of a library are written beside its `use`. Everything else of the file stays, comments too. Terms are fitted again
 //! with the model in the next run.
 
-use model::Library;
+use model::{Entry, Library};
 use serde::Deserialize;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, value};
 
@@ -74,13 +74,13 @@ pub fn extended(text: &str, report: &ReportedModel) -> Result<String, ExtendErro
     put(document.as_table_mut(), report, None);
     let terms = document.get_mut("terms").and_then(Item::as_array_of_tables_mut);
     for term in terms.into_iter().flat_map(ArrayOfTables::iter_mut) {
-        let name = term.get("name").and_then(Item::as_str).map(str::to_owned);
+        let name = name_of(term);
         put(term, report, name.as_deref());
     }
     for ReportedName { suspect } in &report.named {
         let suspects = document.get_mut("suspects").and_then(Item::as_array_of_tables_mut);
         let suspects = suspects.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
-        let is_it = |table: &Table| table.get("name").and_then(Item::as_str) == Some(suspect);
+        let is_it = |table: &Table| name_of(table).as_ref() == Some(suspect);
         let place = suspects.iter().position(is_it);
         let place = place.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
         let mut term = suspects.get(place).expect("it was found").clone();
@@ -104,11 +104,21 @@ fn push(document: &mut DocumentMut, term: Table) -> Result<(), ExtendError> {
     Ok(())
 }
 
+fn library_of(table: &dyn TableLike) -> Option<(&'static Library, &'static Entry)> {
+    table.get("use").and_then(Item::as_str).and_then(Library::entry)
+}
+
+/// What reports call a suspect or a term: its name, else that in its library.
+fn name_of(table: &dyn TableLike) -> Option<String> {
+    let own = table.get("name").and_then(Item::as_str);
+    own.or_else(|| library_of(table).map(|(_, entry)| entry.name.as_str())).map(str::to_owned)
+}
+
 /// Writes fitted numbers over the values of a table's parameters. One at an end of its range keeps that of the file.
 fn put(table: &mut dyn TableLike, report: &ReportedModel, suspect: Option<&str>) {
     let numbers = report.parameters.iter().filter(|number| number.suspect.as_deref() == suspect);
     // Numbers that stand in a library get a place of their own.
-    let library = table.get("use").and_then(Item::as_str).and_then(Library::entry);
+    let library = library_of(table);
     let parameters = match table.get_mut("parameters") {
         None if library.is_none() => return,
         None => {
@@ -193,6 +203,15 @@ name = "offset"
         let again =
             extended(&text.replace("[[terms]]", "[[suspects]]"), &report("drag").with("c", 3.5)).unwrap();
         assert!(again.contains("3.5") && !again.contains("2.5"), "{again}");
+        // Without a name of its own it is called as in the library.
+        let reported: ReportedModel = serde_json::from_value(serde_json::json!({
+            "named": [{"suspect": "turbulent"}],
+            "parameters": [{"name": "c", "suspect": "turbulent", "value": 4.5, "is_at_bound": false}],
+        }))
+        .unwrap();
+        let nameless = extended(&model.replace("name = \"drag\"\n", ""), &reported).unwrap();
+        let term = &nameless.parse::<toml::Table>().unwrap()["terms"][0];
+        assert_eq!(term["parameters"]["c"]["value"].as_float(), Some(4.5), "{nameless}");
     }
 
     #[test]
