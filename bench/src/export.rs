@@ -15,7 +15,6 @@ pub mod cli;
 mod controllers;
 mod foreign;
 mod mcap;
-mod mcap_file;
 mod mdf4;
 mod run_table;
 mod signals;

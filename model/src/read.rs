@@ -327,8 +327,11 @@ impl Reader<'_> {
         let given = range(&mut section, &unit)?;
         let range_si = if section.has("range") { given } else { before.range_si };
         let [least, most] = range_si;
-        if values_si.iter().any(|value| !(least..=most).contains(value)) {
-            return Err(section.wrong_at("value", "value: not within range"));
+        if let Some(outside) = values_si.iter().find(|value| !(least..=most).contains(*value)) {
+            // In the digits of an f32, which hide the rounding of the unit.
+            let [outside, least, most] = [*outside, least, most].map(|si| (si / unit.factor) as f32);
+            let why = format!("value: {outside} is not within its range, {least} to {most}");
+            return Err(section.wrong_at("value", &why));
         }
         let tolerance_si = match section.numbers("tolerance")?.as_slice() {
             [] => None,

@@ -76,7 +76,7 @@ fn an_error_has_line_and_column_and_says_what_is_allowed() {
         (
             "value = 5.0, range = [0, 100]",
             "value = 500.0, range = [0, 100]",
-            "model.toml:13:37: parameters.gain.value: not within range",
+            "model.toml:13:37: parameters.gain.value: 500 is not within its range, 0 to 100",
         ),
         ("start = \"level_mm\"", "start = \"height\"", "model.toml:18:10: 'height' is no output"),
         ("start = \"level_mm\"", "", "model.toml:16:1: states.level.start is missing"),

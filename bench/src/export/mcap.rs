@@ -7,22 +7,23 @@
 //! Messages are JSON, described by JSON Schema: Foxglove and PlotJuggler plot every number of them. Their time is that of
 //! `bus.log`: row k of a table is at cycle 0 plus its `time_s`. They are written in the order of time, without compression.
 //!
-//! Source: MCAP 1, as [`super::mcap_file`] writes it; Foxglove's `mcap` of PyPI reads the same values (a test holds both
-//! together).
+//! Source: MCAP 1 [mcap.dev/spec], by the crate `mcap`; the `mcap` of PyPI reads the same values (a test holds both together).
 
 use super::ExportError;
 use super::controllers;
-use super::mcap_file::{Head, McapFile};
 use super::mdf4::comment;
 use super::run_table::{RunTable, holds_words, unit};
 use super::signals::{Course, Signals};
 use crate::recorded_log::RecordedLog;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{McapResult, WriteOptions, Writer};
 use protocol::can::{ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
 use protocol::frames::SignalKind;
 use runlog::run_folder::{FAULTS_CSV, FileError};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Tables of a run's folder and their channels.
@@ -77,13 +78,14 @@ pub(super) fn write(
     signals: &Signals,
     folder: Option<&Path>,
 ) -> Result<Written, ExportError> {
-    let unwritten = |error: io::Error| FileError::write(part, error);
+    let unwritten = |error: mcap::McapError| FileError::write(part, error);
     let file = super::create(part).map_err(|error| FileError::write(part, error))?;
-    let library = concat!("airbench ", env!("CARGO_PKG_VERSION"));
-    let mut file = McapFile::create(file, library).map_err(unwritten)?;
+    let options = WriteOptions::new().library(concat!("airbench ", env!("CARGO_PKG_VERSION")));
+    let mut file = options.create(file).map_err(unwritten)?;
+    let origin = [("cycle_zero_ns".to_owned(), log.origin_ns().to_string())];
     if folder.is_some() {
-        let origin = log.origin_ns().to_string();
-        file.write_metadata("airbench", &[("cycle_zero_ns", &origin)]).map_err(unwritten)?;
+        let metadata = Metadata { name: "airbench".into(), metadata: origin.into() };
+        file.write_metadata(&metadata).map_err(unwritten)?;
     }
     let mut sources = Vec::new();
     for (name, topic) in TABLES {
@@ -112,17 +114,19 @@ pub(super) fn write(
     {
         data.clear();
         stream.source.write_json(&mut data)?;
-        let head = Head { channel: stream.channel, sequence: stream.sequence, time_ns };
-        file.write_message(head, &data).map_err(unwritten)?;
+        let (channel_id, sequence) = (stream.channel, stream.sequence);
+        let head = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
+        file.write_to_known_channel(&head, &data).map_err(unwritten)?;
         stream.sequence = stream.sequence.wrapping_add(1);
         stream.next_ns = stream.source.next_ns()?;
         messages += 1;
     }
-    file.finish().map_err(unwritten)?;
+    let _ = file.finish().map_err(unwritten)?;
+    file.into_inner().flush().map_err(|error| FileError::write(part, error))?;
     Ok(Written { channels: streams.len(), messages })
 }
 
-fn channel(file: &mut McapFile<BufWriter<File>>, topic: &str, source: &Source<'_>) -> io::Result<u16> {
+fn channel(file: &mut Writer<BufWriter<File>>, topic: &str, source: &Source<'_>) -> McapResult<u16> {
     let (title, about) = match source {
         Source::Table { .. } => (topic.trim_start_matches('/').replace('/', "."), "A row of a run's table."),
         Source::Signals { course, .. } => (course.spec.name.to_owned(), course.spec.comment),
@@ -132,7 +136,9 @@ fn channel(file: &mut McapFile<BufWriter<File>>, topic: &str, source: &Source<'_
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title, "description": about, "type": "object", "properties": source.properties(),
     });
-    file.add_channel(topic, &format!("airbench.{title}"), &schema.to_string())
+    let schema =
+        file.add_schema(&format!("airbench.{title}"), "jsonschema", schema.to_string().as_bytes())?;
+    file.add_channel(schema, topic, "json", &BTreeMap::new())
 }
 
 /// A key's type, what it means, and its unit, as far as there are any.

@@ -265,10 +265,10 @@ pub(crate) fn term(model: &Model, suspect: usize) -> String {
     let text = &suspect.expression.text;
     match (suspect.change, suspect.target) {
         (Change::Add, model::Target::State(_)) => format!("d{name}/dt = … + ({text})"),
-        (Change::Multiply, model::Target::State(_)) => format!("d{name}/dt = (…) ({text})"),
+        (Change::Multiply, model::Target::State(_)) => format!("d{name}/dt = (…) * ({text})"),
         (Change::Replace, model::Target::State(_)) => format!("d{name}/dt = {text}"),
         (Change::Add, _) => format!("{name} + ({text})"),
-        (Change::Multiply, _) => format!("{name} ({text})"),
+        (Change::Multiply, _) => format!("{name} * ({text})"),
         (Change::Replace, _) => text.clone(),
     }
 }
