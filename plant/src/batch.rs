@@ -14,8 +14,8 @@
 //! [`Plant::step`] to the bit, whatever its neighbours and the machine.
 //!
 //! What does not run in lanes runs by itself and costs what it always does: a rig with effects, tables or terms that act
-//! in a step, one with a fault that changes laws, and one with another number of substeps than the first of its group; and all rigs of a group of which
-//! too few are left. A caller need not care, but rigs that can run in lanes are cheapest side by side.
+//! in a step, one with a fault that changes laws, and one with another number of substeps than the first of its group; and all
+//! rigs of a group of which too few are left. A caller need not care, but rigs that can run in lanes are cheapest side by side.
 //!
 //! Measured cost: `docs/integration.md`.
 

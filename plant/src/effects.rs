@@ -28,7 +28,6 @@ mod terms;
 use crate::parameters::RigParameters;
 use crate::state::Axis;
 pub(crate) use acting::Effects;
-use acting::act_in_no_step;
 use declared::{DeclaredTerms, Target};
 pub(crate) use replaced::{dead_volumes_m3, linkage};
 pub(crate) use sheet::OpenBalance;
@@ -244,6 +243,12 @@ impl AxisEffects {
         self.each_term(&balance, |_, term| sum += term);
         sum
     }
+}
+
+/// Whether effects change constants and what sensors show at an instant, and nothing else.
+fn act_in_no_step(on: &[AxisEffects; 2], touched: &[Touched; 2]) -> bool {
+    let declared = on.iter().any(|on| on.declared.any());
+    !declared && touched.iter().all(|touched| *touched == Touched::default())
 }
 
 /// Whether the baseline's laws move a plant of this rig: nothing is added to it, or what changes constants and readings alone.

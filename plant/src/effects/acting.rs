@@ -15,7 +15,7 @@ use super::presliding::Bristle;
 use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
 use super::tabulated::Seen;
-use super::{AxisEffects, OpenBalance, Touched};
+use super::{AxisEffects, OpenBalance, Touched, act_in_no_step};
 use crate::faults::{Faults, Outlet};
 use crate::integrator::laws::{At, Baseline, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
@@ -259,35 +259,6 @@ impl Effects {
         middle.pneumatic = of.chambers.pneumatic_force(middle.pressure[0], middle.pressure[1]);
         middle.edge_flow = flow.map(|lanes| Pair::new(lanes[0], lanes[1]));
     }
-
-    /// Remembers what sensors of an axis will show of this instant.
-    fn keep_readings(&mut self, of: &Integrator, axis: usize, lanes: &Lanes) {
-        let span_s = self.substep_s;
-        let lane = |pair: Pair| pair.to_array()[axis];
-        let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
-        let [a, b] = [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber]));
-        let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
-        let (on, axis_states) = (&self.on[axis], &mut self.memory.moving.axes[axis]);
-        for (i, truth) in [x, a, b].into_iter().enumerate() {
-            let (shown, seen) = (axis_states.shown[i], axis_states.seen[i]);
-            axis_states.shown[i] = match i {
-                0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
-                _ => {
-                    on.pressure_sensor_lag[i - 1].map_or(truth, |lag| lag.advance(shown, seen, truth, span_s))
-                }
-            };
-            axis_states.seen[i] = truth;
-        }
-        for (channel, truth) in [(0, x), (2, a), (3, b)] {
-            self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
-        }
-    }
-}
-
-/// Whether effects change constants and what sensors show at an instant, and nothing else.
-pub(crate) fn act_in_no_step(on: &[AxisEffects; 2], touched: &[Touched; 2]) -> bool {
-    let declared = on.iter().any(|on| on.declared.any());
-    !declared && touched.iter().all(|touched| *touched == Touched::default())
 }
 
 /// What tables are over in a step; speed and spool are those at its beginning.

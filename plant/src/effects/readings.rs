@@ -4,6 +4,8 @@ use super::OpenBalance;
 use super::acting::Effects;
 use super::declared::{DeclaredAt, Target};
 use super::sums::{ForceReading, PositionReading, PressureReading};
+use crate::integrator::{Integrator, Lanes};
+use crate::lanes::{Axes, Pair};
 
 impl Effects {
     /// What skew adds to a channel (position, force, a, b) that would show this now.
@@ -58,6 +60,29 @@ impl Effects {
             pressure_sensor_offset: on.pressure_sensor_offset[chamber].map_or(0.0, |effect| effect.term()),
             declared_reading: on.declared.reading([Target::PressureA, Target::PressureB][chamber], at),
             added: on.added(OpenBalance::PressureReading { chamber, truth_pa: truth }),
+        }
+    }
+
+    /// Remembers what sensors of an axis will show of this instant.
+    pub(super) fn keep_readings(&mut self, of: &Integrator, axis: usize, lanes: &Lanes) {
+        let span_s = self.substep_s;
+        let lane = |pair: Pair| pair.to_array()[axis];
+        let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
+        let [a, b] = [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber]));
+        let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
+        let (on, axis_states) = (&self.on[axis], &mut self.memory.moving.axes[axis]);
+        for (i, truth) in [x, a, b].into_iter().enumerate() {
+            let (shown, seen) = (axis_states.shown[i], axis_states.seen[i]);
+            axis_states.shown[i] = match i {
+                0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
+                _ => {
+                    on.pressure_sensor_lag[i - 1].map_or(truth, |lag| lag.advance(shown, seen, truth, span_s))
+                }
+            };
+            axis_states.seen[i] = truth;
+        }
+        for (channel, truth) in [(0, x), (2, a), (3, b)] {
+            self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
         }
     }
 }
