@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A mass on a spring, pushed by a force; what may be missing, and a decoy.
-const OSCILLATOR: &str = r#"
+pub(crate) const OSCILLATOR: &str = r#"
 name = "Oscillator"
 [fit]
 starts = 0 # the files' values are near

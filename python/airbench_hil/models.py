@@ -14,6 +14,7 @@ from airbench_hil import programs, records, tasks
 from airbench_hil.controllers import StrPath
 from airbench_hil.errors import BOUND_BROKEN, GOOD, BadModel
 from airbench_hil.records import Record
+from airbench_hil.report import number_in_words
 from airbench_hil.run import imported
 
 ModelVerdict = Literal["nothing-missing", "named", "ambiguous", "outside-catalogue"]
@@ -37,8 +38,7 @@ class ModelNumber:
     """Fitted without what was named."""
 
     def __str__(self) -> str:
-        error = f" ± {2 * self.standard_error:.2g}" if self.standard_error is not None else ""
-        return f"{self.name} {self.value:.4g}{error} {self.unit}".rstrip()
+        return number_in_words(self.name, self.value, self.standard_error, self.unit)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,12 @@ Verdict = Literal["nothing-missing", "parameters-only", "named", "ambiguous", "o
 _WIDTH, _ROW, _LEFT = 560, 34, 190
 
 
+def number_in_words(name: str, value: float, standard_error: float | None, unit: str) -> str:
+    """A number of a report with two standard errors, where it has one."""
+    error = f" ± {2 * standard_error:.2g}" if standard_error is not None else ""
+    return f"{name} {value:.4g}{error} {unit}".rstrip()
+
+
 @dataclass(frozen=True)
 class Number:
     """A number that was fitted."""
@@ -47,8 +53,7 @@ class Number:
         return self.value - 2 * self.standard_error, self.value + 2 * self.standard_error
 
     def __str__(self) -> str:
-        error = f" ± {2 * self.standard_error:.2g}" if self.standard_error is not None else ""
-        return f"{self.name} {self.value:.4g}{error} {self.unit}".rstrip()
+        return number_in_words(self.name, self.value, self.standard_error, self.unit)
 
 
 @dataclass(frozen=True)
