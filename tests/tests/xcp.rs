@@ -42,14 +42,14 @@ fn daq_rows(seen: &Value) -> Vec<(usize, Option<f64>, f64)> {
 /// The rows of DAQ are those of the controller's own table, rounded to floats of four bytes.
 #[track_caller]
 fn expect_rows_of(table: &AxisTable, rows: &[(usize, Option<f64>, f64)]) {
-    let positions = table.numbers("position_m");
+    let (positions, states) = (table.numbers("position_m"), table.texts("main_chain"));
     let at: BTreeMap<usize, usize> = table.cycles().into_iter().zip(0..).collect();
     for (cycle, position, state) in rows {
         let row = at[cycle];
         if let Some(position) = position {
             assert_eq!(*position as f32, positions[row] as f32, "position in cycle {cycle}");
         }
-        assert_eq!(*state == 5.0, table.texts("main_chain")[row] == "experiment", "state in cycle {cycle}");
+        assert_eq!(*state == 5.0, states[row] == "experiment", "state in cycle {cycle}");
     }
 }
 
