@@ -69,7 +69,8 @@ pub struct ReadArguments {
     #[arg(long)]
     pub(crate) mapping: Option<PathBuf>,
     /// Refuse records with columns that the measurement file does not know (a model file reads its own alone); with
-    /// close, exit code 1 too where the held-out record contradicts the verdict.
+    /// close, exit code 1 too where the held-out record contradicts the verdict, or no suspect of a model file explains what is
+    /// left.
     #[arg(long)]
     pub(crate) strict: bool,
 }

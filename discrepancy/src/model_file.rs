@@ -20,6 +20,7 @@
 //! | `held_out` | both models on records that were not used |
 //! | `structure` | which suspects can be told apart, before any fit |
 //! | `sensors` | which state, measured, would tell suspects apart |
+//! | `adequacy` | whether what is left is noise |
 //! | `report` | the report |
 //! | `explain` | equations, units, suspects in words |
 //! | `page` | the page |
@@ -27,6 +28,7 @@
 //!
 //! Nothing of a held-out record is read before the terms are chosen and fitted. Keys and figures: `docs/model-files.md`.
 
+mod adequacy;
 mod begin;
 mod covariance;
 mod cuts;
@@ -46,6 +48,7 @@ mod sensors;
 mod starts;
 mod structure;
 
+pub use adequacy::Residual;
 pub use begin::{NewError, new_model};
 pub use discover::DiscoveredTerm;
 pub use explain::explain;
@@ -180,6 +183,7 @@ fn closed(
         // What was found stays, whatever the held-out records are like.
         Err(why) => (held_out::trained(&found)?, Some(why)),
     };
+    report.rate(adequacy::residuals(&found.extended)?);
     let page = page::page(&model, &report, &traces, not_judged.as_deref());
     let is_named = !report.named.is_empty() || !report.discovered.is_empty();
     let extended = is_named.then(|| extended(model.text(), &ReportedModel::from(&report)).ok()).flatten();
@@ -207,6 +211,12 @@ fn judged(
 }
 
 impl ClosedModel {
+    /// Whether more than noise is left, and nothing was named for it.
+    #[must_use]
+    pub fn is_unexplained(&self) -> bool {
+        !self.report.adequate && self.report.named.is_empty() && self.report.discovered.is_empty()
+    }
+
     /// Whether the held-out records confirm what was found, or nothing was.
     #[must_use]
     pub fn is_confirmed(&self) -> bool {

@@ -1,5 +1,6 @@
 //! The integration tests of `discrepancy`, one executable.
 
+mod adequacy;
 mod advice;
 mod bad_records;
 mod balances;

@@ -119,6 +119,8 @@ class ModelReport:
         self.headline: str = self.data["headline"]
         self.confirmed: bool | None = self.data["confirmed"]
         """Whether held-out records get better with what was named, and none worse; None without one, or where nothing was named."""
+        self.adequate: bool = self.data["adequate"]
+        """Whether the reported model leaves no more than noise and declared model error on the training records."""
         self.named = tuple(
             Missing(each["suspect"], each["place"], each["term"], each["share_explained"], tuple(each["alternatives"]))
             for each in self.data["named"]

@@ -37,7 +37,8 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
     progress(&format!("report.json and report.html are in {}", out.path().display()));
     Ok(match closed {
         ClosedModel { not_judged: Some(_), .. } => Exit::BadInput,
-        _ if records.read.strict && !tests.is_empty() && !closed.is_confirmed() => Exit::BoundBroken,
+        _ if !records.read.strict => Exit::Good,
+        _ if closed.is_unexplained() || !tests.is_empty() && !closed.is_confirmed() => Exit::BoundBroken,
         _ => Exit::Good,
     })
 }
@@ -68,6 +69,10 @@ fn in_words(report: &ModelReport) -> String {
             "{}: {} {:.4} {} rms with the model, {:.4} extended",
             left.record, left.output, left.rms_before, left.unit, left.rms_after
         );
+    }
+    for residual in &report.residuals {
+        let what = if residual.is_noise { "mostly noise" } else { "more than noise" };
+        let _ = writeln!(text, "what is left on the training records is {what}: {}", residual.in_words());
     }
     for number in &report.parameters {
         let error =

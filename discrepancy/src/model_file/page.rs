@@ -1,5 +1,6 @@
 //! The page of a model file: what was found, the record with both models, suspects, numbers, equations.
 
+use super::adequacy::Residual;
 use super::explain::in_words;
 use super::held_out::Traces;
 use super::report::{Judgement, Left, ModelReport, Number, significant};
@@ -31,7 +32,11 @@ pub(crate) fn page(
         ("named", "What is missing", named(report)),
         ("discovered", "What a search found", discovered(report)),
         ("held-out", "On held-out records", left("Held-out records", &report.held_out)),
-        ("training", "On the training records", left("Training records", &report.training)),
+        (
+            "training",
+            "On the training records",
+            left("Training records", &report.training) + &residuals(&report.residuals),
+        ),
         ("suspects", "Suspects, the most likely first", suspects(&report.suspects)),
         ("parameters", "Numbers of the model", numbers(&report.parameters)),
         ("structure", "What these records can tell apart", structure(report)),
@@ -165,6 +170,30 @@ fn left(label: &str, all: &[Left]) -> String {
         ]
     });
     table(label, &["record", "output", "model, rms", "extended, rms", "ratio", "samples"], rows)
+}
+
+fn residuals(all: &[Residual]) -> String {
+    let rows = all.iter().map(|one| {
+        let value = |value: f64| number(format!("{} {}", significant(value), one.unit));
+        let noise = if one.is_noise_declared { "declared" } else { "by differences of neighbours" };
+        vec![
+            words(&one.output),
+            value(one.rms),
+            value(one.signal_rms),
+            Cell::About(format!("{} {}", significant(one.noise), one.unit), noise.into()),
+            value(one.model_error_rms),
+            words(if one.is_noise { "mostly noise" } else { "more than noise" }),
+        ]
+    });
+    let heads = [
+        "output",
+        "left, rms",
+        "signal, standard deviation",
+        "noise",
+        "declared model error",
+        "what is left",
+    ];
+    table("What is left, and its noise", &heads, rows)
 }
 
 fn suspects(all: &[Judgement]) -> String {

@@ -1,5 +1,6 @@
 //! The report of a model file, in the model's own names and units.
 
+use super::adequacy::Residual;
 use super::covariance;
 use super::discover::DiscoveredTerm;
 use super::fit::Fitting;
@@ -29,6 +30,10 @@ pub struct ModelReport {
     pub headline: String,
     /// Whether held-out records get better with what was named; `None` without any, or where nothing was named.
     pub confirmed: Option<bool>,
+    /// Whether the reported model leaves no more than noise and declared error on the training records.
+    pub adequate: bool,
+    /// What it leaves of each output, and its noise.
+    pub residuals: Vec<Residual>,
     /// Numbers of the extended model, with what they were beside the model alone.
     pub parameters: Vec<Number>,
     /// What is left on the training records.
@@ -195,6 +200,8 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         verdict,
         headline,
         confirmed: None,
+        adequate: true,
+        residuals: Vec::new(),
         parameters: numbers(&found.extended, &found.baseline),
         training: training.collect(),
         held_out: Vec::new(),

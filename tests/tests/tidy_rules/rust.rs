@@ -381,6 +381,8 @@ const DIMENSIONLESS: &[&str] = &[
     "rms",                   // whose unit is a field beside it
     "rms_before",            // the same
     "rms_after",             // the same
+    "signal_rms",            // the same
+    "model_error_rms",       // the same
     "baseline",              // the same
     "ratio",                 // of two of them
     "probability",           // 0 to 1
