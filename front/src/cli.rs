@@ -141,7 +141,8 @@ const FIND_EFFECT_HELP: &str = "\
 An effect is drawn and sealed; the emulator runs with it and the controller drives both axes over the bus; 'discrepancy close'
 gets the rig file without the effect and the measurement, names the missing effect and writes an extended rig file; the emulator
 runs the same experiments without the effect and with the extended file. One picture shows both gaps to the measurement, beside
-that of the sealed rig measured once more, which is the repeatability. Only then the seal is opened and compared.
+that of the sealed rig measured once more, which is the repeatability. Only then the seal is opened and compared. A term of a file
+that is hidden with --hidden counts as named when a suspect of its name and axis is.
 
 In DIR, for each seed: fitted/ and held-out/ with the runs measured, baseline and extended, held-out/ with repeated besides;
 workflow/ with report.html, report.json and the extended rig.toml; gap.html, the gaps in one picture; hidden/, which only the
@@ -166,6 +167,12 @@ pub struct FindEffectArguments {
     /// Where effects are drawn
     #[arg(long, value_name = "WHICH", default_value = "both", value_parser = ["drive", "load", "both"])]
     pub axis: String,
+    /// Effects and terms to hide, in place of a draw: a file as a rig file has them
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["effects", "axis"])]
+    pub hidden: Option<PathBuf>,
+    /// Suspects beside the catalogue, for 'discrepancy close'
+    #[arg(long, value_name = "FILE")]
+    pub suspects: Option<PathBuf>,
     /// Simulated time: as fast as it goes, and the same bytes every time (default: real time)
     #[arg(long)]
     pub lockstep: bool,

@@ -31,6 +31,8 @@ struct Search<'a> {
     controller: PathBuf,
     discrepancy: PathBuf,
     rig: PathBuf,
+    /// What is hidden in place of a draw.
+    hidden: Option<String>,
     programs: PathBuf,
     /// Experiments of the fit and of the comparison, by the names of their folders.
     experiments: [(&'static str, PathBuf); 2],
@@ -68,6 +70,9 @@ pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Res
             "{out} holds an earlier search; choose another folder with --out"
         )));
     }
+    let read = |file: &PathBuf| fs::read_to_string(file).map_err(|error| FrontError::input(file, &error));
+    let hidden = arguments.hidden.as_ref().map(read).transpose()?;
+    arguments.suspects.as_ref().map(read).transpose()?;
     let bus = RunBus::of_its_own(arguments.bus.as_deref(), arguments.lockstep)?;
     let mut search = Search {
         children: Children::watch()?,
@@ -78,6 +83,7 @@ pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Res
         controller: front.places.program("controller")?,
         discrepancy,
         rig: front.places.data("rig.toml")?,
+        hidden,
         programs: front.places.data("programs")?,
         experiments: [("fitted", fitted), ("held-out", held_out)],
         arguments,
@@ -115,12 +121,13 @@ impl Search<'_> {
         make_folder(&folder)?;
         DirBuilder::new().mode(0o700).create(&hidden).map_err(|error| FrontError::output(&hidden, &error))?;
         say(&format!("== seed {seed}: files in {}", folder.display()));
-        let mut seal = Command::new(&self.emulator);
-        seal.args(["seal", "--seed", &seed.to_string(), "--effects", &self.arguments.effects.to_string()]);
-        seal.args(["--axis", &self.arguments.axis, "--out"])
-            .arg(hidden.join("sealed.toml"))
-            .stdout(Stdio::null());
-        self.called(&mut seal, "emulator seal failed")?;
+        let sealed = hidden.join("sealed.toml");
+        match &self.hidden {
+            Some(text) => {
+                fs::write(&sealed, text).map_err(|error| FrontError::output(&sealed, &error))?;
+            }
+            None => self.draw(seed, &sealed)?,
+        }
         for ((name, file), noise) in self.experiments.clone().iter().zip([1000, 2000]) {
             say(&format!("measuring {name} on the sealed rig …"));
             // Each with noise of its own, as two measurements have.
@@ -149,15 +156,22 @@ impl Search<'_> {
         self.called(compare.arg("--out").arg(folder.join("gap.html")), "no picture of the gap")?;
 
         let report = judge::read(&workflow.join("report.json"))?;
-        let sealed = hidden.join("sealed.toml");
         let sealed = fs::read_to_string(&sealed).map_err(|error| FrontError::input(&sealed, &error))?;
-        let judged = judge::judge(&sealed, &report);
+        let judged = judge::judge(&sealed, &report)?;
         let told = folder.join("told.txt");
         fs::write(&told, judged.lines.join("\n") + "\n")
             .map_err(|error| FrontError::output(&told, &error))?;
         judged.lines.iter().for_each(|line| say(&format!("  {line}")));
         say(&format!("  report: {}", workflow.join("report.html").display()));
         Ok(judged.right)
+    }
+
+    /// Draws what is hidden.
+    fn draw(&mut self, seed: u64, sealed: &Path) -> Result<(), FrontError> {
+        let mut seal = Command::new(&self.emulator);
+        seal.args(["seal", "--seed", &seed.to_string(), "--effects", &self.arguments.effects.to_string()]);
+        seal.args(["--axis", &self.arguments.axis, "--out"]).arg(sealed).stdout(Stdio::null());
+        self.called(&mut seal, "emulator seal failed")
     }
 
     /// A run of the rig that the folder's seal hides something in.
@@ -230,6 +244,9 @@ impl Search<'_> {
         let mut close = Command::new(&self.discrepancy);
         close.arg("close").arg("--rig").arg(&self.rig).arg("--train").arg(measured("fitted"));
         close.arg("--test").arg(measured("held-out")).arg("--out").arg(workflow);
+        if let Some(suspects) = &self.arguments.suspects {
+            close.arg("--suspects").arg(suspects);
+        }
         close.stdout(log.try_clone().map_err(|error| FrontError::output(&console, &error))?).stderr(log);
         let code = self.children.call(&mut close)?;
         self.expect_going_on()?;

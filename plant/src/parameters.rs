@@ -139,11 +139,12 @@ impl RigParameters {
         Self::from_entries(self.entries.with_effect(name, place, numbers)?)
     }
 
-    /// The same rig with the effects of a file besides its own; where both switch on one effect at one place, the file's counts.
+    /// The same rig with the effects and declared terms of a file besides its own; of two of one name at one place, the file's
+    /// counts.
     /// `file` is only its name for messages.
     ///
     /// # Errors
-    /// [`ParameterError`] as from a rig file, also for any key besides `[effects.…]`.
+    /// [`ParameterError`] as from a rig file, also for any key besides `[effects.…]` and `[[terms]]`.
     pub fn with_effects_of(&self, text: &str, file: &str) -> Result<Self, ParameterError> {
         Self::from_entries(self.entries.with_effects_of(text, file)?)
     }
@@ -166,10 +167,7 @@ impl RigParameters {
     #[must_use]
     pub fn with_term(&self, term: &Declared) -> Self {
         let mut entries = self.entries.clone();
-        match entries.terms.iter_mut().find(|own| own.is_same(term)) {
-            Some(own) => *own = term.clone(),
-            None => entries.terms.push(term.clone()),
-        }
+        entries.put_term(term.clone());
         RigParameters { entries, ..self.clone() }
     }
 

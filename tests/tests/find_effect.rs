@@ -39,7 +39,7 @@ fn help_tells_options_files_and_exit_codes() {
 
 #[test]
 fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
-    let wrong: [(&[&str], &str); 9] = [
+    let wrong: [(&[&str], &str); 11] = [
         (&["--fly"], "unknown argument --fly"),
         (&["--seed"], "--seed needs a value"),
         (&["--seed", "x"], "whole number"),
@@ -49,6 +49,8 @@ fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
         (&["--lockstep", "--bus", "can://vcan0"], "embedded"),
         (&["--experiment", "nothing-of-this-name"], "scripts/run --list"),
         (&["--discrepancy", "/nowhere"], "no program"),
+        (&["--hidden", "/nowhere"], "/nowhere"),
+        (&["--hidden", "x", "--effects", "2"], "--effects"),
     ];
     for (arguments, hint) in wrong {
         let _ = find_effect(arguments).expect_code(2).expect_said(&[hint]);
@@ -97,6 +99,31 @@ fn what_was_named_is_held_against_the_seal() {
         let run = Path::new(out).join("seed-9/fitted/measured");
         assert!(run.join("measurement.csv").exists() && !run.join("truth.csv").exists());
     }
+}
+
+#[test]
+fn a_term_from_a_file_is_hidden_and_held_against_what_is_named() {
+    let (scene, folder) = (Scene::new(SHORT), tempfile::tempdir().expect("a folder"));
+    let experiment = scene.path("experiment.toml").display().to_string();
+    let term = "[[terms]]\nname = \"eddy-brake\"\nplace = \"drive.force\"\nadd = \"-(30[N s/m] + 160[N s/m^2]*x)*v\"\n";
+    let hidden = scene.write("hidden.toml", term).display().to_string();
+    let named = |name: &str| {
+        format!(
+            r#"{{ "verdict": "named", "named": [{{ "effect": "{name}", "where": {{ "axis": "drive", "element": null }} }}] }}"#
+        )
+    };
+    for (name, code) in [("eddy-brake", 0), ("wind-drag", 1)] {
+        let (program, out) = (stand_in(folder.path(), &named(name)), scene.path(name).display().to_string());
+        let options =
+            ["--lockstep", "--hidden", &hidden, "--suspects", &hidden, "--expect-right", "--out", &out];
+        let more = ["--discrepancy", &program, "--experiment", &experiment, "--held-out", &experiment];
+        let ended = find_effect(&[&options[..], &more].concat()).expect_code(code);
+        ended.expect_printed(&["hidden: eddy-brake at drive.force (-(30[N s/m] + 160[N s/m^2]*x)*v)"]);
+    }
+    // It acted in the runs measured, and only the last step may know.
+    let truth = scene.path("eddy-brake").join("seed-1/hidden/truth-fitted-measured.csv");
+    let truth = fs::read_to_string(truth).expect("what the rig knows");
+    assert!(truth.lines().any(|line| line.contains("drive_force_declared_N")), "a column of the term");
 }
 
 #[test]

@@ -6,6 +6,7 @@
 use crate::FrontError;
 use runlog::run_folder::read_json;
 use serde::Deserialize;
+use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 
 /// The most effects that a named one may stand for.
@@ -59,9 +60,13 @@ pub(super) fn read(file: &Path) -> Result<Report, FrontError> {
 }
 
 /// Opens the seal.
-pub(super) fn judge(sealed: &str, report: &Report) -> Judged {
-    let hidden = hidden_effects(sealed);
-    let mut lines: Vec<String> = hidden.iter().map(|(name, numbers)| told("hidden", name, numbers)).collect();
+///
+/// # Errors
+/// [`FrontError::Input`] if the sealed file cannot be read as one.
+pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judged, FrontError> {
+    let hidden = Hidden::of(sealed)?;
+    let mut lines: Vec<String> =
+        hidden.iter().map(|hidden| told("hidden", &hidden.to_string(), &hidden.written)).collect();
     if hidden.is_empty() {
         lines.push("hidden: nothing".into());
     }
@@ -69,16 +74,16 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Judged {
     if report.named.is_empty() {
         lines.push(format!("named: nothing ({})", report.verdict));
     }
-    let names = |effects: &[Effect]| effects.iter().map(Effect::name).collect::<Vec<_>>();
-    let alternatives: Vec<_> = report.named.iter().flat_map(|effect| names(&effect.alternatives)).collect();
+    let alternatives: Vec<&Effect> = report.named.iter().flat_map(|effect| &effect.alternatives).collect();
     if !alternatives.is_empty() {
-        lines.push(format!("not to be told apart by this record: {}", alternatives.join(", ")));
+        let names: Vec<String> = alternatives.iter().map(|effect| effect.name()).collect();
+        lines.push(format!("not to be told apart by this record: {}", names.join(", ")));
     }
-    let (named, unexcited) = (names(&report.named), names(&report.not_excited));
+    let is_named = |hidden: &&Hidden| report.named.iter().any(|effect| hidden.is(effect));
     let mut verdict = "right";
     let mut right = true;
-    for (name, _) in hidden.iter().filter(|(name, _)| !named.contains(name)) {
-        let indistinguishable = alternatives.contains(name);
+    for hidden in hidden.iter().filter(|hidden| !is_named(hidden)) {
+        let indistinguishable = alternatives.iter().any(|effect| hidden.is(effect));
         if indistinguishable && alternatives.len() <= MOST_ALTERNATIVES {
             verdict = if verdict == "right" {
                 "right, among those that this record cannot tell apart"
@@ -88,44 +93,95 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Judged {
             continue;
         }
         right = false;
-        verdict = match (indistinguishable, unexcited.contains(name)) {
+        let unexcited = report.not_excited.iter().any(|effect| hidden.is(effect));
+        verdict = match (indistinguishable, unexcited) {
             (true, _) => "wrong, it is one of too many that this record cannot tell apart",
             (false, true) => "wrong, and the report says that this experiment does not excite it",
             (false, false) => "wrong",
         };
     }
-    if named.len() > hidden.len() {
+    if report.named.len() > hidden.len() {
         (right, verdict) = (false, "wrong, more was named than hidden");
     }
     if hidden.is_empty() && report.verdict == "outside-catalogue" {
         (right, verdict) = (false, "wrong, nothing was hidden");
     }
     lines.push(verdict.into());
-    Judged { lines, right }
+    Ok(Judged { lines, right })
 }
 
 fn told(what: &str, name: &str, numbers: &str) -> String {
     if numbers.is_empty() { format!("{what}: {name}") } else { format!("{what}: {name} ({numbers})") }
 }
 
-/// Each effect of a sealed file as `EFFECT at PLACE`, and its numbers as they are written.
-fn hidden_effects(sealed: &str) -> Vec<(String, String)> {
-    let mut effects: Vec<(String, String)> = Vec::new();
-    let mut in_effect = false;
-    for line in sealed.lines() {
-        if line.starts_with('[') {
-            let table =
-                line.strip_prefix("[effects.").and_then(|table| table.strip_suffix(']')?.split_once('.'));
-            in_effect = table.is_some();
-            effects.extend(table.map(|(effect, place)| (format!("{effect} at {place}"), String::new())));
-        } else if let (true, Some((key, value)), Some((_, numbers))) =
-            (in_effect, line.split_once(" = "), effects.last_mut())
-        {
-            let separator = if numbers.is_empty() { "" } else { ", " };
-            *numbers += &format!("{separator}{key} {value}");
+/// What a sealed file hides.
+#[derive(Debug, PartialEq)]
+struct Hidden {
+    name: String,
+    /// `drive` or `drive.force`: axis, and element or the target of a declared term.
+    place: String,
+    /// Numbers or expression as they are written.
+    written: String,
+    is_term: bool,
+}
+
+impl Hidden {
+    /// All of a file, effects first.
+    fn of(sealed: &str) -> Result<Vec<Self>, FrontError> {
+        #[derive(Deserialize)]
+        struct Term {
+            name: String,
+            place: String,
+            add: String,
+        }
+        #[derive(Deserialize)]
+        struct File {
+            #[serde(default)]
+            effects: toml::map::Map<String, toml::Value>,
+            #[serde(default)]
+            terms: Vec<Term>,
+        }
+        let file: File = toml::from_str(sealed)
+            .map_err(|error| FrontError::Input(format!("the file of what is hidden: {error}")))?;
+        let mut all = Vec::new();
+        for (name, places) in &file.effects {
+            let parts = places.as_table().into_iter().flatten();
+            parts.for_each(|(part, numbers)| Self::add_effect(&mut all, name, part.clone(), numbers));
+        }
+        let term = |Term { name, place, add }| Hidden { name, place, written: add, is_term: true };
+        all.extend(file.terms.into_iter().map(term));
+        Ok(all)
+    }
+
+    /// The effect at this place, or at each of its elements.
+    fn add_effect(all: &mut Vec<Self>, name: &str, place: String, numbers: &toml::Value) {
+        let numbers = numbers.as_table().cloned().unwrap_or_default();
+        let (elements, numbers): (Vec<_>, Vec<_>) =
+            numbers.into_iter().partition(|(_, value)| value.is_table());
+        for (element, numbers) in &elements {
+            Self::add_effect(all, name, format!("{place}.{element}"), numbers);
+        }
+        if elements.is_empty() {
+            let written: Vec<String> = numbers.iter().map(|(key, value)| format!("{key} {value}")).collect();
+            let (name, written) = (name.to_owned(), written.join(", "));
+            all.push(Hidden { name, place, written, is_term: false });
         }
     }
-    effects
+
+    /// Whether it is this effect of a report, which gives the axis of a term, and the element of a reading or a flow.
+    fn is(&self, effect: &Effect) -> bool {
+        let axis = self.place.split('.').next();
+        match self.is_term {
+            true => effect.effect == self.name && effect.place.axis.as_deref() == axis,
+            false => effect.name() == self.to_string(),
+        }
+    }
+}
+
+impl Display for Hidden {
+    fn fmt(&self, to: &mut Formatter<'_>) -> fmt::Result {
+        write!(to, "{} at {}", self.name, self.place)
+    }
 }
 
 impl Effect {
@@ -187,13 +243,20 @@ mod tests {
     }
 
     #[test]
-    fn effects_of_a_sealed_file_are_told_with_their_numbers() {
-        let sealed = "seed = 9\n\n[effects.piston-leakage.load]\nleakage_nl_per_min = 5.89\nshare = 0.5\n\n[effects.a.drive.x]\n";
-        let expected =
-            [("piston-leakage at load", "leakage_nl_per_min 5.89, share 0.5"), ("a at drive.x", "")];
-        assert_eq!(
-            hidden_effects(sealed),
-            expected.map(|(name, numbers)| (name.to_owned(), numbers.to_owned()))
-        );
+    fn effects_and_terms_of_a_sealed_file_are_told_with_what_is_written() {
+        let sealed = "[effects.piston-leakage.load]\nleakage_nl_per_min = 5.89\nshare = 0.5\n\n[effects.a.drive.x]\n\
+                      [[terms]]\nname = 'brake'\nplace = 'drive.force'\nadd = '-(30[N s/m])*v'\n";
+        let told: Vec<(String, String)> = Hidden::of(sealed)
+            .expect("a sealed file")
+            .iter()
+            .map(|hidden| (hidden.to_string(), hidden.written.clone()))
+            .collect();
+        let expected = [
+            ("a at drive.x", ""),
+            ("piston-leakage at load", "leakage_nl_per_min 5.89, share 0.5"),
+            ("brake at drive.force", "-(30[N s/m])*v"),
+        ];
+        assert_eq!(told, expected.map(|(name, written)| (name.to_owned(), written.to_owned())));
+        assert!(Hidden::of("effects = 3").is_err());
     }
 }

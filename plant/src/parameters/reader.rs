@@ -141,12 +141,14 @@ impl Entries {
         Ok(Entries { tabulated, ..self.clone() })
     }
 
-    /// The same rig with the effects of a file that holds nothing else; they replace those of the same name and place.
+    /// The same rig with the effects and declared terms of a file that holds nothing else; they replace those of the same name
+    /// and place.
     pub(super) fn with_effects_of(&self, text: &str, file: &str) -> Result<Self, ParameterError> {
         let in_file = Place { text, file };
         let root = in_file.parse()?;
-        if let Some((name, value)) = root.get_ref().iter().find(|(name, _)| name.get_ref() != "effects") {
-            return Err(in_file.unknown(name, name.get_ref(), value, "effects"));
+        let is_known = |name: &str| ["effects", "terms"].contains(&name);
+        if let Some((name, value)) = root.get_ref().iter().find(|(name, _)| !is_known(name.get_ref())) {
+            return Err(in_file.unknown(name, name.get_ref(), value, "effects, terms"));
         }
         let mut changed = self.clone();
         for effect in switched::read(root.get_ref(), &in_file)? {
@@ -154,7 +156,18 @@ impl Entries {
             changed.effects.push(effect);
         }
         switched::sort(&mut changed.effects);
+        if root.get_ref().contains_key("terms") {
+            declared::read(text, file, "terms")?.into_iter().for_each(|term| changed.put_term(term));
+        }
         Ok(changed)
+    }
+
+    /// Adds a declared term, in place of one of the same name and place.
+    pub(super) fn put_term(&mut self, term: Declared) {
+        match self.terms.iter_mut().find(|own| own.is_same(&term)) {
+            Some(own) => *own = term,
+            None => self.terms.push(term),
+        }
     }
 }
 
