@@ -45,7 +45,7 @@ pub enum Command {
 /// Records and the model.
 #[derive(Args, Clone, Debug)]
 pub struct RecordArguments {
-    /// Rig file: the model. For close and name also a model file, of any plant.
+    /// Rig file: the model. For close, name and check also a model file, of any plant.
     #[arg(long, visible_alias = "model")]
     pub rig: PathBuf,
     /// Training records: measurement.csv, bus.log, or any CSV with --mapping.

@@ -222,6 +222,9 @@ fn one_test(tests: &[PathBuf]) -> Result<Option<PathBuf>, CommandError> {
 
 fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let out = folder(arguments)?;
+    if std::fs::read_to_string(&arguments.rig).is_ok_and(|text| model_file::is_model_file(&text)) {
+        return any_plant::check_command(arguments, out.as_ref());
+    }
     let rig = RigFile::read(&arguments.rig)?.rig;
     let mut all = Vec::new();
     let mut text = String::new();

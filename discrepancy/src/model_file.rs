@@ -9,6 +9,7 @@
 //! | `begin` | a first model file from the columns of a record |
 //! | `record` | a record as the model reads it |
 //! | `processing` | even grid, smoothed inputs, rates, rows |
+//! | `look` | what a record looks like: holes, spikes, saturation, sign, columns |
 //! | `filter` | zero-phase low passes |
 //! | `fit` | output-error fit by the one Gauss-Newton |
 //! | `normal` | normal equations, steps, standard errors |
@@ -38,6 +39,7 @@ mod extended;
 mod filter;
 mod fit;
 mod held_out;
+mod look;
 mod normal;
 mod page;
 mod processing;
@@ -151,7 +153,7 @@ fn closed(
     progress: &mut dyn FnMut(&str),
 ) -> Result<ClosedModel, ModelError> {
     let model = read(file)?;
-    let records = train.iter().map(|path| Measured::read(&model, path)).collect::<Result<Vec<_>, _>>()?;
+    let records = looked_at(&model, train)?;
     let found = select::search(&model, &records, progress)?;
     progress("structure");
     let structure = structure::structure(&found.baseline);
@@ -176,8 +178,9 @@ fn closed(
     let held_out = judged(&model, &found, tests, progress);
     let (traces, not_judged): (Vec<Traces>, _) = match held_out {
         Ok(None) => (held_out::trained(&found)?, None),
-        Ok(Some((judged, traces))) => {
+        Ok(Some((judged, traces, notes))) => {
             report.judge(&model, &judged, &traces);
+            report.notes.extend(notes);
             (traces, None)
         }
         // What was found stays, whatever the held-out records are like.
@@ -190,7 +193,39 @@ fn closed(
     Ok(ClosedModel { report, not_judged, page, extended })
 }
 
-type Judgement = (Vec<held_out::Judged>, Vec<Traces>);
+/// What there is to say of a record before anything is fitted.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Look {
+    pub record: String,
+    pub rows: usize,
+    pub length_s: f64,
+    pub notes: Vec<String>,
+}
+
+/// Looks at records as [`close`] does, and fits nothing.
+///
+/// # Errors
+/// [`ModelError`] for a model or a record that cannot be used.
+pub fn look(file: &Path, records: &[PathBuf]) -> Result<Vec<Look>, ModelError> {
+    let all = looked_at(&read(file)?, records)?;
+    let of = |record: Measured| Look {
+        rows: record.rows.len(),
+        length_s: record.sampled_s.last().unwrap_or(&0.0) - record.sampled_s[0],
+        record: record.name,
+        notes: record.notes,
+    };
+    Ok(all.into_iter().map(of).collect())
+}
+
+/// Records with what they look like beside the model among their notes.
+fn looked_at(model: &Model, files: &[PathBuf]) -> Result<Vec<Measured>, ModelError> {
+    let mut records = files.iter().map(|path| Measured::read(model, path)).collect::<Result<Vec<_>, _>>()?;
+    look::beside_model(model, &mut records);
+    Ok(records)
+}
+
+/// What both models leave, what they say, and notes of the records.
+type Judgement = (Vec<held_out::Judged>, Vec<Traces>, Vec<String>);
 
 /// Both models on the held-out records; `None` where there is none.
 fn judged(
@@ -207,7 +242,9 @@ fn judged(
         progress(&format!("held out: {}", test.display()));
         records.push(Measured::read(model, test).map_err(|error| error.to_string())?);
     }
-    held_out::judge(found, &records).map(Some).map_err(|error| error.to_string())
+    look::beside_model(model, &mut records);
+    let (judged, traces) = held_out::judge(found, &records).map_err(|error| error.to_string())?;
+    Ok(Some((judged, traces, report::notes_of(&records))))
 }
 
 impl ClosedModel {

@@ -74,7 +74,9 @@ pub enum WorkflowError {
     Rig { file: String, why: std::io::Error },
     #[error(transparent)]
     Parameters(#[from] ParameterError),
-    #[error("{file}: a model file: only close, name, extend and explain take one; give a rig file here")]
+    #[error(
+        "{file}: a model file: only close, name, check, extend and explain take one; give a rig file here"
+    )]
     ModelFile { file: String },
     #[error(transparent)]
     Read(#[from] ReadError),

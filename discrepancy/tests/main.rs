@@ -9,6 +9,7 @@ mod calibrate;
 mod chamber;
 mod discover;
 mod locate;
+mod looks;
 mod model_files;
 mod name;
 mod outside_expected;

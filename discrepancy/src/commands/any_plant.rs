@@ -1,20 +1,15 @@
 //! `close` and `name` of a model file of any plant.
 
-use super::{CommandError, Exit, NameArguments, print, progress};
+use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress};
+use crate::cli::ReadArguments;
 use crate::folder::{self, Folder};
-use crate::model_file::{ClosedModel, ModelReport, close, close_searching, new_model};
+use crate::model_file::{ClosedModel, ModelReport, close, close_searching, look, new_model};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
     let NameArguments { records, without, .. } = arguments;
-    let given = [
-        ("--mapping", records.read.mapping.is_some(), "[record] of the model file says how records are read"),
-        ("--without", !without.is_empty(), "take the suspect out of the model file"),
-    ];
-    if let Some((option, _, instead)) = given.iter().find(|(_, given, _)| *given) {
-        return Err(CommandError::BadData(format!("{option}: not for a model file: {instead}")));
-    }
+    no_options_of_a_rig(&records.read, without)?;
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
     let out = Folder::open(&out, [&records.rig].into_iter().chain(&records.train).chain(tests))?;
     let model = PathBuf::from(records.rig.file_name().unwrap_or("model.toml".as_ref()));
@@ -43,6 +38,36 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
     })
 }
 
+/// `check` of records with a model file: what can be said before anything is fitted.
+pub(super) fn check_command(arguments: &RecordArguments, out: Option<&Folder>) -> Result<Exit, CommandError> {
+    no_options_of_a_rig(&arguments.read, &[])?;
+    let all = look(&arguments.rig, &arguments.train)?;
+    let mut text = String::new();
+    for one in &all {
+        let _ = writeln!(text, "{}: {} rows, {:.3} s: can be used", one.record, one.rows, one.length_s);
+        one.notes.iter().for_each(|note| text.push_str(&format!("  {note}\n")));
+    }
+    print(&text)?;
+    if let Some(out) = out {
+        out.write_json("checks.json", &all)?;
+    }
+    Ok(Exit::Good)
+}
+
+/// Refuses what belongs to a rig file.
+fn no_options_of_a_rig(read: &ReadArguments, without: &[String]) -> Result<(), CommandError> {
+    let given = [
+        ("--mapping", read.mapping.is_some(), "[record] of the model file says how records are read"),
+        ("--without", !without.is_empty(), "take the suspect out of the model file"),
+    ];
+    match given.iter().find(|(_, given, _)| *given) {
+        Some((option, _, instead)) => {
+            Err(CommandError::BadData(format!("{option}: not for a model file: {instead}")))
+        }
+        None => Ok(()),
+    }
+}
+
 /// `new`: a first model file, printed or written where nothing stands yet.
 pub(super) fn new_command(record: &Path, out: Option<&Path>) -> Result<Exit, CommandError> {
     let text = new_model(record)?;
@@ -63,6 +88,7 @@ pub(super) fn new_command(record: &Path, out: Option<&Path>) -> Result<Exit, Com
 /// What a person reads first.
 fn in_words(report: &ModelReport) -> String {
     let mut text = format!("{}: {}.\n", report.name, report.headline);
+    report.notes.iter().for_each(|note| text.push_str(&format!("  note: {note}\n")));
     for left in report.training.iter().chain(&report.held_out) {
         let _ = writeln!(
             text,
@@ -86,6 +112,5 @@ fn in_words(report: &ModelReport) -> String {
             suspect.suspect, suspect.probability, suspect.decision
         );
     }
-    report.notes.iter().for_each(|note| text.push_str(&format!("  note: {note}\n")));
     text
 }

@@ -27,7 +27,12 @@ pub(crate) fn page(
     if let Some(why) = not_judged {
         head += &paragraph(&format!("The held-out record was not judged: {why}."));
     }
+    let notes = match report.notes.is_empty() {
+        true => String::new(),
+        false => pagekit::markup::list(&report.notes, ""),
+    };
     let sections = [
+        ("notes", "Notes", notes),
         ("records", "Measured, and both models", pictures(model, report, traces)),
         ("named", "What is missing", named(report)),
         ("discovered", "What a search found", discovered(report)),
@@ -41,7 +46,6 @@ pub(crate) fn page(
         ("parameters", "Numbers of the model", numbers(&report.parameters)),
         ("structure", "What these records can tell apart", structure(report)),
         ("equations", "The model", format!("<pre>{}</pre>\n", escaped(&in_words(model)))),
-        ("notes", "Notes", pagekit::markup::list(&report.notes, "")),
     ];
     let body: String = sections
         .iter()

@@ -8,6 +8,7 @@
 //! Source: Janot, Gautier, Brunot 2019 (processing of EMPS).
 
 use super::filter::LowPass;
+use super::look::{HOLE, is_in_hole, usual_period_s};
 use super::record::{FEWEST_ROWS, Measured, RecordError};
 use crate::check::SPARSEST;
 use model::{Hold, Inputs, Model};
@@ -71,11 +72,18 @@ impl Grid {
         }
     }
 
-    /// Samples of an output: as they were measured, or straight between them on a grid of its own.
+    /// Samples of an output: as they were measured, or straight between them on a grid of its own, but in no hole.
     pub(super) fn outputs(&self, time_s: &[f64], values: &[Option<f64>], factor: f64) -> Vec<Option<f64>> {
         match self.is_record {
             true => values.iter().map(|value| value.map(|value| value * factor)).collect(),
-            false => straight(time_s, values, &self.sampled_s, factor).into_iter().map(Some).collect(),
+            false => {
+                let known_s = known_s(time_s, values);
+                let farthest_s = HOLE * usual_period_s(&known_s).max(self.period_s.unwrap_or(0.0));
+                let all = straight(time_s, values, &self.sampled_s, factor);
+                let measured =
+                    |(value, at_s): (f64, &f64)| (!is_in_hole(&known_s, *at_s, farthest_s)).then_some(value);
+                all.into_iter().zip(&self.sampled_s).map(measured).collect()
+            }
         }
     }
 
@@ -138,7 +146,13 @@ impl Grid {
             None => rows.iter().map(|row| values[*row]).collect(),
             Some(filter) => {
                 let whole = straight(&sampled_s, &values, &sampled_s, 1.0);
-                of_rows(&filter.zero_phase(&whole)).into_iter().map(Some).collect()
+                let filtered = of_rows(&filter.zero_phase(&whole));
+                let known_s = known_s(&sampled_s, &values);
+                let farthest_s = HOLE * usual_period_s(&sampled_s);
+                let measured = |(value, row): (f64, &usize)| {
+                    (!is_in_hole(&known_s, sampled_s[*row], farthest_s)).then_some(value)
+                };
+                filtered.into_iter().zip(&rows).map(measured).collect()
             }
         });
         let outputs = outputs.collect();
@@ -178,6 +192,11 @@ fn filled(time_s: &[f64], values: &[Option<f64>], hold: Hold, factor: f64) -> Ve
             }
         })
         .collect()
+}
+
+/// Times of what is known.
+fn known_s(time_s: &[f64], values: &[Option<f64>]) -> Vec<f64> {
+    time_s.iter().zip(values).filter(|(_, value)| value.is_some()).map(|(time_s, _)| *time_s).collect()
 }
 
 /// Straight lines between what is known; level beyond. Nothing known is 0.

@@ -1,8 +1,8 @@
 //! A record as a model reads it: inputs at every sample, outputs where they were measured, all in SI.
 
 use super::filter::LowPass;
+use super::look::{self, Column, StuckFrom};
 use super::processing::{Grid, Names};
-use crate::check::stuck;
 use model::{Input, Model};
 use records::{ColumnOptions, Columns, ReadError, read_columns};
 use std::path::Path;
@@ -86,7 +86,7 @@ impl Measured {
     }
 
     fn of(model: &Model, columns: Columns) -> Result<Self, RecordError> {
-        let Columns { file, time_s, lines, values, warnings } = columns;
+        let Columns { file, time_s, lines, mut values, warnings } = columns;
         let file = file.display().to_string();
         if time_s.len() < FEWEST_ROWS {
             return Err(RecordError::Few { file, rows: time_s.len() });
@@ -116,19 +116,18 @@ impl Measured {
                 return Err(RecordError::Output { file, column, name });
             }
         }
-        let names = measured.iter().map(|input| &input.column);
-        for (column, values) in names.chain(model.outputs.iter().map(|output| &output.column)).zip(&values) {
-            let (runs, is_fatal) = stuck(values);
-            let Some(first) = runs.first() else { continue };
-            let line = lines[first.places.start];
-            if is_fatal {
-                return Err(RecordError::Stuck { file, line, column: column.clone() });
+        notes.extend(look::holes(&time_s, &lines, !model.states.is_empty()));
+        let of_inputs = measured.iter().map(|input| Column { name: &input.column, output: None });
+        let of_outputs =
+            model.outputs.iter().map(|output| Column { name: &output.column, output: Some(output) });
+        for (column, values) in of_inputs.chain(of_outputs).zip(&mut values) {
+            match column.look(values, &lines) {
+                Ok(seen) => notes.extend(seen),
+                Err(StuckFrom(row)) => {
+                    let (line, column) = (lines[row], column.name.to_owned());
+                    return Err(RecordError::Stuck { file, line, column });
+                }
             }
-            notes.push(format!(
-                "line {line}: {column} keeps one value over {} samples, {} times in all: stuck, or at the end of its range",
-                first.samples,
-                runs.len()
-            ));
         }
         let grid = Grid::of(model, &file, &time_s, &lines)?;
         let holds = measured.iter().map(|input| (input.hold, input.unit.factor * input.scale));

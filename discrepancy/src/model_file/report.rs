@@ -5,7 +5,9 @@ use super::covariance;
 use super::discover::DiscoveredTerm;
 use super::fit::Fitting;
 use super::held_out::{Judged, Traces};
+use super::look;
 use super::normal::standard_errors;
+use super::record::Measured;
 use super::select::{Evaluation, Fitted, Found};
 use super::structure::Structure;
 use crate::report::Verdict;
@@ -177,11 +179,8 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
     let mut suspects: Vec<Judgement> =
         found.first.iter().map(|evaluation| judgement(fitting, evaluation, found)).collect();
     suspects.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.gain.total_cmp(&a.gain)));
-    let mut notes: Vec<String> = fitting
-        .records
-        .iter()
-        .flat_map(|record| record.notes.iter().map(|note| format!("{}: {note}", record.name)))
-        .collect();
+    let mut notes = notes_of(fitting.records);
+    notes.extend(look::beyond_reach(&found.baseline));
     let failed = found.failed.iter();
     notes.extend(failed.map(|(suspect, why)| {
         format!("suspect {}: cannot be simulated: {why}", model.suspects[*suspect].name)
@@ -241,6 +240,14 @@ impl ModelReport {
         };
         self.headline += &about;
     }
+}
+
+/// Notes of records, with their names.
+pub(super) fn notes_of(records: &[Measured]) -> Vec<String> {
+    let of = |record: &Measured| {
+        record.notes.iter().map(|note| format!("{}: {note}", record.name)).collect::<Vec<_>>()
+    };
+    records.iter().flat_map(of).collect()
 }
 
 pub(crate) fn significant(value: f64) -> String {

@@ -1,0 +1,137 @@
+//! What is said of a record before a model file is fitted to it.
+
+use discrepancy::model_file::{close, look};
+use std::fs;
+
+/// A tank that drains, a pump that fills it.
+const TANK: &str = r#"
+[inputs.pump]
+column = "pump_V"
+unit = "V"
+[parameters]
+gain = { unit = "1/s", value = 0.15, range = [0.001, 1] }
+drain = { unit = "1/s", value = 0.1, range = [0.001, 1] }
+[states.level]
+unit = "V"
+start = 0
+derivative = "gain*pump - drain*level"
+[outputs.seen]
+column = "level_V"
+unit = "V"
+value = "level"
+"#;
+
+/// 400 rows of time, pump and level, 0.5 s apart; the pump jumps, the level has a noise of 10 mV.
+fn rows() -> Vec<[f64; 3]> {
+    let (mut level, mut state) = (0.0, 7_u64);
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+    };
+    let mut pump = 3.0;
+    let row = |k: i32| {
+        if k % 40 == 0 {
+            pump = 5.0 + 6.0 * random();
+        }
+        let row = [f64::from(k) * 0.5, pump, level + 0.035 * random()];
+        level += (pump * 2.0 - level) * (1.0 - (-0.05_f64).exp());
+        row
+    };
+    (0..400).map(row).collect()
+}
+
+fn written(rows: impl Iterator<Item = [f64; 3]>) -> String {
+    let text: String = rows.map(|[t, pump, level]| format!("{t},{pump:.4},{level:.4}\n")).collect();
+    format!("t_s,pump_V,level_V\n{text}")
+}
+
+/// Notes of a record beside a model.
+fn notes(model: &str, rows: impl Iterator<Item = [f64; 3]>) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
+    fs::write(&file, model).unwrap();
+    fs::write(&record, written(rows)).unwrap();
+    look(&file, &[record]).unwrap_or_else(|error| panic!("{error}"))[0].notes.join("\n")
+}
+
+#[test]
+fn a_good_record_has_no_notes() {
+    assert_eq!(notes(TANK, rows().into_iter()), "");
+}
+
+#[test]
+fn what_is_filled_into_a_hole_is_not_compared() {
+    let without = || rows().into_iter().filter(|[t, ..]| !(50.0..100.0).contains(t));
+    let said = notes(TANK, without());
+    assert!(said.starts_with("lines 101 to 102: no row over 50.5 s, 101 usual periods: nothing"), "{said}");
+    let folder = tempfile::tempdir().unwrap();
+    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
+    fs::write(&record, written(without())).unwrap();
+    // As it is, on an even grid, and on one behind a filter.
+    for (more, expected) in
+        [("", 300), ("record.period_s = 0.5\n", 300), ("record.period_s = 0.5\nrows.every = 2\n", 150)]
+    {
+        fs::write(&file, format!("{more}{TANK}")).unwrap();
+        let report = close(&file, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
+        let left = &report.training[0];
+        assert!(left.rows.abs_diff(expected) <= 1, "{more}: {left:?}");
+        assert!(report.notes[0].contains("no row over 50.5 s"), "{:?}", report.notes);
+    }
+}
+
+#[test]
+fn rows_that_are_lost_one_by_one_are_counted() {
+    let said = notes(TANK, rows().into_iter().enumerate().filter(|(k, _)| k % 50 != 20).map(|(_, row)| row));
+    assert_eq!(said, "one or two rows are missing at 8 places");
+}
+
+#[test]
+fn a_spike_is_left_out_with_its_line() {
+    let spiked = |[t, pump, level]: [f64; 3]| [t, pump, if t == 60.0 { 99999.0 } else { level }];
+    let said = notes(TANK, rows().into_iter().map(spiked));
+    assert!(said.starts_with("line 122: level_V is 99999, far beyond all others ("), "{said}");
+    let folder = tempfile::tempdir().unwrap();
+    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
+    fs::write(&file, TANK).unwrap();
+    fs::write(&record, written(rows().into_iter().map(spiked))).unwrap();
+    let report = close(&file, &[record], &[], &mut |_| {}).unwrap().report;
+    assert!(report.training[0].rows == 399 && report.training[0].rms_before < 0.02, "{:?}", report.training);
+}
+
+#[test]
+fn a_constant_and_a_saturated_output_are_noted() {
+    let said = notes(TANK, rows().into_iter().map(|[t, pump, _]| [t, pump, 4.0]));
+    assert!(said.contains("level_V is 4.00 all the time: it shows nothing of the equations"), "{said}");
+    let clipped = || rows().into_iter().map(|[t, pump, level]| [t, pump, level.min(12.0)]);
+    let said = notes(TANK, clipped());
+    assert!(said.contains("level_V keeps one value, 12, over "), "{said}");
+    assert!(said.contains("write value = \"min(level, 12[V])\" under [outputs.seen]"), "{said}");
+    // The key that it names is one that a file may have.
+    let told = TANK.replace("value = \"level\"", "value = \"min(level, 12[V])\"");
+    let said = notes(&told, clipped());
+    assert!(said.contains("keeps one value") && !said.contains("write value"), "{said}");
+}
+
+#[test]
+fn a_sign_and_exchanged_columns_are_noted_before_the_fit() {
+    let said = notes(TANK, rows().into_iter().map(|[t, pump, level]| [t, pump, -level]));
+    assert!(said.contains("before the fit the model moves against seen (correlation -"), "{said}");
+    let said = notes(TANK, rows().into_iter().map(|[t, pump, level]| [t, level, pump]));
+    assert!(
+        said.contains("with pump_V in its place it is (") && said.contains("are columns exchanged?"),
+        "{said}"
+    );
+}
+
+#[test]
+fn an_output_in_another_unit_is_noted_after_the_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
+    fs::write(&file, TANK).unwrap();
+    fs::write(&record, written(rows().into_iter().map(|[t, pump, level]| [t, pump, 1e3 * level]))).unwrap();
+    let notes = close(&file, &[record], &[], &mut |_| {}).unwrap().report.notes;
+    assert!(
+        notes.iter().any(|note| note.contains("than its mean would") && note.contains("level_V right?")),
+        "{notes:?}"
+    );
+}
