@@ -302,6 +302,27 @@ install_browser() {
         npm ci --prefix "$modules" --silent --no-audit --no-fund --ignore-scripts
 }
 
+# libFuzzer as Debian has compiled it, 4 MB of clang's libraries, where libfuzzer-sys would spend 30 s of CPU on it. Always unpacked.
+# Sets $libfuzzer; fails where there is none, and libfuzzer-sys compiles its own.
+install_libfuzzer() {
+    local package packages archive
+    archive="libclang_rt.fuzzer-$(uname -m).a"
+    libfuzzer="$tools/libfuzzer/$archive"
+    [ ! -f "$libfuzzer" ] || return 0
+    newest_of_clang() { apt-cache search --names-only '^libclang-rt-[0-9]+-dev$' 2>/dev/null | cut -d ' ' -f 1 | sort -V | tail -n 1; }
+    package=$(newest_of_clang)
+    if [ -z "$package" ]; then
+        [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null && apt_get check -q >/dev/null || return 1 # with package lists
+        package=$(newest_of_clang) && [ -n "$package" ] || return 1
+    fi
+    packages=$(mktemp -d) || return 1
+    (cd "$packages" && apt-get -o APT::Sandbox::User=root download -q "$package" >/dev/null 2>&1) &&
+        dpkg-deb -x "$packages"/*.deb "$packages" && mkdir -p "$tools/libfuzzer" &&
+        find "$packages" -name "$archive" -exec mv {} "$libfuzzer" \;
+    rm -rf "$packages"
+    [ -f "$libfuzzer" ]
+}
+
 install_chromium() {
     command -v chromium >/dev/null || [ -x "$tools/bin/chromium" ] && return
     # shellcheck disable=SC2046 # a list of names
