@@ -19,6 +19,7 @@ mod memory;
 mod node;
 mod over_stroke;
 mod readings;
+pub mod remembered;
 mod replaced;
 pub mod sheet;
 mod sums;

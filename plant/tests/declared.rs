@@ -127,6 +127,91 @@ fn a_reading_is_the_truth_and_its_term_and_leaves_the_motion_alone() {
     );
 }
 
+const LOW_PASS: &str =
+    "{ unit = \"m\", range = [0, 1], start = \"x\", update = \"w + (x - w)*(1 - exp(-dt/5[ms]))\" }";
+
+#[test]
+fn a_reading_that_remembers_is_a_lagging_sensor() {
+    let term = with(&[("drive.position-reading", "w - x", &format!("memory.w = {LOW_PASS}"))]);
+    let effect = [("time_constant_ms", 5.0)];
+    let lagging =
+        RigParameters::baseline().with_effect("position-sensor-lag", "drive", &effect).expect("good");
+    let [mut term, mut lagging] =
+        [&term, &lagging].map(|rig| Plant::new(rig, &Setup::default()).expect("good"));
+    let mut most_m = 0.0_f64;
+    for period in 0..2000 {
+        let [one, two] = [&term, &lagging].map(|plant| plant.shown(&plant.truth(&inputs(period)))[0][0]);
+        // It sees the end of a substep held, and the sensor a straight line: half a substep of a fast stroke.
+        assert!((one - two).abs() < 5e-5, "{period}: {one} {two}");
+        most_m = most_m.max((one - term.truth(&inputs(period)).axes[0].position_m).abs());
+        term.step(&inputs(period));
+        lagging.step(&inputs(period));
+    }
+    assert!(most_m > 1e-3, "it lags by {most_m} m");
+}
+
+#[test]
+fn a_play_moves_only_when_the_axis_has_taken_it_up() {
+    let play =
+        "memory.w = { unit = \"m\", range = [-1, 1], start = \"x\", update = \"min(max(w, x - g), x + g)\" }";
+    let gap = "parameters.g = { unit = \"mm\", value = 2, range = [0, 10] }";
+    // Two that remember on one axis, and one on the other that does not.
+    let rig = with(&[
+        ("load.pressure-b-reading", "1[Pa]", ""),
+        ("drive.pressure-a-reading", "1e5[Pa/m]*(x - w)", &format!("{play}\n{gap}")),
+        ("drive.pressure-b-reading", "1e5[Pa/m]*w", &format!("memory.w = {LOW_PASS}")),
+    ]);
+    let mut plant = Plant::new(&rig, &Setup::default()).expect("good");
+    let mut off = [0.0_f64; 2];
+    for period in 0..3000 {
+        let truth = plant.truth(&inputs(period));
+        let by = plant.shown(&truth)[0][2] - truth.axes[0].pressure_a_pa;
+        off = [off[0].min(by), off[1].max(by)];
+        plant.step(&inputs(period));
+    }
+    // Taken up to both sides, and never beyond, but for what the axis goes within a substep.
+    assert!(off[0] < -199.0 && off[0] > -206.0 && off[1] > 199.0 && off[1] < 206.0, "{off:?}");
+    let [_, with_play, _] = rig.terms() else { panic!("three terms") };
+    assert_eq!((with_play.memory()[0].name(), with_play.memory()[0].range()), ("w", [-1.0, 1.0]));
+    let again: String = rig.terms().iter().map(|term| term.toml("terms")).collect();
+    let again = RigParameters::from_toml(&format!("{}{again}", RigParameters::BASELINE_TOML), "rig.toml");
+    assert_eq!(again.expect("written as it is read"), rig);
+}
+
+#[test]
+fn what_a_term_keeps_is_refused_where_it_cannot_run() {
+    let memory = |range: &str, start: &str, update: &str| {
+        format!("memory.w = {{ unit = \"m\", range = {range}, start = \"{start}\", update = \"{update}\" }}")
+    };
+    let c = "parameters.dt = { unit = \"N/m\", value = 4 }";
+    for (add, numbers, message) in [
+        ("1[N/m]*w", memory("[0, 1]", "x", "w + v"), "sum of a value in m and one in m s^-1"),
+        ("1[N/m]*w", memory("[0, 1]", "w", "x"), "'w' is unknown here"),
+        ("1[N/m]*w", memory("[0, 1]", "x", "x/v*1[m/s]"), "divides by a value that may be 0"),
+        ("1[N/m]*w", memory("[1, 1]", "x", "x"), "range: needed are two numbers"),
+        ("1[N/m]/w*1[m^2]", memory("[0, 1]", "x", "x"), "divides by a value that may be 0 (0 to 1)"),
+        (
+            "1[N/m]*w",
+            "memory.w = { unit = \"m\", range = [0, 1], update = \"x\" }".to_owned(),
+            "start is missing",
+        ),
+        ("1[N/m]*w", memory("[0, 1]", "x", "x").replace(".w", ".x"), "memory.x: a variable has this name"),
+        ("dt*w", format!("{}\n{c}", memory("[0, 1]", "x", "x")), "parameters.dt: a variable has this name"),
+        (
+            "1[N/m]*w",
+            ["a", "b", "w"]
+                .map(|name| memory("[0, 1]", "x", "x").replace(".w", &format!(".{name}")))
+                .join("\n"),
+            "more than 2 of memory in one term",
+        ),
+    ] {
+        let error = RigParameters::from_toml(&text(&[("drive.force", add, &numbers)]), "rig.toml")
+            .expect_err(&numbers)
+            .to_string();
+        assert!(error.starts_with("rig.toml:") && error.contains(message), "{numbers}\n{error}");
+    }
+}
+
 #[test]
 fn two_terms_act_as_their_sum_and_a_force_is_held_at_2000_newton() {
     let half = ("drive.force", "-20[N s/m]*v", "");
@@ -204,6 +289,15 @@ fn a_suspect_adds_nothing_while_it_is_off() {
         (
             file("-c*v", "parameters.c = { unit = \"N s/m\", value = 1, range = [0, 9] }"),
             "is its amplitude, and has no value",
+        ),
+        (
+            file(
+                "-c*v + 1[N/m]*w",
+                &format!(
+                    "{c}\nmemory.w = {{ unit = \"m\", range = [0, 1], start = \"0[m]\", update = \"x\" }}"
+                ),
+            ),
+            "where c is 0 a suspect adds nothing, and this adds 1 N",
         ),
         (file("-c*v", "parameters.c = { unit = \"N s/m\" }"), "range: needed are two numbers"),
         (format!("gain = 1\n{}", file("-c*v", c)), "unknown key gain"),

@@ -55,7 +55,8 @@ const TERMS: &str = r#"
 [[terms]]
 name = "eddy-brake"
 place = "drive.force"
-add = "-(c0 + c1*x)*v"
+add = "-(c0 + c1*x)*v - 1[N/m]*(x - w)"
+memory.w = { unit = "m", range = [0, 1], start = "x", update = "min(max(w, x - 1[mm]), x + 1[mm])" }
 parameters.c0 = { unit = "N s/m", value = 5, range = [0, 200] }
 parameters.c1 = { unit = "N s/m^2", value = 10 }
 [[terms]]

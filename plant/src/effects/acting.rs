@@ -10,7 +10,7 @@ use super::air::HeatAt;
 use super::declared::DeclaredAt;
 use super::flows::PortsAt;
 use super::friction::direction_of;
-use super::memory::{Memory, Moving};
+use super::memory::{Memory, Moving, seen_at};
 use super::presliding::Bristle;
 use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
@@ -172,10 +172,15 @@ impl Effects {
     }
 
     /// What declared terms are over.
-    pub(crate) fn declared_at<'a>(&self, axis: usize, seen: &'a Seen, sensor_force_n: f64) -> DeclaredAt<'a> {
+    pub(crate) fn declared_at<'a>(
+        &'a self,
+        axis: usize,
+        seen: &'a Seen,
+        sensor_force_n: f64,
+    ) -> DeclaredAt<'a> {
         let command = self.memory.commands[axis].newest();
         let time_s = self.memory.substeps as f64 * self.substep_s;
-        DeclaredAt { seen, command, time_s, sensor_force_n }
+        DeclaredAt { seen, command, time_s, sensor_force_n, kept: &self.memory.declared[axis] }
     }
 }
 
@@ -471,6 +476,10 @@ impl Laws for Effects {
             }
             if self.touched[axis].past_readings {
                 self.keep_readings(of, axis, lanes);
+            }
+            if self.on[axis].declared.remembers() {
+                let values = self.declared_at(axis, &seen_at(of, lanes, axis), 0.0).values();
+                self.on[axis].declared.renew(&values, span_s, &mut self.memory.declared[axis]);
             }
         }
         if self.memory.channels.iter().any(|axis| axis[1].is_some()) {

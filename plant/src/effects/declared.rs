@@ -12,6 +12,8 @@
 //! and pressures are those at the midpoint of a step; v, u, s and t those at its beginning, since the force itself decides on the
 //! speed after. Terms of one target add up.
 //!
+//! A term may keep values from step to step ([`super::remembered`]), and is then over them too.
+//!
 //! Every expression is proven finite over [`VARIABLES`] and the ranges of its parameters before it acts; a variable beyond its
 //! range counts as the end of it. Force and flow are held at the largest that a table may have, so that no slope makes a step run
 //! away.
@@ -23,6 +25,7 @@
 //!
 //! Source: the file that declares it.
 
+use super::remembered::{Kept, Remembered, renew};
 use super::sheet::{Element, Part, Place, PlaceKind};
 use super::tabulated::{MOST_FLOW_NL_PER_MIN, MOST_FORCE_N, Seen, neither_empties_nor_bursts};
 use crate::parameters::table::Unit;
@@ -31,9 +34,12 @@ use crate::state::Axis;
 use expression::formula::{Formula, Variable};
 use expression::units::Dimension;
 use std::fmt::Write as _;
+use std::ops::Range;
 
 /// Parameters of a term at most.
 pub const MOST_PARAMETERS: usize = 6;
+/// Values that a term keeps at most.
+pub const MOST_REMEMBERED: usize = 2;
 /// Terms of a file at most.
 pub const MOST_TERMS: usize = 32;
 /// What expressions are over: name, unit, least and largest value. The last one stands in readings alone.
@@ -197,6 +203,7 @@ pub struct Declared {
     pub(crate) target: Target,
     pub(crate) add: String,
     pub(crate) numbers: Vec<Number>,
+    pub(crate) memory: Vec<Remembered>,
     pub(crate) twins: Vec<String>,
     pub(crate) formula: Formula,
 }
@@ -238,6 +245,12 @@ impl Declared {
         &self.numbers
     }
 
+    /// What it keeps from step to step, in the order of the file.
+    #[must_use]
+    pub fn memory(&self) -> &[Remembered] {
+        &self.memory
+    }
+
     /// Effects or suspects that are known to do the same.
     #[must_use]
     pub fn twins(&self) -> &[String] {
@@ -257,10 +270,16 @@ impl Declared {
         self.name == other.name && self.at() == other.at()
     }
 
-    /// Its value, in SI, at these values of [`VARIABLES`].
+    /// Its value, in SI, at these values of [`VARIABLES`], where the plant begins there.
     #[must_use]
     pub fn value(&self, at: &[f64; VARIABLES.len()]) -> f64 {
-        self.formula.value(at)
+        let kept: Vec<f64> = self.memory.iter().map(|one| one.kept().begin(at)).collect();
+        self.value_keeping(at, &kept)
+    }
+
+    /// Its value, in SI, at these values of [`VARIABLES`] and of what it keeps.
+    pub(crate) fn value_keeping(&self, at: &[f64; VARIABLES.len()], kept: &[f64]) -> f64 {
+        value(&self.formula, self.target, at, kept)
     }
 
     /// The same with other values of its numbers, in the units of the file.
@@ -281,12 +300,18 @@ impl Declared {
             }
             number.value = *value;
         }
-        let values_si = changed.values_si();
-        changed.formula.set(&values_si);
+        changed.set_formulas();
         Ok(changed)
     }
 
-    pub(crate) fn values_si(&self) -> Vec<f64> {
+    /// Takes the values of the numbers over into the expressions.
+    pub(crate) fn set_formulas(&mut self) {
+        let values_si = self.values_si();
+        self.formula.set(&values_si);
+        self.memory.iter_mut().for_each(|one| one.set(&values_si));
+    }
+
+    fn values_si(&self) -> Vec<f64> {
         self.numbers.iter().map(|number| number.value * number.unit.factor).collect()
     }
 
@@ -311,6 +336,13 @@ impl Declared {
                 number.value
             );
         }
+        for Remembered { name, unit, range: [least, most], start, update, .. } in &self.memory {
+            let (unit, start, update) = (text(&unit.text), text(start), text(update));
+            let _ = writeln!(
+                out,
+                "memory.{name} = {{ unit = {unit}, range = [{least:?}, {most:?}], start = {start}, update = {update} }}"
+            );
+        }
         if !self.twins.is_empty() {
             let twins: Vec<String> = self.twins.iter().map(|twin| text(twin)).collect();
             let _ = writeln!(out, "twins = [{}]", twins.join(", "));
@@ -327,20 +359,41 @@ pub(crate) struct DeclaredAt<'a> {
     pub(crate) time_s: f64,
     /// What the force sensor should show, N; read by readings alone.
     pub(crate) sensor_force_n: f64,
+    /// What the axis' terms keep, SI, in the order of [`DeclaredTerms::begin`].
+    pub(crate) kept: &'a [f64],
 }
 
 impl DeclaredAt<'_> {
     /// In the order of [`VARIABLES`].
-    fn values(&self) -> [f64; VARIABLES.len()] {
+    pub(super) fn values(&self) -> [f64; VARIABLES.len()] {
         let Seen { extension_m, velocity_m_per_s, spool, pressure_pa: [a, b] } = *self.seen;
         [extension_m, velocity_m_per_s, a, b, self.command, spool, self.time_s, self.sensor_force_n]
     }
 }
 
+/// The value of an expression of a term with this target.
+fn value(formula: &Formula, target: Target, at: &[f64; VARIABLES.len()], kept: &[f64]) -> f64 {
+    let before = VARIABLES.len() - usize::from(!target.is_reading());
+    let mut all = [0.0; VARIABLES.len() + MOST_REMEMBERED];
+    all[..before].copy_from_slice(&at[..before]);
+    all[before..][..kept.len()].copy_from_slice(kept);
+    formula.value(&all[..before + kept.len()])
+}
+
+/// A term at work.
+#[derive(Debug, Clone)]
+struct Acting {
+    target: Target,
+    formula: Formula,
+    /// Where what it keeps lies among that of its axis.
+    kept: Range<usize>,
+}
+
 /// The declared terms of an axis.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct DeclaredTerms {
-    terms: Vec<(Target, Formula)>,
+    terms: Vec<Acting>,
+    laws: Vec<Kept>,
     kg_per_m3: f64,
     exhaust_pa: f64,
     supply_pa: f64,
@@ -349,9 +402,16 @@ pub(crate) struct DeclaredTerms {
 impl DeclaredTerms {
     /// Those of an axis that a rig has.
     pub(crate) fn of(rig: &RigParameters, axis: Axis) -> Self {
-        let own = rig.terms().iter().filter(|term| term.axis == axis);
+        let (mut terms, mut laws) = (Vec::new(), Vec::new());
+        for term in rig.terms().iter().filter(|term| term.axis == axis) {
+            let first = laws.len();
+            laws.extend(term.memory.iter().map(Remembered::kept));
+            let (target, formula) = (term.target, term.formula.clone());
+            terms.push(Acting { target, formula, kept: first..laws.len() });
+        }
         DeclaredTerms {
-            terms: own.map(|term| (term.target, term.formula.clone())).collect(),
+            terms,
+            laws,
             kg_per_m3: rig.gas().normal_pressure_pa / (GAS_J_PER_KG_K * rig.gas().temperature_k),
             exhaust_pa: rig.supply().exhaust_pressure_pa,
             supply_pa: rig.supply().pressure_pa,
@@ -365,12 +425,29 @@ impl DeclaredTerms {
 
     /// Whether any adds to a target.
     pub(crate) fn adds(&self, target: Target) -> bool {
-        self.terms.iter().any(|(own, _)| *own == target)
+        self.terms.iter().any(|term| term.target == target)
     }
 
     /// Whether any adds to a flow.
     pub(crate) fn adds_air(&self) -> bool {
         self.adds(Target::FlowA) || self.adds(Target::FlowB)
+    }
+
+    /// Whether any keeps a value.
+    pub(crate) fn remembers(&self) -> bool {
+        !self.laws.is_empty()
+    }
+
+    /// What they keep where the plant begins, at these [`VARIABLES`].
+    pub(crate) fn begin(&self, values: &[f64; VARIABLES.len()]) -> Vec<f64> {
+        self.laws.iter().map(|law| law.begin(values)).collect()
+    }
+
+    /// Renews it at the end of a substep.
+    pub(crate) fn renew(&self, values: &[f64; VARIABLES.len()], step_s: f64, kept: &mut [f64]) {
+        for term in self.terms.iter().filter(|term| !term.kept.is_empty()) {
+            renew(&self.laws[term.kept.clone()], values, step_s, &mut kept[term.kept.clone()]);
+        }
     }
 
     /// Force along the own extension, N.
@@ -393,8 +470,8 @@ impl DeclaredTerms {
 
     fn sum(&self, target: Target, at: &DeclaredAt<'_>) -> f64 {
         let mut sum = 0.0;
-        for (_, formula) in self.terms.iter().filter(|(own, _)| *own == target) {
-            sum += formula.value(&at.values());
+        for term in self.terms.iter().filter(|term| term.target == target) {
+            sum += value(&term.formula, target, &at.values(), &at.kept[term.kept.clone()]);
         }
         sum
     }

@@ -4,6 +4,8 @@
 //! histories grow only when a substep counts. All room is taken at construction: a step allocates nothing.
 
 use super::AxisEffects;
+use super::declared::DeclaredAt;
+use super::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes, PERIOD_S};
 use crate::lanes::{Axes, Pair};
 use crate::state::State;
@@ -119,6 +121,18 @@ impl History {
     }
 }
 
+/// What tables and terms are over at the end of a step.
+pub(super) fn seen_at(of: &Integrator, lanes: &Lanes, axis: usize) -> Seen {
+    let lane = |pair: Pair| pair.to_array()[axis];
+    let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
+    Seen {
+        extension_m: lane(lanes.extension),
+        velocity_m_per_s: lane(lanes.velocity),
+        spool: lane(lanes.spool),
+        pressure_pa: [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber])),
+    }
+}
+
 /// All that effects remember.
 #[derive(Debug, Clone)]
 pub(crate) struct Memory {
@@ -130,6 +144,8 @@ pub(crate) struct Memory {
     pub(super) lines: [[Option<History>; 2]; 2],
     /// What the channels position, force, a, b would have shown, at the ends of substeps.
     pub(super) channels: [[Option<History>; 4]; 2],
+    /// What declared terms keep, SI.
+    pub(super) declared: [Vec<f64>; 2],
 }
 
 impl Memory {
@@ -169,12 +185,18 @@ impl Memory {
             })
         });
         let commands = [0, 1].map(|i: usize| Commands::new(axes[i].spool));
+        let declared = [0, 1].map(|i: usize| {
+            let (seen, command) = (seen_at(of, &lanes, i), axes[i].spool);
+            let at = DeclaredAt { seen: &seen, command, time_s: 0.0, sensor_force_n: 0.0, kept: &[] };
+            on[i].declared.begin(&at.values())
+        });
         Memory {
             moving: Moving { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 },
             commands,
             substeps: 0,
             lines,
             channels,
+            declared,
         }
     }
 

@@ -3,9 +3,10 @@
 use super::OpenBalance;
 use super::acting::Effects;
 use super::declared::{DeclaredAt, Target};
+use super::memory::seen_at;
 use super::sums::{ForceReading, PositionReading, PressureReading};
+use super::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
-use crate::lanes::{Axes, Pair};
 
 impl Effects {
     /// What skew adds to a channel (position, force, a, b) that would show this now.
@@ -66,10 +67,8 @@ impl Effects {
     /// Remembers what sensors of an axis will show of this instant.
     pub(super) fn keep_readings(&mut self, of: &Integrator, axis: usize, lanes: &Lanes) {
         let span_s = self.substep_s;
-        let lane = |pair: Pair| pair.to_array()[axis];
-        let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
-        let [a, b] = [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber]));
-        let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
+        let Seen { extension_m, pressure_pa: [a, b], .. } = seen_at(of, lanes, axis);
+        let x = if axis == 0 { extension_m } else { self.stroke_m - extension_m };
         let (on, axis_states) = (&self.on[axis], &mut self.memory.moving.axes[axis]);
         for (i, truth) in [x, a, b].into_iter().enumerate() {
             let (shown, seen) = (axis_states.shown[i], axis_states.seen[i]);

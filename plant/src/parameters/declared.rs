@@ -9,17 +9,27 @@
 //! parameters.c1 = { unit = "N s/m^2", value = 120, range = [0, 500] }
 //! ```
 //!
+//! A term may keep values from step to step, here a play between the axis and what brakes it:
+//!
+//! ```text
+//! add = "-k*w"
+//! memory.w = { unit = "m", range = [0, 1], start = "x", update = "min(max(w, x - g), x + g)" }    # over dt and w too
+//! ```
+//!
 //! A term needs the value of each number, and its range is that value alone where the file gives none. A suspect needs ranges,
 //! and its values are those at which it adds nothing, 0 where the file gives none.
 
 use super::reader::ParameterError;
-use crate::effects::declared::{Declared, MOST_PARAMETERS, MOST_TERMS, Number, Target, dimension};
+use crate::effects::declared::{
+    Declared, MOST_PARAMETERS, MOST_REMEMBERED, MOST_TERMS, Number, Target, VARIABLES, dimension,
+};
+use crate::effects::remembered::{BEFORE, Remembered, STEP};
 use crate::effects::sheet;
 use crate::state::Axis;
 use expression::formula::{Formula, Variable};
 use expression::grammar::is_of_name;
 use expression::units::Unit;
-use settings::{Section, SettingsError, Source};
+use settings::{Section, SettingsError, Source, Text};
 use std::path::Path;
 
 /// Values of the variables at which a suspect that is off must add nothing, in their order: rest and motion of a rig.
@@ -66,6 +76,43 @@ pub(super) fn read(text: &str, file: &str, key: &str) -> Result<Vec<Declared>, P
     Ok(all)
 }
 
+/// What a term keeps, as it is written.
+struct KeptText {
+    name: String,
+    unit: Unit,
+    range: [f64; 2],
+    start: Text,
+    update: Text,
+}
+
+impl KeptText {
+    fn variable(&self) -> Variable<'_> {
+        let range = self.range.map(|end| end * self.unit.factor);
+        Variable { name: &self.name, dimension: self.unit.dimension, range }
+    }
+
+    fn with(&self, (start_formula, update_formula): (Formula, Formula)) -> Remembered {
+        Remembered {
+            name: self.name.clone(),
+            unit: self.unit.clone(),
+            range: self.range,
+            start: self.start.text.clone(),
+            update: self.update.text.clone(),
+            start_formula,
+            update_formula,
+        }
+    }
+}
+
+/// Refuses a key that no expression could read.
+fn is_name(section: &Section<'_>, name: &str) -> Result<(), SettingsError> {
+    let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
+    if begins && name.chars().all(is_of_name) && name.chars().count() <= 64 {
+        return Ok(());
+    }
+    Err(section.wrong_at(name, &format!("{name}: a name has letters, digits and _ alone")))
+}
+
 struct Reader<'a> {
     source: &'a Source<'a>,
     is_suspect: bool,
@@ -94,12 +141,19 @@ impl Reader<'_> {
         };
         let add = section.needed_text("add", "the expression that is added")?;
         let numbers = self.numbers(&mut section)?;
+        let kept = self.kept(&mut section)?;
         let twins = section.texts("twins")?;
         section.finish()?;
 
-        let variables = target.variables();
-        if let Some(number) = numbers.iter().find(|own| variables.iter().any(|one| one.name == own.name)) {
+        let ways: Vec<Variable<'_>> = kept.iter().map(KeptText::variable).collect();
+        let variables = [target.variables(), ways.clone()].concat();
+        let taken = variables.iter().map(|one| one.name).chain((!kept.is_empty()).then_some(STEP.0));
+        if let Some(number) = numbers.iter().find(|own| taken.clone().any(|name| name == own.name)) {
             return Err(section.wrong(&format!("parameters.{}: a variable has this name", number.name)));
+        }
+        let all = VARIABLES.iter().map(|one| one.0).chain([STEP.0]);
+        if let Some(one) = kept.iter().find(|own| all.clone().any(|name| name == own.name)) {
+            return Err(section.wrong(&format!("memory.{}: a variable has this name", one.name)));
         }
         let parameters: Vec<Variable<'_>> = numbers
             .iter()
@@ -112,10 +166,30 @@ impl Reader<'_> {
         let wanted = (dimension(target.unit()), place.text.as_str());
         let formula = Formula::compile((&add.text, add.at), &variables, &parameters, wanted)
             .map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))?;
-        drop(parameters);
-        let mut term = Declared { name: name.text, axis, target, add: add.text, numbers, twins, formula };
-        let values_si = term.values_si();
-        term.formula.set(&values_si);
+        let before = Target::Force.variables();
+        let (name_of_step, unit_of_step, range) = STEP;
+        let step = Variable { name: name_of_step, dimension: dimension(unit_of_step), range };
+        let while_kept = [before.clone(), ways.clone(), vec![step]].concat();
+        debug_assert!(before.len() == BEFORE);
+        let memory = kept
+            .iter()
+            .map(|one| {
+                let compiled = |text: &Text, variables: &[Variable<'_>]| {
+                    Formula::compile(
+                        (&text.text, text.at),
+                        variables,
+                        &parameters,
+                        (one.unit.dimension, &one.name),
+                    )
+                    .map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))
+                };
+                let formulas = (compiled(&one.start, &before)?, compiled(&one.update, &while_kept)?);
+                Ok(one.with(formulas))
+            })
+            .collect::<Result<Vec<_>, SettingsError>>()?;
+        let mut term =
+            Declared { name: name.text, axis, target, add: add.text, numbers, memory, twins, formula };
+        term.set_formulas();
         if self.is_suspect {
             self.adds_nothing(&term, add.at)?;
         }
@@ -129,7 +203,12 @@ impl Reader<'_> {
             let why = "the first of its parameters is its amplitude, and has no value: it is 0 where the suspect is off";
             return Err(self.source.wrong_from(at, why));
         };
-        let Some(added) = OFF_AT.iter().map(|values| term.formula.value(values)).find(|value| *value != 0.0)
+        // Whatever it keeps.
+        let end = |end: usize| term.memory.iter().map(|one| one.range[end] * one.unit.factor).collect();
+        let kept: [Vec<f64>; 2] = [end(0), end(1)];
+        let each = OFF_AT.iter().flat_map(|values| kept.iter().map(move |kept| (values, kept)));
+        let Some(added) =
+            each.map(|(values, kept)| term.value_keeping(values, kept)).find(|value| *value != 0.0)
         else {
             return Ok(());
         };
@@ -143,6 +222,43 @@ impl Reader<'_> {
         Err(self.source.wrong_from(at, &why))
     }
 
+    /// What the term keeps, its expressions as they are written.
+    fn kept(&self, section: &mut Section<'_>) -> Result<Vec<KeptText>, SettingsError> {
+        let Some(mut all) = section.section("memory")? else { return Ok(Vec::new()) };
+        let names = all.keys();
+        if names.len() > MOST_REMEMBERED {
+            return Err(all.wrong(&format!("more than {MOST_REMEMBERED} of memory in one term")));
+        }
+        let mut kept = Vec::new();
+        for name in names {
+            is_name(&all, &name)?;
+            let Some(mut one) = all.section(&name)? else { continue };
+            let unit = self.unit(&mut one)?;
+            let range = match one.numbers("range")?.as_slice() {
+                [least, most] if least < most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],
+                _ => {
+                    let why = "range: needed are two numbers that it stays within, and within 1e12 of 0";
+                    return Err(one.wrong_at("range", why));
+                }
+            };
+            let start = one.needed_text("start", "the expression of its value where the plant begins")?;
+            let update =
+                one.needed_text("update", "the expression that renews it at the end of a substep")?;
+            one.finish()?;
+            kept.push(KeptText { name, unit, range, start, update });
+        }
+        all.finish()?;
+        Ok(kept)
+    }
+
+    fn unit(&self, section: &mut Section<'_>) -> Result<Unit, SettingsError> {
+        match section.text("unit")? {
+            None => Ok(Unit::one()),
+            Some(text) => Unit::parse(&text.text)
+                .map_err(|wrong| self.source.wrong_from(text.at + wrong.at, &wrong.why)),
+        }
+    }
+
     fn numbers(&self, section: &mut Section<'_>) -> Result<Vec<Number>, SettingsError> {
         let Some(mut all) = section.section("parameters")? else { return Ok(Vec::new()) };
         let names = all.keys();
@@ -151,10 +267,7 @@ impl Reader<'_> {
         }
         let mut numbers = Vec::new();
         for name in names {
-            let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
-            if !begins || !name.chars().all(is_of_name) || name.chars().count() > 64 {
-                return Err(all.wrong_at(&name, &format!("{name}: a name has letters, digits and _ alone")));
-            }
+            is_name(&all, &name)?;
             let Some(one) = all.section(&name)? else { continue };
             numbers.push(self.number(name, one)?);
         }
@@ -163,11 +276,7 @@ impl Reader<'_> {
     }
 
     fn number(&self, name: String, mut section: Section<'_>) -> Result<Number, SettingsError> {
-        let unit = match section.text("unit")? {
-            None => Unit::one(),
-            Some(text) => Unit::parse(&text.text)
-                .map_err(|wrong| self.source.wrong_from(text.at + wrong.at, &wrong.why))?,
-        };
+        let unit = self.unit(&mut section)?;
         let value = match section.numbers("value")?.as_slice() {
             [one] => *one,
             [] if self.is_suspect => 0.0,
