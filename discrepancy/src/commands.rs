@@ -314,8 +314,7 @@ fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
         .map_err(|why| CommandError::File { file: arguments.rig.clone(), why })?;
     let text = if model_file::is_model_file(&text) {
         current_form(&arguments.rig, &text)?;
-        let extended = model_file::extended(&text, &read_report(&arguments.report)?);
-        extended.map_err(|why| CommandError::BadData(format!("{}: {why}", arguments.rig.display())))?
+        any_plant::extended_text(&arguments.rig, &text, &read_report(&arguments.report)?)?
     } else {
         let report = read_report(&arguments.report)?;
         workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?

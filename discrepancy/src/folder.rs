@@ -53,11 +53,23 @@ impl Folder {
         if !self.path.join("report.json").exists() {
             return Ok(());
         }
+        if let Some(earlier) = self.earlier_model().filter(|earlier| self.file(earlier).is_ok()) {
+            self.remove(&earlier)?;
+        }
         let proposed = MENU.iter().map(|entry| PathBuf::from(entry.file()));
         for name in ["report.json", "report.html"].map(PathBuf::from).into_iter().chain(proposed) {
             self.remove(&name)?;
         }
         self.remove(model)
+    }
+
+    /// The file of a model of any plant that an earlier close wrote here.
+    fn earlier_model(&self) -> Option<PathBuf> {
+        let text = fs::read_to_string(self.path.join("report.json")).ok()?;
+        let report: serde_json::Value = serde_json::from_str(&text).ok()?;
+        let wrote = |key: &str| report[key].as_array().is_some_and(|all| !all.is_empty());
+        let name = Path::new(report["model"].as_str()?).file_name()?;
+        (wrote("named") || wrote("discovered")).then(|| PathBuf::from(name))
     }
 
     fn remove(&self, name: &Path) -> Result<(), FolderError> {
@@ -124,5 +136,22 @@ mod tests {
         fs::create_dir(scratch.path().join("report.json.part")).unwrap();
         let error = write(&scratch.path().join("report.json"), "after").unwrap_err().to_string();
         assert!(error.contains("report.json") && error.contains("choose another folder"), "{error}");
+    }
+
+    #[test]
+    fn the_extended_model_of_an_earlier_close_goes_with_its_report() {
+        let scratch = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| fs::write(scratch.path().join(name), text).unwrap();
+        write("tanks.toml", "extended");
+        write("mine.toml", "of the user");
+        write("report.json", r#"{"model": "../models/tanks.toml", "named": [{"suspect": "leak"}]}"#);
+        let folder = Folder::open(scratch.path(), []).unwrap();
+        folder.clear(Path::new("ball.toml")).unwrap();
+        let is_there = |name: &str| scratch.path().join(name).exists();
+        assert_eq!(["tanks.toml", "report.json", "mine.toml"].map(is_there), [false, false, true]);
+        // A close that named nothing wrote none.
+        write("report.json", r#"{"model": "mine.toml", "named": [], "discovered": []}"#);
+        folder.clear(Path::new("ball.toml")).unwrap();
+        assert!(is_there("mine.toml"));
     }
 }

@@ -12,6 +12,7 @@
 //! | `look` | what a record looks like: holes, spikes, saturation, sign, columns |
 //! | `filter` | zero-phase low passes |
 //! | `fit` | output-error fit by the one Gauss-Newton |
+//! | `bounds` | numbers at the end of their range, or hardly determined |
 //! | `normal` | normal equations, steps, standard errors |
 //! | `covariance` | standard errors beside coloured residuals and a law that is only near |
 //! | `cuts` | rows in blocks of time, and in bands |
@@ -31,6 +32,7 @@
 
 mod adequacy;
 mod begin;
+mod bounds;
 mod covariance;
 mod cuts;
 mod discover;
@@ -181,11 +183,13 @@ fn closed(
         Ok(Some((judged, traces, notes))) => {
             report.judge(&model, &judged, &traces);
             report.notes.extend(notes);
+            report.notes.extend(report.much_worse());
             (traces, None)
         }
         // What was found stays, whatever the held-out records are like.
         Err(why) => (held_out::trained(&found)?, Some(why)),
     };
+    report.equations = report::equations(&model);
     report.rate(adequacy::residuals(&found.extended)?);
     let page = page::page(&model, &report, &traces, not_judged.as_deref());
     let is_named = !report.named.is_empty() || !report.discovered.is_empty();

@@ -12,6 +12,7 @@ mod locate;
 mod looks;
 mod model_files;
 mod name;
+mod numbers;
 mod outside_expected;
 mod passage;
 mod real;

@@ -3,7 +3,10 @@
 use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress};
 use crate::cli::ReadArguments;
 use crate::folder::{self, Folder};
-use crate::model_file::{ClosedModel, ModelReport, close, close_searching, look, new_model};
+use crate::model_file::{
+    ClosedModel, ModelReport, ReportedModel, close, close_searching, extended, look, new_model, read,
+};
+use crate::page::significant;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -68,6 +71,17 @@ fn no_options_of_a_rig(read: &ReadArguments, without: &[String]) -> Result<(), C
     }
 }
 
+/// `extend`: the text of a model file with what its report names.
+pub(super) fn extended_text(
+    model: &Path,
+    text: &str,
+    report: &ReportedModel,
+) -> Result<String, CommandError> {
+    let is_of = report.is_of(&read(model)?);
+    let extended = is_of.and_then(|()| extended(text, report));
+    extended.map_err(|why| CommandError::BadData(format!("{}: {why}", model.display())))
+}
+
 /// `new`: a first model file, printed or written where nothing stands yet.
 pub(super) fn new_command(record: &Path, out: Option<&Path>) -> Result<Exit, CommandError> {
     let text = new_model(record)?;
@@ -101,9 +115,12 @@ fn in_words(report: &ModelReport) -> String {
         let _ = writeln!(text, "what is left on the training records is {what}: {}", residual.in_words());
     }
     for number in &report.parameters {
-        let error =
-            number.standard_error.map_or("not determined".to_owned(), |error| format!("± {error:.2e}"));
-        let _ = writeln!(text, "  {} = {:.5e} {error} {}", number.name, number.value, number.unit);
+        let error = match number.standard_error {
+            Some(error) => format!("± {}", significant(error)),
+            None if number.is_at_bound => "at the end of its range".to_owned(),
+            None => "not determined".to_owned(),
+        };
+        let _ = writeln!(text, "  {} = {} {error} {}", number.name, significant(number.value), number.unit);
     }
     for suspect in &report.suspects {
         let _ = writeln!(

@@ -1,7 +1,8 @@
 //! A model file in words: equations, numbers, units, suspects; with records also what these can tell apart.
 
+use super::bounds;
 use super::record::Measured;
-use super::report::{place, significant, term};
+use super::report::{numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
 use super::{ModelError, read, select};
 use model::{Model, Parameter, Program, Rows, Smoothing, Solver, Start};
@@ -20,7 +21,8 @@ pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
     }
     let records = train.iter().map(|path| Measured::read(&model, path)).collect::<Result<Vec<_>, _>>()?;
     let baseline = select::fitted(&model, &records, &[], None)?;
-    text += &structure_in_words(&structure(&baseline));
+    let weak = bounds::remarks(&numbers(&baseline, &baseline));
+    text += &structure_in_words(&structure(&baseline), weak);
     Ok(text)
 }
 
@@ -149,7 +151,7 @@ fn parameter(parameter: &Parameter) -> String {
     text
 }
 
-fn structure_in_words(structure: &Structure) -> String {
+fn structure_in_words(structure: &Structure, weak: Vec<String>) -> String {
     let undetermined = structure.undetermined.iter();
     let undetermined = undetermined
         .map(|name| format!("{name}: not determined: other numbers move the outputs in the same way"));
@@ -160,7 +162,7 @@ fn structure_in_words(structure: &Structure) -> String {
         format!("{one} and {other}: the same to these records (cosine {:.3})", twins.cosine)
     });
     let advice = structure.advice.iter().map(Advice::in_words);
-    let mut lines: Vec<String> = undetermined.chain(hidden).chain(twins).chain(advice).collect();
+    let mut lines: Vec<String> = undetermined.chain(weak).chain(hidden).chain(twins).chain(advice).collect();
     if lines.is_empty() {
         lines.push("every number, and every suspect from each other".into());
     }

@@ -3,7 +3,8 @@
 //! Numbers of a library are written beside its `use`. Everything else of the file stays, comments too. Terms are fitted again
 //! with the model in the next run.
 
-use model::{Entry, Library};
+use super::report::equations;
+use model::{Entry, Library, Model};
 use serde::Deserialize;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, value};
 
@@ -14,6 +15,8 @@ pub enum ExtendError {
     Text(#[from] toml_edit::TomlError),
     #[error("suspect {name} of the report is not in the model file: is it the report of this model?")]
     Unknown { name: String },
+    #[error("the report is of another model: one of both has no '{equation}'; close this model again")]
+    Other { equation: String },
     #[error("suspects and terms are written as [[suspects]] and [[terms]]")]
     Form,
 }
@@ -26,6 +29,25 @@ pub struct ReportedModel {
     #[serde(default)]
     discovered: Vec<ReportedTerm>,
     parameters: Vec<ReportedNumber>,
+    /// Absent in reports of before 0.1.0.
+    #[serde(default)]
+    equations: Vec<String>,
+}
+
+impl ReportedModel {
+    /// Whether it is the report of this model.
+    ///
+    /// # Errors
+    /// The first equation in which they differ.
+    pub fn is_of(&self, model: &Model) -> Result<(), ExtendError> {
+        let own = equations(model);
+        let unknown = self.equations.iter().find(|equation| !own.contains(equation));
+        let added = own.iter().find(|equation| !self.equations.contains(equation));
+        match unknown.or(added).filter(|_| !self.equations.is_empty()) {
+            Some(equation) => Err(ExtendError::Other { equation: equation.clone() }),
+            None => Ok(()),
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -61,7 +83,12 @@ impl From<&super::ModelReport> for ReportedModel {
             .discovered
             .iter()
             .map(|one| ReportedTerm { name: one.name.clone(), text: one.text.clone() });
-        Self { named: named.collect(), discovered: discovered.collect(), parameters: parameters.collect() }
+        Self {
+            named: named.collect(),
+            discovered: discovered.collect(),
+            parameters: parameters.collect(),
+            equations: report.equations.clone(),
+        }
     }
 }
 

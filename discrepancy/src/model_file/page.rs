@@ -234,6 +234,7 @@ fn numbers(all: &[Number]) -> String {
     let rows = all.iter().map(|one| {
         let error =
             one.standard_error.map_or("not determined".into(), |error| format!("± {}", significant(error)));
+        let error = if one.is_at_bound { "none".to_owned() } else { error };
         let bound = if one.is_at_bound { "at the end of its range" } else { "" };
         vec![
             Cell::About(one.name.clone(), bound.into()),
@@ -253,7 +254,17 @@ fn structure(report: &ModelReport) -> String {
         structure.hidden.iter().map(|name| format!("{name} looks like a change of the model's own numbers."));
     let twins = structure.twins.iter().map(|twins| {
         let [one, other] = &twins.suspects;
-        format!("{one} and {other} do the same to these records (cosine {:.3}).", twins.cosine)
+        let is_other = |name: &String| name == one || name == other;
+        let named = report.named.iter().find(|named| is_other(&named.suspect));
+        let told = match named {
+            Some(named) if named.alternatives.iter().any(is_other) => ", and so say the fits",
+            Some(_) => "; the fits tell them apart by what they leave",
+            None => "",
+        };
+        format!(
+            "{one} and {other} do the same to these records at their first values (cosine {:.3}){told}.",
+            twins.cosine
+        )
     });
     let advice = structure.advice.iter().map(|advice| sentence(&advice.in_words()));
     let all: Vec<String> = undetermined.chain(hidden).chain(twins).chain(advice).collect();

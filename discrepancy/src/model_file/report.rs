@@ -1,6 +1,7 @@
 //! The report of a model file, in the model's own names and units.
 
 use super::adequacy::Residual;
+use super::bounds;
 use super::covariance;
 use super::discover::DiscoveredTerm;
 use super::fit::Fitting;
@@ -10,6 +11,7 @@ use super::normal::standard_errors;
 use super::record::Measured;
 use super::select::{Evaluation, Fitted, Found};
 use super::structure::Structure;
+use crate::estimator::Outcome;
 use crate::report::Verdict;
 use crate::verify::WORSE;
 use model::{Change, Model};
@@ -49,6 +51,8 @@ pub struct ModelReport {
     pub suspects: Vec<Judgement>,
     pub structure: Structure,
     pub notes: Vec<String>,
+    /// States, definitions, outputs and suspects as the file has them.
+    pub equations: Vec<String>,
 }
 
 /// A number with its unit.
@@ -59,11 +63,15 @@ pub struct Number {
     pub suspect: Option<String>,
     pub unit: String,
     pub value: f64,
-    /// By coloured residuals or by blocks of time, the larger; `None` where the records do not determine it.
+    /// By coloured residuals or by blocks of time, the larger; `None` where the records do not determine it, or
+    /// it is at the end of its range.
     pub standard_error: Option<f64>,
     /// Fitted without what was named.
     pub baseline: Option<f64>,
     pub is_at_bound: bool,
+    /// Its range has values of one sign alone.
+    #[serde(skip)]
+    pub(crate) is_of_one_sign: bool,
 }
 
 /// What both models leave of an output.
@@ -185,8 +193,13 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
     notes.extend(failed.map(|(suspect, why)| {
         format!("suspect {}: cannot be simulated: {why}", model.suspects[*suspect].name)
     }));
-    notes.extend(found.baseline.convergence.doubt().map(|doubt| format!("the model alone: {doubt}")));
-    notes.extend(found.extended.convergence.doubt().map(|doubt| format!("the extended model: {doubt}")));
+    for (name, fitted) in [("the model alone", &found.baseline), ("the extended model", &found.extended)] {
+        // Which number ended there is said by itself.
+        let doubt = fitted.convergence.doubt().filter(|_| fitted.convergence.outcome != Outcome::Bound);
+        notes.extend(doubt.map(|doubt| format!("{name}: {doubt}")));
+    }
+    let parameters = numbers(&found.extended, &found.baseline);
+    notes.extend(bounds::remarks(&parameters));
     let [before, after] = [found.baseline.rms_si(), found.extended.rms_si()];
     let training = (0..model.outputs.len()).map(|output| {
         left(model, "training", output, [before[output], after[output]], fitting.count(output) as usize)
@@ -201,7 +214,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         confirmed: None,
         adequate: true,
         residuals: Vec::new(),
-        parameters: numbers(&found.extended, &found.baseline),
+        parameters,
         training: training.collect(),
         held_out: Vec::new(),
         named,
@@ -209,6 +222,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         suspects,
         structure: structure.clone(),
         notes,
+        equations: Vec::new(),
     }
 }
 
@@ -235,7 +249,10 @@ impl ModelReport {
                 significant(first.rms_after),
                 first.unit
             ),
-            None if better => "; confirmed on what was held out".to_owned(),
+            None if better => match self.much_worse().first() {
+                Some(much) => format!("; better on what was held out, though {much}"),
+                None => "; confirmed on what was held out".to_owned(),
+            },
             None => "; what was held out gets neither better nor worse with it".to_owned(),
         };
         self.headline += &about;
@@ -260,6 +277,23 @@ fn left(model: &Model, record: &str, output: usize, rms_si: [f64; 2], rows: usiz
     let ratio = (rms_before > 0.0).then(|| rms_after / rms_before);
     let (record, name, unit) = (record.to_owned(), output.name.clone(), output.unit.text.clone());
     Left { record, output: name, unit, rms_before, rms_after, ratio, rows }
+}
+
+/// What tells a model from another one: its equations and suspects, not its numbers.
+pub(super) fn equations(model: &Model) -> Vec<String> {
+    let own = |suspect: Option<usize>| suspect.is_none();
+    let states = model.states.iter().filter(|one| own(one.suspect));
+    let definitions = model.definitions.iter().filter(|one| own(one.suspect));
+    states
+        .map(|one| format!("d{}/dt = {}", one.name, one.derivative.text))
+        .chain(definitions.map(|one| format!("{} = {}", one.name, one.value.text)))
+        .chain(model.outputs.iter().map(|one| format!("output {} = {}", one.name, one.value.text)))
+        .chain(
+            (0..model.suspects.len()).map(|one| {
+                format!("{}, {}: {}", model.suspects[one].name, place(model, one), term(model, one))
+            }),
+        )
+        .collect()
 }
 
 pub(crate) fn place(model: &Model, suspect: usize) -> String {
@@ -288,7 +322,7 @@ pub(crate) fn term(model: &Model, suspect: usize) -> String {
 }
 
 /// Numbers of a fit; their errors are the larger of what a coloured residual is worth and of the jackknife over blocks of time.
-fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
+pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
     let fitting = &fitted.fitting;
     let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();
     let inflation = (counts / fitted.effective.iter().sum::<f64>().max(1.0)).max(1.0).sqrt();
@@ -297,15 +331,19 @@ fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
     let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors.into_iter().zip(&of_blocks));
     all.map(|((unknown, value), (error, of_blocks))| {
         let unit = fitting.unit_of(unknown);
+        let is_at_bound = bounds::is_at_bound(*value, unknown.range_si);
         let before = baseline.fitting.unknowns.iter().position(|other| other.what == unknown.what);
         Number {
             name: fitting.name_of(unknown),
             suspect: fitting.suspect_of(unknown).map(|suspect| fitting.model.suspects[suspect].name.clone()),
             unit: unit.text.clone(),
             value: value / unit.factor,
-            standard_error: error.map(|error| (error * inflation).max(*of_blocks) / unit.factor),
+            standard_error: error
+                .filter(|_| !is_at_bound)
+                .map(|error| (error * inflation).max(*of_blocks) / unit.factor),
             baseline: before.map(|place| baseline.point.values_si[place] / unit.factor),
-            is_at_bound: unknown.range_si.contains(value),
+            is_at_bound,
+            is_of_one_sign: unknown.range_si[0] >= 0.0 || unknown.range_si[1] <= 0.0,
         }
     })
     .collect()
@@ -325,9 +363,6 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
         (None, Some(last)) => format!("rejected: {}", last.gate),
         (None, None) => "rejected beside what was taken".to_owned(),
     };
-    if let Some(doubt) = evaluation.convergence.doubt() {
-        decision += &format!("; {doubt}");
-    }
     let numbers = evaluation.values_si.iter().map(|(index, value)| {
         let parameter = &model.parameters[*index];
         Number {
@@ -337,9 +372,22 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
             value: value / parameter.unit.factor,
             standard_error: None,
             baseline: None,
-            is_at_bound: parameter.range_si.contains(value),
+            is_at_bound: bounds::is_at_bound(*value, parameter.range_si),
+            is_of_one_sign: false,
         }
     });
+    let numbers: Vec<Number> = numbers.collect();
+    let at_end = numbers.iter().find(|number| number.is_at_bound);
+    match (evaluation.convergence.outcome, at_end) {
+        (Outcome::Bound, Some(number)) => {
+            let (name, value, unit) = (&number.name, significant(number.value), &number.unit);
+            decision += &format!("; its {name} ended at the end of the range, {value} {unit}");
+        }
+        (Outcome::Bound, None) => {
+            decision += "; a number of the model ended at the end of its range beside it";
+        }
+        _ => decision += &evaluation.convergence.doubt().map_or(String::new(), |doubt| format!("; {doubt}")),
+    }
     Judgement {
         suspect: suspect.name.clone(),
         place: place(model, evaluation.suspect),
@@ -350,6 +398,6 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
         share: evaluation.share,
         clustered_t: evaluation.t,
         decision,
-        numbers: numbers.collect(),
+        numbers,
     }
 }

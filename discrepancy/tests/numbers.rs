@@ -1,0 +1,104 @@
+//! What is said of the numbers of a model file, and of a report that is another model's.
+
+use discrepancy::model_file::{ClosedModel, ReportedModel, close, explain, read};
+use std::fs;
+use std::path::Path;
+
+const LINE: &str = r#"
+[inputs.u]
+unit = "V"
+[parameters]
+gain = { unit = "mm/V", value = 1, range = [0, 2] }
+[outputs.y]
+unit = "mm"
+value = "gain*u"
+[[suspects]]
+name = "square"
+place = "y"
+add = "c*u^2"
+parameters.c = { unit = "mm/V^2", value = 0.01, range = [0, 9] }
+"#;
+
+/// 300 rows of an output of u with a noise of 0.1 mm, u from -1 V on in steps of `step` V.
+fn record(step: f64, output: impl Fn(f64) -> f64) -> String {
+    let row = |k: u32| {
+        let u = -1.0 + step * f64::from(k % 5);
+        format!("{},{u},{}\n", f64::from(k) * 0.1, output(u) + 0.01 * f64::from(k * k % 31) - 0.15)
+    };
+    "t_s,u,y\n".to_owned() + &(0..300).map(row).collect::<String>()
+}
+
+fn closed(folder: &Path, model: &str, train: &str, test: Option<&str>) -> ClosedModel {
+    let [file, first, second] = ["model.toml", "train.csv", "test.csv"].map(|name| folder.join(name));
+    fs::write(&file, model).unwrap();
+    fs::write(&first, train).unwrap();
+    fs::write(&second, test.unwrap_or_default()).unwrap();
+    let tests = if test.is_some() { vec![second] } else { Vec::new() };
+    close(&file, &[first], &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_number_at_the_end_of_its_range_is_named_and_has_no_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = closed(folder.path(), LINE, &record(0.5, |u| 3.0 * u), None).report;
+    let gain = &report.parameters[0];
+    assert!(gain.is_at_bound && gain.standard_error.is_none(), "{gain:?}");
+    let said = "gain ended at the end of its range, 2.00 mm/V";
+    assert!(report.notes.iter().any(|note| note.starts_with(said)), "{:?}", report.notes);
+    let square = &report.suspects[0].decision;
+    assert!(square.contains("ended at the end of"), "{square}");
+}
+
+#[test]
+fn a_number_whose_error_is_as_large_as_itself_is_said_to_be_hardly_determined() {
+    let folder = tempfile::tempdir().unwrap();
+    let weak = LINE
+        .replace("value = \"gain*u\"", "value = \"gain*u + small*u^2\"")
+        .replace("[outputs.y]", "small = { unit = \"mm/V^2\", value = 0.001, range = [0, 9] }\n[outputs.y]");
+    let train = record(0.5, |u| 1.5 * u + 0.003 * u * u);
+    let report = closed(folder.path(), &weak, &train, None).report;
+    let small = report.parameters.iter().find(|number| number.name == "small").unwrap();
+    assert!(
+        small.is_at_bound || small.standard_error.is_some_and(|error| error > 0.5 * small.value),
+        "{small:?}"
+    );
+    assert!(report.notes.iter().any(|note| note.starts_with("small ")), "{:?}", report.notes);
+    let text = explain(&folder.path().join("model.toml"), &[folder.path().join("train.csv")]).unwrap();
+    assert!(text.contains("\n  small "), "{text}");
+}
+
+#[test]
+fn a_held_out_record_that_is_left_much_worse_is_remarked_with_the_ratio() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = |u: f64| 1.5 * u + 0.5 * u * u;
+    // The square is named; at up to 19 V a cube shows that is not in the training record.
+    let test = record(5.0, |u| plant(u) + 1e-3 * u.powi(3));
+    let report = closed(folder.path(), LINE, &record(0.5, plant), Some(&test)).report;
+    assert_eq!(report.named.len(), 1, "{report:#?}");
+    assert!(
+        report.headline.contains("better on what was held out, though on test.csv y ")
+            && report.headline.contains(" times that of the training records"),
+        "{}",
+        report.headline
+    );
+    assert_eq!(report.confirmed, Some(true));
+}
+
+#[test]
+fn the_report_of_another_model_extends_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = closed(folder.path(), LINE, &record(0.5, |u| 1.5 * u + u * u), None).report;
+    let reported: ReportedModel = serde_json::from_value(serde_json::to_value(&report).unwrap()).unwrap();
+    let is_of = |text: &str| {
+        let file = folder.path().join("other.toml");
+        fs::write(&file, text).unwrap();
+        reported.is_of(&read(&file).unwrap()).map_err(|error| error.to_string())
+    };
+    assert_eq!(is_of(LINE), Ok(()));
+    assert_eq!(is_of(&LINE.replace("value = 1,", "value = 1.2,")), Ok(()));
+    let other = is_of(&LINE.replace("\"gain*u\"", "\"gain*u + 0.1[mm]\"")).unwrap_err();
+    assert!(
+        other.contains("the report is of another model") && other.contains("output y = gain*u"),
+        "{other}"
+    );
+}
