@@ -2,6 +2,7 @@
 
 use latency::model::*;
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// Runs of the session, each of so many seconds.
 const RUNS: usize = 10;
@@ -358,7 +359,13 @@ fn conditions() -> Conditions {
     }
 }
 
+/// Made once: without optimisation it takes seconds.
 pub(crate) fn rich() -> Report {
+    static RICH: OnceLock<Report> = OnceLock::new();
+    RICH.get_or_init(make_rich).clone()
+}
+
+fn make_rich() -> Report {
     let sentence = |text: &str| text.to_owned();
     Report {
         schema: SCHEMA.into(),
