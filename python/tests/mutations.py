@@ -43,8 +43,8 @@ def _make(sources, build, *targets):
 
 
 def codec(folder):
-    """The codec of rig.dbc in `folder`, which no mistake touches."""
-    _make(FIRMWARE, folder, folder / "rig.c")
+    """The codec of rig.dbc in `folder`, compiled, which no mistake touches."""
+    _make(FIRMWARE, folder, folder / "rig.o")
     return folder
 
 
