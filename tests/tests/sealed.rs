@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use memchr::memmem;
 use plant::effects::draw::as_toml;
 use plant::effects::sheet::Switched;
 use plant::effects::{SHEETS, sheet};
@@ -91,7 +92,7 @@ fn census(outputs: &BTreeMap<String, String>, words: &BTreeSet<String>) -> BTree
         for word in words {
             // Dumps are as many as there were late wake-ups: those of a process count as one output.
             let name = name.split('/').next().unwrap_or_default();
-            let count = text.matches(word.as_str()).count();
+            let count = memmem::find_iter(text.as_bytes(), word.as_bytes()).count();
             if count > 0 {
                 *counts.entry(format!("{word} in {name}")).or_default() += count;
             }
