@@ -13,16 +13,21 @@
 //! | `filter` | zero-phase low passes |
 //! | `fit` | output-error fit by the one Gauss-Newton |
 //! | `bounds` | numbers at the end of their range, or hardly determined |
+//! | `samples` | measured samples, what the model says of them, derivatives |
 //! | `normal` | normal equations, steps, standard errors |
 //! | `covariance` | standard errors beside coloured residuals and a law that is only near |
 //! | `cuts` | rows in blocks of time, and in bands |
+//! | `folds` | what a block leaves under the fit without it |
 //! | `starts` | from where a fit starts |
 //! | `select` | which suspects are taken |
+//! | `judge` | whether a suspect passes |
+//! | `pairs` | two suspects that pay together where neither does alone |
 //! | `discover` | a search for what no suspect describes |
 //! | `held_out` | both models on records that were not used |
 //! | `structure` | which suspects can be told apart, before any fit |
 //! | `sensors` | which state, measured, would tell suspects apart |
 //! | `adequacy` | whether what is left is noise |
+//! | `watch` | progress of work that takes long |
 //! | `report` | the report |
 //! | `explain` | equations, units, suspects in words |
 //! | `page` | the page |
@@ -40,21 +45,26 @@ mod explain;
 mod extended;
 mod filter;
 mod fit;
+mod folds;
 mod held_out;
+mod judge;
 mod look;
 mod normal;
 mod page;
+mod pairs;
 mod processing;
 mod record;
 mod report;
+mod samples;
 mod select;
 mod sensors;
 mod starts;
 mod structure;
+mod watch;
 
 pub use adequacy::Residual;
 pub use begin::{NewError, new_model};
-pub use discover::DiscoveredTerm;
+pub use discover::{DiscoveredTerm, Located, Place};
 pub use explain::explain;
 pub use extended::{ExtendError, ReportedModel, extended};
 pub use held_out::JudgeError;
@@ -160,6 +170,8 @@ fn closed(
     progress("structure");
     let structure = structure::structure(&found.baseline);
     let grown = (is_searching && found.taken.is_empty()).then(|| discover::grown(&found.baseline));
+    let located =
+        watch::watched(progress, ("where it comes from: steps", 1), |_| discover::located(&found.baseline));
     let (found, mut report) = match &grown {
         None => {
             let report = report::report(file, &found, &structure);
@@ -177,6 +189,7 @@ fn closed(
             (discovery.found, report)
         }
     };
+    report.located = located;
     let held_out = judged(&model, &found, tests, progress);
     let (traces, not_judged): (Vec<Traces>, _) = match held_out {
         Ok(None) => (held_out::trained(&found)?, None),

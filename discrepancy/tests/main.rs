@@ -20,3 +20,4 @@ mod real_models;
 mod real_records;
 mod record;
 mod tabulate;
+mod together;

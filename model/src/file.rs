@@ -138,6 +138,8 @@ pub struct Parameter {
     pub is_fixed: bool,
     /// Each record has its own.
     pub is_per_record: bool,
+    /// A time constant of a library, whose range the file leaves to it: samples bound it from below.
+    pub is_bound_by_samples: bool,
     /// The suspect that it belongs to.
     pub suspect: Option<usize>,
 }

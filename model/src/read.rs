@@ -274,6 +274,7 @@ impl Reader<'_> {
                 range_si: [f64::NEG_INFINITY, f64::INFINITY],
                 is_fixed: false,
                 is_per_record: false,
+                is_bound_by_samples: false,
                 suspect,
             };
             self.parameter(section, parameter)?;
@@ -325,7 +326,8 @@ impl Reader<'_> {
             );
         }
         let given = range(&mut section, &unit)?;
-        let range_si = if section.has("range") { given } else { before.range_si };
+        let has_range = section.has("range");
+        let range_si = if has_range { given } else { before.range_si };
         let [least, most] = range_si;
         if let Some(outside) = values_si.iter().find(|value| !(least..=most).contains(*value)) {
             // In the digits of an f32, which hide the rounding of the unit.
@@ -346,10 +348,17 @@ impl Reader<'_> {
                 .wrong_at("per_record", "per_record: the number is fixed, so that no record has its own"));
         }
         section.finish()?;
-        let Parameter { name, suspect, .. } = before;
-        let parameter =
-            Parameter { name, unit, values_si, tolerance_si, range_si, is_fixed, is_per_record, suspect };
-        self.model.parameters.push(parameter);
+        let is_bound_by_samples = before.is_bound_by_samples && !has_range;
+        self.model.parameters.push(Parameter {
+            unit,
+            values_si,
+            tolerance_si,
+            range_si,
+            is_fixed,
+            is_per_record,
+            is_bound_by_samples,
+            ..before
+        });
         Ok(())
     }
 

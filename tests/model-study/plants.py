@@ -1,7 +1,8 @@
 """Three plants with equations of their own: as the engineer models them (TOML), and as they are (right-hand sides for scipy).
 
 A hidden law has another form here than its suspect in the model file has, and every record has a background that no suspect
-describes. `AMPLITUDE` gives the number of the suspect that comes nearest to a hidden law on a path, by least squares.
+describes. `variables` are those that a hidden law depends on, `alike` changes a suspect a little, and `amplitude` gives the
+number of the suspect that comes nearest to a hidden law on a path, by least squares.
 """
 
 import math
@@ -14,18 +15,30 @@ NAMES = ("drive", "thermal", "oscillator")
 class Plant:
     """What all plants share: nominal numbers, and suspects as (place, first lines of TOML, numbers of TOML)."""
 
-    def file(self, guess, without=None):
-        """The model file with first values of the parameters, less a suspect."""
+    def file(self, guess, without=None, alike=None):
+        """The model file with first values of the parameters, less a suspect, with a second one that is alike to another."""
         numbers = "\n".join(
             f'{name} = {{ unit = "{unit}", value = {guess[name]!r}, range = [{guess[name] / 50!r}, {guess[name] * 50!r}] }}'
             for name, (_, unit) in self.numbers.items()
         )
         suspects = "\n".join(
             f'[[suspects]]\nname = "{name}"\nplace = "{place}"\n{text}\n'
-            for name, (place, text) in self.suspects.items()
+            for name, (place, text) in self.with_alike(alike)
             if name != without
         )
         return f"[fit]\nstarts = 0\n[parameters]\n{numbers}\n{self.body}\n{suspects}"
+
+
+    def with_alike(self, name):
+        """All suspects, and one of nearly the same law as `name`."""
+        suspects = list(self.suspects.items())
+        if name is not None:
+            place, text = self.suspects[name]
+            old, new = self.alike[name]
+            if old not in text:
+                raise ValueError(f"{name} has no {old}")
+            suspects.append((f"{name}-alike", (place, text.replace(old, new))))
+        return suspects
 
 
 class Drive(Plant):
@@ -86,6 +99,26 @@ value = "wl"
             'states.late = { unit = "N m", start = 0, derivative = "(torque - late)/a" }',
         ),
         "speed-offset": ("load", 'add = "a"\nparameters.a = { unit = "1/s", value = 0.01, range = [-5, 5] }'),
+    }
+    variables = {
+        "load-coulomb": {"wl"},
+        "motor-coulomb": {"wm"},
+        "windage": {"wl"},
+        "hard-shaft": {"twist"},
+        "unbalance": {"angle"},
+        "torque-limit": {"torque"},
+        "torque-lag": {"torque"},
+        "speed-offset": set(),
+    }
+    alike = {
+        "load-coulomb": ("tanh(wl/0.1[1/s])", "tanh(wl/0.12[1/s])"),
+        "motor-coulomb": ("tanh(wm/0.1[1/s])", "tanh(wm/0.12[1/s])"),
+        "windage": ("wl*abs(wl)", "wl*sqrt(wl^2 + 0.01[1/s^2])"),
+        "hard-shaft": ("twist^3", "twist^3*(1 + twist^2)"),
+        "unbalance": ("sin(angle)", "sin(angle + 0.05)"),
+        "torque-limit": ("torque/sqrt(1 + (torque/a)^2)", "a*tanh(torque/a)"),
+        "torque-lag": ("(torque - late)/a", "(torque - late)/a*(1 + 0.05*tanh(torque/1[N m]))"),
+        "speed-offset": ('"a"', '"a*(1 + 0.1*sin(0.5[1/s]*t))"'),
     }
     first = {
         "load-coulomb": 0.1,
@@ -203,6 +236,26 @@ value = "outer"
         ),
         "shell-offset": ("shell", 'add = "a"\nparameters.a = { unit = "K", value = 0.1, range = [-20, 20] }'),
     }
+    variables = {
+        "radiation": {"outer"},
+        "convection": {"outer"},
+        "body-loss": {"inner"},
+        "boiling": {"outer"},
+        "hot-heater": {"power", "inner"},
+        "heater-lag": {"power"},
+        "heater-limit": {"power"},
+        "shell-offset": set(),
+    }
+    alike = {
+        "radiation": ("^4 - 1", "^4.1 - 1"),
+        "convection": ("^0.25", "^0.26"),
+        "body-loss": ("a*inner", "a*inner*abs(inner/1[K])^0.01"),
+        "boiling": ("outer - 60[K]", "outer - 60.5[K]"),
+        "hot-heater": ("1/(1 + a*inner)", "exp(-a*inner)"),
+        "heater-lag": ("(power - late)/a", "(power - late)/a*(1 + 0.05*tanh(power/200[W]))"),
+        "heater-limit": ("power/sqrt(1 + (power/a)^2)", "a*tanh(power/a)"),
+        "shell-offset": ('"a"', '"a*(1 + 0.1*sin(t/200[s]))"'),
+    }
     first = {
         "radiation": 100.0,
         "convection": 0.3,
@@ -303,6 +356,26 @@ value = "x"
             'states.late = { unit = "N", start = 0, derivative = "(force - late)/a" }',
         ),
         "position-offset": ("position", 'add = "a"\nparameters.a = { unit = "m", value = 0.001, range = [-0.1, 0.1] }'),
+    }
+    variables = {
+        "cubic-spring": {"x"},
+        "one-sided-spring": {"x"},
+        "quadratic-damping": {"v"},
+        "coulomb": {"v"},
+        "damping-by-place": {"x", "v"},
+        "force-limit": {"force"},
+        "force-lag": {"force"},
+        "position-offset": set(),
+    }
+    alike = {
+        "cubic-spring": ("x^3", "x^3*(1 + (x/0.2[m])^2)"),
+        "one-sided-spring": ("max(x, 0)", "max(x - 0.1[mm], 0)"),
+        "quadratic-damping": ("v*abs(v)", "v*sqrt(v^2 + 0.001[m^2/s^2])"),
+        "coulomb": ("tanh(v/0.02[m/s])", "tanh(v/0.024[m/s])"),
+        "damping-by-place": ("x^2*v", "x^2*v*(1 + (x/0.2[m])^2)"),
+        "force-limit": ("force/sqrt(1 + (force/a)^2)", "a*tanh(force/a)"),
+        "force-lag": ("(force - late)/a", "(force - late)/a*(1 + 0.05*tanh(force/5[N]))"),
+        "position-offset": ('"a"', '"a*(1 + 0.1*sin(0.5[1/s]*t))"'),
     }
     first = {
         "cubic-spring": 5000.0,

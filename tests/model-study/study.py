@@ -30,6 +30,8 @@ SIZE = (4.0, 20.0)
 BACKGROUND = (0.3, 1.0)
 # Share of the noise's power that is a first-order process of 15 samples.
 COLOURED = 0.3
+# Every how many draws are closed with a suspect beside that is alike to the hidden term.
+TWINS = 2
 # Of twice the log likelihood, less penalties: below it two suspects are the same to a record (docs/model-files.md).
 APART = 10.0
 
@@ -190,6 +192,9 @@ def one(program, seed, number, is_null, folder):
     if draw.hidden:
         (folder / "withheld.toml").write_text(plant.file(draw.guess, without=draw.hidden))
         row["withheld"] = withheld(row, close(program, folder, "withheld.toml", "withheld"))
+        if number % TWINS == 0:
+            (folder / "twins.toml").write_text(plant.file(draw.guess, alike=draw.hidden))
+            row["twins"] = twins(draw.hidden, close(program, folder, "twins.toml", "twins"))
     kept.write_text(json.dumps(row))
     return row
 
@@ -197,19 +202,15 @@ def one(program, seed, number, is_null, folder):
 def judged(row, report):
     """What a report says, beside the truth."""
     if isinstance(report, str):
-        return {"failed": report, "named": [], "right": False, "located": False, "intervals": [], "twins": []}
+        return {"failed": report, "named": [], "right": False, "located": False, "intervals": []}
     # A name that the headline takes back, since a held-out record gets worse with it, is no name.
     report["named"] = [] if "taken back" in report["headline"] else report["named"]
     named = [each["suspect"] for each in report["named"]]
     others = {other for each in report["named"] for other in each["alternatives"]}
-    twins = [(set(pair["suspects"]), pair["cosine"]) for pair in report["structure"]["twins"]]
+    pairs = [set(pair["suspects"]) for pair in report["structure"]["twins"]]
     # Suspects that structure calls the same are one answer; every other alternative makes it a wrong one.
-    same = {row["hidden"]}.union(*(pair for pair, _ in twins if row["hidden"] in pair)) if row["hidden"] else set()
+    same = {row["hidden"]}.union(*(pair for pair in pairs if row["hidden"] in pair)) if row["hidden"] else set()
     right = len(named) == 1 and row["hidden"] in {*named, *others} and {*named, *others} <= same
-    worth = {each["suspect"]: each["gain"] - each["penalty"] for each in report["suspects"]}
-    confirmed = [
-        abs(worth[one] - worth[two]) < APART for one, two in (sorted(pair) for pair, _ in twins if row["hidden"] in pair)
-    ]
     intervals = []
     for number in report["parameters"]:
         truth = row["numbers"].get(number["name"]) if number["suspect"] is None else None
@@ -228,7 +229,6 @@ def judged(row, report):
         "located": bool(named) and is_place(report["named"][0]["place"], row["place"]),
         "confirmed": report["confirmed"],
         "intervals": intervals,
-        "twins": confirmed,
         "discovered": report.get("discovered"),
     }
 
@@ -236,14 +236,28 @@ def judged(row, report):
 def withheld(row, report):
     """Where a report places what no suspect of it is."""
     if isinstance(report, str):
-        return {"failed": report, "located": False}
+        return {"failed": report, "located": False, "variable": False, "named place": False}
     named = [[each["suspect"], each["place"]] for each in report["named"]]
+    said = report["located"]
+    located = said is not None and is_place(said["place"], row["place"])
     return {
         "failed": None,
         "named": named,
-        "located": bool(named) and is_place(named[0][1], row["place"]),
+        "said": said,
+        "located": located,
+        "variable": located and set(said["variables"]) == PLANTS[row["plant"]].variables[row["hidden"]],
+        "named place": bool(named) and is_place(named[0][1], row["place"]),
         "verdict": report["verdict"],
     }
+
+
+def twins(hidden, report):
+    """Of pairs with the hidden term that structure calls the same, which fits cannot tell apart either."""
+    if isinstance(report, str):
+        return {"failed": report, "pairs": [], "confirmed": []}
+    pairs = [sorted(pair["suspects"]) for pair in report["structure"]["twins"] if hidden in pair["suspects"]]
+    worth = {each["suspect"]: each["gain"] - each["penalty"] for each in report["suspects"]}
+    return {"failed": None, "pairs": pairs, "confirmed": [abs(worth[one] - worth[two]) < APART for one, two in pairs]}
 
 
 def is_place(said, place):
@@ -266,7 +280,8 @@ def table(hidden, nulls):
     right = [row for row in hidden if row["right"]]
     inside = [[kind, abs(z) <= INTERVAL] for row in right for kind, _, z in row["intervals"]]
     all_inside = [abs(z) <= INTERVAL for row in hidden for _, _, z in row["intervals"]]
-    confirmed = [each for row in hidden for each in row["twins"]]
+    confirmed = [each for row in hidden for each in row.get("twins", {"confirmed": []})["confirmed"]]
+    failed = [row["failed"] or row.get("twins", {"failed": None})["failed"] for row in hidden + nulls]
     rows = [
         ("right name", share(len(right), len(hidden)), "at least 90 %"),
         (
@@ -279,13 +294,11 @@ def table(hidden, nulls):
         ("right name: 90 % intervals that hold, of the plant's numbers", counted(inside, "own"), "85 to 95 %"),
         ("the same of the term's number", counted(inside, "term"), "85 to 95 %"),
         ("all draws: 90 % intervals that hold", share(sum(all_inside), len(all_inside)), ""),
-        (
-            "true suspect withheld: place of what is named instead",
-            share(sum(row["withheld"]["located"] for row in hidden), len(hidden)),
-            "at least 80 %",
-        ),
+        ("true suspect withheld: place that is said", of_withheld(hidden, "located"), "at least 80 %"),
+        ("the same, and the variables", of_withheld(hidden, "variable"), ""),
+        ("the same: place of what is named instead", of_withheld(hidden, "named place"), ""),
         ("twins by structure that fits cannot tell either", share(sum(confirmed), len(confirmed)), "at least 90 %"),
-        ("crashes, time-outs (counted as wrong)", str(sum(bool(row["failed"]) for row in hidden + nulls)), ""),
+        ("crashes, time-outs (counted as wrong)", str(sum(map(bool, failed))), ""),
     ]
     for plant in NAMES:
         mine = [row for row in hidden if row["plant"] == plant]
@@ -293,6 +306,11 @@ def table(hidden, nulls):
     return "\n".join(
         ["| question | score (exact 95 % interval) | asked |", "|---|---|---|", *(f"| {' | '.join(row)} |" for row in rows)]
     )
+
+
+def of_withheld(hidden, what):
+    """Share of the draws with the true suspect withheld."""
+    return share(sum(row["withheld"][what] for row in hidden), len(hidden))
 
 
 def counted(inside, kind):

@@ -129,5 +129,8 @@ fn in_words(report: &ModelReport) -> String {
             suspect.suspect, suspect.probability, suspect.decision
         );
     }
+    if let Some(located) = &report.located {
+        let _ = writeln!(text, "  {}", located.in_words());
+    }
     text
 }

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `described` | what was found, in a report |
 //! | `features` | the terms, as suspects |
+//! | `place` | where what is left comes from, whatever the law |
 //! | `screen` | gains of all terms, stability |
 //!
 //! A term is taken under the gates of a suspect ([`super::select`]), where the penalty counts every term of the search, and if
@@ -17,14 +18,18 @@
 
 mod described;
 mod features;
+mod place;
 mod screen;
 
 use super::fit::{Fitting, What};
+use super::judge::{Evaluation, GAIN_APART, judge};
 use super::record::Measured;
-use super::select::{Evaluation, Fitted, Found, GAIN_APART, MOST_TERMS, SAME, fitted, fitted_from, judge};
+use super::select::{Fitted, Found, MOST_TERMS, SAME, fitted, fitted_from};
 pub use described::DiscoveredTerm;
 use features::{Term, terms, variables};
 use model::{Failure, Model};
+pub(super) use place::located;
+pub use place::{Located, Place};
 use rayon::prelude::*;
 use screen::{Screen, coefficient};
 use std::path::Path;
@@ -152,8 +157,10 @@ fn round<'a>(
     let mut fits: Vec<(usize, Fitted<'a>)> = best.par_iter().filter_map(fit).collect();
     let least = fits.iter().min_by(|(_, one), (_, other)| one.point.loss.total_cmp(&other.point.loss))?;
     let effective = least.1.effective.clone();
-    let judged: Vec<Evaluation> =
-        fits.iter().map(|(suspect, fit)| judge(found, fit, *suspect, (terms.len(), &effective))).collect();
+    let judged: Vec<Evaluation> = fits
+        .iter()
+        .map(|(suspect, fit)| judge(found.sides(), fit, *suspect, (terms.len(), &effective)))
+        .collect();
     let most = judged.iter().map(Evaluation::worth).fold(f64::NEG_INFINITY, f64::max);
     // Of those that are as good the simplest.
     let is_as_good = |place: &usize| judged[*place].worth() > most - SAME;

@@ -17,12 +17,20 @@ use crate::estimator::{Convergence, Estimator, Iterate, Options, Step};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start, Unit};
 use nalgebra::{DMatrix, DVector};
 
-pub(super) const OPTIONS: Options =
-    Options { steps: 80, converged: 0.1, fractions: &[1.0, 0.4, 0.16, 0.064, 0.0256, 0.01, 1e-3, 1e-4] };
+/// Numbers that a record hardly tells apart make a narrow valley, which bends: between no damping and one that ends all motion
+/// along it there are some decades.
+pub(super) const OPTIONS: Options = Options {
+    steps: 80,
+    converged: 0.1,
+    fractions: &[1.0, 0.999_999, 0.999_99, 0.9999, 0.999, 0.99, 0.9, 0.6, 0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4],
+};
 /// What a sample adds to the fall of the loss that counts: a change of the residual by half of it, relatively.
 const CONVERGED_PER_SAMPLE: f64 = 1e-4;
 /// Noise of an output is at least this share of its size: a fit that leaves nothing has no likelihood.
 const LEAST_NOISE: f64 = 1e-9;
+
+/// Shortest time constant of a library over the period of the samples.
+const FASTEST: f64 = 0.25;
 
 /// What is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,6 +93,15 @@ impl Iterate for Point {
     }
 }
 
+/// Least time constant that samples show, s. A shorter one changes nothing that is measured, and makes the equations stiff.
+fn fastest_s(records: &[Measured]) -> f64 {
+    let period_s = |record: &Measured| {
+        let length_s = record.sampled_s[record.sampled_s.len() - 1] - record.sampled_s[0];
+        length_s / (record.sampled_s.len() - 1) as f64
+    };
+    FASTEST * records.iter().map(period_s).fold(f64::INFINITY, f64::min)
+}
+
 impl<'a> Fitting<'a> {
     /// Everything that the model leaves open, with these suspects.
     pub(crate) fn new(
@@ -96,10 +113,14 @@ impl<'a> Fitting<'a> {
         let mut unknowns = Vec::new();
         for index in model.parameters_of(suspects).filter(|index| !model.parameters[*index].is_fixed) {
             let parameter = &model.parameters[index];
+            let mut range_si = parameter.range_si;
+            if parameter.is_bound_by_samples {
+                range_si[0] = range_si[0].max(fastest_s(records)).min(range_si[1]);
+            }
             let unknown = |what| Unknown {
                 what,
-                start_si: parameter.values_si[0],
-                range_si: parameter.range_si,
+                start_si: parameter.values_si[0].clamp(range_si[0], range_si[1]),
+                range_si,
                 prior_si: parameter.tolerance_si.map(|tolerance| [parameter.values_si[0], tolerance]),
             };
             if parameter.is_per_record {
@@ -214,7 +235,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// Simulates a record; `sink` gets row, output, value and derivatives by the unknowns of that record.
-    fn simulate(
+    pub(super) fn simulate(
         &self,
         record: usize,
         values_si: &[f64],
@@ -314,32 +335,8 @@ impl<'a> Fitting<'a> {
         Ok(all)
     }
 
-    /// Derivatives and values of all measured samples, row after row, times the scale of their output.
-    pub(crate) fn sensitivities(
-        &self,
-        values_si: &[f64],
-        scale: &[f64],
-    ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
-        let (mut slopes, mut values) = (Vec::new(), Vec::new());
-        for record in 0..self.records.len() {
-            let (measured, mine) = (&self.records[record].outputs, self.of_record(record));
-            self.simulate(record, values_si, true, |row, output, value, slope| {
-                if measured[output][row].is_none() {
-                    return;
-                }
-                values.push(scale[output] * value);
-                let first = slopes.len();
-                slopes.resize(first + self.unknowns.len(), 0.0);
-                for (place, slope) in mine.iter().zip(slope) {
-                    slopes[first + place] = scale[output] * slope;
-                }
-            })?;
-        }
-        Ok((slopes, values))
-    }
-
     /// Unknowns that a record is simulated with, in the order of its directions.
-    fn of_record(&self, record: usize) -> Vec<usize> {
+    pub(super) fn of_record(&self, record: usize) -> Vec<usize> {
         let is_mine = |place: &usize| match self.unknowns[*place].what {
             What::Shared(_) => true,
             What::OfRecord(_, of) | What::Start(_, of) => of == record,
@@ -418,11 +415,8 @@ impl<'a> Fitting<'a> {
         sum
     }
 
-    /// Fits from a start in at most so many steps.
+    /// Fits from a start within the ranges in at most so many steps.
     pub(crate) fn fit(&self, start: Vec<f64>, steps: usize) -> Result<(Point, Convergence), Failure> {
-        let clamped = self.unknowns.iter().zip(start);
-        let start =
-            clamped.map(|(unknown, value)| value.clamp(unknown.range_si[0], unknown.range_si[1])).collect();
         let start = self.at(start)?;
         let samples: f64 = (0..self.model.outputs.len()).map(|output| self.count(output)).sum();
         let converged = OPTIONS.converged + CONVERGED_PER_SAMPLE * samples;

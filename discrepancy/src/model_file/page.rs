@@ -3,8 +3,8 @@
 use super::adequacy::Residual;
 use super::explain::in_words;
 use super::held_out::Traces;
+use super::judge::share_in_words;
 use super::report::{Judgement, Left, ModelReport, Number, significant};
-use super::select::share_in_words;
 use crate::page::draw::{Plot, Sample, figure, range};
 use crate::page::markup::{Cell, charts, number, paragraph, section, table, words};
 use model::Model;

@@ -3,13 +3,14 @@
 use super::adequacy::Residual;
 use super::bounds;
 use super::covariance;
-use super::discover::DiscoveredTerm;
+use super::discover::{DiscoveredTerm, Located};
 use super::fit::Fitting;
 use super::held_out::{Judged, Traces};
+use super::judge::Evaluation;
 use super::look;
 use super::normal::standard_errors;
 use super::record::Measured;
-use super::select::{Evaluation, Fitted, Found};
+use super::select::{Fitted, Found};
 use super::structure::Structure;
 use crate::estimator::Outcome;
 use crate::report::Verdict;
@@ -47,6 +48,8 @@ pub struct ModelReport {
     pub named: Vec<Named>,
     /// Where nothing was named and a search was asked for: terms that no suspect describes.
     pub discovered: Vec<DiscoveredTerm>,
+    /// Where what the model alone leaves comes from, whatever the suspects are; `None` where no place explains enough of it.
+    pub located: Option<Located>,
     /// Every suspect beside the model alone, the most likely first.
     pub suspects: Vec<Judgement>,
     pub structure: Structure,
@@ -63,8 +66,8 @@ pub struct Number {
     pub suspect: Option<String>,
     pub unit: String,
     pub value: f64,
-    /// By coloured residuals or by blocks of time, the larger; `None` where the records do not determine it, or
-    /// it is at the end of its range.
+    /// By coloured residuals or by blocks of time, the larger, and by a law that is only near; `None` where the records do not
+    /// determine it, or it is at the end of its range.
     pub standard_error: Option<f64>,
     /// Fitted without what was named.
     pub baseline: Option<f64>,
@@ -193,12 +196,13 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
     notes.extend(failed.map(|(suspect, why)| {
         format!("suspect {}: cannot be simulated: {why}", model.suspects[*suspect].name)
     }));
+    notes.extend(found.notes.iter().cloned());
     for (name, fitted) in [("the model alone", &found.baseline), ("the extended model", &found.extended)] {
         // Which number ended there is said by itself.
         let doubt = fitted.convergence.doubt().filter(|_| fitted.convergence.outcome != Outcome::Bound);
         notes.extend(doubt.map(|doubt| format!("{name}: {doubt}")));
     }
-    let parameters = numbers(&found.extended, &found.baseline);
+    let parameters = numbers(&found.extended, &found.baseline, !found.taken.is_empty());
     notes.extend(bounds::remarks(&parameters));
     let [before, after] = [found.baseline.rms_si(), found.extended.rms_si()];
     let training = (0..model.outputs.len()).map(|output| {
@@ -219,6 +223,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         held_out: Vec::new(),
         named,
         discovered: Vec::new(),
+        located: None,
         suspects,
         structure: structure.clone(),
         notes,
@@ -321,8 +326,9 @@ pub(crate) fn term(model: &Model, suspect: usize) -> String {
     }
 }
 
-/// Numbers of a fit; their errors are the larger of what a coloured residual is worth and of the jackknife over blocks of time.
-pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number> {
+/// Numbers of a fit; their errors are the larger of what a coloured residual is worth and of the jackknife over blocks of time,
+/// and beside it, where a law was named, what one that is only near leaves to them. A formula that was searched for claims no law.
+pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) -> Vec<Number> {
     let fitting = &fitted.fitting;
     let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();
     let inflation = (counts / fitted.effective.iter().sum::<f64>().max(1.0)).max(1.0).sqrt();
@@ -333,6 +339,8 @@ pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number>
         let unit = fitting.unit_of(unknown);
         let is_at_bound = bounds::is_at_bound(*value, unknown.range_si);
         let before = baseline.fitting.unknowns.iter().position(|other| other.what == unknown.what);
+        let before = before.map(|place| baseline.point.values_si[place]);
+        let of_law = if has_law { covariance::of_law(*value, before) } else { 0.0 };
         Number {
             name: fitting.name_of(unknown),
             suspect: fitting.suspect_of(unknown).map(|suspect| fitting.model.suspects[suspect].name.clone()),
@@ -340,8 +348,8 @@ pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>) -> Vec<Number>
             value: value / unit.factor,
             standard_error: error
                 .filter(|_| !is_at_bound)
-                .map(|error| (error * inflation).max(*of_blocks) / unit.factor),
-            baseline: before.map(|place| baseline.point.values_si[place] / unit.factor),
+                .map(|error| (error * inflation).max(*of_blocks).hypot(of_law) / unit.factor),
+            baseline: before.map(|before| before / unit.factor),
             is_at_bound,
             is_of_one_sign: unknown.range_si[0] >= 0.0 || unknown.range_si[1] <= 0.0,
         }

@@ -3,11 +3,17 @@
 //! | starts | how many |
 //! |---|---|
 //! | values of the file, those of the smaller fit, each value of the newest suspect | at most 12 |
+//! | numbers of the newest suspect over their ranges, all others as in the smaller fit | 4 to 24, by the length of the records |
+//! | the newest suspect without effect: a number at 0 or at an end of its range that leaves what the smaller does | at most 1 |
 //! | points of a Halton sequence around them, those with the least loss | `kept` of `[fit] starts` |
 //!
 //! A point is spread over a fifth to five times each number, as far as its range allows; a number that may change its sign over
-//! five times it either way, and one whose value is 0 over its range. The sequence is the same in each run, and training records
+//! five times it either way, and one whose value is 0 over its range. A suspect's own number goes over its whole range, on a
+//! logarithmic scale where that has one sign. The sequence is the same in each run, and training records
 //! alone say which of its points are kept.
+//!
+//! All starts go two steps, the best six four more, and the best two of these to the end [Jamieson, Talwalkar 2016, AISTATS:
+//! successive halving].
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
 
@@ -17,13 +23,17 @@ use model::Failure;
 
 /// Most starts that values of the file make.
 const MOST: usize = 12;
+/// Rows over the points of a suspect's own numbers, and the fewest and most of these: a fit takes some seconds on any record.
+const OWN_ROWS: usize = 14_400;
+const OWN: [usize; 2] = [4, 24];
 /// Points of the sequence that are kept.
 const KEPT: usize = 3;
-/// Steps from each start, and how many of those that have come lowest go on to the end.
-const SHORT: usize = 6;
-const FINISHED: usize = 2;
+/// Steps of each round, and how many of those that have come lowest go on.
+const ROUNDS: [(usize, usize); 2] = [(2, 6), (4, 2)];
 /// How far a number is spread, times or over its value.
 const FACTOR: f64 = 5.0;
+/// How far below its value a number is spread that may be 0, and above it one without an end.
+const BELOW: f64 = 20.0;
 /// Bases of the sequence; numbers beyond them keep their values.
 const PRIMES: [u32; 20] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71];
 
@@ -33,19 +43,16 @@ pub(crate) fn starts(
     suspects: &[usize],
     from: Option<(&Fitting<'_>, &Point)>,
 ) -> Vec<Vec<f64>> {
-    let known = |what: What| {
-        let (smaller, point) = from?;
-        let place = smaller.unknowns.iter().position(|unknown| unknown.what == what)?;
-        Some(point.values_si[place])
-    };
-    let first: Vec<f64> =
-        fitting.unknowns.iter().map(|unknown| known(unknown.what).unwrap_or(unknown.start_si)).collect();
+    let first = from.map_or_else(|| fitting.start(), |from| beside(fitting, from));
     if suspects.is_empty() && from.is_some() {
         return vec![first];
     }
-    let mut all = values_of_newest(fitting, suspects, first.clone());
     if fitting.model.starts == 0 {
-        return all;
+        return values_of_newest(fitting, suspects, first);
+    }
+    let mut all = of_newest_from(fitting, suspects, &first);
+    if let (Some(newest), Some((_, smaller))) = (suspects.last(), from) {
+        all.extend(without_effect(fitting, *newest, &first, smaller.loss));
     }
     let file = fitting.start();
     let spread = spread(fitting, [&file, &first]);
@@ -56,34 +63,129 @@ pub(crate) fn starts(
     all
 }
 
+/// The newest suspect at the values of its file and over its ranges, all other numbers as in the smaller fit.
+pub(super) fn of_newest(
+    fitting: &Fitting<'_>,
+    suspects: &[usize],
+    from: (&Fitting<'_>, &Point),
+) -> Vec<Vec<f64>> {
+    of_newest_from(fitting, suspects, &beside(fitting, from))
+}
+
+/// First values of a suspect's numbers, all other numbers as in the smaller fit.
+fn beside(fitting: &Fitting<'_>, (smaller, point): (&Fitting<'_>, &Point)) -> Vec<f64> {
+    let known = |what: What| smaller.unknowns.iter().position(|unknown| unknown.what == what);
+    let value = |place: usize| point.values_si[place];
+    let unknowns = fitting.unknowns.iter();
+    unknowns.map(|unknown| known(unknown.what).map_or(unknown.start_si, value)).collect()
+}
+
+fn of_newest_from(fitting: &Fitting<'_>, suspects: &[usize], first: &[f64]) -> Vec<Vec<f64>> {
+    let mut all = values_of_newest(fitting, suspects, first.to_vec());
+    all.extend(suspects.last().into_iter().flat_map(|newest| over_ranges(fitting, *newest, first)));
+    all
+}
+
 impl Fitting<'_> {
     /// The best of the fits from several starts: a few steps from each, and all steps from those that have come lowest.
     pub(crate) fn fit_from(&self, starts: Vec<Vec<f64>>) -> Result<(Point, Convergence), Failure> {
         let mut why = None;
-        let mut begun = Vec::new();
-        for start in starts {
-            match self.fit(start, SHORT) {
-                Ok(fit) => begun.push(fit),
+        let mut begun: Vec<(Point, Convergence)> = Vec::new();
+        let unmoved = Convergence { outcome: Outcome::StepLimit, ..Convergence::default() };
+        for start in self.within_ranges(starts) {
+            match self.fit(start, ROUNDS[0].0) {
+                Ok((point, convergence)) => begun.push((point, unmoved.then(convergence))),
                 Err(failure) => why = Some(failure),
             }
         }
-        begun.sort_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
-        // Starts that have come to the same minimum go on once.
-        begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.converged);
-        let mut best: Option<(Point, Convergence)> = None;
-        for (point, convergence) in begun.into_iter().take(FINISHED) {
-            let ended = match convergence.outcome {
-                Outcome::StepLimit => self
-                    .fit(point.values_si, OPTIONS.steps)
-                    .map(|(end, more)| (end, convergence.then(more)))?,
-                _ => (point, convergence),
-            };
-            if best.as_ref().is_none_or(|(best, _)| ended.0.loss < best.loss) {
-                best = Some(ended);
+        let further = |(point, convergence): (Point, Convergence), steps: usize| match convergence.outcome {
+            Outcome::StepLimit => {
+                self.fit(point.values_si, steps).map(|(end, more)| (end, convergence.then(more)))
             }
+            _ => Ok((point, convergence)),
+        };
+        for (round, (_, kept)) in ROUNDS.iter().enumerate() {
+            begun.sort_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
+            // Starts that have come to the same minimum go on once.
+            begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.converged);
+            begun.truncate(*kept);
+            let steps = ROUNDS.get(round + 1).map_or(OPTIONS.steps, |(steps, _)| *steps);
+            begun = begun.into_iter().map(|one| further(one, steps)).collect::<Result<_, _>>()?;
         }
+        let best = begun.into_iter().min_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
         best.ok_or_else(|| why.expect("there is one start at least"))
     }
+
+    /// Starts within the ranges, each once.
+    fn within_ranges(&self, starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for mut start in starts {
+            for (value, unknown) in start.iter_mut().zip(&self.unknowns) {
+                *value = value.clamp(unknown.range_si[0], unknown.range_si[1]);
+            }
+            if !all.contains(&start) {
+                all.push(start);
+            }
+        }
+        all
+    }
+}
+
+/// Places of a suspect's own numbers among the unknowns.
+fn own(fitting: &Fitting<'_>, suspect: usize) -> Vec<usize> {
+    let is_own = |place: &usize| fitting.suspect_of(&fitting.unknowns[*place]) == Some(suspect);
+    (0..fitting.unknowns.len()).filter(is_own).collect()
+}
+
+/// A suspect's own numbers over their ranges.
+fn over_ranges(fitting: &Fitting<'_>, suspect: usize, first: &[f64]) -> Vec<Vec<f64>> {
+    let own = own(fitting, suspect);
+    let rows: usize = fitting.records.iter().map(|record| record.time_s.len()).sum();
+    let points = if own.is_empty() { 0 } else { (OWN_ROWS / rows.max(1)).clamp(OWN[0], OWN[1]) };
+    let point = |number: usize| {
+        let mut values = first.to_vec();
+        for (dimension, place) in own.iter().enumerate().take(PRIMES.len()) {
+            let share = radical_inverse(number as u32, PRIMES[dimension]);
+            values[*place] = within_range(values[*place], fitting.unknowns[*place].range_si, share);
+        }
+        values
+    };
+    (1..=points).map(point).collect()
+}
+
+/// A value at a share, 0 to 1, of its range: on a logarithmic scale on each side of 0.
+fn within_range(value: f64, [least, most]: [f64; 2], share: f64) -> f64 {
+    let size = value.abs();
+    if least < 0.0 && most > 0.0 {
+        let (end, share) = if share < 0.5 { (least, 1.0 - 2.0 * share) } else { (most, 2.0 * share - 1.0) };
+        let side = within_range(size, [0.0, end.abs()], share);
+        return side.copysign(end);
+    }
+    if most <= 0.0 {
+        return -within_range(size, [-most, -least], 1.0 - share);
+    }
+    let most = if most.is_finite() { most } else { BELOW * size.max(least) };
+    let least = if least > 0.0 { least } else { (size / BELOW).min(most / BELOW) };
+    if least > 0.0 { least * libm::pow(most / least, share) } else { most * share }
+}
+
+/// A start that leaves what the smaller fit leaves: a larger model must not end above it.
+fn without_effect(fitting: &Fitting<'_>, suspect: usize, first: &[f64], loss: f64) -> Option<Vec<f64>> {
+    let candidates = own(fitting, suspect).into_iter().flat_map(|place| {
+        let [least, most] = fitting.unknowns[place].range_si;
+        let ends = [0.0, least, most]
+            .into_iter()
+            .filter(move |end| end.is_finite() && least <= *end && *end <= most);
+        ends.map(move |end| {
+            let mut values = first.to_vec();
+            values[place] = end;
+            values
+        })
+    });
+    let is_as_low = |values: &Vec<f64>| {
+        fitting.at(values.clone()).is_ok_and(|point| point.loss <= loss + OPTIONS.converged)
+    };
+    candidates.into_iter().find(is_as_low)
 }
 
 /// Every start of the newest suspect beside the other numbers.
@@ -152,6 +254,23 @@ fn radical_inverse(mut number: u32, base: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_range_is_covered_on_each_side_of_nothing() {
+        for (value, range, share, expected) in [
+            (5.0, [1.0, 100.0], 0.5, 10.0),
+            (1.0, [0.0, 20.0], 1.0, 20.0),
+            (1.0, [0.0, 20.0], 0.0, 0.05),
+            (1.0, [-20.0, 20.0], 0.0, -20.0),
+            (1.0, [-20.0, 20.0], 0.75, 1.0),
+            (-5.0, [-100.0, -1.0], 0.5, -10.0),
+            (2.0, [0.0, f64::INFINITY], 1.0, 40.0),
+            (0.0, [0.0, 8.0], 0.5, 4.0),
+        ] {
+            let moved = within_range(value, range, share);
+            assert!((moved - expected).abs() < 1e-12, "{value} within {range:?}: {moved}, not {expected}");
+        }
+    }
 
     #[test]
     fn the_sequence_is_that_of_halton() {

@@ -9,7 +9,7 @@
 //!
 //! Source: discrepancy-notes.md, 3; Brun, Reichert, Künsch 2001, Water Resources Research 37(4) (collinearity).
 
-use super::fit::Fitting;
+use super::fit::{Fitting, What};
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
 use super::sensors;
@@ -137,7 +137,7 @@ pub(super) fn seen(
 ) -> Result<Vec<Seen>, Failure> {
     let (columns, base) = columns(fitting, values_si, scale)?;
     let of = |suspect: &usize| {
-        let change = changed(fitting, (taken, values_si), *suspect, scale).ok()? - &base;
+        let change = changed(fitting, (taken, values_si), *suspect, &[], scale).ok()? - &base;
         let rest = &change - &columns * projected(&columns, &change);
         let share = if change.norm() > 0.0 { rest.norm() / change.norm() } else { 0.0 };
         Some(Seen { suspect: *suspect, share, direction: rest.normalize() })
@@ -146,13 +146,13 @@ pub(super) fn seen(
 }
 
 /// Coefficients of the columns that come nearest to a change.
-fn projected(columns: &DMatrix<f64>, change: &DVector<f64>) -> DVector<f64> {
+pub(super) fn projected(columns: &DMatrix<f64>, change: &DVector<f64>) -> DVector<f64> {
     let normal = Normal { matrix: columns.tr_mul(columns), slope: columns.tr_mul(change), squares: 0.0 };
     solved(&normal, &vec![true; columns.ncols()], 0.0)
 }
 
 /// Scaled sensitivities and scaled outputs of the model.
-fn columns(
+pub(super) fn columns(
     fitting: &Fitting<'_>,
     values_si: &[f64],
     scale: &[f64],
@@ -162,11 +162,12 @@ fn columns(
     Ok((DMatrix::from_row_slice(rows, fitting.unknowns.len(), &slopes), DVector::from_vec(values)))
 }
 
-/// Scaled outputs with a suspect at its first values, all other numbers as they are.
-fn changed(
+/// Scaled outputs with a suspect at these values, or its first; all other numbers as they are.
+pub(super) fn changed(
     fitting: &Fitting<'_>,
     (taken, values_si): (&[usize], &[f64]),
     suspect: usize,
+    own: &[(What, f64)],
     scale: &[f64],
 ) -> Result<DVector<f64>, Failure> {
     let mut suspects = taken.to_vec();
@@ -177,7 +178,10 @@ fn changed(
     let values: Vec<f64> = extended
         .unknowns
         .iter()
-        .map(|unknown| known(unknown.what).map_or(unknown.start_si, |place| values_si[place]))
+        .map(|unknown| {
+            let own = own.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
+            own.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
+        })
         .collect();
-    Ok(DVector::from_vec(extended.sensitivities(&values, scale)?.1))
+    Ok(DVector::from_vec(extended.said(&values, scale)?))
 }

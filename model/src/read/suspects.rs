@@ -280,6 +280,7 @@ impl Reader<'_> {
                 ],
                 is_fixed: number.is_fixed,
                 is_per_record: false,
+                is_bound_by_samples: !bound.entry.states.is_empty() && unit.dimension == Dimension::TIME,
                 suspect: Some(bound.index),
                 unit,
             };

@@ -20,6 +20,8 @@ use std::fmt::Write as _;
 
 /// Most terms of a search: names and numbers of a file are limited.
 const MOST: usize = 300;
+/// Most terms of all places.
+const MOST_OF_GROUPS: usize = 600;
 /// Low passes from three samples to a tenth of the shortest record.
 const LOW_PASSES: usize = 3;
 /// Half width of the play over the rms of its variable, and width of a sign that is integrated.
@@ -28,6 +30,8 @@ const SIGN: f64 = 0.05;
 /// A variable changes its sign when it is beyond this share of its largest size on both sides.
 const BOTH_SIDES: f64 = 0.05;
 
+/// Before the variable whose fastest low pass is taken from it, in its name.
+const CHANGE: &str = "change of ";
 /// Before the time from which a low pass is fitted, in its name.
 const FROM: &str = " (from ";
 
@@ -52,6 +56,13 @@ pub(super) struct Term {
     pub(super) complexity: usize,
     /// As `[[suspects]]` of a model file.
     pub(super) text: String,
+}
+
+impl Term {
+    /// Whether it stands for a lag.
+    pub(super) fn is_of_change(&self) -> bool {
+        self.name.starts_with(CHANGE)
+    }
 }
 
 /// A factor of a product: what it is called, its expression, and the memory that it needs.
@@ -131,6 +142,58 @@ pub(super) fn terms(
     let left_out = all.len().saturating_sub(MOST);
     all.truncate(MOST);
     (all, left_out)
+}
+
+/// Terms of which a place and its variables are judged, see [`super::place`].
+pub(super) fn group_terms(model: &Model, variables: &[Variable], period_s: f64) -> Vec<Term> {
+    let mut all = Vec::new();
+    for (target, unit) in places(model).into_iter().chain(parts(model)) {
+        let name = model.target_name(target);
+        let is_output = matches!(target, Target::Output(_));
+        let mut add = |factors: &[Factor]| all.push(term(name, &unit, factors, variables));
+        add(&[]);
+        for (place, one) in variables.iter().enumerate() {
+            let x = plain(one);
+            add(std::slice::from_ref(&x));
+            add(&[x.clone(), x.clone()]);
+            add(&[x.clone(), x.clone(), x.clone()]);
+            if one.has_both_signs {
+                add(&[size(one)]);
+                add(&[sign(one)]);
+                add(&[x.clone(), size(one)]);
+            }
+            // What an input was a moment ago acts as a lag of it.
+            if matches!(target, Target::Input(_)) && name == one.name {
+                memories(one, period_s, 30.0 * period_s)
+                    .iter()
+                    .filter(|low| low.is_change())
+                    .for_each(|low| add(std::slice::from_ref(low)));
+            }
+            for other in variables[place + 1..].iter().filter(|_| !is_output) {
+                let y = plain(other);
+                add(&[x.clone(), y.clone()]);
+                add(&[x.clone(), x.clone(), y.clone()]);
+                add(&[x.clone(), y.clone(), y.clone()]);
+            }
+        }
+    }
+    all.truncate(MOST_OF_GROUPS);
+    all
+}
+
+impl Factor {
+    fn is_change(&self) -> bool {
+        self.name.starts_with(CHANGE)
+    }
+}
+
+/// Inputs and definitions with their units.
+fn parts(model: &Model) -> Vec<(Target, String)> {
+    let inputs = model.inputs.iter().enumerate();
+    let inputs = inputs.map(|(index, input)| (Target::Input(index), input.unit.text.clone()));
+    let definitions = (0..model.definitions.len())
+        .map(|index| (Target::Definition(index), model.definition_unit(index).text));
+    inputs.chain(definitions).collect()
 }
 
 /// Where a term may stand, with its unit there.
@@ -243,7 +306,7 @@ fn memories(variable: &Variable, period_s: f64, length_s: f64) -> Vec<Factor> {
             factor(format!("{name} low-passed{FROM}{time_s} s)"), format!("(low_found/{over})"), low(time_s))
         })
         .collect();
-    all.push(factor(format!("change of {name}"), format!("(({name} - low_found)/{over})"), low(time_s(0))));
+    all.push(factor(format!("{CHANGE}{name}"), format!("(({name} - low_found)/{over})"), low(time_s(0))));
     let half = measured(rounded(PLAY * size), unit);
     let play = format!(
         "memory.play_found = {{ {}, start = {first:e}, update = \"min(max(play_found, {name} - {half}), {name} + {half})\" }}\n",
@@ -267,9 +330,10 @@ fn term(place: &str, unit: &str, factors: &[Factor], variables: &[Variable]) -> 
         count => format!("{}^{count}", factors[0].name),
     };
     let named: Vec<String> = factors.chunk_by(|one, other| one.name == other.name).map(power).collect();
-    let name = format!("{} in {place}", named.join(" * "));
+    let named = if named.is_empty() { "constant".to_owned() } else { named.join(" * ") };
+    let name = format!("{named} in {place}");
     let product: Vec<&str> = factors.iter().map(|factor| factor.expression.as_str()).collect();
-    let product = product.join("*");
+    let product = if product.is_empty() { "1".to_owned() } else { product.join("*") };
     let mut text =
         format!("\n[[suspects]]\nname = \"{name}\"\nplace = \"{place}\"\nadd = \"k_found*{product}\"\n");
     let _ = writeln!(text, "parameters.k_found = {{ unit = \"{unit}\", value = 0 }}");

@@ -56,6 +56,11 @@ struct Projected {
 impl Screen {
     /// `first` is the index of the first of `count` suspects of the model that are the terms.
     pub(super) fn new(fitted: &Fitted<'_>, first: usize, count: usize) -> Option<Self> {
+        Self::of(fitted.fitting.model, fitted, first, count)
+    }
+
+    /// The same of terms of a larger model than the one that was fitted.
+    pub(super) fn of(model: &Model, fitted: &Fitted<'_>, first: usize, count: usize) -> Option<Self> {
         let fitting = &fitted.fitting;
         let scale: Vec<f64> = (0..fitting.model.outputs.len())
             .map(|output| fitting.variance(output, fitted.point.squares[output]).sqrt().recip())
@@ -74,8 +79,10 @@ impl Screen {
             }
         }
         let all: Vec<usize> = (first..first + count).collect();
-        let columns: Vec<DMatrix<f64>> =
-            all.par_chunks(CHUNK).map(|chunk| responses(fitted, chunk, &scale, left.len())).collect();
+        let columns: Vec<DMatrix<f64>> = all
+            .par_chunks(CHUNK)
+            .map(|chunk| responses(model, fitted, chunk, (&scale, left.len())))
+            .collect();
         let mut terms = DMatrix::zeros(left.len(), count);
         for (place, columns) in columns.iter().enumerate() {
             terms.columns_mut(place * CHUNK, columns.ncols()).copy_from(columns);
@@ -112,6 +119,25 @@ impl Screen {
     /// Coefficient of a term that explains most of what is left.
     pub(super) fn coefficient_si(&self, term: usize) -> f64 {
         self.whole.coefficients_si[term]
+    }
+
+    /// Share of what is left, beyond what the model's own numbers explain, that some terms explain together.
+    pub(super) fn share(&self, terms: &[usize]) -> f64 {
+        let rest = |change: DMatrix<f64>| {
+            let taken = inverse(&self.own.tr_mul(&self.own)) * self.own.tr_mul(&change);
+            change - &self.own * taken
+        };
+        let plain = self.terms.select_columns(terms);
+        let mut own = rest(plain.clone());
+        for (mut left, whole) in own.column_iter_mut().zip(plain.column_iter()) {
+            if left.norm_squared() <= HIDDEN * whole.norm_squared() {
+                left.fill(0.0);
+            }
+        }
+        let left = rest(DMatrix::from_column_slice(self.left.len(), 1, self.left.as_slice()));
+        let along = own.tr_mul(&left);
+        let explained = (along.transpose() * inverse(&own.tr_mul(&own)) * &along)[(0, 0)];
+        (explained / left.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     }
 
     /// Share of halves of the blocks in which the best term is this one or one that does nearly the same.
@@ -224,10 +250,14 @@ fn inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Derivatives of all outputs by the coefficients of some terms; 0 of terms that are there, or cannot be simulated.
-fn responses(fitted: &Fitted<'_>, terms: &[usize], scale: &[f64], rows: usize) -> DMatrix<f64> {
+fn responses(
+    model: &Model,
+    fitted: &Fitted<'_>,
+    terms: &[usize],
+    (scale, rows): (&[f64], usize),
+) -> DMatrix<f64> {
     let mut columns = DMatrix::zeros(rows, terms.len());
     let fitting = &fitted.fitting;
-    let model: &Model = fitting.model;
     let new: Vec<usize> = terms.iter().copied().filter(|term| !fitted.suspects.contains(term)).collect();
     let suspects: Vec<usize> = fitted.suspects.iter().chain(&new).copied().collect();
     let Ok(program) = Program::new(model, &suspects) else { return columns };

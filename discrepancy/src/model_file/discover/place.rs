@@ -1,0 +1,147 @@
+//! Where what the model leaves comes from, whatever the suspects say: an unknown function of one or two variables at each place.
+//!
+//! ```text
+//!   place p, variables x (and y):   x, |x|, x^2, x |x|, x^3, sign x     or   x y, x^2 y, x y^2     or a constant
+//!   g_k  = responses of all outputs to the coefficients of these at p, less what the model's own numbers can do
+//!   R^2  = share of what is left that the g_k of a group explain together
+//!   worth = -n ln(1 - R^2) - k ln n        n independent samples, k functions
+//! ```
+//! A suspect is one law at one place; a wrong one that looks similar may be named where the right one is not in the file. These
+//! groups have no law, so that the best of them says place and variables alone. A function of an input acts the same at the input
+//! and in the equation that it drives: it is said of the input, and any other of the equation.
+//!
+//! Source: the unknown-input view of model error, e.g. Gillijns, De Moor 2007, Automatica 43(1).
+
+use super::super::fit::Fitting;
+use super::super::judge::GAIN_APART;
+use super::super::record::Measured;
+use super::super::select::{Fitted, SAME};
+use super::features::{Term, group_terms, variables};
+use super::screen::Screen;
+use model::Model;
+use serde::Serialize;
+use std::path::Path;
+
+/// Least share of what the model leaves that a place must explain to be said.
+const LEAST_SHARE: f64 = 0.3;
+
+/// Where what the model leaves comes from.
+#[derive(Clone, Debug, Serialize)]
+pub struct Located {
+    /// As in `suspects`: the input, equation, definition or output.
+    pub place: String,
+    /// Variables that it depends on; none for a constant.
+    pub variables: Vec<String>,
+    /// Share of what the model leaves that a function of these explains there, linearly.
+    pub share: f64,
+    /// Other places and variables that explain it as well.
+    pub alternatives: Vec<Place>,
+}
+
+/// A place with variables.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Place {
+    pub place: String,
+    pub variables: Vec<String>,
+}
+
+/// A group of terms: a place with variables.
+struct Group {
+    place: Place,
+    /// It is a lag, not a function.
+    is_of_change: bool,
+    terms: Vec<usize>,
+    worth: f64,
+    share: f64,
+    rank: usize,
+}
+
+/// The place and the variables that explain most of what a fitted model leaves; `None` where none explains enough of it.
+pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
+    let model = baseline.fitting.model;
+    let terms = group_terms(model, &variables(baseline), period_s(&baseline.fitting));
+    let text: String = terms.iter().map(|term| term.text.as_str()).collect();
+    let text = format!("{}\n{text}", model.text());
+    let grown = Model::parse(&text, Path::new("model with the terms of places")).ok()?;
+    let first = model.suspects.len();
+    let screen = Screen::of(&grown, baseline, first, terms.len())?;
+    let samples: f64 = baseline.effective.iter().sum();
+    let mut groups = groups(&grown, first, &terms);
+    for group in &mut groups {
+        group.share = screen.share(&group.terms);
+        let count = group.terms.len() as f64;
+        group.worth = -samples * (1.0 - group.share).max(1e-12).ln() - count * samples.ln();
+    }
+    let most = |groups: &[Group]| groups.iter().map(|group| group.worth).fold(f64::NEG_INFINITY, f64::max);
+    // Two variables only where one does worse beyond doubt.
+    let best = most(&groups);
+    groups.retain(|group| group.worth > best - GAIN_APART);
+    let fewest = groups.iter().map(|group| group.place.variables.len()).min()?;
+    groups.retain(|group| group.place.variables.len() == fewest);
+    let best = most(&groups);
+    groups.retain(|group| group.worth > best - SAME);
+    groups.sort_by(|one, other| one.rank.cmp(&other.rank).then(other.worth.total_cmp(&one.worth)));
+    let mut groups = groups.into_iter();
+    let best = groups.next().filter(|best| best.share >= LEAST_SHARE && best.worth > 0.0)?;
+    let Place { place, variables } = best.place;
+    Some(Located { place, variables, share: best.share, alternatives: groups.map(|one| one.place).collect() })
+}
+
+/// Terms of one place and the same variables.
+fn groups(model: &Model, first: usize, terms: &[Term]) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for (index, term) in terms.iter().enumerate() {
+        let place = super::super::report::place(model, first + index);
+        let place = Place { place, variables: term.variables.clone() };
+        let is_of_change = term.is_of_change();
+        let is_same = |group: &&mut Group| group.place == place && group.is_of_change == is_of_change;
+        match groups.iter_mut().find(is_same) {
+            Some(group) => group.terms.push(index),
+            None => {
+                let target = model.suspects[first + index].target;
+                let rank = rank(target, model.target_name(target), &term.variables);
+                groups.push(Group { place, is_of_change, terms: vec![index], worth: 0.0, share: 0.0, rank });
+            }
+        }
+    }
+    groups
+}
+
+/// Of places that explain as much the one that is said: a function of an input is said of the input.
+fn rank(target: model::Target, name: &str, variables: &[String]) -> usize {
+    let is_its_own = matches!(target, model::Target::Input(_)) && variables.iter().any(|one| one == name);
+    match target {
+        model::Target::Input(_) if is_its_own => 0,
+        model::Target::State(_) => 1,
+        model::Target::Definition(_) => 2,
+        model::Target::Output(_) => 3,
+        model::Target::Input(_) => 4,
+    }
+}
+
+/// Shortest mean period of the samples, s.
+fn period_s(fitting: &Fitting<'_>) -> f64 {
+    let period = |record: &Measured| {
+        let times = &record.sampled_s;
+        (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64
+    };
+    fitting.records.iter().map(period).fold(f64::INFINITY, f64::min)
+}
+
+impl Located {
+    /// A line of a report.
+    pub(crate) fn in_words(&self) -> String {
+        let of = |variables: &[String]| match variables {
+            [] => "a constant".to_owned(),
+            all => format!("a function of {}", all.join(" and ")),
+        };
+        let also = |other: &Place| format!("; as well: {} at {}", of(&other.variables), other.place);
+        let others: String = self.alternatives.iter().map(also).collect();
+        format!(
+            "what the model alone leaves looks most like {} at {}, whatever the suspects are ({:.0} % of its power){others}",
+            of(&self.variables),
+            self.place,
+            self.share * 100.0
+        )
+    }
+}

@@ -1,0 +1,230 @@
+//! Whether a suspect passes, on the training records alone.
+//!
+//! All of these must hold:
+//!
+//! | gate | asks | against |
+//! |---|---|---|
+//! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n is what the residual of the best fit is worth |
+//! | folds in time | at least a tenth of the power that the model leaves | size |
+//! | folds in time | a gain without the block that gains most, too | an event that is none of the plant's |
+//! | folds in bands of `[rows.folds]` | half of that share, at 2 clustered standard errors | what does not hold elsewhere |
+//!
+//! A mean over its standard error asked of folds in time would ask that a term acts in every block: a tank overflows in two of
+//! ten.
+//! Bands are not asked of a suspect that is `local`.
+//!
+//! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
+
+use super::fit::What;
+use super::folds::{Folds, clustered_t, gained, in_units};
+use super::select::Fitted;
+use crate::estimator::Convergence;
+use model::Model;
+
+/// Least share of the power left out that a term must explain on folds in time; on bands half of it.
+const SHARE_FLOOR: f64 = 0.1;
+/// Clustered standard errors that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
+/// Grandvalet 2004, JMLR 5]; for ten folds 2 is about 4 % one-sided.
+const T_BANDS: f64 = 2.0;
+/// Clustered standard errors of a difference between two suspects that tells them apart.
+const T_APART: f64 = 3.0;
+/// Twice the difference of log likelihoods that does the same. "Very strong" is 10 for twice the log Bayes factor [Kass, Raftery
+/// 1995, JASA 90(430)], which this difference approximates for equal numbers of parameters only.
+pub(super) const GAIN_APART: f64 = 10.0;
+
+/// How a suspect did in a round.
+#[derive(Clone, Debug)]
+pub(crate) struct Evaluation {
+    pub(crate) suspect: usize,
+    pub(crate) gain: f64,
+    pub(crate) penalty: f64,
+    /// Share of the power left out, on folds in time.
+    pub(crate) share: f64,
+    /// Of the folds' differences.
+    pub(crate) t: f64,
+    pub(crate) passes: bool,
+    /// The gate that decided, in words.
+    pub(crate) gate: String,
+    /// Posterior probability among the suspects of its round and none of them, all as likely before.
+    pub(crate) probability: f64,
+    /// Numbers of the suspect, by parameter.
+    pub(crate) values_si: Vec<(usize, f64)>,
+    pub(crate) convergence: Convergence,
+    /// What each fold gains.
+    differences: Vec<f64>,
+}
+
+/// What a suspect is judged beside: the model alone, in whose power shares are, and the fit without the suspect.
+#[derive(Clone, Copy)]
+pub(super) struct Sides<'f, 'a> {
+    pub(super) baseline: &'f Fitted<'a>,
+    pub(super) before: &'f Fitted<'a>,
+}
+
+/// Judges a suspect; where its likelihood gains and its folds by linear steps lose, by folds that are fitted.
+pub(super) fn judge(
+    sides: Sides<'_, '_>,
+    after: &Fitted<'_>,
+    suspect: usize,
+    of_round: (usize, &[f64]),
+) -> Evaluation {
+    let linear = judge_by_folds(sides, after, suspect, of_round);
+    if linear.passes || linear.share >= 0.0 || linear.gain <= linear.penalty {
+        return linear;
+    }
+    let [baseline, before, after] = [sides.baseline, sides.before, after].map(Fitted::by_fits);
+    match (baseline, before, after) {
+        (Some(baseline), Some(before), Some(after)) => {
+            judge_by_folds(Sides { baseline: &baseline, before: &before }, &after, suspect, of_round)
+        }
+        _ => linear,
+    }
+}
+
+fn judge_by_folds(
+    Sides { baseline, before }: Sides<'_, '_>,
+    after: &Fitted<'_>,
+    suspect: usize,
+    (tried, samples): (usize, &[f64]),
+) -> Evaluation {
+    let gain: f64 = (0..after.judged.len())
+        .map(|output| {
+            let [old, new] = [before, after].map(|of| of.judged[output]);
+            let share = samples[output] / after.fitting.count(output).max(1.0);
+            match after.fitting.model.outputs[output].noise_si {
+                Some(_) => share * (old - new) / after.fitting.variance(output, new),
+                None => {
+                    let variances =
+                        before.fitting.variance(output, old) / after.fitting.variance(output, new);
+                    samples[output] * variances.ln()
+                }
+            }
+        })
+        .sum();
+    let effective: f64 = samples.iter().sum();
+    let more = after.fitting.unknowns.len() as f64 - before.fitting.unknowns.len() as f64;
+    let penalty = more * effective.ln() + 2.0 * (tried.max(1) as f64).ln();
+    let differences = gained(&before.folds, &after.folds, before);
+    let share_of = |differences: &[f64], plain: &Folds| {
+        let plain: f64 = in_units(plain, before).iter().sum();
+        differences.iter().sum::<f64>() / plain.max(f64::MIN_POSITIVE)
+    };
+    let share = share_of(&differences, &baseline.folds);
+    let t = clustered_t(&differences);
+    let best_fold = differences.iter().copied().fold(0.0, f64::max);
+    let without_best = differences.iter().sum::<f64>() - best_fold;
+    let mut gates = vec![
+        (gain / penalty.max(f64::MIN_POSITIVE), format!("likelihood gain {gain:.1}, penalty {penalty:.1}")),
+        (
+            share / SHARE_FLOOR,
+            format!("folds in time: {}, {:.0} % asked", share_in_words(share), SHARE_FLOOR * 100.0),
+        ),
+        (
+            if without_best > 0.0 { f64::INFINITY } else { 0.0 },
+            "folds in time: it gains in one block of time alone".to_owned(),
+        ),
+    ];
+    let model = after.fitting.model;
+    let all_bands = before.bands.iter().zip(&after.bands).zip(&baseline.bands).zip(&model.rows.folds);
+    for (((before_bands, after_bands), plain), over) in
+        all_bands.filter(|_| !model.suspects[suspect].is_local)
+    {
+        let differences = gained(before_bands, after_bands, before);
+        let (share, t) = (share_of(&differences, plain), clustered_t(&differences));
+        let (floor, over) = (SHARE_FLOOR / 2.0, &over.text);
+        let words = share_in_words(share);
+        gates.push((share / floor, format!("folds over {over}: {words}, {:.0} % asked", floor * 100.0)));
+        gates.push((
+            t / T_BANDS,
+            format!("folds over {over}: {t:.1} clustered standard errors, {T_BANDS:.0} asked"),
+        ));
+    }
+    let (score, gate) =
+        gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are three at least");
+    let unknowns = after.fitting.unknowns.iter().zip(&after.point.values_si);
+    let values_si = unknowns.filter_map(|(unknown, value)| match unknown.what {
+        What::Shared(index) | What::OfRecord(index, 0)
+            if after.fitting.model.parameters[index].suspect == Some(suspect) =>
+        {
+            Some((index, *value))
+        }
+        _ => None,
+    });
+    Evaluation {
+        suspect,
+        gain,
+        penalty,
+        share,
+        t,
+        passes: score > 1.0,
+        gate,
+        probability: 0.0,
+        values_si: values_si.collect(),
+        convergence: after.convergence,
+        differences,
+    }
+}
+
+impl Evaluation {
+    /// Twice a log likelihood ratio, less what chance is granted.
+    pub(super) fn worth(&self) -> f64 {
+        self.gain - self.penalty
+    }
+}
+
+/// Probabilities of a round: each suspect and none of them, as likely before; gains in units of the best one's samples.
+pub(super) fn weigh(round: &mut [Evaluation]) {
+    let best = round.iter().map(Evaluation::worth).fold(0.0, f64::max);
+    let weight = |worth: f64| (0.5 * (worth - best)).exp();
+    let sum: f64 = weight(0.0) + round.iter().map(|one| weight(one.worth())).sum::<f64>();
+    for one in round {
+        one.probability = weight(one.worth()) / sum;
+    }
+}
+
+/// A share of the power that the model alone leaves on folds; one that leaves much more says how many times as much.
+pub(crate) fn share_in_words(share: f64) -> String {
+    match share {
+        share if share >= -1.0 => format!("{:.1} % of the power", share * 100.0),
+        share if share > -1e4 => format!("worse, {:.0} times the power", 1.0 - share),
+        _ => "worse, more than 10000 times the power".into(),
+    }
+}
+
+/// Whether two suspects are forms of one effect.
+pub(super) fn is_one_effect(model: &Model, one: usize, other: usize) -> bool {
+    let [effect, of_other] = [one, other].map(|suspect| model.suspects[suspect].effect.as_ref());
+    one == other || effect.is_some() && effect == of_other
+}
+
+/// Whether one is better than the other beyond doubt: by its likelihood, or on the same folds. Forms of one effect differ by so
+/// little that the spread over folds is nothing to compare it with: of them the likelihood decides alone.
+pub(super) fn apart(model: &Model, best: &Evaluation, other: &Evaluation) -> bool {
+    if best.worth() - other.worth() > GAIN_APART {
+        return true;
+    }
+    if is_one_effect(model, best.suspect, other.suspect) {
+        return false;
+    }
+    let differences: Vec<f64> =
+        best.differences.iter().zip(&other.differences).map(|(best, other)| best - other).collect();
+    clustered_t(&differences) > T_APART
+}
+
+#[cfg(test)]
+mod tests {
+    use super::share_in_words;
+
+    #[test]
+    fn a_share_that_is_far_below_nothing_is_said_as_a_ratio() {
+        let said = [0.123, -0.5, -1.0, -3351.0, -2e4].map(share_in_words);
+        let expected = [
+            "12.3 % of the power",
+            "-50.0 % of the power",
+            "-100.0 % of the power",
+            "worse, 3352 times the power",
+            "worse, more than 10000 times the power",
+        ];
+        assert_eq!(said, expected);
+    }
+}
