@@ -230,6 +230,8 @@ impl Reader<'_> {
         named(&name).ok_or_else(|| {
             let what = if name.is_empty() {
                 "a unit is missing here".into()
+            } else if ["degC", "°C", "degF", "°F"].contains(&name.as_str()) {
+                format!("'{name}' has an offset: write K, for a difference or for an absolute temperature")
             } else {
                 format!("'{name}' is no unit")
             };

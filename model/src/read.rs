@@ -180,7 +180,10 @@ fn range(section: &mut Section<'_>, unit: &Unit) -> Result<[f64; 2], SettingsErr
     match section.numbers("range")?.as_slice() {
         [] => Ok([f64::NEG_INFINITY, f64::INFINITY]),
         [least, most] if least < most => Ok([least * unit.factor, most * unit.factor]),
-        _ => Err(section.wrong_at("range", "range: allowed is [least, largest]")),
+        given => {
+            let why = format!("range: {given:?} is none; allowed is [least, largest], the least first");
+            Err(section.wrong_at("range", &why))
+        }
     }
 }
 

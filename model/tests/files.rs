@@ -83,8 +83,14 @@ fn an_error_has_line_and_column_and_says_what_is_allowed() {
         (
             "place = \"level\"",
             "place = \"levle\"",
-            "model.toml:28:10: 'levle' is no input, state, definition or output",
+            "model.toml:28:10: 'levle' is no input, state, definition or output of this model; it has pump, level",
         ),
+        (
+            "range = [0, 100]",
+            "range = [100, 0]",
+            "range: [100.0, 0.0] is none; allowed is [least, largest], the least first",
+        ),
+        ("mm/(V s)", "degC", "'degC' has an offset: write K"),
         ("add = ", "addd = ", "suspects[1].one of add, multiply, replace is missing"),
         ("-rate*level", "-rate", "leak is in m s^-1, and this is in s^-1"),
         ("noise = 0.5", "noise = -1", "model.toml:24:9: outputs.level_mm.noise: allowed is one number"),

@@ -114,7 +114,11 @@ impl Table {
             self.cut = self.rows.pop().map(|(line, _)| line);
         }
         if let Some((line, row)) = self.rows.iter().find(|(_, row)| row.len() != expected) {
-            let message = format!("{} cells, but the head has {expected}", row.len());
+            let hint = match expected {
+                1 => ": is another separator, or a decimal comma, to be named where the record is described?",
+                _ => "",
+            };
+            let message = format!("{} cells, but the head has {expected}{hint}", row.len());
             return Err(ReadError::at(&self.file, *line, message));
         }
         if self.rows.is_empty() {
@@ -190,6 +194,10 @@ mod tests {
             ("a,b\n", "has no rows"),
             ("a,a\n1,2\n", "a.csv:1: column a stands twice"),
             ("a,b\n1,2\n1,2,3\n", "a.csv:3: 3 cells, but the head has 2"),
+            (
+                "a;b\n1,2;2\n",
+                "a.csv:2: 2 cells, but the head has 1: is another separator, or a decimal comma,",
+            ),
             ("a,b\n1\n1,2\n", "a.csv:2: 1 cells"),
         ] {
             let message = parse(text, &Layout::default()).err().expect(text).to_string();

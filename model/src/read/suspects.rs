@@ -341,7 +341,14 @@ impl Reader<'_> {
         let output = model.outputs.iter().position(|one| one.name == *name).map(Target::Output);
         let all = input.or(states.map(Target::State)).or(defined.map(Target::Definition)).or(output);
         all.ok_or_else(|| {
-            let why = format!("'{name}' is no input, state, definition or output of this model");
+            let inputs = model.inputs.iter().map(|one| &one.name);
+            let states = model.states.iter().filter(|one| one.suspect.is_none()).map(|one| &one.name);
+            let defined = model.definitions.iter().filter(|one| one.suspect.is_none()).map(|one| &one.name);
+            let outputs = model.outputs.iter().map(|one| &one.name);
+            let all = inputs.chain(states).chain(defined).chain(outputs);
+            let all = all.map(String::as_str).collect::<Vec<_>>().join(", ");
+            let why =
+                format!("'{name}' is no input, state, definition or output of this model; it has {all}");
             self.source.wrong_from(text.at, &why)
         })
     }
