@@ -327,7 +327,7 @@ pub(crate) fn term(model: &Model, suspect: usize) -> String {
 }
 
 /// Numbers of a fit; their errors are the larger of what a coloured residual is worth and of the jackknife over blocks of time,
-/// and beside it, where a law was named, what one that is only near leaves to them. A formula that was searched for claims no law.
+/// and beside it, where a law was named, what one that is only near leaves to them. A formula that was searched for claims none.
 pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) -> Vec<Number> {
     let fitting = &fitted.fitting;
     let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();
