@@ -211,8 +211,7 @@ fn suspects(all: &[Judgement]) -> String {
         vec![
             Cell::About(name, one.place.clone()),
             number(format!("{:.1} %", one.probability * 100.0)),
-            number(format!("{:.1}", one.gain)),
-            number(format!("{:.1}", one.penalty)),
+            number(format!("{:.1}, {:.1}", one.gain, one.penalty)),
             number(share_in_words(one.share)),
             Cell::Sentence(one.decision.clone()),
             Cell::Sentence(values.join(", ")),
@@ -221,9 +220,8 @@ fn suspects(all: &[Judgement]) -> String {
     let heads = [
         "suspect",
         "probability",
-        "likelihood gain",
-        "penalty",
-        "of what is left, on folds",
+        "gain, penalty",
+        "on folds, of what is left",
         "decision",
         "numbers",
     ];
