@@ -149,7 +149,7 @@ fn a_record_of_one_balance_is_checked_before_it_is_believed() {
     let number = turned.parameters.iter().find(|number| number.name == "mass").unwrap();
     assert!(number.is_at_bound && number.value == 0.0, "{number:?}");
     assert!(
-        turned.notes.iter().any(|note| note.contains("ended at the end of a range")),
+        turned.notes.iter().any(|note| note.contains("mass ended at the end of its range")),
         "{:?}",
         turned.notes
     );

@@ -217,14 +217,8 @@ fn suspects(all: &[Judgement]) -> String {
             Cell::Sentence(values.join(", ")),
         ]
     });
-    let heads = [
-        "suspect",
-        "probability",
-        "gain, penalty",
-        "on folds, of what is left",
-        "decision",
-        "numbers",
-    ];
+    let heads =
+        ["suspect", "probability", "gain, penalty", "on folds, of what is left", "decision", "numbers"];
     table("Suspects beside the model alone", &heads, rows)
 }
 
