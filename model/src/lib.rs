@@ -13,7 +13,7 @@
 //! | `names` | what names mean |
 //! | `check` | names, numbers of arguments, dimensions |
 //! | `compile` | suspects in their places, bytecode |
-//! | `simulate` | integration with sensitivities |
+//! | `simulate`, `failure` | integration with sensitivities; why it ends |
 //!
 //! Grammar, units and bytecode of expressions are in the crate `expression`.
 //!
@@ -25,6 +25,7 @@ use expression::{inputs, tape, units};
 
 mod check;
 mod compile;
+mod failure;
 mod file;
 mod library;
 mod names;
@@ -35,10 +36,11 @@ mod simulate;
 pub use expression::grammar::{DEEPEST, MOST_NODES};
 pub use expression::inputs::{Hold, Inputs};
 pub use expression::units::{Dimension, Unit, UnitError};
+pub use failure::Failure;
 pub use file::{
     Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Smoothing, Solver,
     Start, State, Suspect, Target,
 };
 pub use library::{Entry, EntryMemory, EntryParameter, EntryState, Library, Quantity, Variable};
 pub use rows::Rows;
-pub use simulate::{Direction, Failure, Program, Simulator};
+pub use simulate::{Direction, Program, Simulator};

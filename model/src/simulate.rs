@@ -17,6 +17,7 @@
 //! Bock 1983, internal numerical differentiation.
 
 use crate::compile::{Tapes, tapes};
+use crate::failure::Failure;
 use crate::file::{Model, Solver};
 use crate::inputs::{Hold, Inputs};
 use crate::tape::{Leaves, Registers, Tape};
@@ -43,7 +44,7 @@ const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
 /// Most steps between two samples.
-const MOST_STEPS: usize = 100_000;
+pub(crate) const MOST_STEPS: usize = 100_000;
 
 /// A number that something is differentiated by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,35 +53,6 @@ pub enum Direction {
     Parameter(usize),
     /// The start of a state, by its index.
     Start(usize),
-}
-
-/// Why a record cannot be simulated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Failure {
-    /// No number at the first sample.
-    #[error("{place}: {what} is no finite number at the start")]
-    Start {
-        /// File, line and column of its equation.
-        place: String,
-        /// The equation of a state, or the output.
-        what: String,
-    },
-    /// A state or output that runs away.
-    #[error("{what} is no finite number at {time_s} s")]
-    NotFinite {
-        /// The state or output, as the file names it.
-        what: String,
-        /// Time of the record, s.
-        time_s: f64,
-    },
-    /// Steps that would never end.
-    #[error(
-        "more than {MOST_STEPS} steps from {time_s} s to the next sample: the equations are stiff or do not end"
-    )]
-    Steps {
-        /// Time of the sample before, s.
-        time_s: f64,
-    },
 }
 
 /// A model with some of its suspects, compiled.
@@ -150,6 +122,9 @@ pub struct Simulator<'a> {
     largest: Vec<f64>,
     memory: Vec<f64>,
     step_s: f64,
+    /// Steps of the record, refused ones too, and how many it may take.
+    steps: usize,
+    most_steps: usize,
 }
 
 impl<'a> Simulator<'a> {
@@ -188,7 +163,21 @@ impl<'a> Simulator<'a> {
             largest: vec![0.0; program.tapes.states.len()],
             memory: vec![0.0; program.tapes.memories.len() * width],
             step_s: 0.0,
+            steps: 0,
+            most_steps: usize::MAX,
         }
+    }
+
+    /// The same with at most so many steps over all samples: a fit gives up values at which the equations become stiff.
+    #[must_use]
+    pub fn within(self, most_steps: usize) -> Self {
+        Self { most_steps, ..self }
+    }
+
+    /// Steps that the last record took.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.steps
     }
 
     fn width(&self) -> usize {
@@ -228,6 +217,7 @@ impl<'a> Simulator<'a> {
         self.x.fill(0.0);
         self.memory.fill(0.0);
         self.step_s = 0.0;
+        self.steps = 0;
         for (place, state) in self.program.tapes.states.iter().enumerate() {
             self.x[place * width] = starts[*state];
             for (index, direction) in self.directions.iter().enumerate() {
@@ -278,6 +268,9 @@ impl<'a> Simulator<'a> {
     /// From a sample to the next one.
     fn advance(&mut self, inputs: &Inputs<'_>, row: usize) -> Result<(), Failure> {
         let (from_s, to_s) = (inputs.time_s[row], inputs.time_s[row + 1]);
+        if self.steps >= self.most_steps {
+            return Err(Failure::Steps { time_s: from_s });
+        }
         match self.program.solver {
             Solver::Fixed { step_s } => {
                 // A step that is longer by a rounding error is no step more.
@@ -286,6 +279,7 @@ impl<'a> Simulator<'a> {
                     return Err(Failure::Steps { time_s: from_s });
                 }
                 let length_s = (to_s - from_s) / steps;
+                self.steps += steps as usize;
                 for step in 0..steps as usize {
                     self.first_stage(inputs, row, from_s + length_s * step as f64)?;
                     self.classical(inputs, row, from_s + length_s * step as f64, length_s);
@@ -328,7 +322,8 @@ impl<'a> Simulator<'a> {
         let (from_s, to_s) = (inputs.time_s[row], inputs.time_s[row + 1]);
         let mut time_s = from_s;
         self.first_stage(inputs, row, time_s)?;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MOST_STEPS.min(self.most_steps - self.steps) {
+            self.steps += 1;
             let left_s = to_s - time_s;
             let wished_s = if self.step_s > 0.0 { self.step_s } else { left_s };
             // The last step ends on the sample, and no sliver is left behind it.

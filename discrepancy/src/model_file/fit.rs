@@ -32,6 +32,11 @@ const LEAST_NOISE: f64 = 1e-9;
 /// Shortest time constant of a library over the period of the samples.
 const FASTEST: f64 = 0.25;
 
+/// Steps that a simulation within a fit may take: so many times those at the start of the fit, and so many for each sample. A
+/// suspect that makes the equations blow up in some corner of its range would cost minutes there.
+const STEPS_OF_START: usize = 10;
+const STEPS_OF_SAMPLE: usize = 30;
+
 /// What is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum What {
@@ -68,6 +73,8 @@ pub(crate) struct Fitting<'a> {
     memories_si: Vec<f64>,
     /// Least variance of each output.
     floor: Vec<f64>,
+    /// Steps that the simulation of a record may take.
+    most_steps: usize,
 }
 
 /// Of each output of a record what is left, and what the model says.
@@ -81,6 +88,8 @@ pub(crate) struct Point {
     /// Sum of squares of each output.
     pub(crate) squares: Vec<f64>,
     is_at_bound: bool,
+    /// Steps of its longest simulation.
+    steps: usize,
 }
 
 impl Iterate for Point {
@@ -168,6 +177,7 @@ impl<'a> Fitting<'a> {
             starts_si,
             memories_si: model.memories.iter().map(|memory| memory.start_si).collect(),
             floor: floor.collect(),
+            most_steps: usize::MAX,
         }
     }
 
@@ -234,14 +244,14 @@ impl<'a> Fitting<'a> {
         outputs + priors.sum::<f64>()
     }
 
-    /// Simulates a record; `sink` gets row, output, value and derivatives by the unknowns of that record.
+    /// Simulates a record; `sink` gets row, output, value and derivatives by the unknowns of that record. Returns its steps.
     pub(super) fn simulate(
         &self,
         record: usize,
         values_si: &[f64],
         with_slopes: bool,
         mut sink: impl FnMut(usize, usize, f64, &[f64]),
-    ) -> Result<(), Failure> {
+    ) -> Result<usize, Failure> {
         let mut parameters = self.parameters_si[record].clone();
         let mut starts = self.starts_si[record].clone();
         let mut directions = Vec::new();
@@ -262,18 +272,19 @@ impl<'a> Fitting<'a> {
         let end = measured.samples_of(self.in_score[record].end);
         let inputs = Inputs { time_s: &measured.sampled_s[..end], samples_si: &measured.inputs };
         let directions = if with_slopes { directions.as_slice() } else { &[] };
-        let mut simulator = Simulator::new(&self.program, directions);
+        let mut simulator = Simulator::new(&self.program, directions).within(self.most_steps);
         let values = [parameters.as_slice(), &starts, &self.memories_si];
         let Some(filter) = &measured.thinning else {
             let mut place = 0;
-            return simulator.run(&inputs, values, |sample, output, value, slopes| {
+            simulator.run(&inputs, values, |sample, output, value, slopes| {
                 while measured.rows.get(place).is_some_and(|row| *row < sample) {
                     place += 1;
                 }
                 if measured.rows.get(place) == Some(&sample) {
                     sink(place, output, value, slopes);
                 }
-            });
+            })?;
+            return Ok(simulator.steps());
         };
         // Values and derivatives of all samples go through the filter of what was measured.
         let width = 1 + directions.len();
@@ -292,24 +303,26 @@ impl<'a> Fitting<'a> {
                 sink(place, output, columns[0][*sample], &slopes);
             }
         }
-        Ok(())
+        Ok(simulator.steps())
     }
 
     /// A point with its loss.
     pub(crate) fn at(&self, values_si: Vec<f64>) -> Result<Point, Failure> {
         let mut squares = vec![0.0; self.model.outputs.len()];
+        let mut steps = 0;
         for record in 0..self.records.len() {
             let (outputs, rows) = (&self.records[record].outputs, self.rows(record));
-            self.simulate(record, &values_si, false, |row, output, value, _| {
+            let of_record = self.simulate(record, &values_si, false, |row, output, value, _| {
                 if let Some(measured) = outputs[output][row].filter(|_| rows.contains(&row)) {
                     squares[output] += (measured - value).powi(2);
                 }
             })?;
+            steps = steps.max(of_record);
         }
         let loss = self.loss(&values_si, &squares);
         let mut ends = self.unknowns.iter().zip(&values_si);
         let is_at_bound = ends.any(|(unknown, value)| unknown.range_si.contains(value));
-        Ok(Point { values_si, loss, squares, is_at_bound })
+        Ok(Point { values_si, loss, squares, is_at_bound, steps })
     }
 
     /// Where the fit starts.
@@ -415,18 +428,26 @@ impl<'a> Fitting<'a> {
         sum
     }
 
+    /// The same where no simulation takes many more steps than at this point.
+    pub(super) fn near(&self, point: &Point) -> Self {
+        let samples = self.records.iter().map(|record| record.sampled_s.len()).max().unwrap_or(0);
+        let most_steps = STEPS_OF_START * point.steps + STEPS_OF_SAMPLE * samples;
+        Fitting { most_steps: self.most_steps.min(most_steps), ..self.clone() }
+    }
+
     /// Fits from a start within the ranges in at most so many steps.
     pub(crate) fn fit(&self, start: Vec<f64>, steps: usize) -> Result<(Point, Convergence), Failure> {
         let start = self.at(start)?;
+        let here = self.near(&start);
         let samples: f64 = (0..self.model.outputs.len()).map(|output| self.count(output)).sum();
         let converged = OPTIONS.converged + CONVERGED_PER_SAMPLE * samples;
         let options = Options { steps, converged, ..OPTIONS };
         let cut = self.in_time();
         Ok(Estimator::new(options).descend(start, |estimator, point| {
-            let Ok(normals) = self.normals(&point.values_si, &cut) else { return Step::Impossible };
-            let sum = self.sum(&normals, point);
-            let promised = sum.slope.dot(&self.step(&sum, &point.values_si, 0.0));
-            match self.best_step(estimator, point, &sum) {
+            let Ok(normals) = here.normals(&point.values_si, &cut) else { return Step::Impossible };
+            let sum = here.sum(&normals, point);
+            let promised = sum.slope.dot(&here.step(&sum, &point.values_si, 0.0));
+            match here.best_step(estimator, point, &sum) {
                 Some(best) => Step::Taken(best),
                 None => Step::Refused { promised },
             }

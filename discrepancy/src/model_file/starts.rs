@@ -92,9 +92,13 @@ impl Fitting<'_> {
         let mut why = None;
         let mut begun: Vec<(Point, Convergence)> = Vec::new();
         let unmoved = Convergence { outcome: Outcome::StepLimit, ..Convergence::default() };
+        let mut here = self.clone();
         for start in self.within_ranges(starts) {
-            match self.fit(start, ROUNDS[0].0) {
-                Ok((point, convergence)) => begun.push((point, unmoved.then(convergence))),
+            match here.fit(start, ROUNDS[0].0) {
+                Ok((point, convergence)) => {
+                    here = here.near(&point);
+                    begun.push((point, unmoved.then(convergence)));
+                }
                 Err(failure) => why = Some(failure),
             }
         }
