@@ -202,7 +202,7 @@ fn what_a_term_keeps_is_refused_where_it_cannot_run() {
             ["a", "b", "w"]
                 .map(|name| memory("[0, 1]", "x", "x").replace(".w", &format!(".{name}")))
                 .join("\n"),
-            "more than 2 of memory in one term",
+            "more than 2 names under memory",
         ),
     ] {
         let error = RigParameters::from_toml(&text(&[("drive.force", add, &numbers)]), "rig.toml")

@@ -38,28 +38,10 @@ impl Remembered {
         &self.name
     }
 
-    /// Its unit, as the file writes it.
-    #[must_use]
-    pub fn unit(&self) -> &str {
-        &self.unit.text
-    }
-
     /// Least and largest value, in the unit of the file.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
         self.range
-    }
-
-    /// The expression of its value where the plant begins.
-    #[must_use]
-    pub fn start(&self) -> &str {
-        &self.start
-    }
-
-    /// The expression that renews it.
-    #[must_use]
-    pub fn update(&self) -> &str {
-        &self.update
     }
 
     pub(crate) fn set(&mut self, parameters_si: &[f64]) {

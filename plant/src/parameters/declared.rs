@@ -140,8 +140,8 @@ impl Reader<'_> {
             return Err(self.source.wrong_from(place.at, &why));
         };
         let add = section.needed_text("add", "the expression that is added")?;
-        let numbers = self.numbers(&mut section)?;
-        let kept = self.kept(&mut section)?;
+        let numbers = self.named(&mut section, "parameters", MOST_PARAMETERS, Self::number)?;
+        let kept = self.named(&mut section, "memory", MOST_REMEMBERED, Self::kept)?;
         let twins = section.texts("twins")?;
         section.finish()?;
 
@@ -222,33 +222,44 @@ impl Reader<'_> {
         Err(self.source.wrong_from(at, &why))
     }
 
-    /// What the term keeps, its expressions as they are written.
-    fn kept(&self, section: &mut Section<'_>) -> Result<Vec<KeptText>, SettingsError> {
-        let Some(mut all) = section.section("memory")? else { return Ok(Vec::new()) };
+    /// What stands under the names of a table, at most so many.
+    fn named<T>(
+        &self,
+        section: &mut Section<'_>,
+        table: &str,
+        most: usize,
+        one: impl Fn(&Self, String, Section<'_>) -> Result<T, SettingsError>,
+    ) -> Result<Vec<T>, SettingsError> {
+        let Some(mut all) = section.section(table)? else { return Ok(Vec::new()) };
         let names = all.keys();
-        if names.len() > MOST_REMEMBERED {
-            return Err(all.wrong(&format!("more than {MOST_REMEMBERED} of memory in one term")));
+        if names.len() > most {
+            return Err(all.wrong(&format!("more than {most} names under {table}")));
         }
-        let mut kept = Vec::new();
+        let mut found = Vec::new();
         for name in names {
             is_name(&all, &name)?;
-            let Some(mut one) = all.section(&name)? else { continue };
-            let unit = self.unit(&mut one)?;
-            let range = match one.numbers("range")?.as_slice() {
-                [least, most] if least < most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],
-                _ => {
-                    let why = "range: needed are two numbers that it stays within, and within 1e12 of 0";
-                    return Err(one.wrong_at("range", why));
-                }
-            };
-            let start = one.needed_text("start", "the expression of its value where the plant begins")?;
-            let update =
-                one.needed_text("update", "the expression that renews it at the end of a substep")?;
-            one.finish()?;
-            kept.push(KeptText { name, unit, range, start, update });
+            let Some(section) = all.section(&name)? else { continue };
+            found.push(one(self, name, section)?);
         }
         all.finish()?;
-        Ok(kept)
+        Ok(found)
+    }
+
+    /// What the term keeps, its expressions as they are written.
+    fn kept(&self, name: String, mut section: Section<'_>) -> Result<KeptText, SettingsError> {
+        let unit = self.unit(&mut section)?;
+        let range = match section.numbers("range")?.as_slice() {
+            [least, most] if least < most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],
+            _ => {
+                let why = "range: needed are two numbers that it stays within, and within 1e12 of 0";
+                return Err(section.wrong_at("range", why));
+            }
+        };
+        let start = section.needed_text("start", "the expression of its value where the plant begins")?;
+        let update =
+            section.needed_text("update", "the expression that renews it at the end of a substep")?;
+        section.finish()?;
+        Ok(KeptText { name, unit, range, start, update })
     }
 
     fn unit(&self, section: &mut Section<'_>) -> Result<Unit, SettingsError> {
@@ -257,22 +268,6 @@ impl Reader<'_> {
             Some(text) => Unit::parse(&text.text)
                 .map_err(|wrong| self.source.wrong_from(text.at + wrong.at, &wrong.why)),
         }
-    }
-
-    fn numbers(&self, section: &mut Section<'_>) -> Result<Vec<Number>, SettingsError> {
-        let Some(mut all) = section.section("parameters")? else { return Ok(Vec::new()) };
-        let names = all.keys();
-        if names.len() > MOST_PARAMETERS {
-            return Err(all.wrong(&format!("more than {MOST_PARAMETERS} parameters")));
-        }
-        let mut numbers = Vec::new();
-        for name in names {
-            is_name(&all, &name)?;
-            let Some(one) = all.section(&name)? else { continue };
-            numbers.push(self.number(name, one)?);
-        }
-        all.finish()?;
-        Ok(numbers)
     }
 
     fn number(&self, name: String, mut section: Section<'_>) -> Result<Number, SettingsError> {
