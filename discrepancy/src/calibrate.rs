@@ -11,10 +11,10 @@
 pub mod finer;
 
 use crate::engine::Engine;
-use crate::estimator::CALIBRATION;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{Linearisation, Refit, refit, relinearise};
 use crate::report::Quantity;
+use model_fit::estimator::CALIBRATION;
 use plant::RigParameters;
 
 /// Share of the tolerance above which an error means that the records do not determine the parameter.

@@ -16,7 +16,6 @@
 mod grid;
 mod noise;
 mod notes;
-mod quantum;
 mod range;
 mod signs;
 mod stuck;
@@ -25,11 +24,10 @@ mod units;
 
 use crate::report::{ChannelCheck, Finding, RecordCheck};
 use grid::Grid;
-pub(crate) use grid::SPARSEST;
+use model_fit::quantum;
 use notes::Notes;
 use plant::{Axis, RigParameters};
 use records::{Channel, Record, Signal};
-pub(crate) use stuck::stuck;
 
 /// Kind of the finding that an axis stood at the end of its stroke all the time.
 pub(crate) const PARKED: &str = "parked";

@@ -21,7 +21,8 @@ use crate::refit::Linearisation;
 use crate::report::{Misfit, Objection, Report, Verdict, Verification};
 use crate::suspects::{self, Suspect};
 use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
-use crate::{locate, model_file, page, verify};
+use crate::{locate, page, verify};
+use model_fit::{is_model_file, successor};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
 use serde::de::DeserializeOwned;
@@ -39,9 +40,9 @@ pub enum CommandError {
     #[error(transparent)]
     Workflow(#[from] WorkflowError),
     #[error(transparent)]
-    Model(#[from] model_file::ModelError),
+    Model(#[from] model_fit::ModelError),
     #[error(transparent)]
-    New(#[from] model_file::NewError),
+    New(#[from] model_fit::NewError),
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error("{file}: {why}")]
@@ -96,7 +97,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     never_seen(&records.train, tests)?;
     let text = std::fs::read_to_string(&records.rig)
         .map_err(|why| CommandError::File { file: records.rig.clone(), why })?;
-    if model_file::is_model_file(&text) {
+    if is_model_file(&text) {
         current_form(&records.rig, &text)?;
         if let Some(file) = suspects {
             return Err(CommandError::BadData(format!(
@@ -164,7 +165,7 @@ fn exit_of(report: &Report, strict: bool) -> Exit {
 
 /// Models of one balance had another form, which says what to do instead.
 fn current_form(file: &Path, text: &str) -> Result<(), CommandError> {
-    let Some(successor) = model_file::successor(text) else { return Ok(()) };
+    let Some(successor) = successor(text) else { return Ok(()) };
     Err(CommandError::BadData(format!(
         "{}: kind: models of one balance are model files now: begin with discrepancy/models/{successor}, see docs/model-files.md",
         file.display()
@@ -222,7 +223,7 @@ fn one_test(tests: &[PathBuf]) -> Result<Option<PathBuf>, CommandError> {
 
 fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let out = folder(arguments)?;
-    if std::fs::read_to_string(&arguments.rig).is_ok_and(|text| model_file::is_model_file(&text)) {
+    if std::fs::read_to_string(&arguments.rig).is_ok_and(|text| is_model_file(&text)) {
         return any_plant::check_command(arguments, out.as_ref());
     }
     let rig = RigFile::read(&arguments.rig)?.rig;
@@ -312,7 +313,7 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
 fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
     let text = std::fs::read_to_string(&arguments.rig)
         .map_err(|why| CommandError::File { file: arguments.rig.clone(), why })?;
-    let text = if model_file::is_model_file(&text) {
+    let text = if is_model_file(&text) {
         current_form(&arguments.rig, &text)?;
         any_plant::extended_text(&arguments.rig, &text, &read_report(&arguments.report)?)?
     } else {
@@ -370,7 +371,7 @@ struct VerifiedFile<'a> {
 }
 
 fn explain_command(arguments: &ExplainArguments) -> Result<Exit, CommandError> {
-    print(&model_file::explain(&arguments.model, &arguments.train)?)?;
+    print(&model_fit::explain(&arguments.model, &arguments.train)?)?;
     Ok(Exit::Good)
 }
 

@@ -14,8 +14,8 @@
 use crate::fit::{self, Products};
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
-use crate::stats::order_statistic;
 use crate::windows::{ReferenceRun, VariableRanges, Windows, axis_by_axis, dot};
+use model_fit::stats::order_statistic;
 use plant::effects::leave_laws_alone;
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;

@@ -16,7 +16,7 @@ mod rest;
 mod subsample;
 
 use crate::check::Checked;
-use crate::stats::{mean, mean_and_variance, median};
+use model_fit::stats::{mean, mean_and_variance, median};
 use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
 use records::{Channel, Record, Signal};
 use rest::{Rate, Still};

@@ -1,5 +1,5 @@
 //! Model discrepancy: where a measurement and its simulation disagree, and which effect is missing. Records are read by the crate
-//! [`records`].
+//! [`records`]; estimator, statistics of columns and the workflow for any other plant are the crate [`model_fit`].
 //!
 //! | file | holds |
 //! |---|---|
@@ -9,8 +9,6 @@
 //! | [`windows`] | truncated simulation error: whitened residuals of windows |
 //! | [`engine`] | training records with their simulations and sensitivities |
 //! | `fit` | linear robust least squares over windows: the step of a fit, standard errors |
-//! | `estimator` | Gauss-Newton of every nonlinear fit: options, globalisation, outcome |
-//! | `stats` | order statistics and means |
 //! | [`candidates`] | effects at places, and the scaling of their numbers |
 //! | [`parameters`] | baseline parameters as nuisance parameters |
 //! | [`calibrate`] | calibration of these parameters |
@@ -25,7 +23,6 @@
 //! | `tabulate` | such terms as tables of the rig file |
 //! | [`next`] | experiment design for ambiguous explanations |
 //! | `verify` | both models on the held-out record |
-//! | [`model_file`] | the same for a plant that its user wrote as a file |
 //! | [`report`], `page` | results as data and as a page |
 //! | [`workflow`] | the steps in order |
 //! | [`commands`], [`cli`], `folder` | the program |
@@ -37,13 +34,11 @@ pub mod cli;
 pub mod commands;
 pub mod discrepancy_term;
 pub mod engine;
-pub(crate) mod estimator;
 pub mod extend;
 pub(crate) mod fit;
 pub(crate) mod folder;
 pub mod gridded_record;
 pub mod locate;
-pub mod model_file;
 pub mod name;
 pub mod next;
 pub mod outside;
@@ -53,7 +48,6 @@ pub mod refit;
 pub mod report;
 pub(crate) mod screen;
 pub(crate) mod sensor_inverse;
-pub(crate) mod stats;
 pub mod suspects;
 pub(crate) mod tabulate;
 pub(crate) mod unknown_inputs;

@@ -14,17 +14,15 @@
 //! | `candidates` | ranking, what is not excited, detection limits |
 //! | `held_out` | gap and verification |
 //! | `checks` | the records |
-//! | `draw`, `thin`, `markup`, `words` | drawings, long series, tables, numbers |
+//! | `markup`, `words` | headings, numbers with units |
 
 mod candidates;
 mod checks;
-mod decimate;
-pub(crate) mod draw;
 mod explanations;
 mod finding;
 mod held_out;
 mod location;
-pub(crate) mod markup;
+mod markup;
 mod pictures;
 mod verdict;
 mod words;
@@ -63,8 +61,6 @@ pub struct Pictures {
     pub(crate) held_out: bool,
     pub(crate) traces: Vec<Trace>,
 }
-
-pub(crate) use words::short as significant;
 
 pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
     let bad = report.verdict == Verdict::BadData;

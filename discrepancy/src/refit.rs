@@ -10,10 +10,10 @@
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::estimator::{CANDIDATE, Convergence, Estimator, Iterate, Options, Outcome, Step};
 use crate::fit::{Fit, Products};
 use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
+use model_fit::estimator::{CANDIDATE, Convergence, Estimator, Iterate, Options, Outcome, Step};
 use plant::RigParameters;
 
 /// Smallest step of finite differences, and its share of the coordinate.

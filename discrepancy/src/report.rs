@@ -6,9 +6,10 @@
 mod declared;
 mod objection;
 
-use crate::estimator::Convergence;
 use crate::name::{Evidence, ExplanationKind};
 pub use declared::DeclaredSuspect;
+pub use model_fit::Verdict;
+use model_fit::estimator::Convergence;
 pub(crate) use objection::Objection;
 use plant::effects::sheet::{Part, Place};
 use serde::{Deserialize, Serialize};
@@ -16,25 +17,6 @@ use std::collections::BTreeMap;
 
 /// Version of the schema; a new optional field does not change it.
 pub const SCHEMA_VERSION: u32 = 1;
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// No effect was found. An effect at its detection limit would be found in about half of the records or fewer, so that one
-    /// just above it may be missed.
-    #[default]
-    NothingMissing,
-    /// Only baseline parameters are off.
-    ParametersOnly,
-    /// Effects are missing and named.
-    Named,
-    /// Effects are missing, and several explain the records equally well.
-    Ambiguous,
-    /// A term outside the catalogue is missing.
-    OutsideCatalogue,
-    /// A record cannot be used.
-    BadData,
-}
 
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {

@@ -33,8 +33,9 @@ use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::name::lack_of_fit_per_dof;
 use crate::page::Trace;
 use crate::report::{BeforeAfter, Misfit, Verification};
-use crate::stats::mean_and_variance;
 use crate::windows::Windows;
+use model_fit::WORSE;
+use model_fit::stats::mean_and_variance;
 use null_power::NullPower;
 use plant::{Axis, RigParameters};
 use power::{Power, kept, levels, pooled};
@@ -45,8 +46,6 @@ use std::collections::BTreeMap;
 pub(crate) const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.75, 1.15];
 /// Significance of an improvement, in standard errors.
 const BETTER_ERRORS: f64 = 3.0;
-/// Largest ratio of a signal's rms after to before.
-pub(crate) const WORSE: f64 = 1.02;
 /// Smallest excess in null standard deviations; below, the closed share is not known to a tenth.
 const EXCESS_SPREADS: f64 = 10.0;
 

@@ -175,3 +175,21 @@ pub fn section(identifier: &str, title: &str, markup: &str) -> String {
         escaped(title)
     )
 }
+
+/// A table; empty without rows. The first cell of a row is its head.
+#[must_use]
+pub fn table(label: &str, heads: &[&str], rows: impl IntoIterator<Item = Vec<Cell>>) -> String {
+    let mut table = Table::new(label, heads.iter().copied());
+    rows.into_iter().for_each(|row| table.row(row));
+    table.html().unwrap_or_default()
+}
+
+/// Drawings side by side where there is room; nothing without any.
+#[must_use]
+pub fn charts(figures: &[String]) -> String {
+    if figures.is_empty() {
+        String::new()
+    } else {
+        format!("<div class=\"charts\">\n{}</div>\n", figures.concat())
+    }
+}

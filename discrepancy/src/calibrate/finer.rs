@@ -11,11 +11,11 @@
 
 use super::{Calibrated, UNRESOLVED};
 use crate::engine::{Engine, FACTOR_CHANGE};
-use crate::estimator::{CALIBRATION, Estimator, Iterate};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit, parameter_precisions};
 use crate::report::Quantity;
+use model_fit::estimator::{CALIBRATION, Estimator, Iterate};
 use plant::RigParameters;
 use plant::parameters::table::KEYS;
 

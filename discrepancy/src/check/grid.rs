@@ -1,7 +1,8 @@
 //! Rows on a regular grid of the record's period, so that lags and differences stay right where rows are missing.
 
 use super::notes::Notes;
-use crate::stats::median;
+use model_fit::SPARSEST;
+use model_fit::stats::median;
 use records::{Channel, Record};
 
 /// Indices of a record's rows in units of its period.
@@ -12,9 +13,6 @@ pub(super) struct Grid {
     /// The row of each place, if there is one.
     pub(super) rows: Vec<Option<usize>>,
 }
-
-/// Places for each row that a record may need at most; one with larger holes is taken row by row.
-pub(crate) const SPARSEST: usize = 20;
 
 impl Grid {
     /// The grid of the rows whose time was found good.

@@ -12,7 +12,7 @@
 //!
 //! Source: the lags are those of a variogram of second differences, Cressie 1993, Statistics for Spatial Data, 2.4.
 
-use crate::stats::median;
+use model_fit::stats::median;
 
 /// Samples of a block.
 const BLOCK: usize = 200;

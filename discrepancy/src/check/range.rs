@@ -9,8 +9,8 @@
 use super::PARKED;
 use super::grid::Grid;
 use super::notes::Notes;
-use super::quantum;
-use super::stuck::{by_chance, is_rest, runs};
+use model_fit::equal_runs::{by_chance, is_rest, runs};
+use model_fit::quantum;
 use plant::RigParameters;
 use records::{Channel, Quantity, Signal};
 

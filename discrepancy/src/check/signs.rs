@@ -14,7 +14,7 @@
 
 use super::grid::Grid;
 use super::notes::Notes;
-use crate::stats::{means, slopes};
+use model_fit::stats::{means, slopes};
 use plant::{Axis, RigParameters, StaticValve};
 use records::{Channel, Signal};
 

@@ -3,10 +3,11 @@
 //! Rows on the longest increasing subsequence of times are good, which separates a single wrong stamp from a clock that was set
 //! back. Source of the chain: Fredman 1975, Discrete Math. 11(1), longest growing subsequence.
 
-use super::grid::{SPARSEST, period_s};
+use super::grid::period_s;
 use super::notes::Notes;
 use crate::gridded_record::{HELD_LONGEST, SHORTEST};
-use crate::stats::quantile;
+use model_fit::SPARSEST;
+use model_fit::stats::quantile;
 use plant::{Axis, PERIOD_S};
 use records::{Channel, Signal};
 

@@ -5,7 +5,7 @@
 //! are tested elsewhere.
 
 use super::notes::Notes;
-use crate::stats::quantile;
+use model_fit::stats::quantile;
 use plant::{Axis, RigParameters};
 use records::{Channel, Signal};
 

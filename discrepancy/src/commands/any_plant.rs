@@ -3,10 +3,10 @@
 use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress};
 use crate::cli::ReadArguments;
 use crate::folder::{self, Folder};
-use crate::model_file::{
+use model_fit::{
     ClosedModel, ModelReport, ReportedModel, close, close_searching, extended, look, new_model, read,
 };
-use crate::page::significant;
+use pagekit::significant;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -116,11 +116,17 @@ fn in_words(report: &ModelReport) -> String {
     }
     for number in &report.parameters {
         let error = match number.standard_error {
-            Some(error) => format!("± {}", significant(error)),
+            Some(error) => format!("± {}", significant::short(error)),
             None if number.is_at_bound => "at the end of its range".to_owned(),
             None => "not determined".to_owned(),
         };
-        let _ = writeln!(text, "  {} = {} {error} {}", number.name, significant(number.value), number.unit);
+        let _ = writeln!(
+            text,
+            "  {} = {} {error} {}",
+            number.name,
+            significant::short(number.value),
+            number.unit
+        );
     }
     for suspect in &report.suspects {
         let _ = writeln!(

@@ -5,7 +5,7 @@
 //! is kept, and the simulation decides by the residual.
 
 use super::{POSITION_HALF_WIDTH, Parabola};
-use crate::stats::mean;
+use model_fit::stats::mean;
 use plant::PERIOD_S;
 
 /// Periods to each side that must be slow at rest.

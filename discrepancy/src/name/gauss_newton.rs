@@ -10,13 +10,13 @@
 use super::EFFECT_PARAMETER_PENALTY;
 use super::null_distribution::above_outlier_limit;
 use crate::engine::Engine;
-use crate::estimator::{Estimator, Iterate, JOINT, Step};
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
     EffectEstimate, MOST_OFF, Refit, coordinate_columns, is_at_bound, model_penalty, prior_deviations,
     prior_precisions, rig_of,
 };
+use model_fit::estimator::{Estimator, Iterate, JOINT, Step};
 use rayon::prelude::*;
 use std::borrow::Cow;
 

@@ -6,7 +6,7 @@ use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{Linearisation, Refit, parameter_precisions, rig_of};
 use crate::screen::Columns;
-use crate::stats::order_statistic;
+use model_fit::stats::order_statistic;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -12,7 +12,7 @@
 
 use crate::locate::maps::{BINS, bins, few_bins};
 use crate::locate::{UnknownSeries, VARIABLES};
-use crate::stats::mean_and_variance;
+use model_fit::stats::mean_and_variance;
 
 /// Circular shifts.
 pub(crate) const SHIFTS: usize = 200;

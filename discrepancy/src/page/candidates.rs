@@ -1,11 +1,11 @@
 //! The ranking of candidates, effects that are not excited, and detection limits.
 
-use super::draw::{Bar, bars, figure};
 use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as text_cell};
 use super::words;
-use crate::estimator::Convergence;
 use crate::report::{Candidate, Report};
 use crate::workflow::place_name;
+use model_fit::estimator::Convergence;
+use pagekit::plot::{Bar, bars, figure};
 
 /// Candidates that are drawn; all stand in the table.
 const DRAWN: usize = 15;

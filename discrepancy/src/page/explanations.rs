@@ -1,10 +1,10 @@
 //! The explanations that the search compared: how probable each is, what speaks for it and against it.
 
-use super::draw::{Bar, figure, share_bars};
 use super::markup::{number, paragraph, table, words as text_cell};
 use super::words;
 use crate::name::{Evidence, ExplanationKind};
 use crate::report::{EffectPlace, Explanation, Report, listed};
+use pagekit::plot::{Bar, figure, share_bars};
 
 pub(super) fn explanations(report: &Report) -> String {
     let row = |explanation: &Explanation| {

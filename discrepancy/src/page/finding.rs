@@ -1,15 +1,15 @@
 //! Findings in full: effects with numbers and alternatives, parameters, terms outside the catalogue, next experiment.
 
 use super::candidates;
-use super::draw::{Plot, Sample, figure, range};
 use super::markup::{Cell, charts, heading, number, paragraph, table, words as text_cell};
 use super::words;
-use crate::estimator::Convergence;
 use crate::outside::SHIFTS;
 use crate::report::{
     Curve, Dependence, LocatedTerm, LocatedVariable, NamedEffect, Outside, Quantity, Report, Surface,
     Verdict, listed,
 };
+use model_fit::estimator::Convergence;
+use pagekit::plot::{Plot, Sample, figure, range};
 use plant::effects::sheet;
 
 pub(super) fn title(report: &Report) -> &'static str {

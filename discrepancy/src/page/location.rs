@@ -1,12 +1,12 @@
 //! Where the disagreement is: bars over the balances, cells over the regimes, maps over variables, unknown inputs over time.
 
-use super::decimate::{COLUMNS, columns};
-use super::draw::{Bar, Plot, Sample, bars, figure, range};
 use super::finding::{curve_figure, located_variables};
 use super::markup::{Cell, charts, folded, heading, paragraph, table, words as text_cell};
 use super::words;
 use crate::locate::regime::REGIMES;
 use crate::report::{Location, Report, UnknownInput};
+use pagekit::plot::{Bar, Plot, Sample, bars, figure, range};
+use pagekit::plot::{COLUMNS, columns};
 
 /// Over this many times its noise a balance stands out to the eye.
 const CLEAR: f64 = 1.5;

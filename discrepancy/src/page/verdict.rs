@@ -2,7 +2,7 @@
 
 use super::words;
 use crate::report::{NamedEffect, Objection, Report, Verdict, listed};
-use crate::verify::WORSE;
+use model_fit::WORSE;
 use pagekit::page::escaped;
 
 /// The headline.

@@ -10,12 +10,12 @@
 
 use super::with_tables;
 use crate::engine::{Engine, FACTOR_CHANGE};
-use crate::estimator::{Convergence, Estimator, Options, Outcome, Step, TABLES, TABLES_WITHIN};
 use crate::fit::loss;
 use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
 use crate::windows::{ReferenceRun, VariableRanges};
+use model_fit::estimator::{Convergence, Estimator, Options, Outcome, Step, TABLES, TABLES_WITHIN};
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
@@ -176,7 +176,7 @@ pub(super) struct Iterate {
     pub(super) loss: f64,
 }
 
-impl crate::estimator::Iterate for Iterate {
+impl model_fit::estimator::Iterate for Iterate {
     fn loss(&self) -> f64 {
         self.loss
     }

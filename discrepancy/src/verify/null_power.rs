@@ -2,8 +2,8 @@
 
 use super::Model;
 use super::power::{Power, kept, levels, pooled, sums};
-use crate::stats::mean_and_variance;
 use crate::windows::Windows;
+use model_fit::stats::mean_and_variance;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;

@@ -2,8 +2,8 @@
 
 use super::VARIANCE_FACTOR_BOUNDS;
 use super::null_power::NullPower;
-use crate::stats::order_statistic;
 use crate::windows::WINDOW;
+use model_fit::stats::order_statistic;
 
 /// Share of trimmed windows.
 const LEFT_OUT: f64 = 0.02;

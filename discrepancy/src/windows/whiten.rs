@@ -2,7 +2,7 @@
 
 use super::{FORCE, WINDOW, Windows, dot};
 use crate::gridded_record::{CHANNELS, GriddedRecord};
-use crate::stats::median;
+use model_fit::stats::median;
 use plant::PERIOD_S;
 use rand_core::Rng;
 use rand_pcg::Pcg64;

@@ -6,7 +6,7 @@
 //! A gain of the input and a gain of the flow between the two do the same to `lower`, and only the first one changes `upper`. A
 //! gain of the sensor that is fitted hides them both.
 
-use discrepancy::model_file::{close, explain};
+use model_fit::{close, explain};
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! Model files closed on records that are simulated here, by another integrator, with a term hidden or none.
 
-use discrepancy::model_file::{ClosedModel, close, explain};
-use discrepancy::report::Verdict;
+use model_fit::Verdict;
+use model_fit::{ClosedModel, close, explain};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -140,7 +140,7 @@ fn a_term_of_a_library_is_named_and_written_into_the_extended_model() {
     assert_eq!(closed.report.named[0].term, "dv/dt = … + (-1/mass*(k*x^3))");
     let path = folder.path().join("extended.toml");
     fs::write(&path, closed.extended.unwrap()).unwrap();
-    let extended = discrepancy::model_file::read(&path).unwrap_or_else(|error| panic!("{error}"));
+    let extended = model_fit::read(&path).unwrap_or_else(|error| panic!("{error}"));
     let k = extended.parameters.iter().find(|one| one.name == "k").unwrap();
     assert!(extended.suspects[0].is_term && (k.values_si[0] / 400.0 - 1.0).abs() < 0.2, "{k:?}");
 }

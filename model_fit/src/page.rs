@@ -5,10 +5,10 @@ use super::explain::in_words;
 use super::held_out::Traces;
 use super::judge::share_in_words;
 use super::report::{Judgement, Left, ModelReport, Number, significant};
-use crate::page::draw::{Plot, Sample, figure, range};
-use crate::page::markup::{Cell, charts, number, paragraph, section, table, words};
 use model::Model;
+use pagekit::markup::{Cell, charts, number, paragraph, section, table, words};
 use pagekit::page::{document, escaped};
+use pagekit::plot::{Plot, Sample, figure, range};
 use std::ops::Range;
 
 /// Rows of a picture; of a longer record the stretch around the largest difference is drawn.

@@ -4,12 +4,12 @@
 //! and is skipped.
 
 use crate::real::{crate_folder, data};
-use discrepancy::model_file::{Left, ModelReport, close};
-use discrepancy::report::Verdict;
+use model_fit::Verdict;
+use model_fit::{Left, ModelReport, close};
 use std::path::{Path, PathBuf};
 
 fn shipped(name: &str) -> String {
-    std::fs::read_to_string(crate_folder().join("models").join(name)).unwrap()
+    std::fs::read_to_string(crate_folder().join("../discrepancy/models").join(name)).unwrap()
 }
 
 fn closed(text: &str, train: &[PathBuf], test: &[PathBuf]) -> ModelReport {

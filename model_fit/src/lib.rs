@@ -32,8 +32,16 @@
 //! | `explain` | equations, units, suspects in words |
 //! | `page` | the page |
 //! | `extended` | the model file with what was found |
+//! | [`estimator`] | Gauss-Newton of every nonlinear fit, that of the rig too: options, globalisation, outcome |
+//! | [`stats`], [`quantum`], [`equal_runs`] | order statistics and means; rounding and stuck values of a column |
+//! | `verdict` | what is concluded |
 //!
 //! Nothing of a held-out record is read before the terms are chosen and fitted. Keys and figures: `docs/model-files.md`.
+
+pub mod equal_runs;
+pub mod estimator;
+pub mod quantum;
+pub mod stats;
 
 mod adequacy;
 mod begin;
@@ -60,6 +68,7 @@ mod select;
 mod sensors;
 mod starts;
 mod structure;
+mod verdict;
 mod watch;
 
 pub use adequacy::Residual;
@@ -67,11 +76,12 @@ pub use begin::{NewError, new_model};
 pub use discover::{DiscoveredTerm, Located, Place};
 pub use explain::explain;
 pub use extended::{ExtendError, ReportedModel, extended};
-pub use held_out::JudgeError;
+pub use held_out::{JudgeError, WORSE};
+pub use processing::SPARSEST;
 pub use record::RecordError;
 pub use report::{Left, ModelReport};
+pub use verdict::Verdict;
 
-use crate::report::Verdict;
 use held_out::Traces;
 use model::{Failure, Model};
 use record::Measured;
@@ -91,13 +101,15 @@ pub enum ModelError {
 }
 
 /// Whether a text is a model file: TOML with outputs at its top, or of the former form. A rig file has neither.
-pub(crate) fn is_model_file(text: &str) -> bool {
+#[must_use]
+pub fn is_model_file(text: &str) -> bool {
     let has = |table: &toml::Table| table.contains_key("outputs") || table.contains_key("kind");
     text.parse::<toml::Table>().is_ok_and(|table| has(&table))
 }
 
 /// The shipped model file that stands for a model of one balance, as files were written until 0.1.0: TOML with a `kind`.
-pub(crate) fn successor(text: &str) -> Option<&'static str> {
+#[must_use]
+pub fn successor(text: &str) -> Option<&'static str> {
     let table: toml::Table = text.parse().ok()?;
     if table.contains_key("outputs") {
         return None;
@@ -298,7 +310,7 @@ mod tests {
         let of = |kind: &str| successor(&format!("kind = \"{kind}\"\n"));
         let shipped = ["mass", "friction", "chamber"].map(|kind| of(kind).unwrap());
         for name in shipped {
-            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(name);
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../discrepancy/models").join(name);
             assert!(read(&file).is_ok(), "{name}");
         }
         assert_eq!((of("spring"), successor("[outputs.y]\nvalue = \"1\"\n")), (None, None));

@@ -1,8 +1,8 @@
 //! The model file of a chamber on records that the plant made: a hidden volume, a valve that passes more, nothing.
 
 use crate::real::crate_folder;
-use discrepancy::model_file::{ModelReport, close};
-use discrepancy::report::Verdict;
+use model_fit::Verdict;
+use model_fit::{ModelReport, close};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use std::fmt::Write as _;
 
@@ -33,7 +33,7 @@ fn closed(rig: &RigParameters) -> ModelReport {
         std::fs::write(&file, record(rig, seed)).unwrap();
         file
     });
-    let model = crate_folder().join("models/chamber.toml");
+    let model = crate_folder().join("../discrepancy/models/chamber.toml");
     close(&model, &[train], &[test], &mut |_| {}).unwrap_or_else(|error| panic!("{error}")).report
 }
 

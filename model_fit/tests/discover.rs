@@ -5,8 +5,8 @@
 //! ```
 
 use crate::model_files::OSCILLATOR;
-use discrepancy::model_file::{ClosedModel, close, close_searching, read};
-use discrepancy::report::Verdict;
+use model_fit::Verdict;
+use model_fit::{ClosedModel, close, close_searching, read};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -42,12 +42,8 @@ fn record(mut seed: u64, hidden: fn(f64, f64, f64) -> f64) -> String {
     text
 }
 
-type Close = fn(
-    &Path,
-    &[PathBuf],
-    &[PathBuf],
-    &mut dyn FnMut(&str),
-) -> Result<ClosedModel, discrepancy::model_file::ModelError>;
+type Close =
+    fn(&Path, &[PathBuf], &[PathBuf], &mut dyn FnMut(&str)) -> Result<ClosedModel, model_fit::ModelError>;
 
 fn closed(folder: &Path, close: Close, hidden: fn(f64, f64, f64) -> f64) -> ClosedModel {
     let file = |name: &str, text: &str| {

@@ -3,14 +3,17 @@
 //! Every drawing is [`WIDTH`] wide and stands in a column of at most twice a telephone's width, so that its letters are about as
 //! large as the text's on any screen. Drawings have a title and a description for who does not see them.
 
-use super::decimate::Column;
-use super::words;
-use pagekit::page::escaped;
-use pagekit::svg::{Drawing, legend_entry, stroke, text};
+mod decimate;
+
+pub use decimate::{COLUMNS, Column, columns};
+
+use crate::page::escaped;
+use crate::significant;
+use crate::svg::{Drawing, legend_entry, stroke, text};
 use std::fmt::Write as _;
 
 /// Width of all drawings, in user units.
-pub(super) const WIDTH: f64 = 420.0;
+pub const WIDTH: f64 = 420.0;
 const LEFT: f64 = 54.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 24.0;
@@ -47,14 +50,18 @@ impl Scale {
         let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
         let large = self.low.abs().max(self.high.abs());
         let written = |value: f64| {
-            if (1e-4..1e5).contains(&large) { words::fixed(value, digits) } else { words::short(value) }
+            if (1e-4..1e5).contains(&large) {
+                significant::fixed(value, digits)
+            } else {
+                significant::short(value)
+            }
         };
         (first..=last).map(|index| index as f64 * step).map(|value| (value, written(value))).collect()
     }
 }
 
 /// Smallest and largest finite value; `None` without any.
-pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let start = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = values
         .filter(|value| value.is_finite())
@@ -63,7 +70,7 @@ pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// A pair of axes with what is drawn between them.
-pub(crate) struct Plot {
+pub struct Plot {
     x: Scale,
     y: Scale,
     body: String,
@@ -71,7 +78,7 @@ pub(crate) struct Plot {
 
 impl Plot {
     /// Empty axes over these ranges; a range without length gets some. The labels have their units.
-    pub(crate) fn new(x: (f64, f64), y: (f64, f64), x_label: &str, y_label: &str) -> Self {
+    pub fn new(x: (f64, f64), y: (f64, f64), x_label: &str, y_label: &str) -> Self {
         let wide = |(low, high): (f64, f64), room: f64| {
             let more = if high > low { (high - low) * room } else { low.abs().max(1.0) * 0.5 };
             (low - more, high + more)
@@ -100,7 +107,7 @@ impl Plot {
     }
 
     /// A stretch of the horizontal axis that is marked.
-    pub(super) fn stretch(&mut self, from: f64, to: f64) {
+    pub fn stretch(&mut self, from: f64, to: f64) {
         let (from, to) = (self.x.at(from), self.x.at(to));
         let _ = writeln!(
             self.body,
@@ -110,7 +117,7 @@ impl Plot {
     }
 
     /// All between two levels.
-    pub(super) fn between(&mut self, low: f64, high: f64) {
+    pub fn between(&mut self, low: f64, high: f64) {
         let (top, bottom) = (self.y.at(high), self.y.at(low));
         let _ = writeln!(
             self.body,
@@ -121,19 +128,19 @@ impl Plot {
     }
 
     /// A dashed level with its name.
-    pub(super) fn level(&mut self, value: f64) {
+    pub fn level(&mut self, value: f64) {
         let at = self.y.at(value);
         self.body += &stroke("cut", (LEFT, at), (WIDTH - RIGHT, at));
     }
 
     /// A band around a curve.
-    pub(super) fn band(&mut self, at: &[f64], low: &[f64], high: &[f64]) {
+    pub fn band(&mut self, at: &[f64], low: &[f64], high: &[f64]) {
         let there = at.iter().zip(high).chain(at.iter().zip(low).rev());
         self.path("area", there.map(|(x, y)| (*x, *y)), true);
     }
 
     /// A line, broken where a value is missing.
-    pub(crate) fn line(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>) {
+    pub fn line(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>) {
         let points: Vec<_> = points.collect();
         for piece in points.split(|(x, y)| !x.is_finite() || !y.is_finite()) {
             self.path(class, piece.iter().copied(), false);
@@ -141,7 +148,7 @@ impl Plot {
     }
 
     /// A long series: a line where each column has one value, else the area between smallest and largest.
-    pub(super) fn series(&mut self, line: &str, area: &str, pieces: &[Vec<Column>]) {
+    pub fn series(&mut self, line: &str, area: &str, pieces: &[Vec<Column>]) {
         for piece in pieces {
             let is_line = piece.iter().all(|column| column.low == column.high);
             let upper = piece.iter().map(|column| (column.time_s, column.high));
@@ -166,38 +173,42 @@ impl Plot {
         }
     }
 
-    pub(crate) fn drawn(self, identifier: &str, title: &str, description: &str) -> String {
+    /// The drawing, with a title and a description for who does not see it.
+    #[must_use]
+    pub fn drawn(self, identifier: &str, title: &str, description: &str) -> String {
         svg(identifier, TOP + BODY + FOOT, title, description, &self.body)
     }
 }
 
-pub(super) struct Bar {
-    pub(super) label: String,
+/// A bar of [`bars`] or [`share_bars`].
+pub struct Bar {
+    /// Its name, above it.
+    pub label: String,
     /// Its length, over the line at 1.
-    pub(super) value: f64,
+    pub value: f64,
     /// What stands behind it.
-    pub(super) text: String,
+    pub text: String,
     /// Whether it counts; else it is hollow.
-    pub(super) is_full: bool,
+    pub is_full: bool,
 }
 
 /// Height of a bar with its words.
 const BAR_ROW: f64 = 36.0;
 
 /// Bars over a logarithmic axis with a line at 1, which they start from: to the right of it is more than noise or chance.
-pub(super) fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
+pub fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
     let largest = bars.iter().map(|bar| bar.value).filter(|value| value.is_finite()).fold(3.0, f64::max);
     let scale = Scale { low: 0.3f64.log10(), high: largest.log10(), from: 8.0, to: WIDTH - 14.0 };
     let place = |value: f64| scale.at(if value.is_nan() { 1.0 } else { value.max(1e-9) }.log10());
     let decades = (1..=(largest.log10().floor() as i32)).map(|power| 10f64.powi(power));
-    let ticks: Vec<(f64, String)> = decades.map(|at| (at, words::round(at))).collect();
+    let ticks: Vec<(f64, String)> = decades.map(|at| (at, significant::round(at))).collect();
     bars_from((identifier, title), bars, place, (1.0, "1"), &ticks)
 }
 
 /// Bars of shares, from 0 to 1.
-pub(super) fn share_bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
+pub fn share_bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
     let scale = Scale { low: 0.0, high: 1.0, from: 8.0, to: WIDTH - 14.0 };
-    let ticks: Vec<(f64, String)> = [0.5, 0.9].map(|at| (at, words::percent(at))).into();
+    let ticks: Vec<(f64, String)> = [0.5, 0.9].map(|at| (at, significant::percent(at))).into();
     bars_from((identifier, title), bars, |value| scale.at(value.clamp(0.0, 1.0)), (0.0, "0"), &ticks)
 }
 
@@ -243,7 +254,7 @@ fn svg(identifier: &str, height: f64, title: &str, description: &str, body: &str
 
 /// How an entry of a legend is drawn.
 #[derive(Clone, Copy)]
-pub(crate) enum Sample {
+pub enum Sample {
     /// A line of this class.
     Line(&'static str),
     /// An area of this class.
@@ -251,7 +262,7 @@ pub(crate) enum Sample {
 }
 
 /// A drawing with its caption, what is said below it, and the names of its curves.
-pub(crate) fn figure(caption: &str, about: &str, legend: &[(Sample, &str)], drawing: &str) -> String {
+pub fn figure(caption: &str, about: &str, legend: &[(Sample, &str)], drawing: &str) -> String {
     let entry = |(sample, name): &(Sample, &str)| {
         let inside = match sample {
             Sample::Line(class) => format!("<path class=\"{class}\" d=\"M1 7L37 7\"/>"),

@@ -1,6 +1,6 @@
 //! What is said of the numbers of a model file, and of a report that is another model's.
 
-use discrepancy::model_file::{ClosedModel, ReportedModel, close, explain, read};
+use model_fit::{ClosedModel, ReportedModel, close, explain, read};
 use std::fs;
 use std::path::Path;
 

@@ -1,19 +1,22 @@
 //! Long series made as short as a drawing can show: of each column the smallest and the largest value, so that no spike is lost.
 
 /// Columns of a drawing; twice as many points at most.
-pub(super) const COLUMNS: usize = 500;
+pub const COLUMNS: usize = 500;
 
 /// A column of a series: its middle, the smallest and the largest value in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Column {
-    pub(super) time_s: f64,
-    pub(super) low: f64,
-    pub(super) high: f64,
+pub struct Column {
+    /// Of its first value, s.
+    pub time_s: f64,
+    /// Smallest value, in the unit of the series.
+    pub(crate) low: f64,
+    /// Largest value.
+    pub(crate) high: f64,
 }
 
 /// Pieces of a series without a gap: points where there are few, columns where there are many. Values that are not finite, and
 /// pauses of more than [`PAUSE`] usual steps, end a piece.
-pub(super) fn columns(time_s: &[f64], values: &[f64], most: usize) -> Vec<Vec<Column>> {
+pub fn columns(time_s: &[f64], values: &[f64], most: usize) -> Vec<Vec<Column>> {
     let points: Vec<(f64, f64)> = time_s.iter().copied().zip(values.iter().copied()).collect();
     let (Some(first), Some(last)) = (time_s.first(), time_s.last()) else { return Vec::new() };
     let count = points.len();

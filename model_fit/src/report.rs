@@ -12,9 +12,9 @@ use super::normal::standard_errors;
 use super::record::Measured;
 use super::select::{Fitted, Found};
 use super::structure::Structure;
+use crate::Verdict;
 use crate::estimator::Outcome;
-use crate::report::Verdict;
-use crate::verify::WORSE;
+use crate::held_out::WORSE;
 use model::{Change, Model};
 use serde::Serialize;
 use std::path::Path;
@@ -273,7 +273,7 @@ pub(super) fn notes_of(records: &[Measured]) -> Vec<String> {
 }
 
 pub(crate) fn significant(value: f64) -> String {
-    crate::page::significant(value)
+    pagekit::significant::short(value)
 }
 
 fn left(model: &Model, record: &str, output: usize, rms_si: [f64; 2], rows: usize) -> Left {

@@ -4,33 +4,33 @@
 //! the bit.
 
 /// The value at a rank from 0; `None` beyond the last.
-pub(crate) fn order_statistic(values: &mut [f64], rank: usize) -> Option<f64> {
+pub fn order_statistic(values: &mut [f64], rank: usize) -> Option<f64> {
     (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
 /// The value at the rank nearest to a share of the last rank; `None` for an empty list.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+pub fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     order_statistic(values, (values.len().saturating_sub(1) as f64 * share).round() as usize)
 }
 
 /// The median, the upper one of two; `None` for an empty list.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+pub fn median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, values.len() / 2)
 }
 
-pub(crate) fn mean(values: &[f64]) -> f64 {
+pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Mean and sample variance.
-pub(crate) fn mean_and_variance(values: &[f64]) -> (f64, f64) {
+pub fn mean_and_variance(values: &[f64]) -> (f64, f64) {
     let mean = mean(values);
     let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
     (mean, squares / (values.len() as f64 - 1.0))
 }
 
 /// Mean over `reach` places to each side; `None` where fewer than half of them are there.
-pub(crate) fn means(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
+pub fn means(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0_usize)];
     for value in values {
         let (sum, count) = sums[sums.len() - 1];
@@ -47,7 +47,7 @@ pub(crate) fn means(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
 }
 
 /// Change per place, from `reach` places before to `reach` after.
-pub(crate) fn slopes(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
+pub fn slopes(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
     (0..values.len())
         .map(|place| {
             let before = values[place.checked_sub(reach)?]?;

@@ -130,7 +130,8 @@ fn period_s(fitting: &Fitting<'_>) -> f64 {
 
 impl Located {
     /// A line of a report.
-    pub(crate) fn in_words(&self) -> String {
+    #[must_use]
+    pub fn in_words(&self) -> String {
         let of = |variables: &[String]| match variables {
             [] => "a constant".to_owned(),
             all => format!("a function of {}", all.join(" and ")),

@@ -2,7 +2,7 @@
 
 use super::super::report::{ModelReport, Number, place, term};
 use super::Discovery;
-use crate::report::Verdict;
+use crate::Verdict;
 use serde::Serialize;
 
 /// A term that a search found, which no suspect describes.

@@ -13,7 +13,7 @@ const TOLERANCE: f64 = 0.1;
 const FARTHEST: f64 = 30.0;
 
 /// Step of the values; `None` for values without one and for fewer than three distinct ones.
-pub(super) fn of(values: &[f64]) -> Option<f64> {
+pub fn of(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());

@@ -17,7 +17,7 @@ use super::fit::Fitting;
 use super::record::Measured;
 use super::report::significant;
 use super::select::Fitted;
-use crate::check::stuck;
+use crate::equal_runs::stuck;
 use crate::stats::{mean_and_variance, median, order_statistic};
 use model::{Model, Output, Program};
 

@@ -1,7 +1,7 @@
 //! Whether a report says that what is left is more than noise.
 
-use discrepancy::model_file::{ClosedModel, close};
-use discrepancy::report::Verdict;
+use model_fit::Verdict;
+use model_fit::{ClosedModel, close};
 use std::fs;
 
 const LINE: &str = r#"

@@ -10,9 +10,10 @@
 use super::filter::LowPass;
 use super::look::{HOLE, is_in_hole, usual_period_s};
 use super::record::{FEWEST_ROWS, Measured, RecordError};
-use crate::check::SPARSEST;
 use model::{Hold, Inputs, Model};
 
+/// Places for each row that a record may need at most; one with larger holes is taken row by row.
+pub const SPARSEST: usize = 20;
 /// Share of the period by which a sample may be beside an even grid.
 const BESIDE: f64 = 0.01;
 

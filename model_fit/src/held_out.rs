@@ -7,6 +7,9 @@ use super::select::{Fitted, Found};
 use super::starts;
 use model::Failure;
 
+/// Largest ratio of a signal's rms after to before.
+pub const WORSE: f64 = 1.02;
+
 /// What is left of an output on a record by both models, the baseline's first.
 #[derive(Clone, Debug)]
 pub(crate) struct Judged {

@@ -1,6 +1,6 @@
 //! What is said of a record before a model file is fitted to it.
 
-use discrepancy::model_file::{close, look};
+use model_fit::{close, look};
 use std::fs;
 
 /// A tank that drains, a pump that fills it.

@@ -1,7 +1,7 @@
 //! Model files of one balance, which integrate nothing, on records that are made here.
 
-use discrepancy::model_file::{ClosedModel, ModelError, close};
-use discrepancy::report::Verdict;
+use model_fit::Verdict;
+use model_fit::{ClosedModel, ModelError, close};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -8,9 +8,9 @@
 //! ```
 //!
 //! Backtracking on the simulated loss: a step counts only if the loss of the simulator falls, not that of the linearised model.
-//! Callers know how to linearise and which fits are linear within a step ([`crate::refit`] takes the baseline parameters as
-//! linear, [`crate::name`] and [`crate::tabulate`] simulate them). Through stick-slip the loss has steps, so that neither the
-//! slope nor a sufficient decrease is asked for.
+//! Callers know how to linearise and which fits are linear within a step (of the rig, `refit` takes the baseline parameters as
+//! linear, `name` and `tabulate` simulate them). Through stick-slip the loss has steps, so that neither the slope nor a
+//! sufficient decrease is asked for.
 //!
 //! Source: Björck, Numerical Methods for Least Squares Problems, SIAM 1996, chapter 9 (damped Gauss-Newton, variable projection).
 
@@ -18,14 +18,14 @@ use serde::Serialize;
 
 /// Options of a fit.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Options {
+pub struct Options {
     /// Most accepted steps.
-    pub(crate) steps: usize,
+    pub steps: usize,
     /// Fall of the loss in a step below which the fit has converged. The loss is minus twice a log-likelihood, so that a
     /// parameter off by one standard error costs 1; the tolerances are below what decides between two models.
-    pub(crate) converged: f64,
+    pub converged: f64,
     /// Fractions of the step that are tried, longest first.
-    pub(crate) fractions: &'static [f64],
+    pub fractions: &'static [f64],
 }
 
 /// Backtracking factor.
@@ -33,27 +33,27 @@ const SHORTER: f64 = 0.4;
 const SHORTER_TWICE: f64 = SHORTER * SHORTER;
 
 /// A candidate beside fixed parameter sensitivities. A step that is still too long at the last fraction crosses a break-away.
-pub(crate) const CANDIDATE: Options =
+pub const CANDIDATE: Options =
     Options { steps: 7, converged: 0.3, fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER] };
 /// All numbers of a model, with one fraction more: this is the model that is reported.
-pub(crate) const JOINT: Options = Options {
+pub const JOINT: Options = Options {
     steps: 6,
     converged: 0.3,
     fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER, SHORTER_TWICE * SHORTER_TWICE],
 };
 /// Tables: each step is some [`TABLES_WITHIN`] with the same derivatives, which cost many times a step.
-pub(crate) const TABLES: Options = Options { steps: 7, converged: 1.0, fractions: &[1.0, 0.4, 0.15, 0.05] };
+pub const TABLES: Options = Options { steps: 7, converged: 1.0, fractions: &[1.0, 0.4, 0.15, 0.05] };
 /// The same with the derivatives held.
-pub(crate) const TABLES_WITHIN: Options = Options { steps: 3, ..TABLES };
+pub const TABLES_WITHIN: Options = Options { steps: 3, ..TABLES };
 /// New linearisations of the parameters beside a candidate: those of a model that has an effect differ from the rig file's.
-pub(crate) const RELINEARISED: Options = Options { steps: 4, converged: 1.0, fractions: &[1.0] };
+pub const RELINEARISED: Options = Options { steps: 4, converged: 1.0, fractions: &[1.0] };
 /// New linearisations of the parameters alone, from the rig file's values to a supply or a mass that is a tenth off.
-pub(crate) const CALIBRATION: Options = Options { steps: 7, ..RELINEARISED };
+pub const CALIBRATION: Options = Options { steps: 7, ..RELINEARISED };
 
 /// How a fit ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Outcome {
+pub enum Outcome {
     /// The last step lowered the loss by less than the tolerance, or none promised more.
     #[default]
     Converged,
@@ -67,17 +67,17 @@ pub(crate) enum Outcome {
 
 /// How a fit ended and what it took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct Convergence {
-    pub(crate) outcome: Outcome,
+pub struct Convergence {
+    pub outcome: Outcome,
     /// Accepted steps.
-    pub(crate) iterations: usize,
+    pub iterations: usize,
     /// Simulations of the records for the loss; derivatives are not counted.
-    pub(crate) evaluations: usize,
+    pub evaluations: usize,
 }
 
 impl Convergence {
     /// What to doubt about it, in words.
-    pub(crate) fn doubt(self) -> Option<&'static str> {
+    pub fn doubt(self) -> Option<&'static str> {
         match self.outcome {
             Outcome::Converged => None,
             Outcome::Bound => Some("its fit ended at the end of a range"),
@@ -87,7 +87,7 @@ impl Convergence {
     }
 
     /// Of one fit after another.
-    pub(crate) fn then(self, next: Self) -> Self {
+    pub fn then(self, next: Self) -> Self {
         Convergence {
             outcome: next.outcome,
             iterations: self.iterations + next.iterations,
@@ -97,7 +97,7 @@ impl Convergence {
 }
 
 /// A simulated model.
-pub(crate) trait Iterate {
+pub trait Iterate {
     /// Loss of the windows with priors and penalties.
     fn loss(&self) -> f64;
     /// Whether a number is at the end of its range.
@@ -105,7 +105,7 @@ pub(crate) trait Iterate {
 }
 
 /// A step that was searched for.
-pub(crate) enum Step<P> {
+pub enum Step<P> {
     /// The next iterate.
     Taken(P),
     /// No fraction lowers the loss, though the linearised model promises this fall.
@@ -116,18 +116,18 @@ pub(crate) enum Step<P> {
 
 /// The loop of one fit, which counts.
 #[derive(Debug)]
-pub(crate) struct Estimator {
+pub struct Estimator {
     options: Options,
     evaluations: usize,
 }
 
 impl Estimator {
-    pub(crate) fn new(options: Options) -> Self {
+    pub fn new(options: Options) -> Self {
         Estimator { options, evaluations: 0 }
     }
 
     /// The longest fraction of a step that lowers the loss; `at` simulates a fraction.
-    pub(crate) fn backtrack<P: Iterate>(
+    pub fn backtrack<P: Iterate>(
         &mut self,
         from: &P,
         promised: f64,
@@ -146,17 +146,17 @@ impl Estimator {
     }
 
     /// Counts a simulation outside [`Estimator::backtrack`].
-    pub(crate) fn count(&mut self) {
+    pub fn count(&mut self) {
         self.evaluations += 1;
     }
 
     /// Counts those of a fit within a step.
-    pub(crate) fn count_all(&mut self, within: Convergence) {
+    pub fn count_all(&mut self, within: Convergence) {
         self.evaluations += within.evaluations;
     }
 
     /// Steps from a start until convergence.
-    pub(crate) fn descend<P: Iterate>(
+    pub fn descend<P: Iterate>(
         mut self,
         start: P,
         mut step: impl FnMut(&mut Self, &P) -> Step<P>,

@@ -15,7 +15,7 @@
 use super::fit::{Fitting, OfRecord};
 use super::report::{ModelReport, significant};
 use super::select::Fitted;
-use crate::report::Verdict;
+use crate::Verdict;
 use crate::stats::mean_and_variance;
 use model::Failure;
 use serde::Serialize;
@@ -51,7 +51,8 @@ impl Residual {
     }
 
     /// How much is left, of what, and how large its noise is.
-    pub(crate) fn in_words(&self) -> String {
+    #[must_use]
+    pub fn in_words(&self) -> String {
         let Self { output, unit, .. } = self;
         let [rms, signal, noise] = [self.rms, self.signal_rms, self.noise].map(significant);
         let error = match self.model_error_rms > 0.0 {

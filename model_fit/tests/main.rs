@@ -1,0 +1,14 @@
+//! The integration tests of `model-fit`, one executable.
+
+mod adequacy;
+mod advice;
+mod balances;
+mod chamber;
+mod discover;
+mod looks;
+mod model_files;
+mod numbers;
+#[path = "../../discrepancy/tests/real/mod.rs"]
+mod real;
+mod real_models;
+mod together;
