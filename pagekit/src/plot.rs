@@ -9,7 +9,7 @@ pub use decimate::{COLUMNS, Column, columns};
 
 use crate::page::escaped;
 use crate::significant;
-use crate::svg::{Drawing, legend_entry, stroke, text};
+use crate::svg::{Drawing, Scale, legend_entry, stroke, text};
 use std::fmt::Write as _;
 
 /// Width of all drawings, in user units.
@@ -21,43 +21,20 @@ const FOOT: f64 = 40.0;
 /// Height of what is inside the axes.
 const BODY: f64 = 176.0;
 
-/// From values to pixels, in equal steps.
-#[derive(Clone, Copy, Debug)]
-struct Scale {
-    low: f64,
-    high: f64,
-    from: f64,
-    to: f64,
-}
-
-impl Scale {
-    /// Where a value stands; at the axis' end when it is beyond it.
-    fn at(&self, value: f64) -> f64 {
-        let share = (value.clamp(self.low, self.high) - self.low) / (self.high - self.low);
-        self.from + if share.is_finite() { share } else { 0.0 } * (self.to - self.from)
-    }
-
-    /// Round values, about as many as asked for, as they are written.
-    fn ticks(&self, about: f64) -> Vec<(f64, String)> {
-        let rough = (self.high - self.low) / about;
-        if !rough.is_finite() || rough <= 0.0 {
-            return Vec::new();
+/// Round values of an axis, about as many as asked for, as they are written.
+fn ticks(scale: &Scale, about: f64) -> Vec<(f64, String)> {
+    let values = scale.round_values(about);
+    let [first, second, ..] = values[..] else { return Vec::new() };
+    let digits = (-(second - first).log10().floor()).clamp(0.0, 9.0) as usize;
+    let large = values.iter().fold(0.0_f64, |large, value| large.max(value.abs()));
+    let written = |value: f64| {
+        if (1e-4..1e5).contains(&large) {
+            significant::fixed(value, digits)
+        } else {
+            significant::short(value)
         }
-        let power = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough);
-        let step = step.unwrap_or(10.0 * power);
-        let (first, last) = ((self.low / step).ceil() as i64, (self.high / step).floor() as i64);
-        let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
-        let large = self.low.abs().max(self.high.abs());
-        let written = |value: f64| {
-            if (1e-4..1e5).contains(&large) {
-                significant::fixed(value, digits)
-            } else {
-                significant::short(value)
-            }
-        };
-        (first..=last).map(|index| index as f64 * step).map(|value| (value, written(value))).collect()
-    }
+    };
+    values.iter().map(|value| (*value, written(*value))).collect()
 }
 
 /// Smallest and largest finite value; `None` without any.
@@ -86,16 +63,16 @@ impl Plot {
         let (y_low, y_high) = wide(y, 0.06);
         let (x_low, x_high) = if x.1 > x.0 { x } else { wide(x, 0.0) };
         let mut plot = Plot {
-            x: Scale { low: x_low, high: x_high, from: LEFT, to: WIDTH - RIGHT },
-            y: Scale { low: y_low, high: y_high, from: TOP + BODY, to: TOP },
+            x: Scale::linear((x_low, x_high), (LEFT, WIDTH - RIGHT)),
+            y: Scale::linear((y_low, y_high), (TOP + BODY, TOP)),
             body: String::new(),
         };
-        for (value, label) in plot.y.ticks(5.0) {
+        for (value, label) in ticks(&plot.y, 5.0) {
             let at = plot.y.at(value);
             plot.body += &stroke("grid", (LEFT, at), (WIDTH - RIGHT, at));
             plot.body += &text("end", (LEFT - 6.0, at + 4.5), &label);
         }
-        for (value, label) in plot.x.ticks(6.0) {
+        for (value, label) in ticks(&plot.x, 6.0) {
             let at = plot.x.at(value);
             plot.body += &stroke("edge", (at, TOP + BODY), (at, TOP + BODY + 4.0));
             plot.body += &text("middle", (at, TOP + BODY + 18.0), &label);
@@ -198,8 +175,8 @@ const BAR_ROW: f64 = 36.0;
 /// Bars over a logarithmic axis with a line at 1, which they start from: to the right of it is more than noise or chance.
 pub fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
     let largest = bars.iter().map(|bar| bar.value).filter(|value| value.is_finite()).fold(3.0, f64::max);
-    let scale = Scale { low: 0.3f64.log10(), high: largest.log10(), from: 8.0, to: WIDTH - 14.0 };
-    let place = |value: f64| scale.at(if value.is_nan() { 1.0 } else { value.max(1e-9) }.log10());
+    let scale = Scale::logarithmic((0.3, largest), (8.0, WIDTH - 14.0));
+    let place = |value: f64| scale.at(if value.is_nan() { 1.0 } else { value });
     let decades = (1..=(largest.log10().floor() as i32)).map(|power| 10f64.powi(power));
     let ticks: Vec<(f64, String)> = decades.map(|at| (at, significant::round(at))).collect();
     bars_from((identifier, title), bars, place, (1.0, "1"), &ticks)
@@ -207,7 +184,7 @@ pub fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
 
 /// Bars of shares, from 0 to 1.
 pub fn share_bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
-    let scale = Scale { low: 0.0, high: 1.0, from: 8.0, to: WIDTH - 14.0 };
+    let scale = Scale::linear((0.0, 1.0), (8.0, WIDTH - 14.0));
     let ticks: Vec<(f64, String)> = [0.5, 0.9].map(|at| (at, significant::percent(at))).into();
     bars_from((identifier, title), bars, |value| scale.at(value.clamp(0.0, 1.0)), (0.0, "0"), &ticks)
 }
@@ -291,12 +268,12 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_told_apart() {
-        let scale = Scale { low: -3.0, high: 61.0, from: 0.0, to: 1.0 };
-        let ticks = |scale: Scale| scale.ticks(7.0).into_iter().map(|(_, text)| text).collect::<Vec<_>>();
-        assert_eq!(ticks(scale), ["0", "10", "20", "30", "40", "50", "60"]);
-        assert_eq!(ticks(Scale { low: 0.0, high: 0.05, ..scale })[1], "0.01");
-        assert!(ticks(Scale { low: 1.0, high: 1.0, ..scale }).is_empty());
-        assert_eq!(scale.at(1e9), 1.0);
+        let of = |low, high| ticks(&Scale::linear((low, high), (0.0, 1.0)), 7.0);
+        let texts = of(-3.0, 61.0).into_iter().map(|(_, text)| text).collect::<Vec<_>>();
+        assert_eq!(texts, ["0", "10", "20", "30", "40", "50", "60"]);
+        assert_eq!(of(0.0, 0.05)[1].1, "0.01");
+        assert!(of(1.0, 1.0).is_empty());
+        assert_eq!(Scale::linear((-3.0, 61.0), (0.0, 1.0)).at(1e9), 1.0);
     }
 
     #[test]
