@@ -1,6 +1,8 @@
 //! A program while it runs, and what is left of it: exit code and everything it said.
 
-use rustix::process::{Pid, Signal, kill_process, kill_process_group};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use rustix::process::{Pid, PidfdFlags, Signal, kill_process, kill_process_group, pidfd_open};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -116,15 +118,20 @@ impl Running {
         self.wait_within(PATIENCE)
     }
 
+    /// Without asking again and again, which would disturb runs in real time beside it.
     pub fn wait_within(mut self, limit: Duration) -> Ended {
         let until = Instant::now() + limit;
-        let status = loop {
-            if let Some(status) = self.child.try_wait().expect("a child can be waited for") {
-                break status;
+        let child = pidfd_open(self.pid(), PidfdFlags::empty()).expect("a child that was not waited for");
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let left = Timespec::try_from(left).expect("a limit of hours at most");
+            match poll(&mut [PollFd::new(&child, PollFlags::IN)], Some(&left)) {
+                Ok(0) => panic!("{} hangs; it said:\n{}", self.name, self.stderr()),
+                Ok(_) => break,
+                Err(error) => assert_eq!(error, Errno::INTR, "waiting for {}", self.name),
             }
-            assert!(Instant::now() < until, "{} hangs; it said:\n{}", self.name, self.stderr());
-            std::thread::sleep(POLL);
-        };
+        }
+        let status = self.child.wait().expect("a child can be waited for");
         self.output.iter_mut().for_each(Said::finish);
         Ended {
             name: self.name.clone(),
