@@ -16,7 +16,7 @@ def main():
             times = signal.timestamps.tolist()
             channels[signal.name] = {"unit": signal.unit, "times": times, "values": signal.samples.tolist()}
         start = mdf.header.start_time.timestamp()
-    json.dump({"start": start, "channels": channels}, sys.stdout)
+    print(json.dumps({"start": start, "channels": channels}))
 
 
 if __name__ == "__main__":

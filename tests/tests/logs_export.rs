@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use system_tests::binaries::Program;
-use system_tests::foreign_python::{python, run_script};
+use system_tests::foreign_python::{light_path, python, run_script};
 use system_tests::launch::{Pace, run_both};
 use system_tests::process::{Ended, Running};
 use system_tests::records::Table;
@@ -26,7 +26,13 @@ fn run_folder() -> PathBuf {
 
 fn export(source: &Path, format: &str, out: &Path, options: &[&str]) -> Ended {
     let mut bench = Program::Bench.command();
-    bench.env("AIRBENCH_PYTHON", python()).arg("export").arg(source).args(["--to", format, "--out"]).arg(out);
+    bench
+        .env("AIRBENCH_PYTHON", python())
+        .env("PYTHONPATH", light_path())
+        .arg("export")
+        .arg(source)
+        .args(["--to", format, "--out"])
+        .arg(out);
     Running::start("bench export", bench.args(options)).wait()
 }
 
