@@ -49,7 +49,7 @@ def codec(folder):
 
 
 def build(folder, codec_folder, mutation=None):
-    """The firmware's two programs for Linux in `folder`/build, changed or as it is, with the codec.
+    """The firmware for the embedded bus, which the suite runs, in `folder`/build, changed or as it is, with the codec.
 
     :raises ValueError: the text to be changed does not stand in its file exactly once.
     """
@@ -61,7 +61,7 @@ def build(folder, codec_folder, mutation=None):
             raise ValueError(f"{mutation.name}: what it changes stands {text.count(mutation.old)} times in {mutation.file}")
         (sources / mutation.file).write_text(text.replace(mutation.old, mutation.new))
     shutil.copytree(codec_folder, folder / "build")
-    _make(sources, folder / "build")
+    _make(sources, folder / "build", folder / "build/firmware-embedded")
     return folder / "build"
 
 
