@@ -11,7 +11,7 @@
 #![allow(clippy::print_stdout)]
 
 use discrepancy::candidates::Candidate;
-use discrepancy::next::closed_loop::{ClosedLoopRun, drive};
+use discrepancy::next::closed_loop::{ClosedLoopRun, SEED, drive};
 use discrepancy::next::menu::Entry;
 use discrepancy::parameters::PARAMETERS;
 use plant::{Plant, RigParameters};
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .iter()
         .try_fold(baseline, |rig, key| rig.with(key, &[0.0]))?;
     let quiet = &quiet;
-    let driven = drive(&STEP, quiet, quiet)?;
+    let driven = drive(&STEP, quiet, quiet, SEED)?;
     let began = driven.began.ok_or("the baseline does not come to its step")?;
     let edge = edge(&driven, began).ok_or("no edge of the valve")?;
     let hidden = changes(quiet, &driven, edge)?;
@@ -128,7 +128,7 @@ fn row(
     hidden: &Changes,
     noise: &[f64; 3],
 ) -> Result<(f64, String), String> {
-    let driven = drive(&STEP, quiet, rig).map_err(|error| error.to_string())?;
+    let driven = drive(&STEP, quiet, rig, SEED).map_err(|error| error.to_string())?;
     let Some(edge) = driven.began.and_then(|began| edge(&driven, began)) else {
         return Ok((f64::NEG_INFINITY, format!("{head} the step was not reached | | | | | |")));
     };

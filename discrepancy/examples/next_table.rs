@@ -1,10 +1,12 @@
-//! Prints the tables of `discrepancy/docs/next.md`: T of pairs of twins in every entry of the menu.
+//! Prints the tables of `discrepancy/docs/next.md`: T of pairs of twins in every entry of the menu, and what
+//! is proposed.
 //!
 //! Pairs are those that the study calls twins (tests/study/classes.json, tests/docs/study.md) and those of effects.md; each
 //! with numbers that make the two about as large: those of the middle of what is drawn.
 
 use discrepancy::next::menu::MENU;
-use discrepancy::next::{Explanation, propose};
+use discrepancy::next::noise::ReadingNoise;
+use discrepancy::next::{Explanation, Question, judge, propose};
 use plant::RigParameters;
 use plant::effects::sheet;
 use std::io::Write;
@@ -47,11 +49,15 @@ const PAIRS: &[(Given, Given)] = &[
 fn explanation((name, place, number): &Given) -> Result<Explanation, Box<dyn std::error::Error>> {
     let baseline = RigParameters::baseline();
     if name.starts_with("parameter:") {
-        return Ok(Explanation { rig: baseline.with(place, &[*number])?, names: vec![(*name).to_owned()] });
+        return Ok(Explanation {
+            rig: baseline.with(place, &[*number])?,
+            names: vec![(*name).to_owned()],
+            errors: Vec::new(),
+        });
     }
     let amplitude = sheet(name).ok_or_else(|| format!("no effect {name}"))?.keys[0].name;
     let rig = baseline.with_effect(name, place, &[(amplitude, *number)])?;
-    Ok(Explanation { rig, names: vec![format!("{name} {place}")] })
+    Ok(Explanation { rig, names: vec![format!("{name} {place}")], errors: Vec::new() })
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -62,11 +68,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     writeln!(out, "|---|{}---|", "---:|".repeat(names.len()))?;
     for (one, other) in PAIRS {
         let both = [explanation(one)?, explanation(other)?];
-        let proposal = propose(&baseline, &both, [true, true], &mut |_| {});
-        let of = |name: &str| proposal.table.iter().find(|judged| judged.name == name);
-        let cells: Vec<_> = names
+        let noise = ReadingNoise::specified(&baseline);
+        let question = Question {
+            baseline: &baseline,
+            explanations: &both,
+            axes_measured: [true, true],
+            noise: &noise,
+            training: None,
+        };
+        let proposal = propose(question, &mut |_| {});
+        let cells: Vec<_> = MENU
             .iter()
-            .map(|name| of(name).map_or_else(|| "-".to_owned(), |judged| shown(judged.least())))
+            .map(|entry| judge(entry, &baseline, &both, [true, true]))
+            .map(|judged| judged.map_or_else(|| "-".to_owned(), |judged| shown(judged.least())))
             .collect();
         let proposed = proposal.next.experiment.or(proposal.next.otherwise).unwrap_or_default();
         let pair = format!("{}, {}", both[0].names[0], both[1].names[0]);

@@ -140,7 +140,8 @@ impl Candidate {
         suspects.iter().filter(shown).map(one).collect()
     }
 
-    fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
+    /// An effect at a place, beside what the rig file has there.
+    pub(crate) fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
         let effect = rig.effects().iter().find(|effect| effect.name == sheet.name && effect.place == place);
         let present = effect.map(|effect| {
             let mut numbers = [0.0; MOST_KEYS];

@@ -101,6 +101,12 @@ impl Products {
             .collect();
     }
 
+    /// The same residual with the squares that noise adds on average.
+    pub(crate) fn with_expected_noise(mut self) -> Self {
+        self.squares.iter_mut().zip(&self.dof).for_each(|(square, dof)| *square += dof);
+        self
+    }
+
     /// The same with further columns, whose products are known: for each window C'e of the further ones, and the information
     /// between the present and the further ones, and among the further ones.
     pub(crate) fn extended(

@@ -188,7 +188,6 @@ impl GriddedRecord {
         places: &[usize],
     ) {
         let i = axis.index();
-        let stroke_m = rig.cylinder().stroke_m;
         let sensors = rig.sensors();
         let offset_m = if axis == Axis::Load { sensors.load_position_offset_m } else { 0.0 };
         let mut commands = vec![None; self.len()];
@@ -228,6 +227,28 @@ impl GriddedRecord {
         for (inputs, command) in self.inputs.iter_mut().zip(&commands) {
             inputs.valve[i] = quantise_valve(command.unwrap_or(0.0).clamp(-1.0, 1.0));
         }
+        self.smooth(axis, rig);
+    }
+
+    /// A record of simulated samples: inputs, samples, noise and measured axes are given.
+    pub(crate) fn of_samples(given: GriddedRecord, rig: &RigParameters) -> GriddedRecord {
+        let mut gridded = GriddedRecord {
+            points: vec![[AxisState::default(); 2]; given.len()],
+            excluded_periods: vec![false; given.len()],
+            ..given
+        };
+        for axis in Axis::ALL {
+            if gridded.measured[axis.index()] {
+                gridded.smooth(axis, rig);
+            }
+        }
+        gridded
+    }
+
+    /// Points, autocorrelation and jitter of an axis from its samples.
+    fn smooth(&mut self, axis: Axis, rig: &RigParameters) {
+        let i = axis.index();
+        let stroke_m = rig.cylinder().stroke_m;
         let column =
             |at: usize| -> Vec<Option<f64>> { self.samples.iter().map(|sample| sample[i][at]).collect() };
         let positions = column(0);

@@ -34,7 +34,7 @@ use crate::screen::{Columns, Screened};
 use consistency::{amplitude_variation, eliminate_inconsistent, prefer_consistent, prefer_large};
 pub use decision::NotExplained;
 use decision::{Decision, Searched, decide};
-pub(crate) use elimination::same;
+pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, same};
 use elimination::{alternatives, eliminate_backward, swap};
 pub use explanations::{Evidence, Explanation, ExplanationKind};
 use explanations::{Fits, explanations};

@@ -1,45 +1,55 @@
-//! Experiment design: the experiment that best discriminates between ambiguous explanations.
+//! Experiment design: the experiment that best tells ambiguous explanations apart, by rehearsal.
 //!
 //! ```text
-//!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair
-//!                                                 ──► most pairs apart, then the largest least T
+//!   explanations ──► each entry of the menu, rehearsed as if each were true, with the records' noise
+//!                ──► refitted by all explanations ──► share of the rehearsed records that tell them apart
 //! ```
 //!
-//! T is the expected gain in chi2 of the true explanation over its rival with refitted amplitude, with noise and model error
-//! (`next/divergence.rs`). The target is 25, a distance d' = 5 between the two mean records: the difference of chi2 has mean 25
-//! and standard deviation 10, so that noise alone prefers the rival in 0.6 % of records. The criterion is T-optimality [Atkinson,
-//! Fedorov 1975]. Repetitions average noise: an experiment that reaches 25
-//! within [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`remedies`] names a manual measurement: tilting,
-//! uncoupling, locking the piston.
+//! The probability is that of the refits (`next/refits.rs`, `next/choice.rs`). An experiment that reaches `choice::WANTED`
+//! within [`MOST_REPETITIONS`] is proposed with so many, and a second one where it leaves much open. Where none is worth its
+//! time, [`remedies`] names a manual measurement: tilting, uncoupling, locking the piston.
+//!
+//! T of the proposed entry stands beside it: the expected gain in chi2 of the true explanation over its rival with refitted
+//! amplitude, with noise and model error (`next/divergence.rs`). Its target is 25, a distance d' = 5 between the two mean
+//! records. Alone, as the criterion of T-optimality [Atkinson, Fedorov 1975], it takes noise as white and the rival's other
+//! numbers as known.
 //!
 //! | file | holds |
 //! |---|---|
 //! | [`menu`] | the experiments |
 //! | [`closed_loop`] | one of them in closed loop with an explanation's rig |
+//! | [`noise`] | the noise of the training records, drawn anew |
+//! | [`refits`] | rehearsed records refitted by all explanations |
+//! | [`choice`] | the experiment that tells them apart most often |
 //! | [`divergence`] | how far explanations lie apart in it |
 //! | [`nuisance`] | baseline parameters that are refitted jointly |
 //! | [`remedies`] | what would separate effects where no experiment does |
 //!
-//! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner
-//! 1965; Atkinson and Fedorov 1975, Biometrika 62(1): T-optimality.
+//! Which entry separates which twins: `discrepancy/docs/next.md`. Source: issue 32, 6; discrepancy-notes.md, pipeline 9; Hunter
+//! and Reiner 1965; Atkinson and Fedorov 1975, Biometrika 62(1): T-optimality.
 
+pub mod choice;
 pub mod closed_loop;
 pub(crate) mod divergence;
 pub mod menu;
+pub mod noise;
 pub(crate) mod nuisance;
+pub mod refits;
 pub(crate) mod remedies;
 
-use crate::report::{Next, listed};
-use closed_loop::drive;
+use crate::engine::Engine;
+use crate::report::{Next, SecondExperiment, listed};
+use choice::{Probability, RehearsedEntry, WORTH_IT, rehearse, second};
+use closed_loop::{SEED, drive};
 use divergence::{Divergence, divergences};
 use menu::{Entry, MENU};
+use noise::ReadingNoise;
 use plant::RigParameters;
 use rayon::prelude::*;
+use refits::{Setting, axes_concerned};
 
-/// Target divergence, a squared distance: d' = 5.
-pub(crate) const TARGET_DIVERGENCE: f64 = 25.0;
 /// Maximum number of repetitions.
-pub(crate) const MOST_REPETITIONS: u32 = 6;
+pub(crate) const MOST_REPETITIONS: usize = 6;
 
 /// A model that explains the records.
 #[derive(Clone, Debug)]
@@ -48,6 +58,8 @@ pub struct Explanation {
     pub rig: RigParameters,
     /// Its effects, as `line-delay drive` or `parameter:mass`.
     pub names: Vec<String>,
+    /// Standard errors of the numbers of its effects, by name and place; the numbers of others have the priors of naming.
+    pub errors: Vec<(String, Vec<Option<f64>>)>,
 }
 
 impl Explanation {
@@ -71,50 +83,51 @@ pub struct Proposal {
     pub next: Next,
     /// Text of the experiment file, if one is proposed.
     pub(crate) experiment_toml: Option<String>,
-    /// All entries of the menu that can be rehearsed, in its order.
-    pub table: Vec<ExperimentDivergences>,
+    /// All entries of the menu that can be rehearsed, the best first.
+    pub rehearsed: Vec<RehearsedEntry>,
 }
 
 impl ExperimentDivergences {
     /// The smallest T of its pairs, in one repetition.
     pub fn least(&self) -> f64 {
-        self.pairs.iter().map(|pair| pair.2.in_repetitions(1)).fold(f64::INFINITY, f64::min)
+        self.least_in_repetitions(1)
     }
 
-    /// T in `times` repetitions of the pairs that reach the target within [`MOST_REPETITIONS`].
-    fn apart(&self, times: u32) -> impl Iterator<Item = f64> {
-        let enough =
-            self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= TARGET_DIVERGENCE);
-        enough.map(move |pair| pair.2.in_repetitions(times))
-    }
-
-    /// The smallest of those; 0 without one.
-    fn least_apart(&self, times: u32) -> f64 {
-        let least = self.apart(times).fold(f64::INFINITY, f64::min);
-        if least.is_finite() { least } else { 0.0 }
+    fn least_in_repetitions(&self, times: usize) -> f64 {
+        self.pairs.iter().map(|pair| pair.2.in_repetitions(times)).fold(f64::INFINITY, f64::min)
     }
 }
 
-/// Proposes the experiment that best discriminates between explanations, or a manual measurement where none does.
-///
-/// `axes_measured` are drive and load. The new record will be used together with the present ones, on their common axes. Where
-/// that is one axis, entries with linked rods are left out. `progress` gets a line for each entry of the menu.
-pub fn propose(
-    baseline: &RigParameters,
-    explanations: &[Explanation],
-    axes_measured: [bool; 2],
-    progress: &mut dyn FnMut(&str),
-) -> Proposal {
-    let mut table = Vec::new();
-    if explanations.len() > 1 {
-        let both = axes_measured == [true, true];
-        for entry in MENU.iter().filter(|entry| both || !entry.is_linked()) {
-            progress(&format!("rehearsing {}", entry.name));
-            table.extend(judge(entry, baseline, explanations, axes_measured));
-        }
+/// What is proposed for.
+#[derive(Clone, Copy)]
+pub struct Question<'a> {
+    pub baseline: &'a RigParameters,
+    pub explanations: &'a [Explanation],
+    /// Drive and load. The new record will be used together with the present ones, on their common axes; where that is one axis,
+    /// entries with linked rods are left out.
+    pub axes_measured: [bool; 2],
+    pub noise: &'a ReadingNoise,
+    /// The training records; without them the explanations are taken as exact.
+    pub training: Option<&'a Engine<'a>>,
+}
+
+/// Proposes the experiment that best tells explanations apart, or a manual measurement where none does. `progress` gets a line
+/// for each entry of the menu.
+pub fn propose(question: Question<'_>, progress: &mut dyn FnMut(&str)) -> Proposal {
+    let Question { baseline, explanations, axes_measured, noise, training } = question;
+    if explanations.len() < 2 {
+        return Proposal::without("nothing is ambiguous".to_owned(), None, Vec::new());
     }
-    let (next, experiment_toml) = choose(explanations, &table);
-    Proposal { next, experiment_toml, table }
+    let both = axes_measured == [true, true];
+    let entries: Vec<&Entry> = MENU.iter().filter(|entry| both || !entry.is_linked()).collect();
+    let measured = axes_concerned(baseline, explanations, axes_measured);
+    let shrinkage = vec![vec![1.0; explanations.len()]; explanations.len()];
+    let setting = Setting { baseline, explanations, noise, measured, shrinkage };
+    let setting = match training {
+        Some(training) => setting.shrunk_by(training),
+        None => setting,
+    };
+    choose(question, rehearse(&setting, &entries, progress))
 }
 
 /// T of all ordered pairs in an entry; `None` where a rehearsal fails, does not end or comes near an end of the stroke.
@@ -131,7 +144,7 @@ pub fn judge(
     let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
         .into_par_iter()
         .map(|truth| {
-            let run = drive(entry, baseline, &explanations[truth].rig).ok()?;
+            let run = drive(entry, baseline, &explanations[truth].rig, SEED).ok()?;
             let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
             let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != truth).collect();
             let rigs: Vec<_> = [truth].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
@@ -142,59 +155,69 @@ pub fn judge(
     Some(ExperimentDivergences { name: entry.name, pairs: pairs?.concat() })
 }
 
-fn choose(explanations: &[Explanation], table: &[ExperimentDivergences]) -> (Next, Option<String>) {
+impl Proposal {
+    fn without(reason: String, otherwise: Option<String>, rehearsed: Vec<RehearsedEntry>) -> Self {
+        let next = Next { reason, otherwise, ..Next::default() };
+        Proposal { next, experiment_toml: None, rehearsed }
+    }
+}
+
+/// The probability in words, for a number of trials.
+fn told_in_words(probability: Probability, trials: usize) -> String {
+    let Probability { value, low, high } = probability;
+    format!("in {:.0} % of {trials} rehearsed records ({:.0} to {:.0} %)", 1e2 * value, 1e2 * low, 1e2 * high)
+}
+
+fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
+    let explanations = question.explanations;
     let titles: Vec<String> = explanations.iter().map(Explanation::title).collect();
     let alike = format!("{} explain the records alike", listed(&titles));
-    // Ties go to the first of the menu.
-    let better = |one: &ExperimentDivergences, other: &ExperimentDivergences| {
-        let key = |judged: &ExperimentDivergences| (judged.apart(1).count(), judged.least_apart(1));
-        key(one) > key(other)
-    };
-    let best = table.iter().fold(None, |best: Option<&ExperimentDivergences>, one| match best {
-        Some(best) if !better(one, best) => Some(best),
-        _ => Some(one),
-    });
-    let Some(best) = best else {
-        let reason = if explanations.len() < 2 {
-            "nothing is ambiguous".to_owned()
-        } else {
-            format!("{alike}, and no experiment of the menu can be rehearsed with them")
-        };
-        return (Next { reason, experiment: None, divergence: None, otherwise: None }, None);
+    let Some(best) = rehearsed.first() else {
+        let reason = format!("{alike}, and no experiment of the menu can be rehearsed with them");
+        return Proposal::without(reason, None, rehearsed);
     };
     let entry = MENU.iter().find(|entry| entry.name == best.name).expect("it is of the menu");
-    let left: Vec<(usize, usize)> = best
-        .pairs
-        .iter()
-        .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < TARGET_DIVERGENCE)
-        .map(|(one, other, _)| (*one.min(other), *one.max(other)))
-        .collect();
+    let times = best.repetitions(MOST_REPETITIONS);
+    let probability = best.probability(times);
+    let open = best.pairs(times).into_iter().filter(|pair| pair.2 < WORTH_IT);
+    let left: Vec<(usize, usize)> = open.map(|(one, other, _)| (one.min(other), one.max(other))).collect();
     let otherwise = remedies::of_pairs(explanations, &left);
-    if left.len() == best.pairs.len() {
-        let reason = format!(
-            "{alike}, and no experiment of this rig separates them: \
-             the best, {}, is expected to by {:.1}, and {TARGET_DIVERGENCE} are wanted",
-            best.name,
-            best.least()
-        );
-        return (Next { reason, experiment: None, divergence: Some(best.least()), otherwise }, None);
-    }
-    let times = (1..MOST_REPETITIONS).find(|times| best.least_apart(*times) >= TARGET_DIVERGENCE);
-    let times = times.unwrap_or(MOST_REPETITIONS);
+    let told = told_in_words(probability, best.trials.len());
+    let divergence = judge(entry, question.baseline, explanations, question.axes_measured)
+        .map(|judged| judged.least_in_repetitions(times));
+    let found = Next {
+        divergence,
+        probability: Some(probability.value),
+        probability_interval: Some([probability.low, probability.high]),
+        rehearsals: Some(best.trials.len()),
+        otherwise,
+        ..Next::default()
+    };
     let how_often = if times > 1 { format!(" in {times} repetitions") } else { String::new() };
+    if probability.value < WORTH_IT {
+        let reason = format!(
+            "{alike}, and no experiment of this rig separates them: the best, {}, is expected to{how_often} {told}",
+            best.name
+        );
+        let next = Next { reason, ..found };
+        return Proposal { next, experiment_toml: None, rehearsed };
+    }
     let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
-    let total = best.least_apart(times);
     let reason = format!(
-        "{alike}; {}, which serves to tell apart {}, is expected to separate them by {total:.0}{how_often} \
-         ({TARGET_DIVERGENCE} are wanted){rest}",
+        "{alike}; {}, which serves to tell apart {}, is expected to separate them{how_often} {told}{rest}",
         entry.name, entry.purpose
     );
-    let experiment = Some(entry.file());
-    (Next { reason, experiment, divergence: Some(total), otherwise }, Some(text(entry, times)))
+    let then = second(best, times, &rehearsed).map(|(after, both)| SecondExperiment {
+        experiment: after.name.to_owned(),
+        probability: both.value,
+        probability_interval: [both.low, both.high],
+    });
+    let next = Next { reason, experiment: Some(entry.file()), then, ..found };
+    Proposal { next, experiment_toml: Some(text(entry, times)), rehearsed }
 }
 
 /// The file of an entry with so many repetitions.
-fn text(entry: &Entry, times: u32) -> String {
+fn text(entry: &Entry, times: usize) -> String {
     let how = "# Proposed by 'discrepancy next'. Run it as it is: scripts/run FILE\n";
     let toml = if times > 1 {
         entry.toml.replacen("[run]\n", &format!("[run]\nrepetitions = {times}\n"), 1)

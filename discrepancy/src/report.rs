@@ -4,12 +4,14 @@
 //! and `verification` know the held-out record.
 
 mod declared;
+mod next;
 mod objection;
 
 use crate::name::{Evidence, ExplanationKind};
 pub use declared::DeclaredSuspect;
 pub use model_fit::Verdict;
 use model_fit::estimator::Convergence;
+pub use next::{Next, SecondExperiment};
 pub(crate) use objection::Objection;
 use plant::effects::sheet::{Part, Place};
 use serde::{Deserialize, Serialize};
@@ -467,15 +469,4 @@ pub(crate) fn listed(words: &[String]) -> String {
 /// Decimals of a value that is rounded to the second digit of its standard error.
 pub(crate) fn decimals(standard_error: f64) -> usize {
     (1.0 - standard_error.log10().floor()).clamp(0.0, 12.0) as usize
-}
-
-#[derive(Clone, Debug, Serialize)]
-pub struct Next {
-    pub reason: String,
-    /// File of the experiment beside the report; null when none discriminates.
-    pub experiment: Option<String>,
-    /// Expected divergence of the alternatives, in squared standard deviations; the target is 25.
-    pub(crate) divergence: Option<f64>,
-    /// Manual measurement that resolves the ambiguity where no experiment does.
-    pub otherwise: Option<String>,
 }

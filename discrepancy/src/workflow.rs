@@ -9,6 +9,7 @@
 
 mod explained;
 mod findings;
+mod proposal;
 mod reported;
 
 use crate::check::{Checked, check};
@@ -18,12 +19,11 @@ use crate::extend::{Addition, ExtendError, add_tables, add_terms, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::locate::{UnknownSeries, locate};
 use crate::name::{SelectionResult, is_off, on_all};
-use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
 use crate::parameters::COUNT;
 use crate::refit::{Refit, rig_of};
-use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Next, Report, Verdict};
+use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Report, Verdict};
 use crate::suspects::Suspect;
 use crate::tabulate::{tables, tabulate};
 use crate::verify::{drawn, verify};
@@ -34,6 +34,8 @@ pub(crate) use findings::place_name;
 use findings::{report_of, summary};
 use model_fit::is_model_file;
 use plant::{Axis, ParameterError, RigParameters};
+pub use proposal::proposal;
+use proposal::proposal_for;
 use records::{ReadError, ReadOptions};
 pub use reported::Reported;
 use std::path::{Path, PathBuf};
@@ -218,7 +220,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     let reported = Reported::from(&report);
     let mut experiment = None;
     if report.verdict == Verdict::Ambiguous
-        && let Some(proposal) = proposal_for(&rig_file, &reported, records[0].measured, progress)
+        && let Some(proposal) = proposal_for(&rig_file, &reported, Some(&engine), progress)
     {
         experiment = proposal.experiment_toml;
         report.next = Some(proposal.next);
@@ -346,43 +348,6 @@ pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, Exten
     let text = add_terms(&text, &rig_file.file, &terms, &reported.inputs.train)?;
     let tables_of = reported.outside.as_ref().map_or(&[][..], |outside| &outside.tables);
     add_tables(&text, &rig_file.file, &tables(tables_of), &reported.inputs.train)
-}
-
-/// Proposes an experiment for an ambiguous report; `None` when it is not ambiguous.
-pub fn proposal(rig_file: &RigFile, reported: &Reported, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
-    proposal_for(rig_file, reported, reported.measured(), progress)
-}
-
-fn proposal_for(
-    rig_file: &RigFile,
-    reported: &Reported,
-    measured: [bool; 2],
-    progress: &mut dyn FnMut(&str),
-) -> Option<Proposal> {
-    let at = reported.named.iter().position(|named| !named.alternatives.is_empty())?;
-    let others = &reported.named[at].alternatives;
-    let explanations: Vec<Explanation> = std::iter::once(&reported.named[at])
-        .chain(others)
-        .filter_map(|alternative| {
-            let mut with = reported.clone();
-            with.named[at] = alternative.clone();
-            let rig = RigParameters::from_toml(&extended(rig_file, &with).ok()?, &rig_file.file).ok()?;
-            let names =
-                with.named.iter().map(|named| format!("{} {}", named.effect, place_name(&named.place)));
-            Some(Explanation { rig, names: names.collect() })
-        })
-        .collect();
-    if explanations.len() < 2 {
-        let named = &reported.named[at];
-        let reason = format!(
-            "{} {} and what explains as much cannot both be written into the rig file beside the rest: nothing can be rehearsed",
-            named.effect,
-            place_name(&named.place)
-        );
-        let next = Next { reason, experiment: None, divergence: None, otherwise: None };
-        return Some(Proposal { next, experiment_toml: None, table: Vec::new() });
-    }
-    Some(next::propose(&rig_file.rig, &explanations, measured, progress))
 }
 
 fn open_all(

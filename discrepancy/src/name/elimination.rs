@@ -15,7 +15,7 @@ const SWAPPED: usize = 3;
 /// Fits are indistinguishable when their objectives differ by less than this times the design effect. Noise alone makes the wrong
 /// one of two better by more in one record of 700 at most, if both have the same number of effect parameters; each further
 /// parameter shifts the difference by [`EFFECT_PARAMETER_PENALTY`].
-const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;
+pub(crate) const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;
 /// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
 const INDISTINGUISHABLE_LOSS_SHARE: f64 = 0.02;
 /// Multiple of the null threshold required of every further effect, since no model is exact.

@@ -4,10 +4,10 @@
 //!   experiment ──► controllers with the baseline's numbers ──► rehearsal of the explanation's rig ──► commands, true points
 //! ```
 //!
-//! The run is the experiment if the explanation were true, closed loop included. Sensor noise has one seed.
+//! The run is the experiment if the explanation were true, closed loop and sensor noise included.
 
 use super::menu::{Entry, program};
-use crate::gridded_record::AxisState;
+use crate::gridded_record::{AxisState, CHANNELS};
 use axis_control::axis::AxisRecord;
 use axis_control::setup::InputError;
 use axis_control::setup::{Inputs as Files, Mode};
@@ -21,7 +21,8 @@ const LONGEST: usize = 30_000;
 const PARKED_M: f64 = 1e-3;
 /// Nearest to an end of the stroke, m: the menu keeps 5 mm with the baseline, a sensor may be off by 2.
 const NEAR_M: f64 = 2e-3;
-const SEED: u64 = 1;
+/// Seed of the sensor noise in the loop where one run stands for all.
+pub const SEED: u64 = 1;
 /// Loose criteria of standstill, so that an effect does not keep the experiment from starting.
 const UNSETTLED: [&str; 6] = [
     "drive.settled.still_m=0.1",
@@ -46,10 +47,14 @@ pub enum ClosedLoopError {
 #[derive(Clone, Debug)]
 pub struct ClosedLoopRun {
     pub linked: bool,
+    /// Weights on the carriage, kg.
+    pub(crate) added_mass_kg: f64,
     pub start: State,
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.
     pub points: Vec<[AxisState; 2]>,
+    /// Readings without noise at the start of each period: position, force, pressures a and b, the load's offset taken off.
+    pub(crate) readings: Vec<[[f64; CHANNELS]; 2]>,
     /// Period in which the experiment began, behind the initial positioning; `None` when it never did.
     pub began: Option<usize>,
     pub done: bool,
@@ -58,18 +63,23 @@ pub struct ClosedLoopRun {
 impl ClosedLoopRun {
     /// Whether the experiment suits this rig: it begins, it ends, and no moved rod comes near an end of its stroke.
     pub(crate) fn ends_well(&self, stroke_m: f64) -> bool {
-        let Some(began) = self.began else { return false };
-        let keeps_away = |axis: usize| {
+        self.done && self.clearance_m(stroke_m).is_some_and(|clearance_m| clearance_m > NEAR_M)
+    }
+
+    /// Least distance of a moved rod from the ends of its stroke, m; `None` when the experiment never began.
+    pub(crate) fn clearance_m(&self, stroke_m: f64) -> Option<f64> {
+        let began = self.began?;
+        let of_axis = |axis: usize| {
             let of = |point: &[AxisState; 2]| point[axis].extension_m;
             let least = self.points[began..].iter().map(of).fold(f64::INFINITY, f64::min);
             let most = self.points[began..].iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-            most - least < PARKED_M || (least > NEAR_M && most < stroke_m - NEAR_M)
+            if most - least < PARKED_M { f64::INFINITY } else { least.min(stroke_m - most) }
         };
-        self.done && (0..2).all(keeps_away)
+        Some(of_axis(0).min(of_axis(1)))
     }
 }
 
-/// Drives `rig` through an experiment; the controllers have the baseline's numbers.
+/// Drives `rig` through an experiment; the controllers have the baseline's numbers, and `seed` gives the sensors' noise.
 ///
 /// # Errors
 /// [`ClosedLoopError`]
@@ -77,6 +87,7 @@ pub fn drive(
     entry: &Entry,
     baseline: &RigParameters,
     rig: &RigParameters,
+    seed: u64,
 ) -> Result<ClosedLoopRun, ClosedLoopError> {
     let file = format!("{}.toml", entry.name);
     let nominal = baseline.without_effects();
@@ -85,11 +96,13 @@ pub fn drive(
     let mode = Mode { partner_needed: true, real_time: false, forever: false };
     let controllers =
         Axis::ALL.into_iter().map(|axis| files.controller(axis, mode)).collect::<Result<_, _>>()?;
-    let mut rehearsal = Rehearsal::new(RehearsalParts { rig, scene: &scene, seed: SEED, controllers })?;
+    let mut rehearsal = Rehearsal::new(RehearsalParts { rig, scene: &scene, seed, controllers })?;
     let start = *rehearsal.plant().state();
-    let (mut inputs, mut points, mut began) = (Vec::new(), Vec::new(), None);
+    let (mut inputs, mut points, mut readings, mut began) = (Vec::new(), Vec::new(), Vec::new(), None);
     let stroke_m = rig.cylinder().stroke_m;
     while inputs.len() < LONGEST && !rehearsal.ended() {
+        let plant = rehearsal.plant();
+        readings.push(plant.shown(&plant.truth(&Inputs::default())));
         let rehearsed = rehearsal.step(|_, _| {});
         let in_experiment = |record: &AxisRecord| record.main == MainChainState::Experiment;
         if began.is_none() && rehearsed.axes.iter().flatten().any(in_experiment) {
@@ -100,7 +113,8 @@ pub fn drive(
         points.push(points_of(&cycle.truth, stroke_m));
     }
     let done = rehearsal.node().done();
-    Ok(ClosedLoopRun { linked: scene.linked, start, inputs, points, began, done })
+    let (linked, added_mass_kg) = (scene.linked, scene.added_mass_kg);
+    Ok(ClosedLoopRun { linked, added_mass_kg, start, inputs, points, readings, began, done })
 }
 
 fn points_of(truth: &Truth, stroke_m: f64) -> [AxisState; 2] {

@@ -59,8 +59,8 @@ pub struct Divergence {
 
 impl Divergence {
     /// T of so many repetitions, in squared standard deviations.
-    pub(crate) fn in_repetitions(&self, times: u32) -> f64 {
-        let square = self.square * f64::from(times);
+    pub(crate) fn in_repetitions(&self, times: usize) -> f64 {
+        let square = self.square * times as f64;
         square * (1.0 - self.cosine * self.cosine) / (1.0 + MODEL_ERROR * MODEL_ERROR * square)
     }
 }

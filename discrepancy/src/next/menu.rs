@@ -3,6 +3,9 @@
 //! Each drives both axes, so that it serves whichever has the effect, takes 13 to 20 s, and stays away from the ends of the
 //! stroke. Tests hold every file to that, with the baseline and with the controllers' own reader.
 
+use axis_control::setup::Inputs as Files;
+use plant::RigParameters;
+
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Its title, and its file without `.toml`.
@@ -16,6 +19,12 @@ impl Entry {
     /// Name of the file in which it is proposed.
     pub fn file(&self) -> String {
         format!("next-{}.toml", self.name)
+    }
+
+    /// How long it is without initial positioning, s, with its file as shipped.
+    pub(crate) fn length_s(&self) -> f64 {
+        let files = Files::of_texts(&RigParameters::baseline(), (self.name, self.toml), program, &[]);
+        files.map_or(f64::INFINITY, |files| files.experiment.duration_s())
     }
 
     pub(crate) fn is_linked(&self) -> bool {

@@ -301,14 +301,25 @@ pub(super) fn next(report: &Report) -> String {
     let Some(next) = &report.next else { return String::new() };
     let mut text = paragraph(&next.reason);
     if let Some(experiment) = &next.experiment {
-        let divergence = next.divergence.map_or(String::new(), |divergence| {
+        let probability =
+            next.probability.zip(next.probability_interval).map_or(String::new(), |(value, of)| {
+                format!(
+                    " It tells them apart with a probability of {:.0} % ({:.0} to {:.0} %).",
+                    1e2 * value,
+                    1e2 * of[0],
+                    1e2 * of[1]
+                )
+            });
+        let then = next.then.as_ref().map_or(String::new(), |then| {
             format!(
-                " It is expected to set them {} squared standard deviations apart; 25 are wanted.",
-                words::short(divergence)
+                " If the records still leave it open, <code>{}</code> is next: both together tell them apart with a \
+                 probability of {:.0} %.",
+                pagekit::page::escaped(&then.experiment),
+                1e2 * then.probability
             )
         });
         text += &format!(
-            "<p>Run <code>{}</code>, which stands beside this page.{divergence}</p>\n",
+            "<p>Run <code>{}</code>, which stands beside this page.{probability}{then}</p>\n",
             pagekit::page::escaped(experiment)
         );
     }

@@ -321,6 +321,10 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
                         .to_owned(),
                 experiment: Some("next.toml".to_owned()),
                 divergence: Some(63.0),
+                probability: Some(0.95),
+                probability_interval: Some([0.76, 0.99]),
+                rehearsals: Some(20),
+                then: None,
                 otherwise: Some("Tilting the rig would tell at once.".to_owned()),
             });
         }

@@ -4,7 +4,7 @@
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Sheet};
 use plant::{Axis, RigParameters};
-use record_maker::{Experiment, Hidden, ROWS, Recipe, comparison, simulate, write};
+use record_maker::{Experiment, Hidden, ROWS, Recipe, comparison, simulate, simulate_proposed, write};
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -12,7 +12,7 @@ use std::time::Instant;
 const USAGE: &str =
     "record-maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes [--unlinked]]
     [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form] [--wrong parameter:NAME=FACTOR]...
-    [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1]
+    [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1 | --proposed FILE]
 record-maker list
 record-maker compare
 record-maker forms
@@ -148,7 +148,7 @@ fn compare() -> Result<(), Box<dyn Error>> {
 
 fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error>> {
     let (mut recipe, mut out, mut truth) = (Recipe::default(), None, None);
-    let (mut name, mut place) = (None, None);
+    let (mut name, mut place, mut proposed) = (None, None, None);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or(format!("{argument} needs a value\n{USAGE}"));
         match argument.as_str() {
@@ -170,6 +170,7 @@ fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error
                     other => return Err(format!("--experiment {other}\n{USAGE}").into()),
                 }
             }
+            "--proposed" => proposed = Some(value()?),
             "--wrong" => {
                 let text = value()?;
                 let (name, factor) = text.split_once('=').ok_or(USAGE)?;
@@ -186,7 +187,11 @@ fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error
     }
     let (out, truth) = (out.ok_or(USAGE)?, truth.ok_or(USAGE)?);
     let began = Instant::now();
-    let record = simulate(&recipe, &RigParameters::baseline())?;
+    let rig = RigParameters::baseline();
+    let record = match proposed {
+        Some(file) => simulate_proposed(&recipe, &rig, (&file, &std::fs::read_to_string(&file)?))?,
+        None => simulate(&recipe, &rig)?,
+    };
     println!("{} rows in {:.2} s", record.rows.len(), began.elapsed().as_secs_f64());
     write(&record, &out, &truth)?;
     Ok(())

@@ -392,6 +392,7 @@ const DIMENSIONLESS: &[&str] = &[
     "baseline",              // the same
     "ratio",                 // of two of them
     "probability",           // 0 to 1
+    "probability_interval",  // 0 to 1
     "penalty",               // twice a log likelihood
     "clustered_t",           // in standard errors
     "quantum",               // of a channel, in its unit

@@ -1,0 +1,32 @@
+//! The next experiment.
+
+use serde::Serialize;
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Next {
+    pub reason: String,
+    /// File of the experiment beside the report; null when none discriminates.
+    pub experiment: Option<String>,
+    /// Expected divergence of the alternatives, in squared standard deviations; the target is 25.
+    pub(crate) divergence: Option<f64>,
+    /// Share of the rehearsed records of the best experiment that tell the alternatives apart.
+    pub probability: Option<f64>,
+    /// Its interval of 95 %.
+    pub probability_interval: Option<[f64; 2]>,
+    /// How many records were rehearsed.
+    pub rehearsals: Option<usize>,
+    /// The experiment after this one, where it leaves much open.
+    pub then: Option<SecondExperiment>,
+    /// Manual measurement that resolves the ambiguity where no experiment does.
+    pub otherwise: Option<String>,
+}
+
+/// An experiment after the first.
+#[derive(Clone, Debug, Serialize)]
+pub struct SecondExperiment {
+    /// Its name in the menu.
+    pub experiment: String,
+    /// Probability that one of the two, or both together, tell the alternatives apart.
+    pub probability: f64,
+    pub probability_interval: [f64; 2],
+}
