@@ -12,7 +12,8 @@
 //! | `dimensions` | the dimension of a tree |
 //! | `bounds` | the smallest and the largest value of a tree |
 //! | `compile` | tree to operations |
-//! | `tape` | operations, computed with or without derivatives |
+//! | `operation` | what an operation does, and its derivatives |
+//! | `tape` | operations in their order, computed with or without derivatives |
 //! | `curve` | tables |
 //! | `inputs` | inputs over time between their samples |
 //! | `formula` | one expression over named variables |
@@ -26,5 +27,6 @@ pub mod dimensions;
 pub mod formula;
 pub mod grammar;
 pub mod inputs;
+mod operation;
 pub mod tape;
 pub mod units;

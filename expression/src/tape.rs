@@ -7,53 +7,19 @@
 //! with the values, along as many directions as there are fitted numbers; operations that no fitted number reaches skip them.
 //! Nothing is allocated while a tape is evaluated, and its length bounds its time.
 //!
-//! Elementary functions are those of `libm`, so that bits are equal on every machine; `+ - * /` and the square root are exact by
-//! IEEE 754. At a kink (abs, min, max, if, table) the derivative is that of the branch that is taken; that of sign and of a
-//! comparison is 0, and that of sqrt at 0 is set to 0.
+//! Operations that depend on parameters and constants alone stand first: they are computed once for a record. Derivatives are kept
+//! in groups of [`LANES`], which a processor multiplies together.
 //!
 //! Source: Griewank, Walther, Evaluating Derivatives, SIAM 2008, chapter 3 (forward mode).
 
 use crate::curve::Curve;
 use crate::inputs::Inputs;
+use crate::operation::Around;
+pub use crate::operation::Code;
 use std::collections::HashMap;
 
 /// A register.
 pub type Register = u32;
-
-/// What an operation does with its operands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Code {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-    Power,
-    Negate,
-    Abs,
-    Sign,
-    Min,
-    Max,
-    Sqrt,
-    Exp,
-    Log,
-    Tanh,
-    Sin,
-    Cos,
-    Atan,
-    Floor,
-    Less,
-    LessOrEqual,
-    Equal,
-    NotEqual,
-    And,
-    Or,
-    /// First operand not 0: the second, else the third.
-    Select,
-    /// The table of this number at the first operand.
-    Table(u16),
-    /// The input of this number, the first operand earlier.
-    Delayed(u16),
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Operation {
@@ -137,22 +103,50 @@ impl Builder {
     /// The tape that computes these registers.
     pub fn tape(self, results: &[Register], curves: Vec<Curve>) -> Tape {
         let (leaves, constants) = (self.leaves.count(), self.constants.len());
+        let is_fixed = self.fixed();
+        let fixed = is_fixed.iter().filter(|fixed| **fixed).count();
+        let mut ahead = [0, fixed];
+        let places: Vec<usize> = is_fixed
+            .iter()
+            .map(|fixed| {
+                let place = &mut ahead[usize::from(!fixed)];
+                *place += 1;
+                *place - 1
+            })
+            .collect();
         let moved = |register: Register| {
-            let register = register as usize;
-            (if register >= leaves + CONSTANTS { register - CONSTANTS + constants } else { register })
-                as Register
+            let operation = (register as usize).checked_sub(leaves + CONSTANTS);
+            operation.map_or(register, |operation| (leaves + constants + places[operation]) as Register)
         };
-        let mut operations = self.operations;
-        for operation in &mut operations {
-            operation.operands = operation.operands.map(moved);
+        let mut operations = self.operations.clone();
+        for (operation, place) in self.operations.into_iter().zip(&places) {
+            operations[*place] = Operation { operands: operation.operands.map(moved), ..operation };
         }
         Tape {
             leaves: self.leaves,
             constants: self.constants,
             operations,
+            fixed,
             results: results.iter().map(|result| moved(*result)).collect(),
             curves,
         }
+    }
+
+    /// Of each operation whether it depends on parameters and constants alone.
+    fn fixed(&self) -> Vec<bool> {
+        let first = self.leaves.count() + CONSTANTS;
+        let parameters = self.leaves.parameter(0)..self.leaves.memory(0);
+        let mut fixed: Vec<bool> = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let is_fixed = |operand: &Register| match (*operand as usize).checked_sub(first) {
+                Some(before) => fixed[before],
+                None => parameters.contains(operand) || *operand as usize >= self.leaves.count(),
+            };
+            let reads_time = matches!(operation.code, Code::Delayed(_));
+            let count = operation.code.operands();
+            fixed.push(!reads_time && operation.operands[..count].iter().all(is_fixed));
+        }
+        fixed
     }
 }
 
@@ -162,46 +156,51 @@ pub struct Tape {
     pub leaves: Leaves,
     constants: Vec<f64>,
     operations: Vec<Operation>,
+    /// The first so many depend on parameters and constants alone.
+    fixed: usize,
     results: Vec<Register>,
     curves: Vec<Curve>,
 }
+
+/// Derivatives that are computed together.
+const LANES: usize = 4;
+
+/// Which operands of an operation have derivatives.
+type Reached = [bool; 3];
 
 /// Values and derivatives of the registers of a tape.
 #[derive(Clone, Debug)]
 pub struct Registers {
     values: Vec<f64>,
-    /// Register by register, along each direction.
-    slopes: Vec<f64>,
+    /// Register by register, along each direction, and zeros up to whole groups.
+    slopes: Vec<[f64; LANES]>,
     directions: usize,
-    active: Vec<bool>,
+    /// Groups of a register.
+    width: usize,
+    /// Of each operation; `None` where nothing reaches it.
+    reached: Vec<Option<Reached>>,
 }
 
 impl Registers {
     /// Those of `tape`; `is_active` tells of a leaf whether it has derivatives.
     pub fn new(tape: &Tape, directions: usize, is_active: impl Fn(Register) -> bool) -> Self {
-        let leaves = tape.leaves.count();
-        let count = leaves + tape.constants.len() + tape.operations.len();
+        let (leaves, count) = (tape.leaves.count(), tape.registers());
         let mut values = vec![0.0; count];
-        values[leaves..leaves + tape.constants.len()].copy_from_slice(&tape.constants);
+        tape.begin(&mut values);
         let mut active: Vec<bool> =
             (0..leaves as Register).map(|leaf| directions > 0 && is_active(leaf)).collect();
-        active.resize(count, false);
-        for (place, operation) in tape.operations.iter().enumerate() {
-            let is_flat = matches!(
-                operation.code,
-                Code::Sign
-                    | Code::Floor
-                    | Code::Less
-                    | Code::LessOrEqual
-                    | Code::Equal
-                    | Code::NotEqual
-                    | Code::And
-                    | Code::Or
-            );
-            let reached = operation.operands.iter().any(|operand| active[*operand as usize]);
-            active[leaves + tape.constants.len() + place] = reached && !is_flat;
+        active.resize(leaves + tape.constants.len(), false);
+        let mut reached = Vec::with_capacity(tape.operations.len());
+        for operation in &tape.operations {
+            let count = operation.code.operands();
+            let mut operands = operation.operands.map(|operand| active[operand as usize]);
+            operands[count..].fill(false);
+            let is_active = !operation.code.is_flat() && operands.contains(&true);
+            active.push(is_active);
+            reached.push(is_active.then_some(operands));
         }
-        Self { values, slopes: vec![0.0; count * directions], directions, active }
+        let width = directions.div_ceil(LANES);
+        Self { values, slopes: vec![[0.0; LANES]; count * width], directions, width, reached }
     }
 
     #[inline]
@@ -211,8 +210,8 @@ impl Registers {
 
     #[inline]
     pub fn slope_mut(&mut self, register: Register) -> &mut [f64] {
-        let start = register as usize * self.directions;
-        &mut self.slopes[start..start + self.directions]
+        let start = register as usize * self.width;
+        &mut self.slopes[start..start + self.width].as_flattened_mut()[..self.directions]
     }
 
     #[inline]
@@ -222,8 +221,8 @@ impl Registers {
 
     #[inline]
     pub fn slope(&self, register: Register) -> &[f64] {
-        let start = register as usize * self.directions;
-        &self.slopes[start..start + self.directions]
+        let start = register as usize * self.width;
+        &self.slopes[start..start + self.width].as_flattened()[..self.directions]
     }
 }
 
@@ -239,16 +238,28 @@ impl Tape {
         self.results[index]
     }
 
-    /// Computes all registers from the leaves that were set.
+    /// Computes what depends on parameters alone, after these were set and before [`Tape::evaluate`].
+    pub fn prepare(&self, registers: &mut Registers) {
+        self.compute_some(registers, 0..self.fixed, &Inputs::none());
+    }
+
+    /// Computes all other registers from the leaves that were set.
     pub fn evaluate(&self, registers: &mut Registers, inputs: &Inputs<'_>) {
-        let first = self.leaves.count() + self.constants.len();
-        for (place, operation) in self.operations.iter().enumerate() {
-            let result = first + place;
-            let [a, b, c] = operation.operands.map(|operand| registers.values[operand as usize]);
-            let (value, partial) = self.apply(operation.code, [a, b, c], registers.values[0], inputs);
-            registers.values[result] = value;
-            if registers.active[result] {
-                carry(registers, result, operation, partial);
+        self.compute_some(registers, self.fixed..self.operations.len(), inputs);
+    }
+
+    #[inline]
+    fn compute_some(&self, registers: &mut Registers, which: core::ops::Range<usize>, inputs: &Inputs<'_>) {
+        let first = self.leaves.count() + self.constants.len() + which.start;
+        let around = Around { time_s: registers.values[0], inputs, curves: &self.curves };
+        for (place, operation) in self.operations[which.clone()].iter().enumerate() {
+            let operands = operation.operands.map(|operand| operand as usize);
+            let [a, b, c] = operands.map(|operand| registers.values[operand]);
+            let value = operation.code.value([a, b, c], &around);
+            registers.values[first + place] = value;
+            if let Some(reached) = registers.reached[which.start + place] {
+                let partial = operation.code.partials([a, b, c], value, reached, &around);
+                carry(registers, first + place, operands, reached, partial);
             }
         }
     }
@@ -275,117 +286,43 @@ impl Tape {
     #[must_use]
     pub fn compute(&self, registers: &mut [f64]) -> f64 {
         let first = self.leaves.count() + self.constants.len();
+        let around = Around { time_s: registers[0], inputs: &Inputs::none(), curves: &self.curves };
         for (place, operation) in self.operations.iter().enumerate() {
             let operands = operation.operands.map(|operand| registers[operand as usize]);
-            registers[first + place] = self.apply(operation.code, operands, registers[0], &Inputs::none()).0;
+            registers[first + place] = operation.code.value(operands, &around);
         }
         registers[self.results[0] as usize]
-    }
-
-    /// Value, and derivatives by the operands.
-    fn apply(&self, code: Code, [a, b, c]: [f64; 3], time_s: f64, inputs: &Inputs<'_>) -> (f64, [f64; 3]) {
-        let truth = |is_true: bool| (f64::from(u8::from(is_true)), [0.0; 3]);
-        match code {
-            Code::Add => (a + b, [1.0, 1.0, 0.0]),
-            Code::Subtract => (a - b, [1.0, -1.0, 0.0]),
-            Code::Multiply => (a * b, [b, a, 0.0]),
-            Code::Divide => {
-                let quotient = a / b;
-                (quotient, [1.0 / b, -quotient / b, 0.0])
-            }
-            Code::Power => power(a, b),
-            Code::Negate => (-a, [-1.0, 0.0, 0.0]),
-            Code::Abs => (a.abs(), [sign(a), 0.0, 0.0]),
-            Code::Sign => (sign(a), [0.0; 3]),
-            Code::Min if a.is_nan() || b.is_nan() => (f64::NAN, [0.0; 3]),
-            Code::Max if a.is_nan() || b.is_nan() => (f64::NAN, [0.0; 3]),
-            Code::Min => {
-                if a <= b {
-                    (a, [1.0, 0.0, 0.0])
-                } else {
-                    (b, [0.0, 1.0, 0.0])
-                }
-            }
-            Code::Max => {
-                if a >= b {
-                    (a, [1.0, 0.0, 0.0])
-                } else {
-                    (b, [0.0, 1.0, 0.0])
-                }
-            }
-            Code::Sqrt => {
-                let root = a.sqrt();
-                (root, [if root > 0.0 { 0.5 / root } else { 0.0 }, 0.0, 0.0])
-            }
-            Code::Exp => {
-                let value = libm::exp(a);
-                (value, [value, 0.0, 0.0])
-            }
-            Code::Log => (libm::log(a), [1.0 / a, 0.0, 0.0]),
-            Code::Tanh => {
-                let value = libm::tanh(a);
-                (value, [1.0 - value * value, 0.0, 0.0])
-            }
-            Code::Sin => (libm::sin(a), [libm::cos(a), 0.0, 0.0]),
-            Code::Cos => (libm::cos(a), [-libm::sin(a), 0.0, 0.0]),
-            Code::Atan => (libm::atan(a), [1.0 / (1.0 + a * a), 0.0, 0.0]),
-            Code::Floor => (libm::floor(a), [0.0; 3]),
-            Code::Less => truth(a < b),
-            Code::LessOrEqual => truth(a <= b),
-            Code::Equal => truth(a == b),
-            Code::NotEqual => truth(a != b),
-            Code::And => truth(a != 0.0 && b != 0.0),
-            Code::Or => truth(a != 0.0 || b != 0.0),
-            Code::Select if a.is_nan() => (f64::NAN, [0.0; 3]),
-            Code::Select => {
-                if a != 0.0 {
-                    (b, [0.0, 1.0, 0.0])
-                } else {
-                    (c, [0.0, 0.0, 1.0])
-                }
-            }
-            Code::Table(number) => {
-                let (value, slope) = self.curves[usize::from(number)].at(a);
-                (value, [slope, 0.0, 0.0])
-            }
-            Code::Delayed(input) => {
-                let (value, rate) = inputs.between(usize::from(input), time_s - a);
-                (value, [-rate, 0.0, 0.0])
-            }
-        }
     }
 }
 
 /// Chain rule. An operand that was not taken has the factor 0, and its own derivative may be infinite: it is left out.
-fn carry(registers: &mut Registers, result: usize, operation: &Operation, partial: [f64; 3]) {
-    let count = registers.directions;
-    let (below, at) = registers.slopes.split_at_mut(result * count);
-    let target = &mut at[..count];
-    target.fill(0.0);
-    for (operand, factor) in operation.operands.iter().zip(partial) {
-        let operand = *operand as usize;
-        if factor != 0.0 && registers.active[operand] {
-            let source = &below[operand * count..(operand + 1) * count];
-            for (sum, slope) in target.iter_mut().zip(source) {
-                *sum += factor * slope;
+fn carry(
+    registers: &mut Registers,
+    result: usize,
+    operands: [usize; 3],
+    reached: Reached,
+    partial: [f64; 3],
+) {
+    let width = registers.width;
+    let (below, at) = registers.slopes.split_at_mut(result * width);
+    let target = &mut at[..width];
+    let mut is_first = true;
+    for (place, (operand, factor)) in operands.into_iter().zip(partial).enumerate() {
+        if factor == 0.0 || !reached[place] {
+            continue;
+        }
+        let source = &below[operand * width..][..width];
+        for (sum, slope) in target.iter_mut().zip(source) {
+            for lane in 0..LANES {
+                let product = factor * slope[lane];
+                sum[lane] = if is_first { product } else { sum[lane] + product };
             }
         }
+        is_first = false;
     }
-}
-
-/// -1, 0 or 1; that of NaN is NaN.
-fn sign(a: f64) -> f64 {
-    if a == 0.0 { 0.0 } else { a / a.abs() * if a.is_infinite() { f64::NAN } else { 1.0 } }
-}
-
-fn power(a: f64, b: f64) -> (f64, [f64; 3]) {
-    if b == 2.0 {
-        return (a * a, [2.0 * a, if a > 0.0 { a * a * libm::log(a) } else { 0.0 }, 0.0]);
+    if is_first {
+        target.fill([0.0; LANES]);
     }
-    let value = libm::pow(a, b);
-    let by_base = if a == 0.0 && b < 1.0 { 0.0 } else { b * libm::pow(a, b - 1.0) };
-    let by_exponent = if a > 0.0 { value * libm::log(a) } else { 0.0 };
-    (value, [by_base, by_exponent, 0.0])
 }
 
 #[cfg(test)]
@@ -407,6 +344,7 @@ mod tests {
         }
         registers.slope_mut(leaves.parameter(0))[0] = 1.0;
         registers.slope_mut(leaves.parameter(1))[1] = 1.0;
+        tape.prepare(&mut registers);
         tape.evaluate(&mut registers, &Inputs::none());
         let slope = registers.slope(tape.result(0));
         (registers.value(tape.result(0)), [slope[0], slope[1]])

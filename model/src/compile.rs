@@ -69,6 +69,7 @@ pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs
     for (index, parameter) in model.parameters.iter().enumerate() {
         registers.set(leaves.parameter(index), parameter.values_si[0]);
     }
+    tape.prepare(&mut registers);
     let value = |(row, time_s): (usize, &f64)| {
         registers.set(0, *time_s);
         for (index, samples) in inputs.samples_si.iter().enumerate() {

@@ -202,6 +202,10 @@ impl<'a> Simulator<'a> {
             self.outputs.set(register, *value);
             self.updates.set(register, *value);
         }
+        let tapes = &self.program.tapes;
+        tapes.rates.prepare(&mut self.rates);
+        tapes.outputs.prepare(&mut self.outputs);
+        tapes.updates.prepare(&mut self.updates);
         self.begin(starts, memories);
         for row in 0..inputs.time_s.len() {
             if row > 0 {
@@ -307,8 +311,8 @@ impl<'a> Simulator<'a> {
 
     fn classical(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64, step_s: f64) {
         for (stage, share) in [(1, 0.5), (2, 0.5), (3, 1.0)] {
-            for (index, tried) in self.tried.iter_mut().enumerate() {
-                *tried = self.x[index] + step_s * share * self.stages[stage - 1][index];
+            for ((tried, x), rate) in self.tried.iter_mut().zip(&self.x).zip(&self.stages[stage - 1]) {
+                *tried = x + step_s * share * rate;
             }
             self.stage(inputs, row, time_s + share * step_s, stage, true);
         }
@@ -330,12 +334,14 @@ impl<'a> Simulator<'a> {
             let is_last = wished_s >= 0.999 * left_s;
             let step_s = if is_last { left_s } else { wished_s.min(0.5 * left_s).max(left_s * 1e-6) };
             for stage in 1..STAGES {
-                for index in 0..self.x.len() {
-                    let mut sum = 0.0;
-                    for (weight, before) in A[stage][..stage.min(6)].iter().zip(&self.stages) {
-                        sum += weight * before[index];
+                self.tried.fill(0.0);
+                for (weight, before) in A[stage][..stage.min(6)].iter().zip(&self.stages) {
+                    for (sum, rate) in self.tried.iter_mut().zip(before) {
+                        *sum += weight * rate;
                     }
-                    self.tried[index] = self.x[index] + step_s * sum;
+                }
+                for (tried, x) in self.tried.iter_mut().zip(&self.x) {
+                    *tried = x + step_s * *tried;
                 }
                 self.stage(inputs, row, time_s + C[stage] * step_s, stage, true);
             }
