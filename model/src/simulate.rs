@@ -275,6 +275,10 @@ impl<'a> Simulator<'a> {
         if self.steps >= self.most_steps {
             return Err(Failure::Steps { time_s: from_s });
         }
+        if self.x.is_empty() && self.memory.is_empty() {
+            self.steps += 1;
+            return Ok(());
+        }
         match self.program.solver {
             Solver::Fixed { step_s } => {
                 // A step that is longer by a rounding error is no step more.

@@ -22,7 +22,7 @@ use crate::estimator::Convergence;
 use model::Model;
 
 /// Least share of the power left out that a term must explain on folds in time; on bands half of it.
-const SHARE_FLOOR: f64 = 0.1;
+pub(super) const SHARE_FLOOR: f64 = 0.1;
 /// Clustered standard errors that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
 /// Grandvalet 2004, JMLR 5]; for ten folds 2 is about 4 % one-sided.
 const T_BANDS: f64 = 2.0;
@@ -59,6 +59,13 @@ pub(crate) struct Evaluation {
 pub(super) struct Sides<'f, 'a> {
     pub(super) baseline: &'f Fitted<'a>,
     pub(super) before: &'f Fitted<'a>,
+}
+
+/// Share of the power that the model alone leaves on folds which is left before: no suspect explains more.
+pub(super) fn most_share(Sides { baseline, before }: Sides<'_, '_>) -> f64 {
+    let [plain, left] =
+        [baseline, before].map(|one| in_units(&one.folds, before).iter().sum::<f64>().max(f64::MIN_POSITIVE));
+    left / plain
 }
 
 /// Judges a suspect; where its likelihood gains and its folds by linear steps lose, by folds that are fitted.

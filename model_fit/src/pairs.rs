@@ -16,7 +16,7 @@ use super::fit::{Fitting, What};
 use super::judge::{Evaluation, GAIN_APART, Sides, judge};
 use super::select::{Fitted, Found, fitted_from};
 use super::starts;
-use super::structure::{changed, columns, projected};
+use super::structure::{Beside, changed};
 use super::watch::Done;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -132,13 +132,7 @@ fn in_place_of([one, two]: [usize; 2], [first, second]: [usize; 2]) -> [usize; 2
 /// What each suspect does at several points of its ranges, beside the model alone.
 fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Response>> {
     let (fitting, point) = (&base.fitting, &base.point);
-    let scale: Vec<f64> = (0..fitting.model.outputs.len())
-        .map(|output| fitting.variance(output, point.squares[output]).sqrt().recip())
-        .collect();
-    let (columns, said) = columns(fitting, &point.values_si, &scale).ok()?;
-    let rest = |change: DVector<f64>| &change - &columns * projected(&columns, &change);
-    let measured = fitting.measured(&scale);
-    let left = rest(DVector::from_vec(measured) - &said);
+    let beside = Beside::new(fitting, point)?;
     let of_suspect = |(suspect, fit): &&(usize, Fitted<'_>)| -> Vec<Response> {
         let own = |values_si: &[f64]| -> Vec<(What, f64)> {
             let all = fit.fitting.unknowns.iter().zip(values_si);
@@ -150,10 +144,10 @@ fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Re
         let response = |values_si: &[f64]| {
             let values_si = own(values_si);
             let said_with =
-                changed(fitting, (&base.suspects, &point.values_si), *suspect, &values_si, &scale);
-            let change = rest(said_with.ok()? - &said);
+                changed(fitting, (&base.suspects, &point.values_si), *suspect, &values_si, &beside.scale);
+            let change = beside.rest(said_with.ok()? - &beside.said);
             let size = change.norm_squared();
-            let gain = change.dot(&left);
+            let gain = change.dot(&beside.left);
             (size > 0.0 && size.is_finite()).then_some(Response {
                 suspect: *suspect,
                 values_si,

@@ -11,7 +11,7 @@
 use super::covariance;
 use super::fit::{Fitting, OfRecord, Point};
 use super::folds::{Folds, folds, refitted, steps};
-use super::judge::{Evaluation, Sides, apart, is_one_effect, judge, weigh};
+use super::judge::{Evaluation, SHARE_FLOOR, Sides, apart, is_one_effect, judge, most_share, weigh};
 use super::normal::Normal;
 use super::pairs::{self, Pair};
 use super::record::Measured;
@@ -97,7 +97,7 @@ pub(crate) fn search<'a>(
         decoy: None,
         notes: Vec::new(),
     };
-    loop {
+    while !found.is_over() {
         let taken = found.extended.suspects.clone();
         let is_open = |suspect: &usize| !taken.contains(suspect) && !model.suspects[*suspect].is_term;
         let open: Vec<usize> = (0..model.suspects.len()).filter(is_open).collect();
@@ -149,7 +149,7 @@ pub(crate) fn search<'a>(
             }
             continue;
         }
-        let Some(best) = best.filter(|_| found.taken.len() < MOST_TERMS) else { return Ok(found) };
+        let Some(best) = best else { return Ok(found) };
         // Of forms of one effect that are as good the first of the file: its order says which is the likelier law.
         let is_as_good = |place: &usize| {
             value(*place) > value(best) - SAME
@@ -172,11 +172,18 @@ pub(crate) fn search<'a>(
         progress(&format!("with {name}: {}", left(&found.extended)));
         found.taken.push(Taken { evaluation, alternatives });
     }
+    Ok(found)
 }
 
 impl<'a> Found<'a> {
     pub(super) fn sides(&self) -> Sides<'_, 'a> {
         Sides { baseline: &self.baseline, before: &self.extended }
+    }
+
+    /// Whether nothing more can be taken: what is left is less than a term must explain.
+    fn is_over(&self) -> bool {
+        let is_little = || most_share(self.sides()) <= SHARE_FLOOR;
+        self.taken.len() >= MOST_TERMS || !self.taken.is_empty() && is_little()
     }
 
     fn take_pair(&mut self, pair: Pair<'a>, progress: &mut dyn FnMut(&str)) {

@@ -12,20 +12,26 @@
 //! logarithmic scale where that has one sign. The sequence is the same in each run, and training records
 //! alone say which of its points are kept.
 //!
-//! All starts go two steps, the best six four more, and the best two of these to the end [Jamieson, Talwalkar 2016, AISTATS:
+//! Of the first two rows six go on beside the first value: those with the largest fall of the squares, were what the suspect does there
+//! taken times the best share. All starts go two steps, the best six four more, and the best two of these to the end [Jamieson, Talwalkar 2016, AISTATS:
 //! successive halving].
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
 
 use super::fit::{Fitting, OPTIONS, Point, What};
 use crate::estimator::{Convergence, Outcome};
+use crate::structure::Beside;
 use model::Failure;
+use nalgebra::DVector;
 
 /// Most starts that values of the file make.
 const MOST: usize = 12;
 /// Rows over the points of a suspect's own numbers, and the fewest and most of these: a fit takes some seconds on any record.
 const OWN_ROWS: usize = 14_400;
 const OWN: [usize; 2] = [4, 24];
+/// Of a suspect's values and points those that are fitted beside the first, and the cosine of what two do that are one start.
+const PROMISING: usize = 6;
+const ALIKE: f64 = 0.999;
 /// Points of the sequence that are kept.
 const KEPT: usize = 3;
 /// Steps of each round, and how many of those that have come lowest go on.
@@ -48,9 +54,9 @@ pub(crate) fn starts(
         return vec![first];
     }
     if fitting.model.starts == 0 {
-        return values_of_newest(fitting, suspects, first);
+        return promising(fitting, values_of_newest(fitting, suspects, first), from);
     }
-    let mut all = of_newest_from(fitting, suspects, &first);
+    let mut all = promising(fitting, of_newest_from(fitting, suspects, &first), from);
     if let (Some(newest), Some((_, smaller))) = (suspects.last(), from) {
         all.extend(without_effect(fitting, *newest, &first, smaller.loss));
     }
@@ -83,6 +89,36 @@ fn beside(fitting: &Fitting<'_>, (smaller, point): (&Fitting<'_>, &Point)) -> Ve
 fn of_newest_from(fitting: &Fitting<'_>, suspects: &[usize], first: &[f64]) -> Vec<Vec<f64>> {
     let mut all = values_of_newest(fitting, suspects, first.to_vec());
     all.extend(suspects.last().into_iter().flat_map(|newest| over_ranges(fitting, *newest, first)));
+    all
+}
+
+/// Of starts that differ in the suspect's own numbers the first, and those with the largest fall of the squares by a share of
+/// what the suspect does there.
+fn promising(
+    fitting: &Fitting<'_>,
+    starts: Vec<Vec<f64>>,
+    from: Option<(&Fitting<'_>, &Point)>,
+) -> Vec<Vec<f64>> {
+    let Some((smaller, point)) = from.filter(|_| starts.len() > PROMISING + 1) else { return starts };
+    let Some(beside) = Beside::new(smaller, point) else { return starts };
+    let mut starts = starts.into_iter();
+    let mut all: Vec<Vec<f64>> = starts.next().into_iter().collect();
+    let fall = |values: Vec<f64>| {
+        let said = fitting.said(&values, &beside.scale).ok()?;
+        let change = beside.rest(DVector::from_vec(said) - &beside.said);
+        let (size, gain) = (change.norm_squared(), change.dot(&beside.left));
+        let fall = if gain > 0.0 { gain * gain / size } else { 0.0 };
+        (size > 0.0 && fall.is_finite()).then(|| (fall, change / size.sqrt(), values))
+    };
+    let mut others: Vec<(f64, DVector<f64>, Vec<f64>)> = starts.filter_map(fall).collect();
+    others.sort_by(|one, other| other.0.total_cmp(&one.0));
+    let mut kept: Vec<DVector<f64>> = Vec::new();
+    for (_, direction, values) in others {
+        if kept.len() < PROMISING && kept.iter().all(|known| known.dot(&direction) < ALIKE) {
+            kept.push(direction);
+            all.push(values);
+        }
+    }
     all
 }
 

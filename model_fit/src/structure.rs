@@ -9,7 +9,7 @@
 //!
 //! Source: discrepancy-notes.md, 3; Brun, Reichert, Künsch 2001, Water Resources Research 37(4) (collinearity).
 
-use super::fit::{Fitting, What};
+use super::fit::{Fitting, Point, What};
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
 use super::sensors;
@@ -160,6 +160,34 @@ pub(super) fn columns(
     let (slopes, values) = fitting.sensitivities(values_si, scale)?;
     let rows = values.len();
     Ok((DMatrix::from_row_slice(rows, fitting.unknowns.len(), &slopes), DVector::from_vec(values)))
+}
+
+/// A fit that changes are held beside: all in units of what it leaves of each output, less what its own numbers can do.
+pub(super) struct Beside {
+    pub(super) scale: Vec<f64>,
+    pub(super) said: DVector<f64>,
+    /// What it leaves.
+    pub(super) left: DVector<f64>,
+    columns: DMatrix<f64>,
+}
+
+impl Beside {
+    /// `None` where it cannot be simulated.
+    pub(super) fn new(fitting: &Fitting<'_>, point: &Point) -> Option<Self> {
+        let scale: Vec<f64> = (0..fitting.model.outputs.len())
+            .map(|output| fitting.variance(output, point.squares[output]).sqrt().recip())
+            .collect();
+        let (columns, said) = columns(fitting, &point.values_si, &scale).ok()?;
+        let left = DVector::from_vec(fitting.measured(&scale)) - &said;
+        let beside = Self { scale, said, left: DVector::zeros(0), columns };
+        Some(Self { left: beside.rest(left), ..beside })
+    }
+
+    /// A change less what the fit's own numbers can do for it.
+    pub(super) fn rest(&self, change: DVector<f64>) -> DVector<f64> {
+        let taken = &self.columns * projected(&self.columns, &change);
+        change - taken
+    }
 }
 
 /// Scaled outputs with a suspect at these values, or its first; all other numbers as they are.
