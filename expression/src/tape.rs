@@ -7,8 +7,8 @@
 //! with the values, along as many directions as there are fitted numbers; operations that no fitted number reaches skip them.
 //! Nothing is allocated while a tape is evaluated, and its length bounds its time.
 //!
-//! Operations that depend on parameters and constants alone stand first: they are computed once for a record. Derivatives are kept
-//! in groups of [`LANES`], which a processor multiplies together.
+//! Operations that depend on parameters and constants alone stand first: they are computed once for a record. Derivatives are
+//! kept in groups of [`LANES`], which a processor multiplies together.
 //!
 //! Source: Griewank, Walther, Evaluating Derivatives, SIAM 2008, chapter 3 (forward mode).
 

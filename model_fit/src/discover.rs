@@ -21,7 +21,7 @@ mod features;
 mod place;
 mod screen;
 
-use super::fit::{Fitting, What};
+use super::fit::{Fitting, OPTIONS, What};
 use super::judge::{Evaluation, GAIN_APART, judge};
 use super::record::Measured;
 use super::select::{Fitted, Found, MOST_TERMS, SAME, fitted, fitted_from};
@@ -152,7 +152,9 @@ fn round<'a>(
             };
             vec![fitting.unknowns.iter().map(value).collect()]
         };
-        fitted_from(model, before.fitting.records, &suspects, start).ok().map(|fit| (suspect, fit))
+        fitted_from(model, before.fitting.records, &suspects, (start, OPTIONS.steps))
+            .ok()
+            .map(|fit| (suspect, fit))
     };
     let mut fits: Vec<(usize, Fitted<'a>)> = best.par_iter().filter_map(fit).collect();
     let least = fits.iter().min_by(|(_, one), (_, other)| one.point.loss.total_cmp(&other.point.loss))?;

@@ -22,7 +22,7 @@ pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
     let records = train.iter().map(|path| Measured::read(&model, path)).collect::<Result<Vec<_>, _>>()?;
     let baseline = select::fitted(&model, &records, &[], None)?;
     let weak = bounds::remarks(&numbers(&baseline, &baseline, false));
-    text += &structure_in_words(&structure(&baseline), weak);
+    text += &structure_in_words(&structure(&baseline, &baseline), weak);
     Ok(text)
 }
 

@@ -332,24 +332,6 @@ impl<'a> Fitting<'a> {
         self.unknowns.iter().map(|unknown| unknown.start_si).collect()
     }
 
-    /// What the model leaves, and what it says: record by record, output by output; NaN where nothing was measured.
-    pub(crate) fn residuals(&self, values_si: &[f64]) -> Result<Vec<OfRecord>, Failure> {
-        let mut all = Vec::new();
-        for (record, measured) in self.records.iter().enumerate() {
-            let mut of_record =
-                vec![
-                    [vec![f64::NAN; measured.time_s.len()], vec![f64::NAN; measured.time_s.len()]];
-                    measured.outputs.len()
-                ];
-            self.simulate(record, values_si, false, |row, output, value, _| {
-                of_record[output][1][row] = value;
-                of_record[output][0][row] = measured.outputs[output][row].map_or(f64::NAN, |y| y - value);
-            })?;
-            all.push(of_record);
-        }
-        Ok(all)
-    }
-
     /// Unknowns that a record is simulated with, in the order of its directions.
     pub(super) fn of_record(&self, record: usize) -> Vec<usize> {
         let is_mine = |place: &usize| match self.unknowns[*place].what {

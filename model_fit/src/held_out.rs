@@ -1,7 +1,7 @@
 //! Both models on records that were not used: shared numbers frozen, the record's own fitted on its first samples, which are not
 //! scored.
 
-use super::fit::{Fitting, OfRecord};
+use super::fit::{Fitting, OPTIONS, OfRecord};
 use super::record::Measured;
 use super::select::{Fitted, Found};
 use super::starts;
@@ -94,7 +94,7 @@ fn residuals(fitted: &Fitted<'_>, record: &[Measured]) -> Result<(OfRecord, usiz
     if rows >= record[0].time_s.len() {
         return Err(JudgeError::Short { record: name(), rows: record[0].time_s.len(), start: rows });
     }
-    let (point, _) = frozen.fit_from(starts::starts(&frozen, &[], None)).map_err(failed)?;
+    let (point, _) = frozen.fit_from(starts::starts(&frozen, &[], None), OPTIONS.steps).map_err(failed)?;
     let residuals = frozen.whole().residuals(&point.values_si).map_err(failed)?;
     Ok((residuals.into_iter().next().expect("one record"), rows))
 }

@@ -180,7 +180,7 @@ fn closed(
     let records = looked_at(&model, train)?;
     let found = select::search(&model, &records, progress)?;
     progress("structure");
-    let structure = structure::structure(&found.baseline);
+    let structure = structure::structure(&found.baseline, &found.extended);
     let grown = (is_searching && found.taken.is_empty()).then(|| discover::grown(&found.baseline));
     let located =
         watch::watched(progress, ("where it comes from: steps", 1), |_| discover::located(&found.baseline));

@@ -24,6 +24,8 @@ use rayon::prelude::*;
 /// Pairs that are fitted in the simulator, and points of each from which that starts.
 pub(super) const FITTED: usize = 4;
 const POINTS: usize = 3;
+/// Most steps of its fit: two suspects that hardly differ make a valley without an end, and such a pair does not pass.
+const STEPS: usize = 20;
 
 /// Two suspects that were taken together.
 pub(super) struct Pair<'a> {
@@ -239,7 +241,7 @@ fn fit<'a>(
         }
         all
     };
-    fitted_from(model, records, &suspects, starts).ok().map(|fit| (pair, fit))
+    fitted_from(model, records, &suspects, (starts, STEPS)).ok().map(|fit| (pair, fit))
 }
 
 #[cfg(test)]

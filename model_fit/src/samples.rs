@@ -1,11 +1,29 @@
 //! All measured samples of all records, row after row, each times the scale of its output: what was measured, what the model
 //! says, and its derivatives.
 
-use super::fit::Fitting;
+use super::fit::{Fitting, OfRecord};
 use super::record::Measured;
 use model::Failure;
 
 impl Fitting<'_> {
+    /// What the model leaves, and what it says: record by record, output by output; NaN where nothing was measured.
+    pub(crate) fn residuals(&self, values_si: &[f64]) -> Result<Vec<OfRecord>, Failure> {
+        let mut all = Vec::new();
+        for (record, measured) in self.records.iter().enumerate() {
+            let mut of_record =
+                vec![
+                    [vec![f64::NAN; measured.time_s.len()], vec![f64::NAN; measured.time_s.len()]];
+                    measured.outputs.len()
+                ];
+            self.simulate(record, values_si, false, |row, output, value, _| {
+                of_record[output][1][row] = value;
+                of_record[output][0][row] = measured.outputs[output][row].map_or(f64::NAN, |y| y - value);
+            })?;
+            all.push(of_record);
+        }
+        Ok(all)
+    }
+
     /// All measured samples that a model is held against, row after row, times the scale of their output.
     pub(crate) fn measured(&self, scale: &[f64]) -> Vec<f64> {
         let of_record = |record: &Measured| -> Vec<f64> {
@@ -16,6 +34,17 @@ impl Fitting<'_> {
             (0..record.time_s.len()).flat_map(row).collect()
         };
         self.records.iter().flat_map(of_record).collect()
+    }
+
+    /// Of which output each of these is.
+    pub(crate) fn outputs_of_samples(&self) -> Vec<usize> {
+        let mut all = Vec::new();
+        for record in self.records {
+            for row in 0..record.time_s.len() {
+                all.extend((0..record.outputs.len()).filter(|output| record.outputs[*output][row].is_some()));
+            }
+        }
+        all
     }
 
     /// What the model says of these.

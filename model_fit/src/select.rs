@@ -9,7 +9,7 @@
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
 use super::covariance;
-use super::fit::{Fitting, OfRecord, Point};
+use super::fit::{Fitting, OPTIONS, OfRecord, Point};
 use super::folds::{Folds, folds, refitted, steps};
 use super::judge::{Evaluation, SHARE_FLOOR, Sides, apart, is_one_effect, judge, most_share, weigh};
 use super::normal::Normal;
@@ -230,21 +230,21 @@ pub(crate) fn fitted<'a>(
     let starts = |fitting: &Fitting<'a>| {
         starts::starts(fitting, suspects, from.map(|from| (&from.fitting, &from.point)))
     };
-    fitted_from(model, records, suspects, starts)
+    fitted_from(model, records, suspects, (starts, OPTIONS.steps))
 }
 
-/// The same from given starts.
+/// The same from given starts, in at most so many steps.
 pub(crate) fn fitted_from<'a>(
     model: &'a Model,
     records: &'a [Measured],
     suspects: &[usize],
-    starts: impl Fn(&Fitting<'a>) -> Vec<Vec<f64>>,
+    (starts, most): (impl Fn(&Fitting<'a>) -> Vec<Vec<f64>>, usize),
 ) -> Result<Fitted<'a>, Failure> {
     let program =
         Program::new(model, suspects).expect("all suspects together were compiled when the file was read");
     let fitting = Fitting::new(model, program, records, suspects);
     let starts = starts(&fitting);
-    let (point, convergence) = fitting.fit_from(starts)?;
+    let (point, convergence) = fitting.fit_from(starts, most)?;
     let normals = fitting.normals(&point.values_si, &fitting.in_time())?;
     let normal = fitting.sum(&normals, &point);
     let bands = (0..model.rows.folds.len()).map(|fold| {

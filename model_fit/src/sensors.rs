@@ -78,7 +78,7 @@ fn with_sensor(
     let mut asked: Vec<usize> = confused.iter().flatten().copied().collect();
     asked.sort_unstable();
     asked.dedup();
-    seen(&fitting, (taken, values_si), &scale, &asked).ok()
+    seen(&fitting, (taken, values_si), &scale, &asked).ok().map(|(seen, _)| seen)
 }
 
 /// The least that is left of an output over its variation.

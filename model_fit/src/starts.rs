@@ -12,9 +12,9 @@
 //! logarithmic scale where that has one sign. The sequence is the same in each run, and training records
 //! alone say which of its points are kept.
 //!
-//! Of the first two rows six go on beside the first value: those with the largest fall of the squares, were what the suspect does there
-//! taken times the best share. All starts go two steps, the best six four more, and the best two of these to the end [Jamieson, Talwalkar 2016, AISTATS:
-//! successive halving].
+//! Of the first two rows six go on beside the first value: those with the largest fall of the squares, were what the suspect does
+//! there taken times the best share. All starts go two steps, the best six four more, and the best two of these to the end
+//! [Jamieson, Talwalkar 2016, AISTATS: successive halving].
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
 
@@ -123,8 +123,12 @@ fn promising(
 }
 
 impl Fitting<'_> {
-    /// The best of the fits from several starts: a few steps from each, and all steps from those that have come lowest.
-    pub(crate) fn fit_from(&self, starts: Vec<Vec<f64>>) -> Result<(Point, Convergence), Failure> {
+    /// The best of the fits from several starts: a few steps from each, and at most so many from those that have come lowest.
+    pub(crate) fn fit_from(
+        &self,
+        starts: Vec<Vec<f64>>,
+        most: usize,
+    ) -> Result<(Point, Convergence), Failure> {
         let mut why = None;
         let mut begun: Vec<(Point, Convergence)> = Vec::new();
         let unmoved = Convergence { outcome: Outcome::StepLimit, ..Convergence::default() };
@@ -149,7 +153,7 @@ impl Fitting<'_> {
             // Starts that have come to the same minimum go on once.
             begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.converged);
             begun.truncate(*kept);
-            let steps = ROUNDS.get(round + 1).map_or(OPTIONS.steps, |(steps, _)| *steps);
+            let steps = ROUNDS.get(round + 1).map_or(most, |(steps, _)| *steps);
             begun = begun.into_iter().map(|one| further(one, steps)).collect::<Result<_, _>>()?;
         }
         let best = begun.into_iter().min_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));

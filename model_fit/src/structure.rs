@@ -5,11 +5,20 @@
 //!   r_s = d_s less what the model's own numbers could do for it (projection off their sensitivities)
 //!   seen share = |r_s| / |d_s|          cosine of two suspects = r_s r_t / (|r_s| |r_t|)
 //! ```
+//! Two suspects are twins where the cosine is above 0.98 and a fit of one in place of the other is predicted to cost less than
+//! what tells two suspects apart. With e = what one explains of what the model leaves, less the part along the other:
+//!
+//! ```text
+//!   cost = sum over outputs of  n ln(1 + |e|^2 / rss)        rss, n: what the best fit leaves, in independent samples
+//! ```
+//! A large term is told apart at a cosine at which a small one is not.
+//!
 //! A parameter without a standard error moves the outputs as others do: the rank of the sensitivities is below their number.
 //!
 //! Source: discrepancy-notes.md, 3; Brun, Reichert, Künsch 2001, Water Resources Research 37(4) (collinearity).
 
 use super::fit::{Fitting, Point, What};
+use super::judge::GAIN_APART;
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
 use super::sensors;
@@ -66,7 +75,8 @@ impl Advice {
     }
 }
 
-pub(crate) fn structure(baseline: &Fitted<'_>) -> Structure {
+/// What can be told apart beside the model alone; `best` is the fit that leaves least.
+pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     let (fitting, point) = (&baseline.fitting, &baseline.point);
     let model = fitting.model;
     let errors = standard_errors(&baseline.normal);
@@ -77,12 +87,32 @@ pub(crate) fn structure(baseline: &Fitted<'_>) -> Structure {
         .collect();
     let is_asked = |suspect: &model::Suspect| !suspect.is_decoy && !suspect.is_term;
     let asked: Vec<usize> = (0..model.suspects.len()).filter(|one| is_asked(&model.suspects[*one])).collect();
-    let Ok(seen) = seen(fitting, (&baseline.suspects, &point.values_si), &scale, &asked) else {
+    let seen = seen(fitting, (&baseline.suspects, &point.values_si), &scale, &asked);
+    let Ok((seen, base)) = seen else {
         return Structure { undetermined, ..Structure::default() };
     };
     let name = |suspect: usize| model.suspects[suspect].name.clone();
     let hidden: Vec<usize> = seen.iter().filter(|one| one.is_hidden()).map(|one| one.suspect).collect();
-    let twins = twins(&seen);
+    let left = DVector::from_vec(fitting.measured(&scale)) - base;
+    let cost = |one: &Seen, other: &Seen| {
+        let along = one.direction.dot(&left);
+        let apart = (&one.direction - &other.direction * one.direction.dot(&other.direction)) * along;
+        let mut squares = vec![0.0; scale.len()];
+        for (output, value) in fitting.outputs_of_samples().into_iter().zip(apart.iter()) {
+            squares[output] += (value / scale[output]).powi(2);
+        }
+        let of_output = |output: usize| {
+            let rest = best.fitting.variance(output, best.point.squares[output]) * fitting.count(output);
+            best.effective[output] * (1.0 + squares[output] / rest.max(f64::MIN_POSITIVE)).ln()
+        };
+        (along.abs(), (0..scale.len()).map(of_output).sum::<f64>())
+    };
+    // At the size of the one that explains more.
+    let predicted = |one: &Seen, other: &Seen| {
+        let [first, second] = [cost(one, other), cost(other, one)];
+        if first.0 >= second.0 { first.1 } else { second.1 }
+    };
+    let twins = twins(&seen, predicted);
     let confused: Vec<Vec<usize>> =
         hidden.iter().map(|one| vec![*one]).chain(twins.iter().map(|(pair, _)| pair.to_vec())).collect();
     let advice = sensors::advice(baseline, &scale, &confused);
@@ -114,13 +144,13 @@ pub(super) fn cosine(one: &Seen, other: &Seen) -> f64 {
 }
 
 /// Pairs that do the same, with their cosines; of suspects that are seen at all.
-fn twins(seen: &[Seen]) -> Vec<([usize; 2], f64)> {
+fn twins(seen: &[Seen], predicted: impl Fn(&Seen, &Seen) -> f64) -> Vec<([usize; 2], f64)> {
     let seen: Vec<&Seen> = seen.iter().filter(|one| !one.is_hidden()).collect();
     let mut twins = Vec::new();
     for (place, one) in seen.iter().enumerate() {
         for other in &seen[place + 1..] {
             let cosine = cosine(one, other);
-            if cosine > TWINS {
+            if cosine > TWINS && predicted(one, other) < GAIN_APART {
                 twins.push(([one.suspect, other.suspect], cosine));
             }
         }
@@ -128,13 +158,14 @@ fn twins(seen: &[Seen]) -> Vec<([usize; 2], f64)> {
     twins
 }
 
-/// What these suspects do, each beside the model with what was `taken`; one that cannot be simulated is left out.
+/// What these suspects do, each beside the model with what was `taken`, and what that says; one that cannot be simulated is left
+/// out.
 pub(super) fn seen(
     fitting: &Fitting<'_>,
     (taken, values_si): (&[usize], &[f64]),
     scale: &[f64],
     asked: &[usize],
-) -> Result<Vec<Seen>, Failure> {
+) -> Result<(Vec<Seen>, DVector<f64>), Failure> {
     let (columns, base) = columns(fitting, values_si, scale)?;
     let of = |suspect: &usize| {
         let change = changed(fitting, (taken, values_si), *suspect, &[], scale).ok()? - &base;
@@ -142,7 +173,8 @@ pub(super) fn seen(
         let share = if change.norm() > 0.0 { rest.norm() / change.norm() } else { 0.0 };
         Some(Seen { suspect: *suspect, share, direction: rest.normalize() })
     };
-    Ok(asked.iter().filter_map(of).collect())
+    let all = asked.iter().filter_map(of).collect();
+    Ok((all, base))
 }
 
 /// Coefficients of the columns that come nearest to a change.
