@@ -121,15 +121,14 @@ impl Running {
     /// Without asking again and again, which would disturb runs in real time beside it.
     pub fn wait_within(mut self, limit: Duration) -> Ended {
         let until = Instant::now() + limit;
-        let child = pidfd_open(self.pid(), PidfdFlags::empty()).expect("a child that was not waited for");
-        loop {
+        // Whoever waited for a word may have met its end, and then there is no process any more.
+        while self.child.try_wait().expect("a child can be waited for").is_none() {
             let left = until.saturating_duration_since(Instant::now());
+            assert!(left > Duration::ZERO, "{} hangs; it said:\n{}", self.name, self.stderr());
             let left = Timespec::try_from(left).expect("a limit of hours at most");
-            match poll(&mut [PollFd::new(&child, PollFlags::IN)], Some(&left)) {
-                Ok(0) => panic!("{} hangs; it said:\n{}", self.name, self.stderr()),
-                Ok(_) => break,
-                Err(error) => assert_eq!(error, Errno::INTR, "waiting for {}", self.name),
-            }
+            let child = pidfd_open(self.pid(), PidfdFlags::empty()).expect("it was not waited for");
+            let ended = poll(&mut [PollFd::new(&child, PollFlags::IN)], Some(&left));
+            assert!(matches!(ended, Ok(_) | Err(Errno::INTR)), "waiting for {}: {ended:?}", self.name);
         }
         let status = self.child.wait().expect("a child can be waited for");
         self.output.iter_mut().for_each(Said::finish);
@@ -225,5 +224,18 @@ pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     while !condition() {
         assert!(Instant::now() < until, "waited in vain for: {what}");
         std::thread::sleep(POLL);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_ended_already_is_waited_for_all_the_same() {
+        let mut running = Running::start("sh", Command::new("sh").args(["-c", "echo word >&2; exit 3"]));
+        running.wait_for_times("word", 1);
+        let _ = running.child.wait().expect("it ends");
+        assert_eq!(running.wait().expect_code(3).stderr, "word\n");
     }
 }
