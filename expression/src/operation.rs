@@ -193,8 +193,8 @@ fn sign(a: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a / a.abs() * if a.is_infinite() { f64::NAN } else { 1.0 } }
 }
 
-/// Derivatives of a power. A logarithm and a second power cost more than all else: the one is computed only where it is wanted, the
-/// other follows from the value.
+/// Derivatives of a power. A logarithm and a second power cost more than all else: the one is computed only where it is
+/// wanted, the other follows from the value.
 fn power(a: f64, b: f64, value: f64, [by_base, by_exponent, _]: [bool; 3]) -> [f64; 3] {
     let base = match (by_base, b == 2.0) {
         (false, _) => 0.0,
