@@ -128,12 +128,17 @@ fn rows(rows: &Rows) -> Vec<String> {
 
 fn parameter(parameter: &Parameter) -> String {
     let factor = parameter.unit.factor;
-    let mut text = format!(
-        "{} = {} {}",
-        parameter.name,
-        significant(parameter.values_si[0] / factor),
-        parameter.unit.text
-    );
+    let value = |value: &f64| significant(value / factor);
+    let mut text = format!("{} = {} {}", parameter.name, value(&parameter.values_si[0]), parameter.unit.text);
+    if let [_, further @ ..] = parameter.values_si.as_slice()
+        && !further.is_empty()
+    {
+        let _ = write!(
+            text,
+            " (a fit starts from {} too)",
+            further.iter().map(value).collect::<Vec<_>>().join(", ")
+        );
+    }
     if parameter.is_fixed {
         return text + ", known";
     }

@@ -35,6 +35,7 @@ pub(crate) fn page(
         ("notes", "Notes", notes),
         ("records", "Measured, and both models", pictures(model, report, traces)),
         ("named", "What is missing", named(report)),
+        ("located", "Where it comes from", located(report)),
         ("discovered", "What a search found", discovered(report)),
         ("held-out", "On held-out records", left("Held-out records", &report.held_out)),
         (
@@ -160,6 +161,10 @@ fn discovered(report: &ModelReport) -> String {
     let heads =
         ["term", "how it stands there", "reads", "of what is left, on folds", "best in halves", "as good"];
     table("Terms that no suspect describes", &heads, rows)
+}
+
+fn located(report: &ModelReport) -> String {
+    report.located.as_ref().map_or_else(String::new, |located| paragraph(&sentence(&located.in_words())))
 }
 
 fn left(label: &str, all: &[Left]) -> String {

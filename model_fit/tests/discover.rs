@@ -71,6 +71,7 @@ fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written()
         "{term:?}"
     );
     assert!(term.stability >= 0.6 && closed.page.contains("What a search found"), "{term:?}");
+    assert!(report.located.is_some() && closed.page.contains("Where it comes from"), "{:?}", report.located);
     let extended = folder.path().join("extended.toml");
     fs::write(&extended, closed.extended.unwrap()).unwrap();
     let extended = read(&extended).unwrap_or_else(|error| panic!("{error}"));

@@ -242,6 +242,7 @@ fn a_model_is_explained_with_its_equations_and_units() {
         "mass = 1.50 kg, fitted within 0.100 to 10.0",
         "cubic-stiffness, equation of v: dv/dt = … + (-k*x^3/mass)",
         "drift, a decoy, output position: position + (rate*t)",
+        "k = 100 N/m^3 (a fit starts from 1000 too), fitted",
     ] {
         assert!(text.contains(line), "{line}\n{text}");
     }
