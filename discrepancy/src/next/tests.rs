@@ -129,6 +129,16 @@ fn an_explanation_does_not_differ_from_itself_and_differs_from_another() {
     assert!(of(2, 0) > TARGET_DIVERGENCE, "{}", of(2, 0));
 }
 
+/// The drive's record alone, of explanations that are exact.
+fn setting<'a>(
+    baseline: &'a RigParameters,
+    explanations: &'a [Explanation],
+    noise: &'a ReadingNoise,
+) -> Setting<'a> {
+    let shrinkage = vec![vec![1.0; explanations.len()]; explanations.len()];
+    Setting { baseline, explanations, noise, measured: [true, false], shrinkage }
+}
+
 #[test]
 fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
     let rig = RigParameters::baseline();
@@ -151,14 +161,7 @@ fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
     let linked =
         |entry: &RehearsedEntry| MENU.iter().any(|known| known.name == entry.name && known.is_linked());
     assert!(!proposal.rehearsed.iter().any(linked));
-    let shrinkage = vec![vec![1.0; 2]; 2];
-    let setting = Setting {
-        baseline: &rig,
-        explanations: &explanations,
-        noise: &noise,
-        measured: [true, false],
-        shrinkage,
-    };
+    let setting = setting(&rig, &explanations, &noise);
     let best = &proposal.rehearsed[0];
     let entry = MENU.iter().find(|entry| entry.name == best.name).expect("it is of the menu");
     let again = setting.trials(entry, 0, Seeds { run: 1, records: 2 }).expect("it was rehearsed");
@@ -171,14 +174,7 @@ fn explanations_that_are_one_are_never_told_apart() {
     let one = explained(&[("inclination", "drive", &[("force_n", 5.0)])]);
     let noise = ReadingNoise::specified(&rig);
     let explanations = [one.clone(), one];
-    let shrinkage = vec![vec![1.0; 2]; 2];
-    let setting = Setting {
-        baseline: &rig,
-        explanations: &explanations,
-        noise: &noise,
-        measured: [true, false],
-        shrinkage,
-    };
+    let setting = setting(&rig, &explanations, &noise);
     let entry = MENU.iter().find(|entry| entry.name == "valve-null").expect("an entry");
     let rehearsed = rehearse(&setting, &[entry], &mut |_| {});
     let trials = &rehearsed[0].trials;
