@@ -132,6 +132,32 @@ impl Builder {
         }
     }
 
+    /// The degree of a register as a polynomial of a leaf, 0 or 1; `None` where it is more or no polynomial.
+    #[must_use]
+    pub fn degree(&self, register: Register, leaf: Register) -> Option<u8> {
+        let first = self.leaves.count() + CONSTANTS;
+        let mut degrees: Vec<Option<u8>> = Vec::with_capacity(self.operations.len());
+        let of = |degrees: &[Option<u8>], register: Register| match (register as usize).checked_sub(first) {
+            Some(before) => degrees[before],
+            None => Some(u8::from(register == leaf)),
+        };
+        for operation in &self.operations {
+            let operands = operation.operands.map(|operand| of(&degrees, operand));
+            let degree = match (operation.code, operands) {
+                (Code::Add | Code::Subtract, [Some(a), Some(b), _]) => Some(a.max(b)),
+                (Code::Negate, [a, ..]) => a,
+                (Code::Multiply, [Some(a), Some(b), _]) if a + b < 2 => Some(a + b),
+                (Code::Divide, [a, Some(0), _]) => a,
+                (Code::Select, [Some(0), Some(b), Some(c)]) => Some(b.max(c)),
+                (code, operands) => {
+                    operands[..code.operands()].iter().all(|one| *one == Some(0)).then_some(0)
+                }
+            };
+            degrees.push(degree);
+        }
+        of(&degrees, register)
+    }
+
     /// Of each operation whether it depends on parameters and constants alone.
     fn fixed(&self) -> Vec<bool> {
         let first = self.leaves.count() + CONSTANTS;

@@ -1,6 +1,6 @@
 //! Checks of all expressions: names, numbers of arguments, dimensions, and that nothing depends on itself.
 
-use crate::compile::tapes;
+use crate::compile::{frictions_hold, tapes};
 use crate::file::{Change, Expression, Model, Target};
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, resolve};
 use crate::rows::reads_inputs_alone;
@@ -22,6 +22,11 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
     for memory in &model.memories {
         dimensions.check(&memory.update, memory.suspect, memory.unit.dimension, &memory.name)?;
     }
+    for friction in &model.frictions {
+        let (unit, name) = (friction.unit.dimension, &friction.name);
+        dimensions.check(&friction.sliding, friction.suspect, unit, &format!("sliding of {name}"))?;
+        dimensions.check(&friction.breakaway, friction.suspect, unit, &format!("breakaway of {name}"))?;
+    }
     for output in &model.outputs {
         dimensions.check(&output.value, None, output.unit.dimension, &output.name)?;
     }
@@ -41,6 +46,7 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
     }
     let is_suspect = |index: &usize| !model.suspects[*index].is_term;
     let all: Vec<usize> = (0..model.suspects.len()).filter(is_suspect).collect();
+    frictions_hold(model, &all)?;
     tapes(model, &all).map(|_| ())
 }
 
@@ -125,6 +131,7 @@ impl Dimensions for Checker<'_> {
             Symbol::State(index) => model.states[index].unit.dimension,
             Symbol::Parameter(index) => model.parameters[index].unit.dimension,
             Symbol::Memory(index) => model.memories[index].unit.dimension,
+            Symbol::Friction(index) => model.frictions[index].unit.dimension,
             Symbol::Output(index) => model.outputs[index].unit.dimension,
             Symbol::Before(suspect) => self.target(model.suspects[suspect].target)?,
             Symbol::Definition(index) => return self.definition(index, at),

@@ -18,9 +18,13 @@ pub(crate) struct Tapes {
     pub(crate) rates: Tape,
     pub(crate) outputs: Tape,
     pub(crate) updates: Tape,
-    /// States and memories that are there, in the order of the tapes' results.
+    /// Of each friction that is there the force that holds its speed, that at which it breaks away, and by how much a unit of
+    /// force brakes it.
+    pub(crate) guards: Tape,
+    /// States, memories and frictions that are there, in the order of the tapes' results.
     pub(crate) states: Vec<usize>,
     pub(crate) memories: Vec<usize>,
+    pub(crate) frictions: Vec<usize>,
 }
 
 fn leaves(model: &Model) -> Leaves {
@@ -28,8 +32,13 @@ fn leaves(model: &Model) -> Leaves {
         inputs: model.inputs.len(),
         states: model.states.len(),
         parameters: model.parameters.len(),
-        memories: model.memories.len(),
+        memories: model.memories.len() + model.frictions.len(),
     }
+}
+
+/// Where the direction of a friction stands: 1 or -1 where it slides, 0 where it holds.
+pub(crate) fn direction_of(leaves: Leaves, model: &Model, friction: usize) -> Register {
+    leaves.memory(model.memories.len() + friction)
 }
 
 /// The tapes with these suspects.
@@ -39,6 +48,8 @@ pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
         (0..model.states.len()).filter(|index| is_there(model.states[*index].suspect)).collect();
     let memories: Vec<usize> =
         (0..model.memories.len()).filter(|index| is_there(model.memories[*index].suspect)).collect();
+    let frictions: Vec<usize> =
+        (0..model.frictions.len()).filter(|index| is_there(model.frictions[*index].suspect)).collect();
     let curves = || model.tables.iter().map(|table| table.curve.clone()).collect();
     let mut compiler = Compiler::new(model, suspects);
     let rates = states.iter().map(|state| compiler.rate(*state)).collect::<Result<Vec<_>, _>>()?;
@@ -54,7 +65,30 @@ pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
     });
     let updates = updates.collect::<Result<Vec<_>, _>>()?;
     let updates = compiler.builder.tape(&updates, curves());
-    Ok(Tapes { rates, outputs, updates, states, memories })
+    let mut compiler = Compiler::new(model, suspects);
+    let guards = frictions.iter().map(|friction| compiler.guards(*friction));
+    let guards = guards.collect::<Result<Vec<_>, _>>()?.concat();
+    let guards = compiler.builder.tape(&guards, curves());
+    Ok(Tapes { rates, outputs, updates, guards, states, memories, frictions })
+}
+
+/// Whether the force of each friction stands in the equation of its speed, and in a way that says which force holds it.
+pub(crate) fn frictions_hold(model: &Model, suspects: &[usize]) -> Result<(), Wrong> {
+    for (index, friction) in model.frictions.iter().enumerate() {
+        let mut compiler = Compiler::new(model, suspects);
+        let force = direction_of(compiler.builder.leaves(), model, index);
+        let rate = compiler.held((index, force))?;
+        let (name, state) = (&friction.name, &model.states[friction.velocity].name);
+        let why = match compiler.builder.degree(rate, force) {
+            Some(0) => format!("the equation of {state} does not read {name}, which is to hold it"),
+            Some(_) => continue,
+            None => {
+                format!("the equation of {state} is not linear in {name}: no force is known that holds it")
+            }
+        };
+        return Err(Wrong::new(model.states[friction.velocity].derivative.at, why));
+    }
+    Ok(())
 }
 
 /// Values of an expression of inputs and fixed numbers at each sample.
@@ -95,19 +129,85 @@ struct Compiler<'a> {
     known: HashMap<Symbol, Register>,
     /// Symbols that are being computed: one that comes again depends on itself.
     open: Vec<Symbol>,
+    /// The friction of whose speed the rate is computed, and the force that it has there.
+    held: Option<(usize, Register)>,
 }
 
 impl<'a> Compiler<'a> {
     fn new(model: &'a Model, suspects: &'a [usize]) -> Self {
         let builder = Builder::new(leaves(model));
-        Self { model, suspects, builder, known: HashMap::new(), open: Vec::new() }
+        Self { model, suspects, builder, known: HashMap::new(), open: Vec::new(), held: None }
     }
 
     fn rate(&mut self, state: usize) -> Result<Register, Wrong> {
         let model = self.model;
         let State { derivative, suspect, .. } = &model.states[state];
         let base = self.node(derivative.root, Scope { suspect: *suspect, before: None })?;
-        self.changed(Target::State(state), base, None)
+        let rate = self.changed(Target::State(state), base, None)?;
+        let holds = |index: &usize| {
+            let friction = &model.frictions[*index];
+            friction.velocity == state && model.is_there(friction.suspect, self.suspects)
+        };
+        match (0..model.frictions.len()).find(holds) {
+            // Exactly at rest, where the sum of forces would leave a rounding error.
+            Some(friction) if self.held.is_none() => {
+                let direction = direction_of(self.builder.leaves(), model, friction);
+                let zero = self.builder.constant(0.0);
+                Ok(self.builder.push(Code::Select, &[direction, rate, zero]))
+            }
+            _ => Ok(rate),
+        }
+    }
+
+    /// The rate of a friction's speed where this is its force.
+    fn held(&mut self, held: (usize, Register)) -> Result<Register, Wrong> {
+        let known = core::mem::take(&mut self.known);
+        let open = core::mem::take(&mut self.open);
+        self.held = Some(held);
+        let rate = self.rate(self.model.frictions[held.0].velocity);
+        self.held = None;
+        (self.known, self.open) = (known, open);
+        rate
+    }
+
+    /// The force that holds a friction's speed, and what a unit of force does to its rate.
+    fn holding(&mut self, friction: usize) -> Result<[Register; 2], Wrong> {
+        let [zero, one] = [0.0, 1.0].map(|force| self.builder.constant(force));
+        let without = self.held((friction, zero))?;
+        let with_one = self.held((friction, one))?;
+        let braked = self.builder.push(Code::Subtract, &[without, with_one]);
+        Ok([self.builder.push(Code::Divide, &[without, braked]), braked])
+    }
+
+    fn guards(&mut self, friction: usize) -> Result<[Register; 3], Wrong> {
+        let [holding, braked] = self.holding(friction)?;
+        let element = &self.model.frictions[friction];
+        let scope = Scope { suspect: element.suspect, before: None };
+        let sliding = self.node(element.sliding.root, scope)?;
+        let breakaway = self.node(element.breakaway.root, scope)?;
+        let zero = self.builder.constant(0.0);
+        let largest = self.builder.push(Code::Max, &[breakaway, sliding]);
+        Ok([holding, self.builder.push(Code::Max, &[largest, zero]), braked])
+    }
+
+    /// The force of a friction: what holds, or the sliding force against the motion.
+    fn force(&mut self, friction: usize, at: usize) -> Result<Register, Wrong> {
+        let model = self.model;
+        let element = &model.frictions[friction];
+        match self.held {
+            Some((held, force)) if held == friction => return Ok(force),
+            Some((held, _)) => {
+                let state = &model.states[model.frictions[held].velocity].name;
+                let why = format!("the equation of {state} reads {} beside its own friction", element.name);
+                return Err(Wrong::new(at, why));
+            }
+            None => {}
+        }
+        let direction = direction_of(self.builder.leaves(), model, friction);
+        let [holding, _] = self.holding(friction)?;
+        let sliding = self.node(element.sliding.root, Scope { suspect: element.suspect, before: None })?;
+        let sliding = self.builder.push(Code::Multiply, &[direction, sliding]);
+        Ok(self.builder.push(Code::Select, &[direction, sliding, holding]))
     }
 
     /// What the file says of a place, without terms and suspects; of a state it is its value, not its rate.
@@ -177,6 +277,7 @@ impl<'a> Compiler<'a> {
             Symbol::State(index) => leaves.state(index),
             Symbol::Parameter(index) => leaves.parameter(index),
             Symbol::Memory(index) => leaves.memory(index),
+            Symbol::Friction(index) => self.force(index, at)?,
             Symbol::Definition(index) => self.whole(Target::Definition(index), None)?,
             Symbol::Output(index) => self.whole(Target::Output(index), None)?,
             Symbol::Before(suspect) => self.whole(self.model.suspects[suspect].target, Some(suspect))?,

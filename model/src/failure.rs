@@ -21,6 +21,14 @@ pub enum Failure {
         /// Time of the record, s.
         time_s: f64,
     },
+    /// Friction that drives.
+    #[error("{place}: {name} does not brake: a force along the speed has to lower its rate")]
+    Drives {
+        /// File, line and column of its sliding force.
+        place: String,
+        /// Its name.
+        name: String,
+    },
     /// Steps that would never end.
     #[error(
         "more than {MOST_STEPS} steps from {time_s} s to the next sample: the equations are stiff or do not end"

@@ -34,6 +34,8 @@ pub struct Model {
     pub states: Vec<State>,
     /// Values that are kept over a step.
     pub memories: Vec<Memory>,
+    /// Dry friction that sticks and slips.
+    pub frictions: Vec<Friction>,
     /// `[define]`: expressions that others use by name.
     pub definitions: Vec<Definition>,
     /// Columns that the model is compared with.
@@ -197,6 +199,23 @@ pub struct Memory {
     pub start_si: f64,
     /// Its value after a step, from what holds at its end and its own old value.
     pub update: Expression,
+    /// The suspect that it belongs to.
+    pub suspect: Option<usize>,
+}
+
+/// Dry friction that holds a speed at rest until the break-away force is reached.
+#[derive(Clone, Debug)]
+pub struct Friction {
+    /// What its force is called in expressions: positive along the speed.
+    pub name: String,
+    /// Unit in which the force is written and reported.
+    pub unit: Unit,
+    /// The state that it holds at rest, by its index.
+    pub velocity: usize,
+    /// Its size while the speed is not 0.
+    pub sliding: Expression,
+    /// What it holds at most, the sliding force at least.
+    pub breakaway: Expression,
     /// The suspect that it belongs to.
     pub suspect: Option<usize>,
 }

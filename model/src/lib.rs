@@ -38,9 +38,11 @@ pub use expression::inputs::{Hold, Inputs};
 pub use expression::units::{Dimension, Unit, UnitError};
 pub use failure::Failure;
 pub use file::{
-    Change, Definition, Expression, Input, Memory, Model, Output, Parameter, RecordLayout, Smoothing, Solver,
-    Start, State, Suspect, Target,
+    Change, Definition, Expression, Friction, Input, Memory, Model, Output, Parameter, RecordLayout,
+    Smoothing, Solver, Start, State, Suspect, Target,
 };
-pub use library::{Entry, EntryMemory, EntryParameter, EntryState, Library, Quantity, Variable};
+pub use library::{
+    Entry, EntryFriction, EntryMemory, EntryParameter, EntryState, Library, Quantity, Variable,
+};
 pub use rows::Rows;
 pub use simulate::{Direction, Program, Simulator};

@@ -79,6 +79,8 @@ pub struct Entry {
     pub states: Vec<EntryState>,
     /// What it keeps over a step.
     pub memories: Vec<EntryMemory>,
+    /// Its dry friction that sticks and slips.
+    pub frictions: Vec<EntryFriction>,
 }
 
 /// A unit, and of what it is made.
@@ -129,6 +131,21 @@ pub struct EntryMemory {
     pub update: String,
 }
 
+/// Dry friction of a suspect of a library.
+#[derive(Clone, Debug)]
+pub struct EntryFriction {
+    /// What its force is called.
+    pub name: String,
+    /// Its unit.
+    pub quantity: Quantity,
+    /// The variable that it holds at rest; a model binds it to a state.
+    pub velocity: String,
+    /// Its size while it slides.
+    pub sliding: String,
+    /// What it holds at most.
+    pub breakaway: String,
+}
+
 impl Library {
     /// The libraries that ship.
     ///
@@ -155,9 +172,7 @@ impl Library {
     #[must_use]
     pub fn variables_of(&self, entry: &Entry) -> Vec<&Variable> {
         let mut used: Vec<&Variable> = Vec::new();
-        let states = entry.states.iter().map(|state| state.derivative.as_str());
-        let memories = entry.memories.iter().map(|memory| memory.update.as_str());
-        let mut texts: Vec<&str> = states.chain(memories).chain([entry.expression.as_str()]).collect();
+        let mut texts = entry.texts();
         while let Some(text) = texts.pop() {
             for variable in &self.variables {
                 let is_new = used.iter().all(|other| other.name != variable.name);
@@ -180,22 +195,28 @@ impl Entry {
         self.parameters.iter().any(|parameter| parameter.name == name)
     }
 
-    /// Whether it has a number, a state or a memory of this name.
+    /// Its expressions, and the names of what its friction holds.
+    fn texts(&self) -> Vec<&str> {
+        let states = self.states.iter().map(|state| state.derivative.as_str());
+        let memories = self.memories.iter().map(|memory| memory.update.as_str());
+        let frictions = self.frictions.iter();
+        let frictions =
+            frictions.flat_map(|one| [one.velocity.as_str(), one.sliding.as_str(), one.breakaway.as_str()]);
+        states.chain(memories).chain(frictions).chain([self.expression.as_str()]).collect()
+    }
+
+    /// Whether it has a number, a state, a memory or a friction of this name.
     pub(crate) fn has_own(&self, name: &str) -> bool {
         self.has_parameter(name)
             || self.states.iter().any(|state| state.name == name)
             || self.memories.iter().any(|memory| memory.name == name)
+            || self.frictions.iter().any(|friction| friction.name == name)
     }
 
     /// Whether its expressions read the value that its place has without it.
     #[must_use]
     pub fn reads_place(&self) -> bool {
-        let states = self.states.iter().map(|state| &state.derivative);
-        let memories = self.memories.iter().map(|memory| &memory.update);
-        states
-            .chain(memories)
-            .chain([&self.expression])
-            .any(|text| names(text).iter().any(|name| name == PLACE))
+        self.texts().iter().any(|text| names(text).iter().any(|name| name == PLACE))
     }
 }
 
@@ -293,8 +314,16 @@ fn entry(mut section: Section<'_>) -> Result<Entry, SettingsError> {
         section.finish()?;
         memories.push(EntryMemory { name, quantity, update });
     }
+    let mut frictions = Vec::new();
+    for (name, mut section) in tables(&mut section, "friction")? {
+        let quantity = quantity(&mut section)?;
+        let mut text = |key| section.needed_text(key, "an expression").map(|text| text.text);
+        let [velocity, sliding, breakaway] = [text("velocity")?, text("sliding")?, text("breakaway")?];
+        section.finish()?;
+        frictions.push(EntryFriction { name, quantity, velocity, sliding, breakaway });
+    }
     section.finish()?;
-    Ok(Entry { name, about, change, expression, effect, is_local, parameters, states, memories })
+    Ok(Entry { name, about, change, expression, effect, is_local, parameters, states, memories, frictions })
 }
 
 fn tables<'a>(section: &mut Section<'a>, key: &str) -> Result<Vec<(String, Section<'a>)>, SettingsError> {
@@ -321,6 +350,16 @@ mod tests {
             .variables
             .iter()
             .map(|variable| format!("[inputs.in_{}]\nunit = \"{}\"\n", variable.name, variable.unit.text));
+        if let [friction] = entry.frictions.as_slice() {
+            // It holds a state, in whose equation it stands.
+            let velocity = &friction.velocity;
+            return format!(
+                "[inputs.was]\nunit = \"N\"\n[define]\nthere = \"was\"\n[states.in_{velocity}]\nunit = \"m/s\"\nstart = 0\n\
+                 derivative = \"-there/1[kg]\"\n[outputs.o]\nunit = \"N\"\nvalue = \"was\"\n\
+                 [[suspects]]\nuse = \"{}/{}\"\nplace = \"there\"\nwith.{velocity} = \"in_{velocity}\"\n",
+                library.name, entry.name
+            );
+        }
         // What an input at its place would delay is the input itself.
         let is_input = entry.expression.contains("delay(");
         let place = if is_input { "in_u" } else { "there" };
@@ -352,6 +391,7 @@ mod tests {
                 let quantities = entry.parameters.iter().map(|one| &one.quantity);
                 let quantities = quantities.chain(entry.states.iter().map(|one| &one.quantity));
                 let quantities = quantities.chain(entry.memories.iter().map(|one| &one.quantity));
+                let quantities = quantities.chain(entry.frictions.iter().map(|one| &one.quantity));
                 for text in quantities.filter_map(|quantity| quantity.dimension.as_ref()) {
                     let unknown = names(text).into_iter().find(|name| !known.contains(&name.as_str()));
                     assert_eq!(unknown, None, "{}/{}: {text}", library.name, entry.name);

@@ -19,6 +19,8 @@ pub(crate) enum Symbol {
     State(usize),
     Parameter(usize),
     Memory(usize),
+    /// The force of dry friction.
+    Friction(usize),
     Definition(usize),
     Output(usize),
     /// What the place of a suspect is without it.
@@ -42,6 +44,7 @@ pub(crate) fn name_of(model: &Model, symbol: Symbol) -> &str {
         Symbol::State(index) => &model.states[index].name,
         Symbol::Parameter(index) => &model.parameters[index].name,
         Symbol::Memory(index) => &model.memories[index].name,
+        Symbol::Friction(index) => &model.frictions[index].name,
         Symbol::Definition(index) => &model.definitions[index].name,
         Symbol::Output(index) => &model.outputs[index].name,
         Symbol::Before(suspect) => model.target_name(model.suspects[suspect].target),
@@ -53,10 +56,12 @@ fn own(model: &Model, name: &str, suspect: Option<usize>) -> Option<Symbol> {
     let parameter = model.parameters.iter().position(|one| is_it((&one.name, one.suspect)));
     let state = || model.states.iter().position(|one| is_it((&one.name, one.suspect)));
     let memory = || model.memories.iter().position(|one| is_it((&one.name, one.suspect)));
+    let friction = || model.frictions.iter().position(|one| is_it((&one.name, one.suspect)));
     parameter
         .map(Symbol::Parameter)
         .or_else(|| state().map(Symbol::State))
         .or_else(|| memory().map(Symbol::Memory))
+        .or_else(|| friction().map(Symbol::Friction))
 }
 
 pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usize) -> Result<Symbol, Wrong> {
@@ -85,6 +90,7 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
     let parameters = find(Box::new(model.parameters.iter().map(|one| (&one.name, one.suspect))));
     let states = find(Box::new(model.states.iter().map(|one| (&one.name, one.suspect))));
     let memories = find(Box::new(model.memories.iter().map(|one| (&one.name, one.suspect))));
+    let frictions = find(Box::new(model.frictions.iter().map(|one| (&one.name, one.suspect))));
     let definitions = find(Box::new(model.definitions.iter().map(|one| (&one.name, one.suspect))));
     let inputs = model.inputs.iter().position(|one| one.name == name);
     let symbol = inputs
@@ -92,6 +98,7 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
         .or(states.map(Symbol::State))
         .or(parameters.map(Symbol::Parameter))
         .or(memories.map(Symbol::Memory))
+        .or(frictions.map(Symbol::Friction))
         .or(definitions.map(Symbol::Definition));
     symbol.ok_or_else(|| {
         let known: Vec<&str> = model
@@ -101,6 +108,7 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
             .chain(model.states.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
             .chain(model.parameters.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
             .chain(model.memories.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
+            .chain(model.frictions.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
             .chain(model.definitions.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
             .map(String::as_str)
             .take(30)

@@ -1,5 +1,6 @@
 //! Reads the tables of a model file.
 
+mod frictions;
 mod inputs;
 mod suspects;
 
@@ -58,6 +59,7 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
         parameters: Vec::new(),
         states: Vec::new(),
         memories: Vec::new(),
+        frictions: Vec::new(),
         definitions: Vec::new(),
         outputs: Vec::new(),
         suspects: Vec::new(),
@@ -225,6 +227,7 @@ impl Reader<'_> {
             || model.parameters.iter().any(|one| one.name == name && local(one.suspect))
             || model.states.iter().any(|one| one.name == name && local(one.suspect))
             || model.memories.iter().any(|one| one.name == name && local(one.suspect))
+            || model.frictions.iter().any(|one| one.name == name && local(one.suspect))
             || model.definitions.iter().any(|one| one.name == name && local(one.suspect))
             || model.outputs.iter().any(|output| output.name == name)
             || model.tables.iter().any(|table| table.name == name);
@@ -301,6 +304,7 @@ impl Reader<'_> {
             section.finish()?;
             self.model.memories.push(Memory { name, unit, start_si, update, suspect });
         }
+        self.frictions(parent, suspect)?;
         let Some(mut section) = parent.section("define")? else { return Ok(()) };
         for name in section.keys() {
             let text = section.needed_text(&name, "an expression")?;

@@ -7,7 +7,7 @@
 //! ```
 //! Every step ends at a sample at the latest, so that an input that jumps there jumps between two steps. The same operations that
 //! step x step S (forward derivatives through the scheme), so that S is the derivative of what is computed; steps are chosen by
-//! x alone. Memories are renewed after each step.
+//! x alone. Memories are renewed after each step. A step ends where dry friction stops or breaks away (`frictions`).
 //!
 //! The scheme is written out here: the kept libraries were tried and allocate in each step (ode_solvers 0.6 clones its state some
 //! six times a step and stores it; diffsol 0.12 brings faer and 90 crates), and both would restart at each sample. ode_solvers is
@@ -16,33 +16,18 @@
 //! Sources: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.4, II.5, table 5.2 [HNW 1993];
 //! Bock 1983, internal numerical differentiation.
 
-use crate::compile::{Tapes, tapes};
+mod frictions;
+mod steps;
+
+use crate::compile::{Tapes, direction_of, tapes};
 use crate::failure::Failure;
 use crate::file::{Model, Solver};
 use crate::inputs::{Hold, Inputs};
-use crate::tape::{Leaves, Registers, Tape};
+use crate::tape::{Leaves, Register, Registers, Tape};
 use settings::SettingsError;
 
 /// Stages of Dormand-Prince.
 const STAGES: usize = 7;
-/// Its coefficients [HNW 1993, table 5.2].
-const A: [[f64; 6]; STAGES] = [
-    [0.0; 6],
-    [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
-    [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0],
-    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0],
-    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
-    [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
-];
-const C: [f64; STAGES] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
-/// Difference of the two orders.
-const E: [f64; STAGES] =
-    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
-/// Share of the step that the error would allow, and bounds of its change [HNW 1993, II.4].
-const SAFETY: f64 = 0.9;
-const SHRINK: f64 = 0.2;
-const GROW: f64 = 5.0;
 /// Most steps between two samples.
 pub(crate) const MOST_STEPS: usize = 100_000;
 
@@ -62,6 +47,8 @@ pub struct Program {
     solver: Solver,
     holds: Vec<Hold>,
     names: Names,
+    /// Of each friction the place of its speed among the states, and the register of its direction.
+    held: Vec<(usize, Register)>,
 }
 
 /// What messages call the parts, with the places of their equations.
@@ -69,6 +56,7 @@ pub struct Program {
 struct Names {
     states: Vec<(String, String)>,
     outputs: Vec<(String, String)>,
+    frictions: Vec<(String, String)>,
 }
 
 impl Program {
@@ -82,12 +70,24 @@ impl Program {
             let state = &model.states[*index];
             (format!("the rate of {}", state.name), model.place_of(&state.derivative))
         };
+        let friction = |index: &usize| {
+            let friction = &model.frictions[*index];
+            (friction.name.clone(), model.place_of(&friction.sliding))
+        };
         let names = Names {
             states: tapes.states.iter().map(state).collect(),
             outputs: model.outputs.iter().map(|one| (one.name.clone(), model.place_of(&one.value))).collect(),
+            frictions: tapes.frictions.iter().map(friction).collect(),
         };
+        let held = tapes.frictions.iter().map(|index| {
+            let velocity = model.frictions[*index].velocity;
+            let place = tapes.states.iter().position(|state| *state == velocity);
+            let place = place.expect("it holds a state of the model or of its own suspect");
+            (place, direction_of(tapes.rates.leaves, model, *index))
+        });
+        let held = held.collect();
         let holds = model.inputs.iter().map(|input| input.hold).collect();
-        Ok(Self { tapes, solver: model.solver, holds, names })
+        Ok(Self { tapes, solver: model.solver, holds, names, held })
     }
 
     /// Operations of one evaluation of all rates.
@@ -115,6 +115,15 @@ pub struct Simulator<'a> {
     rates: Registers,
     outputs: Registers,
     updates: Registers,
+    guards: Registers,
+    /// The same without derivatives, for the search of the instant at which friction stops or breaks away.
+    plain_guards: Registers,
+    /// Of each friction 1 or -1 where it slides, 0 where it holds.
+    direction: Vec<f64>,
+    /// Of each fitted number by how much an event comes earlier, s for a unit of it.
+    earlier_s: Vec<f64>,
+    /// States within a step.
+    within: Vec<f64>,
     /// Each state and its sensitivities, one after the other.
     x: Vec<f64>,
     tried: Vec<f64>,
@@ -134,7 +143,7 @@ impl<'a> Simulator<'a> {
         let leaves = program.leaves();
         let is_active = |leaf| {
             let is_state = (leaves.state(0)..leaves.parameter(0)).contains(&leaf);
-            let is_memory = leaf >= leaves.memory(0);
+            let is_memory = leaf >= leaves.memory(0) && program.held.iter().all(|(_, held)| leaf != *held);
             let is_parameter = directions.iter().any(
                 |direction| matches!(direction, Direction::Parameter(index) if leaf == leaves.parameter(*index)),
             );
@@ -157,6 +166,11 @@ impl<'a> Simulator<'a> {
             rates: registers(&program.tapes.rates),
             outputs: registers(&program.tapes.outputs),
             updates: registers(&program.tapes.updates),
+            guards: registers(&program.tapes.guards),
+            plain_guards: Registers::new(&program.tapes.guards, 0, |_| false),
+            direction: vec![0.0; program.held.len()],
+            earlier_s: vec![0.0; directions.len()],
+            within: vec![0.0; program.tapes.states.len()],
             x: room.clone(),
             tried: room.clone(),
             stages: core::array::from_fn(|_| room.clone()),
@@ -198,15 +212,18 @@ impl<'a> Simulator<'a> {
         let leaves = self.program.leaves();
         for (index, value) in parameters.iter().enumerate() {
             let register = leaves.parameter(index);
-            self.rates.set(register, *value);
-            self.outputs.set(register, *value);
-            self.updates.set(register, *value);
+            for registers in self.all_registers() {
+                registers.set(register, *value);
+            }
         }
         let tapes = &self.program.tapes;
         tapes.rates.prepare(&mut self.rates);
         tapes.outputs.prepare(&mut self.outputs);
         tapes.updates.prepare(&mut self.updates);
+        tapes.guards.prepare(&mut self.guards);
+        tapes.guards.prepare(&mut self.plain_guards);
         self.begin(starts, memories);
+        self.settle(inputs)?;
         for row in 0..inputs.time_s.len() {
             if row > 0 {
                 self.advance(inputs, row - 1)?;
@@ -214,6 +231,10 @@ impl<'a> Simulator<'a> {
             self.read(inputs, row, &mut sink)?;
         }
         Ok(())
+    }
+
+    fn all_registers(&mut self) -> [&mut Registers; 5] {
+        [&mut self.rates, &mut self.outputs, &mut self.updates, &mut self.guards, &mut self.plain_guards]
     }
 
     fn begin(&mut self, starts: &[f64], memories: &[f64]) {
@@ -241,10 +262,11 @@ impl<'a> Simulator<'a> {
         let (leaves, width) = (self.program.leaves(), self.width());
         for (place, memory) in self.program.tapes.memories.iter().enumerate() {
             let value = &self.memory[place * width..(place + 1) * width];
-            for registers in [&mut self.rates, &mut self.outputs, &mut self.updates] {
+            for registers in [&mut self.rates, &mut self.outputs, &mut self.updates, &mut self.guards] {
                 registers.set(leaves.memory(*memory), value[0]);
                 registers.slope_mut(leaves.memory(*memory)).copy_from_slice(&value[1..]);
             }
+            self.plain_guards.set(leaves.memory(*memory), value[0]);
         }
     }
 
@@ -267,187 +289,6 @@ impl<'a> Simulator<'a> {
             sink(row, output, value, self.outputs.slope(register));
         }
         Ok(())
-    }
-
-    /// From a sample to the next one.
-    fn advance(&mut self, inputs: &Inputs<'_>, row: usize) -> Result<(), Failure> {
-        let (from_s, to_s) = (inputs.time_s[row], inputs.time_s[row + 1]);
-        if self.steps >= self.most_steps {
-            return Err(Failure::Steps { time_s: from_s });
-        }
-        if self.x.is_empty() && self.memory.is_empty() {
-            self.steps += 1;
-            return Ok(());
-        }
-        match self.program.solver {
-            Solver::Fixed { step_s } => {
-                // A step that is longer by a rounding error is no step more.
-                let steps = ((to_s - from_s) / step_s - 1e-9).ceil().max(1.0);
-                if steps > MOST_STEPS as f64 {
-                    return Err(Failure::Steps { time_s: from_s });
-                }
-                let length_s = (to_s - from_s) / steps;
-                self.steps += steps as usize;
-                for step in 0..steps as usize {
-                    self.first_stage(inputs, row, from_s + length_s * step as f64)?;
-                    self.classical(inputs, row, from_s + length_s * step as f64, length_s);
-                    self.taken(inputs, row, from_s + length_s * (step + 1) as f64)?;
-                }
-                Ok(())
-            }
-            Solver::Adaptive { relative_tolerance } => self.adapt(inputs, row, relative_tolerance),
-        }
-    }
-
-    /// The rates at the head of a step, which are finite at the start of a record or its equation is wrong.
-    fn first_stage(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64) -> Result<(), Failure> {
-        self.stage(inputs, row, time_s, 0, false);
-        let width = self.width();
-        let lost = (0..self.largest.len()).find(|place| !self.stages[0][place * width].is_finite());
-        match lost {
-            Some(place) => {
-                let (name, where_it_is) = &self.program.names.states[place];
-                Err(failure(time_s == inputs.time_s[0], name, where_it_is, time_s))
-            }
-            None => Ok(()),
-        }
-    }
-
-    fn classical(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64, step_s: f64) {
-        for (stage, share) in [(1, 0.5), (2, 0.5), (3, 1.0)] {
-            for ((tried, x), rate) in self.tried.iter_mut().zip(&self.x).zip(&self.stages[stage - 1]) {
-                *tried = x + step_s * share * rate;
-            }
-            self.stage(inputs, row, time_s + share * step_s, stage, true);
-        }
-        let [first, second, third, fourth, ..] = &self.stages;
-        for (index, x) in self.x.iter_mut().enumerate() {
-            *x += step_s / 6.0 * (first[index] + 2.0 * (second[index] + third[index]) + fourth[index]);
-        }
-    }
-
-    fn adapt(&mut self, inputs: &Inputs<'_>, row: usize, tolerance: f64) -> Result<(), Failure> {
-        let (from_s, to_s) = (inputs.time_s[row], inputs.time_s[row + 1]);
-        let mut time_s = from_s;
-        self.first_stage(inputs, row, time_s)?;
-        for _ in 0..MOST_STEPS.min(self.most_steps - self.steps) {
-            self.steps += 1;
-            let left_s = to_s - time_s;
-            let wished_s = if self.step_s > 0.0 { self.step_s } else { left_s };
-            // The last step ends on the sample, and no sliver is left behind it.
-            let is_last = wished_s >= 0.999 * left_s;
-            let step_s = if is_last { left_s } else { wished_s.min(0.5 * left_s).max(left_s * 1e-6) };
-            for stage in 1..STAGES {
-                self.tried.fill(0.0);
-                for (weight, before) in A[stage][..stage.min(6)].iter().zip(&self.stages) {
-                    for (sum, rate) in self.tried.iter_mut().zip(before) {
-                        *sum += weight * rate;
-                    }
-                }
-                for (tried, x) in self.tried.iter_mut().zip(&self.x) {
-                    *tried = x + step_s * *tried;
-                }
-                self.stage(inputs, row, time_s + C[stage] * step_s, stage, true);
-            }
-            let error = self.error(step_s) / tolerance;
-            let factor = if error > 0.0 { SAFETY * libm::pow(error, -0.2) } else { GROW };
-            let factor = if factor.is_nan() { SHRINK } else { factor.clamp(SHRINK, GROW) };
-            if error <= 1.0 {
-                self.step_s = if is_last { self.step_s.max(step_s * factor) } else { step_s * factor };
-                time_s = if is_last { to_s } else { time_s + step_s };
-                core::mem::swap(&mut self.x, &mut self.tried);
-                self.taken(inputs, row, time_s)?;
-                if is_last {
-                    return Ok(());
-                }
-                if self.memory.is_empty() {
-                    self.stages.swap(0, STAGES - 1);
-                } else {
-                    self.stage(inputs, row, time_s, 0, false);
-                }
-            } else {
-                if step_s <= left_s * 1e-6 {
-                    return Err(if error.is_finite() {
-                        Failure::Steps { time_s: from_s }
-                    } else {
-                        self.lost(time_s)
-                    });
-                }
-                self.step_s = step_s * factor.min(1.0);
-            }
-        }
-        Err(Failure::Steps { time_s: from_s })
-    }
-
-    /// Largest error of a step over the size of its state.
-    fn error(&self, step_s: f64) -> f64 {
-        let width = self.width();
-        let mut worst: f64 = 0.0;
-        for (place, largest) in self.largest.iter().enumerate() {
-            let at = place * width;
-            let error: f64 = E.iter().zip(&self.stages).map(|(weight, stage)| weight * stage[at]).sum();
-            // A state that has not moved yet is as large as its first step.
-            let size =
-                largest.max((step_s * self.stages[0][at]).abs()).max((self.tried[at] - self.x[at]).abs());
-            let relative = (step_s * error).abs() / size.max(f64::MIN_POSITIVE);
-            worst = if relative.is_nan() { f64::INFINITY } else { worst.max(relative) };
-            if worst.is_infinite() {
-                return worst;
-            }
-        }
-        worst
-    }
-
-    /// Rates at a stage, from `tried` or `x`.
-    fn stage(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64, stage: usize, tried: bool) {
-        let program = self.program;
-        let x = if tried { &self.tried } else { &self.x };
-        put(program, &mut self.rates, inputs, (row, time_s), x);
-        program.tapes.rates.evaluate(&mut self.rates, inputs);
-        let width = self.width();
-        for place in 0..program.tapes.states.len() {
-            let register = program.tapes.rates.result(place);
-            let rate = &mut self.stages[stage][place * width..(place + 1) * width];
-            rate[0] = self.rates.value(register);
-            rate[1..].copy_from_slice(self.rates.slope(register));
-        }
-    }
-
-    /// What follows a step: memories, sizes, and whether all is finite.
-    fn taken(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64) -> Result<(), Failure> {
-        let (program, width) = (self.program, self.width());
-        for place in 0..self.largest.len() {
-            let value = self.x[place * width];
-            if !value.is_finite() {
-                return Err(self.lost(time_s));
-            }
-            self.largest[place] = self.largest[place].max(value.abs());
-        }
-        if self.memory.is_empty() {
-            return Ok(());
-        }
-        put(program, &mut self.updates, inputs, (row, time_s), &self.x);
-        program.tapes.updates.evaluate(&mut self.updates, inputs);
-        for place in 0..program.tapes.memories.len() {
-            let register = program.tapes.updates.result(place);
-            let kept = &mut self.memory[place * width..(place + 1) * width];
-            kept[0] = self.updates.value(register);
-            kept[1..].copy_from_slice(self.updates.slope(register));
-        }
-        self.put_memories();
-        Ok(())
-    }
-
-    /// The first state that is not finite, or whose rate is not.
-    fn lost(&self, time_s: f64) -> Failure {
-        let width = self.width();
-        let is_lost = |place: &usize| {
-            !self.x[place * width].is_finite()
-                || self.stages.iter().any(|stage| !stage[place * width].is_finite())
-        };
-        let place = (0..self.largest.len()).find(is_lost).unwrap_or(0);
-        let (name, where_it_is) = &self.program.names.states[place];
-        failure(false, name, where_it_is, time_s)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The integration tests of `model`, one executable; its allocator counts.
 
 mod files;
+mod friction;
 mod integration;
 mod libraries;
 mod schema;

@@ -44,6 +44,10 @@ fn the_schema_has_the_keys_of_the_reader() {
             vec![format!("{head}[states.z]\nstart = 0\nderivative = \"0/1[s]\"\nnonsense = 1\n")],
         ),
         ("/$defs/memory", vec![format!("{head}[memory.m]\nupdate = \"m\"\nnonsense = 1\n")]),
+        (
+            "/$defs/friction",
+            vec![format!("{head}[friction.f]\nvelocity = \"x\"\nsliding = \"1\"\nnonsense = 1\n")],
+        ),
         ("/$defs/output", vec![format!("{head}[outputs.z]\nvalue = \"1\"\nnonsense = 1\n")]),
         ("/$defs/written_suspect", vec![written("nonsense = 1\n")]),
         (

@@ -2,7 +2,7 @@
 
 use super::bounds;
 use super::record::Measured;
-use super::report::{numbers, place, significant, term};
+use super::report::{friction, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
 use super::{ModelError, read, select};
 use model::{Model, Parameter, Program, Rows, Smoothing, Solver, Start};
@@ -63,6 +63,8 @@ pub(crate) fn in_words(model: &Model) -> String {
     section("with", definitions.map(definition).collect());
     let memory = |one: &model::Memory| format!("{} becomes {} after each step", one.name, one.update.text);
     section("memory", model.memories.iter().filter(|one| own(one.suspect)).map(memory).collect());
+    let frictions = model.frictions.iter().filter(|one| own(one.suspect));
+    section("friction", frictions.map(|one| friction(model, one)).collect());
     let output = |output: &model::Output| {
         let noise = output.noise_si.map_or("noise estimated".into(), |noise| {
             format!("noise {} {}", significant(noise / output.unit.factor), output.unit.text)
@@ -80,8 +82,10 @@ pub(crate) fn in_words(model: &Model) -> String {
             twins => format!("; does the same as {}", twins.join(", ")),
         };
         let head = format!("{}{decoy}, {}: {}{twins}", suspect.name, place(model, index), term(model, index));
+        let frictions = model.frictions.iter().filter(move |one| one.suspect == Some(index));
+        let frictions = frictions.map(|one| format!("  {}", friction(model, one)));
         let own = model.parameters.iter().filter(move |one| one.suspect == Some(index));
-        std::iter::once(head).chain(own.map(|one| format!("  {}", parameter(one))))
+        std::iter::once(head).chain(frictions).chain(own.map(|one| format!("  {}", parameter(one))))
     };
     for (name, is_term) in [("terms", true), ("suspects", false)] {
         let all = (0..model.suspects.len()).filter(|index| model.suspects[*index].is_term == is_term);

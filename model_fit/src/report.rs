@@ -292,6 +292,7 @@ pub(super) fn equations(model: &Model) -> Vec<String> {
     states
         .map(|one| format!("d{}/dt = {}", one.name, one.derivative.text))
         .chain(definitions.map(|one| format!("{} = {}", one.name, one.value.text)))
+        .chain(model.frictions.iter().filter(|one| own(one.suspect)).map(|one| friction(model, one)))
         .chain(model.outputs.iter().map(|one| format!("output {} = {}", one.name, one.value.text)))
         .chain(
             (0..model.suspects.len()).map(|one| {
@@ -299,6 +300,14 @@ pub(super) fn equations(model: &Model) -> Vec<String> {
             }),
         )
         .collect()
+}
+
+/// Dry friction in words.
+pub(crate) fn friction(model: &Model, friction: &model::Friction) -> String {
+    let (name, velocity) = (&friction.name, &model.states[friction.velocity].name);
+    let (sliding, breakaway) = (&friction.sliding.text, &friction.breakaway.text);
+    let unit = &friction.unit.text;
+    format!("{name} = {sliding} against {velocity}, which it holds at rest up to {breakaway}    in {unit}")
 }
 
 pub(crate) fn place(model: &Model, suspect: usize) -> String {

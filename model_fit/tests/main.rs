@@ -11,4 +11,5 @@ mod numbers;
 #[path = "../../discrepancy/tests/real/mod.rs"]
 mod real;
 mod real_models;
+mod stick_slip;
 mod together;

@@ -66,6 +66,14 @@ fn in_words(library: &Library, entry: &Entry) -> String {
     for memory in &entry.memories {
         let _ = writeln!(text, "  {} becomes {} after each step, from 0", memory.name, memory.update);
     }
+    for friction in &entry.frictions {
+        let (name, held) = (&friction.name, &friction.velocity);
+        let _ = writeln!(
+            text,
+            "  {name} = {} against {held}, which it holds at rest up to {}",
+            friction.sliding, friction.breakaway
+        );
+    }
     for variable in library.variables_of(entry) {
         let default =
             variable.default.as_ref().map_or(String::new(), |default| format!("; {default} if not given"));

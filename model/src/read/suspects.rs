@@ -3,10 +3,10 @@
 use super::Reader;
 use crate::check::{dimension, target_dimension};
 use crate::file::{Change, Expression, Memory, Parameter, Start, State, Suspect, Target};
-use crate::library::{Entry, Library, PLACE, Quantity};
+use crate::library::{Entry, EntryFriction, Library, PLACE, Quantity};
 use crate::names::own_name;
 use crate::units::{Dimension, Unit};
-use expression::grammar::{Place, Stands, Wrong, is_of_name, renamed};
+use expression::grammar::{Kind, Place, Stands, Wrong, is_of_name, renamed};
 use settings::{Section, SettingsError, Text};
 
 /// Where a suspect of a library stands, and what it is bound to.
@@ -190,6 +190,9 @@ impl Reader<'_> {
             let (name, unit) = (memory.name.clone(), bound.unit(&memory.quantity).0);
             self.model.memories.push(Memory { name, unit, start_si: 0.0, update, suspect: Some(index) });
         }
+        for friction in &entry.frictions {
+            self.friction_of_library(&bound, friction)?;
+        }
         let mut expression = self.of_library(&bound, &entry.expression)?;
         if let Some(times) = times {
             let product = self.model.nodes.product(times.root, expression.root, at);
@@ -197,6 +200,25 @@ impl Reader<'_> {
             expression.text = format!("{}*({})", times.text, expression.text);
         }
         Ok(expression)
+    }
+
+    /// A friction of a library, which holds the state that its variable is bound to.
+    fn friction_of_library(
+        &mut self,
+        bound: &Bound<'_>,
+        friction: &EntryFriction,
+    ) -> Result<(), SettingsError> {
+        let variable = &friction.velocity;
+        let place = bound.bound.iter().find(|(name, _)| name == variable).map(|(_, place)| *place);
+        let node = self.model.nodes.get(place.expect("a test binds each of a library")).clone();
+        let Kind::Name(state) = node.kind else {
+            let why = format!("with.{variable}: friction holds a state at rest: allowed is the name of one");
+            return Err(self.source.wrong_from(node.at, &why));
+        };
+        let sliding = self.of_library(bound, &friction.sliding)?;
+        let breakaway = self.of_library(bound, &friction.breakaway)?;
+        let named = (friction.name.clone(), bound.unit(&friction.quantity).0);
+        self.friction(named, (&state, node.at), [sliding, breakaway], Some(bound.index))
     }
 
     fn wrong(&self, wrong: &Wrong) -> SettingsError {
