@@ -205,13 +205,14 @@ install_mdf4() { install_requirements mdf4 "$(dirname "${BASH_SOURCE[0]}")/../di
 install_dask() { install_requirements dask "$(dirname "${BASH_SOURCE[0]}")/../campaign/dask/requirements.txt"; }
 
 # airbench-hil from python/, with labwired, for scripts/mcu.
-install_hil() {
-    local python stamp="$tools/hil/installed"
-    python="$(dirname "${BASH_SOURCE[0]}")/../python"
+install_hil() (
+    python="$(dirname "${BASH_SOURCE[0]}")/../python" stamp="$tools/hil/installed"
+    # Two that begin at once would install into the same folder.
+    exec {lock}>"$tools/hil.lock" && flock "$lock" || return 1
     cat "$python/pyproject.toml" "$python/requirements.txt" | cmp -s - "$stamp" && return
     make_venv hil --requirement "$python/requirements.txt" --editable "$python[mcu]" &&
         cat "$python/pyproject.toml" "$python/requirements.txt" >"$stamp"
-}
+)
 
 # python-can's own tests, which only its source distribution holds.
 install_python_can_tests() {
