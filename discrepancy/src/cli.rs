@@ -95,9 +95,13 @@ pub struct NameArguments {
     /// File of suspects beside the rig file: terms as expressions that may be missing, candidates beside the effects.
     #[arg(long, value_name = "FILE")]
     pub suspects: Option<PathBuf>,
-    /// Of a model file: where no suspect is named, search for terms that none of them describes.
+    /// Of a model file: wherever no suspect is named, search for terms that none of them describes; without it, where more
+    /// than noise is left.
     #[arg(long)]
     pub discover: bool,
+    /// Of a model file: no such search.
+    #[arg(long, conflicts_with = "discover")]
+    pub no_discover: bool,
 }
 
 /// What the whole workflow is given.

@@ -90,7 +90,7 @@ fn progress() -> impl FnMut(&str) {
 }
 
 fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
-    let NameArguments { records, without, suspects, discover } = arguments;
+    let NameArguments { records, without, suspects, discover, no_discover } = arguments;
     threads(records.threads);
     known_effects(without)?;
     tests.iter().try_for_each(|test| is_there(test))?;
@@ -107,10 +107,12 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         }
         return any_plant::close_command(arguments, tests);
     }
-    if *discover {
-        return Err(CommandError::BadData(
-            "--discover: of a model file alone; the rig has its catalogue".into(),
-        ));
+    if let Some((option, _)) =
+        [("--discover", discover), ("--no-discover", no_discover)].iter().find(|one| *one.1)
+    {
+        return Err(CommandError::BadData(format!(
+            "{option}: of a model file alone; the rig has its catalogue"
+        )));
     }
     let model = PathBuf::from("rig.toml");
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));

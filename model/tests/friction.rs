@@ -212,7 +212,8 @@ fn friction_that_cannot_hold_is_refused_with_line_and_column() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     let one = |index: usize| {
         format!(
-            "[states.w{index}]\nstart = 0\nderivative = \"-f{index}/1[s]\"\n[friction.f{index}]\nvelocity = \"w{index}\"\nsliding = \"1\"\n"
+            "[states.w{index}]\nstart = 0\nderivative = \"-f{index}/1[s]\"\n\
+             [friction.f{index}]\nvelocity = \"w{index}\"\nsliding = \"1\"\n"
         )
     };
     let many: String = (0..21).map(one).collect();

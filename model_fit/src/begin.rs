@@ -352,13 +352,16 @@ mod tests {
         }
         std::fs::write(&record, text).unwrap();
         std::fs::write(&file, new_model(&record).unwrap()).unwrap();
-        let closed = crate::close(&file, &[record], &[], &mut |_| {}).unwrap();
+        let mut closed = crate::close(&file, &[record], &[], &mut |_| {}).unwrap();
         let value = |name: &str| closed.report.parameters.iter().find(|one| one.name == name).unwrap().value;
         assert!((value("lag_y") - 0.5).abs() < 0.01, "{}", value("lag_y"));
         assert!((value("gain_y_heater") - 2.5).abs() < 0.02, "{}", value("gain_y_heater"));
         assert_eq!(closed.report.verdict, crate::Verdict::NothingMissing, "{}", closed.report.headline);
         let schema = include_str!("../../docs/model-report.schema.json");
         let schema: Value = serde_json::from_str(schema).unwrap();
+        let left = closed.report.training[0].clone();
+        let [suspect, instead_of] = ["one", "other"].map(str::to_owned);
+        closed.report.held_out_alternatives.push(crate::OfAlternative { suspect, instead_of, left });
         fits(&schema, &schema, &serde_json::to_value(&closed.report).unwrap(), "$");
     }
 

@@ -3,7 +3,7 @@
 
 use super::fit::{Fitting, OPTIONS, OfRecord};
 use super::record::Measured;
-use super::select::{Fitted, Found};
+use super::select::{Fitted, Found, fitted};
 use super::starts;
 use model::Failure;
 
@@ -56,14 +56,9 @@ pub(crate) fn judge(
         let (after, _) = residuals(&found.extended, one)?;
         let outputs = before.into_iter().zip(after).enumerate().map(
             |(output, ([left, said], [left_after, extended]))| {
-                let scored: Vec<usize> =
-                    (first_row..left.len()).filter(|row| left[*row].is_finite()).collect();
-                let rms = |of: &[f64]| {
-                    (scored.iter().map(|row| of[*row] * of[*row]).sum::<f64>() / scored.len().max(1) as f64)
-                        .sqrt()
-                };
-                let rms_si = [rms(&left), rms(&left_after)];
-                judged.push(Judged { record: index, output, rms_si, scored_rows: scored.len() });
+                let scored_rows = left[first_row..].iter().filter(|value| value.is_finite()).count();
+                let rms_si = [&left, &left_after].map(|left| rms_of(left, first_row));
+                judged.push(Judged { record: index, output, rms_si, scored_rows });
                 [left.iter().zip(&said).map(|(left, said)| left + said).collect(), said, extended]
             },
         );
@@ -76,6 +71,52 @@ pub(crate) fn judge(
         });
     }
     Ok((judged, traces))
+}
+
+/// A suspect that explains the training records as well as a named one, in its place.
+#[derive(Clone, Debug)]
+pub(crate) struct Alternative {
+    pub(crate) suspect: usize,
+    pub(crate) instead_of: usize,
+    /// What the model alone and the model with it leave.
+    pub(crate) judged: Vec<Judged>,
+}
+
+/// The extended model with each alternative in place of what was named, on the same records.
+pub(crate) fn alternatives(
+    found: &Found<'_>,
+    records: &[Measured],
+    judged: &[Judged],
+) -> Result<Vec<Alternative>, JudgeError> {
+    let mut all = Vec::new();
+    for taken in &found.taken {
+        let instead_of = taken.evaluation.suspect;
+        for suspect in &taken.alternatives {
+            let others =
+                found.extended.suspects.iter().filter(|other| **other != instead_of && *other != suspect);
+            let suspects: Vec<usize> = others.chain([suspect]).copied().collect();
+            let of_training = &found.extended.fitting;
+            let fit = fitted(of_training.model, of_training.records, &suspects, Some(&found.extended));
+            let fit = fit.map_err(|why| JudgeError::Failure { record: "training".into(), why })?;
+            let of_record = |one: &Judged| {
+                let record = std::slice::from_ref(&records[one.record]);
+                let (left, first_row) = residuals(&fit, record)?;
+                let rms_si = [one.rms_si[0], rms_of(&left[one.output][0], first_row)];
+                Ok(Judged { rms_si, ..one.clone() })
+            };
+            let judged = judged.iter().map(of_record).collect::<Result<_, JudgeError>>()?;
+            all.push(Alternative { suspect: *suspect, instead_of, judged });
+        }
+    }
+    Ok(all)
+}
+
+/// Of what is left from a row on.
+fn rms_of(left: &[f64], first_row: usize) -> f64 {
+    let scored = left[first_row..].iter().filter(|value| value.is_finite());
+    let (count, squares) =
+        scored.fold((0_usize, 0.0), |(count, sum), value| (count + 1, sum + value * value));
+    (squares / count.max(1) as f64).sqrt()
 }
 
 /// What a fitted model leaves of a record, and the first row that is scored.

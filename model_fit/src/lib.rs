@@ -79,7 +79,7 @@ pub use extended::{ExtendError, ReportedModel, extended};
 pub use held_out::{JudgeError, WORSE};
 pub use processing::SPARSEST;
 pub use record::RecordError;
-pub use report::{Left, ModelReport};
+pub use report::{Left, ModelReport, OfAlternative};
 pub use verdict::Verdict;
 
 use held_out::Traces;
@@ -144,7 +144,19 @@ pub struct ClosedModel {
     pub extended: Option<String>,
 }
 
-/// Closes a model: names what it lacks by the training records, and compares both models on the held-out ones.
+/// Where a formula is searched for what no suspect describes. None is where a suspect is named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Search {
+    /// Where more than noise is left.
+    MoreThanNoise,
+    /// Wherever nothing is named.
+    NothingNamed,
+    /// Nowhere.
+    Never,
+}
+
+/// Closes a model: names what it lacks by the training records, and compares both models on the held-out ones. Where no suspect
+/// is named and more than noise is left, a formula is searched.
 ///
 /// # Errors
 /// [`ModelError`] for a model or a training record that cannot be used.
@@ -154,26 +166,17 @@ pub fn close(
     tests: &[PathBuf],
     progress: &mut dyn FnMut(&str),
 ) -> Result<ClosedModel, ModelError> {
-    closed(file, (train, tests), false, progress)
+    close_with(file, (train, tests), Search::MoreThanNoise, progress)
 }
 
-/// The same, and where no suspect is named a search for terms that none of them describes.
+/// The same, and says where a formula is searched.
 ///
 /// # Errors
 /// As [`close`].
-pub fn close_searching(
-    file: &Path,
-    train: &[PathBuf],
-    tests: &[PathBuf],
-    progress: &mut dyn FnMut(&str),
-) -> Result<ClosedModel, ModelError> {
-    closed(file, (train, tests), true, progress)
-}
-
-fn closed(
+pub fn close_with(
     file: &Path,
     (train, tests): (&[PathBuf], &[PathBuf]),
-    is_searching: bool,
+    search: Search,
     progress: &mut dyn FnMut(&str),
 ) -> Result<ClosedModel, ModelError> {
     let model = read(file)?;
@@ -181,7 +184,13 @@ fn closed(
     let found = select::search(&model, &records, progress)?;
     progress("structure");
     let structure = structure::structure(&found.baseline, &found.extended);
-    let grown = (is_searching && found.taken.is_empty()).then(|| discover::grown(&found.baseline));
+    let is_searched = found.taken.is_empty()
+        && match search {
+            Search::MoreThanNoise => !adequacy::residuals(&found.extended)?.iter().all(|left| left.is_noise),
+            Search::NothingNamed => true,
+            Search::Never => false,
+        };
+    let grown = is_searched.then(|| discover::grown(&found.baseline));
     let located =
         watch::watched(progress, ("where it comes from: steps", 1), |_| discover::located(&found.baseline));
     let (found, mut report) = match &grown {
@@ -205,8 +214,8 @@ fn closed(
     let held_out = judged(&model, &found, tests, progress);
     let (traces, not_judged): (Vec<Traces>, _) = match held_out {
         Ok(None) => (held_out::trained(&found)?, None),
-        Ok(Some((judged, traces, notes))) => {
-            report.judge(&model, &judged, &traces);
+        Ok(Some((judged, alternatives, traces, notes))) => {
+            report.judge(&model, (&judged, &alternatives), &traces);
             report.notes.extend(notes);
             report.notes.extend(report.much_worse());
             (traces, None)
@@ -253,8 +262,8 @@ fn looked_at(model: &Model, files: &[PathBuf]) -> Result<Vec<Measured>, ModelErr
     Ok(records)
 }
 
-/// What both models leave, what they say, and notes of the records.
-type Judgement = (Vec<held_out::Judged>, Vec<Traces>, Vec<String>);
+/// What both models leave, what alternatives do, what both models say, and notes of the records.
+type Judgement = (Vec<held_out::Judged>, Vec<held_out::Alternative>, Vec<Traces>, Vec<String>);
 
 /// Both models on the held-out records; `None` where there is none.
 fn judged(
@@ -273,7 +282,8 @@ fn judged(
     }
     look::beside_model(model, &mut records);
     let (judged, traces) = held_out::judge(found, &records).map_err(|error| error.to_string())?;
-    Ok(Some((judged, traces, report::notes_of(&records))))
+    let alternatives = held_out::alternatives(found, &records, &judged).map_err(|error| error.to_string())?;
+    Ok(Some((judged, alternatives, traces, report::notes_of(&records))))
 }
 
 impl ClosedModel {

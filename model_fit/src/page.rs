@@ -37,7 +37,11 @@ pub(crate) fn page(
         ("named", "What is missing", named(report)),
         ("located", "Where it comes from", located(report)),
         ("discovered", "What a search found", discovered(report)),
-        ("held-out", "On held-out records", left("Held-out records", &report.held_out)),
+        (
+            "held-out",
+            "On held-out records",
+            left("Held-out records", &report.held_out) + &alternatives(report),
+        ),
         (
             "training",
             "On the training records",
@@ -179,6 +183,23 @@ fn left(label: &str, all: &[Left]) -> String {
         ]
     });
     table(label, &["record", "output", "model, rms", "extended, rms", "ratio", "samples"], rows)
+}
+
+fn alternatives(report: &ModelReport) -> String {
+    let rows = report.held_out_alternatives.iter().map(|one| {
+        let value = |value: f64| number(format!("{} {}", significant(value), one.left.unit));
+        vec![
+            words(&one.suspect),
+            words(&one.instead_of),
+            words(&one.left.record),
+            words(&one.left.output),
+            value(one.left.rms_before),
+            value(one.left.rms_after),
+            number(one.left.ratio.map_or_else(String::new, significant)),
+        ]
+    });
+    let heads = ["with", "in place of", "record", "output", "model, rms", "extended, rms", "ratio"];
+    table("What explains the training records as well", &heads, rows)
 }
 
 fn residuals(all: &[Residual]) -> String {

@@ -5,7 +5,7 @@ use super::bounds;
 use super::covariance;
 use super::discover::{DiscoveredTerm, Located};
 use super::fit::Fitting;
-use super::held_out::{Judged, Traces};
+use super::held_out::{Alternative, Judged, Traces};
 use super::judge::Evaluation;
 use super::look;
 use super::normal::standard_errors;
@@ -45,8 +45,10 @@ pub struct ModelReport {
     pub training: Vec<Left>,
     /// What is left on each held-out record.
     pub held_out: Vec<Left>,
+    /// The same with each alternative in place of what was named.
+    pub held_out_alternatives: Vec<OfAlternative>,
     pub named: Vec<Named>,
-    /// Where nothing was named and a search was asked for: terms that no suspect describes.
+    /// Where nothing was named and a search found some: terms that no suspect describes.
     pub discovered: Vec<DiscoveredTerm>,
     /// Where what the model alone leaves comes from, whatever the suspects are; `None` where no place explains enough of it.
     pub located: Option<Located>,
@@ -88,6 +90,15 @@ pub struct Left {
     /// After over before.
     pub ratio: Option<f64>,
     pub rows: usize,
+}
+
+/// What an alternative leaves of a held-out record in place of what was named.
+#[derive(Clone, Debug, Serialize)]
+pub struct OfAlternative {
+    pub suspect: String,
+    pub instead_of: String,
+    #[serde(flatten)]
+    pub left: Left,
 }
 
 /// A suspect that is missing in the model.
@@ -221,6 +232,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         parameters,
         training: training.collect(),
         held_out: Vec::new(),
+        held_out_alternatives: Vec::new(),
         named,
         discovered: Vec::new(),
         located: None,
@@ -233,7 +245,27 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
 
 impl ModelReport {
     /// What held-out records say of what was named. One that gets worse takes the name back.
-    pub(crate) fn judge(&mut self, model: &Model, judged: &[Judged], traces: &[Traces]) {
+    pub(crate) fn judge(
+        &mut self,
+        model: &Model,
+        (judged, alternatives): (&[Judged], &[Alternative]),
+        traces: &[Traces],
+    ) {
+        let name = |suspect: usize| model.suspects[suspect].name.clone();
+        let of_alternative = |one: &Alternative| {
+            let [suspect, instead_of] = [one.suspect, one.instead_of].map(name);
+            let left = one
+                .judged
+                .iter()
+                .map(|one| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows));
+            let each = left.map(move |left| OfAlternative {
+                suspect: suspect.clone(),
+                instead_of: instead_of.clone(),
+                left,
+            });
+            each.collect::<Vec<_>>()
+        };
+        self.held_out_alternatives = alternatives.iter().flat_map(of_alternative).collect();
         self.held_out = judged
             .iter()
             .map(|one| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows))

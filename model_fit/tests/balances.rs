@@ -1,7 +1,7 @@
 //! Model files of one balance, which integrate nothing, on records that are made here.
 
 use model_fit::Verdict;
-use model_fit::{ClosedModel, ModelError, close};
+use model_fit::{ClosedModel, ModelError, Search, close_with};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -54,7 +54,9 @@ fn taken(model: &str, target: impl Fn(usize, f64, f64, f64) -> f64) -> (Verdict,
     let [file, record] = ["model.toml", "record.csv"].map(|name| folder.path().join(name));
     fs::write(&file, model).unwrap();
     fs::write(&record, "t_s,x,v,y\n".to_owned() + &(0..2000).map(row).collect::<String>()).unwrap();
-    let report = close(&file, &[record], &[], &mut |_| {}).unwrap_or_else(|error| panic!("{error}")).report;
+    let report = close_with(&file, (&[record], &[]), Search::Never, &mut |_| {})
+        .unwrap_or_else(|error| panic!("{error}"))
+        .report;
     (report.verdict, report.named.into_iter().map(|named| named.suspect).collect())
 }
 
@@ -130,7 +132,12 @@ fn mass(change: impl Fn(usize, [f64; 3]) -> [f64; 3], test: Option<&str>) -> Res
         path
     };
     let tests: Vec<PathBuf> = test.map(|test| file("short.csv", test)).into_iter().collect();
-    close(Path::new(&file("mass.toml", MASS)), &[file("mass.csv", &text)], &tests, &mut |_| {})
+    close_with(
+        Path::new(&file("mass.toml", MASS)),
+        (&[file("mass.csv", &text)], &tests),
+        Search::Never,
+        &mut |_| {},
+    )
 }
 
 /// Whether the mass that a report tells is this, within a hundredth.

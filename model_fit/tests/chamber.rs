@@ -2,7 +2,7 @@
 
 use crate::real::crate_folder;
 use model_fit::Verdict;
-use model_fit::{ModelReport, close};
+use model_fit::{ModelReport, Search, close_with};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use std::fmt::Write as _;
 
@@ -34,7 +34,9 @@ fn closed(rig: &RigParameters) -> ModelReport {
         file
     });
     let model = crate_folder().join("../discrepancy/models/chamber.toml");
-    close(&model, &[train], &[test], &mut |_| {}).unwrap_or_else(|error| panic!("{error}")).report
+    close_with(&model, (&[train], &[test]), Search::Never, &mut |_| {})
+        .unwrap_or_else(|error| panic!("{error}"))
+        .report
 }
 
 fn number(report: &ModelReport, name: &str) -> f64 {

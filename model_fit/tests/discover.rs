@@ -6,9 +6,9 @@
 
 use crate::model_files::OSCILLATOR;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, close, close_searching, read};
+use model_fit::{ClosedModel, Search, close_with, read};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The plant of the tests of model files, with one suspect that does not describe what is hidden here.
 fn oscillator() -> String {
@@ -42,10 +42,7 @@ fn record(mut seed: u64, hidden: fn(f64, f64, f64) -> f64) -> String {
     text
 }
 
-type Close =
-    fn(&Path, &[PathBuf], &[PathBuf], &mut dyn FnMut(&str)) -> Result<ClosedModel, model_fit::ModelError>;
-
-fn closed(folder: &Path, close: Close, hidden: fn(f64, f64, f64) -> f64) -> ClosedModel {
+fn closed(folder: &Path, search: Search, hidden: fn(f64, f64, f64) -> f64) -> ClosedModel {
     let file = |name: &str, text: &str| {
         let path = folder.join(name);
         fs::write(&path, text).unwrap();
@@ -54,14 +51,14 @@ fn closed(folder: &Path, close: Close, hidden: fn(f64, f64, f64) -> f64) -> Clos
     let model = file("oscillator.toml", &oscillator());
     let train = [file("train.csv", &record(1, hidden))];
     let test = [file("test.csv", &record(3, hidden))];
-    close(&model, &train, &test, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    close_with(&model, (&train, &test), search, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
 fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written() {
     let folder = tempfile::tempdir().unwrap();
-    // A damper that grips away from the middle.
-    let closed = closed(folder.path(), close_searching, |x, v, _| 60.0 * x * x * v);
+    // A damper that grips away from the middle; nobody asks for a search.
+    let closed = closed(folder.path(), Search::MoreThanNoise, |x, v, _| 60.0 * x * x * v);
     let report = &closed.report;
     assert_eq!((report.verdict, report.confirmed), (Verdict::OutsideCatalogue, Some(true)), "{report:#?}");
     let term = &report.discovered[0];
@@ -84,7 +81,7 @@ fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written()
 fn a_term_with_memory_is_found_as_such() {
     let folder = tempfile::tempdir().unwrap();
     // The spring is the harder, the further it was out on one side of late.
-    let report = closed(folder.path(), close_searching, |x, _, low| 60.0 * low * x).report;
+    let report = closed(folder.path(), Search::NothingNamed, |x, _, low| 60.0 * low * x).report;
     assert_eq!((report.verdict, report.confirmed), (Verdict::OutsideCatalogue, Some(true)), "{report:#?}");
     let term = &report.discovered[0];
     assert_eq!(
@@ -104,14 +101,18 @@ fn a_term_with_memory_is_found_as_such() {
 #[test]
 fn nothing_is_found_where_nothing_is_missing() {
     let folder = tempfile::tempdir().unwrap();
-    let report = closed(folder.path(), close_searching, |_, _, _| 0.0).report;
+    let report = closed(folder.path(), Search::NothingNamed, |_, _, _| 0.0).report;
     assert_eq!((report.verdict, report.discovered.len()), (Verdict::NothingMissing, 0), "{report:#?}");
     assert!(report.notes.iter().any(|note| note.contains("0 taken")), "{:?}", report.notes);
 }
 
 #[test]
-fn nothing_is_searched_that_was_not_asked_for() {
+fn nothing_is_searched_where_it_is_switched_off_or_noise_is_left() {
     let folder = tempfile::tempdir().unwrap();
-    let report = closed(folder.path(), close, |x, v, _| 60.0 * x * x * v).report;
+    let report = closed(folder.path(), Search::Never, |x, v, _| 60.0 * x * x * v).report;
+    assert!(report.discovered.is_empty() && report.notes.is_empty(), "{report:#?}");
+    assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{report:#?}");
+    let report = closed(folder.path(), Search::MoreThanNoise, |_, _, _| 0.0).report;
+    assert_eq!(report.verdict, Verdict::NothingMissing, "{report:#?}");
     assert!(report.discovered.is_empty() && report.notes.is_empty(), "{report:#?}");
 }

@@ -168,6 +168,13 @@ fn two_suspects_with_the_same_law_cannot_be_told_apart() {
     let mut names = [report.named[0].suspect.as_str(), report.named[0].alternatives[0].as_str()];
     names.sort_unstable();
     assert_eq!(names, ["cubic-stiffness", "cubic-too"]);
+    // The same law leaves the same of the held-out record.
+    let other = &report.held_out_alternatives[0];
+    assert_eq!(
+        [other.instead_of.as_str(), other.suspect.as_str()],
+        [&report.named[0].suspect, &report.named[0].alternatives[0]]
+    );
+    assert!((other.left.rms_after / report.held_out[0].rms_after - 1.0).abs() < 1e-2, "{other:?}");
     // Structure says so before any of them is fitted.
     assert!(report.structure.twins.iter().any(|twins| twins.suspects == ["cubic-stiffness", "cubic-too"]));
     let train = [folder.path().join("train.csv")];

@@ -5,7 +5,7 @@
 
 use crate::real::{crate_folder, data};
 use model_fit::Verdict;
-use model_fit::{Left, ModelReport, close};
+use model_fit::{Left, ModelReport, Search, close_with};
 use std::path::{Path, PathBuf};
 
 fn shipped(name: &str) -> String {
@@ -16,7 +16,8 @@ fn closed(text: &str, train: &[PathBuf], test: &[PathBuf]) -> ModelReport {
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("model.toml");
     std::fs::write(&model, text).unwrap();
-    let closed = close(&model, train, test, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"));
+    let closed = close_with(&model, (train, test), Search::Never, &mut |_| {})
+        .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(closed.not_judged, None);
     closed.report
 }
@@ -116,6 +117,13 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
     let [before, after] =
         [|left: &Left| left.rms_before, |left: &Left| left.rms_after].map(|of| pooled(&report.held_out, of));
     assert!(after <= 0.60 * before, "{before} {after}");
+    let line: Vec<Left> = report.held_out_alternatives.iter().map(|one| one.left.clone()).collect();
+    assert_eq!(
+        (line.len(), report.held_out_alternatives[0].suspect.as_str()),
+        (2, "proportional-to-pressure")
+    );
+    let by_line = pooled(&line, |left| left.rms_after);
+    assert!((by_line / before - 0.603).abs() < 0.005, "{by_line} {before}");
 }
 
 #[test]

@@ -151,6 +151,7 @@ def close(program, folder, model, out):
     words = [
         program,
         "close",
+        "--no-discover",
         "--model",
         folder / model,
         "--train",

@@ -4,7 +4,8 @@ use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress}
 use crate::cli::ReadArguments;
 use crate::folder::{self, Folder};
 use model_fit::{
-    ClosedModel, ModelReport, ReportedModel, close, close_searching, extended, look, new_model, read,
+    ClosedModel, ModelReport, OfAlternative, ReportedModel, Search, Verdict, close_with, extended, look,
+    new_model, read,
 };
 use pagekit::significant;
 use std::fmt::Write as _;
@@ -20,8 +21,17 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
         out.file(name)?;
     }
     let mut progress = progress();
-    let close = if arguments.discover { close_searching } else { close };
-    let closed = close(&records.rig, &records.train, tests, &mut progress)?;
+    let search = match arguments {
+        NameArguments { discover: true, .. } => Search::NothingNamed,
+        NameArguments { no_discover: true, .. } => Search::Never,
+        _ => Search::MoreThanNoise,
+    };
+    let closed = close_with(&records.rig, (&records.train, tests), search, &mut progress)?;
+    // A formula that was not asked for explains nothing.
+    let is_unexplained = closed.is_unexplained()
+        || !arguments.discover
+            && closed.report.verdict == Verdict::OutsideCatalogue
+            && closed.report.named.is_empty();
     print(&in_words(&closed.report))?;
     if let Some(why) = &closed.not_judged {
         print(&format!("The model was not judged on the held-out record: {why}\n"))?;
@@ -36,7 +46,7 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
     Ok(match closed {
         ClosedModel { not_judged: Some(_), .. } => Exit::BadInput,
         _ if !records.read.strict => Exit::Good,
-        _ if closed.is_unexplained() || !tests.is_empty() && !closed.is_confirmed() => Exit::BoundBroken,
+        _ if is_unexplained || !tests.is_empty() && !closed.is_confirmed() => Exit::BoundBroken,
         _ => Exit::Good,
     })
 }
@@ -108,6 +118,13 @@ fn in_words(report: &ModelReport) -> String {
             text,
             "{}: {} {:.4} {} rms with the model, {:.4} extended",
             left.record, left.output, left.rms_before, left.unit, left.rms_after
+        );
+    }
+    for OfAlternative { suspect, instead_of, left } in &report.held_out_alternatives {
+        let _ = writeln!(
+            text,
+            "{}: {} {:.4} {} rms with {suspect} in place of {instead_of}",
+            left.record, left.output, left.rms_after, left.unit
         );
     }
     for residual in &report.residuals {
