@@ -107,12 +107,9 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         }
         return any_plant::close_command(arguments, tests);
     }
-    if let Some((option, _)) =
-        [("--discover", discover), ("--no-discover", no_discover)].iter().find(|one| *one.1)
-    {
-        return Err(CommandError::BadData(format!(
-            "{option}: of a model file alone; the rig has its catalogue"
-        )));
+    if *discover || *no_discover {
+        let why = "--discover, --no-discover: of a model file alone; the rig has its catalogue";
+        return Err(CommandError::BadData(why.into()));
     }
     let model = PathBuf::from("rig.toml");
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));

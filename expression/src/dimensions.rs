@@ -2,7 +2,7 @@
 
 use crate::compile::function;
 use crate::grammar::{Binary, Kind, Node, Place, Wrong};
-use crate::units::Dimension;
+use crate::units::{Dimension, Unit};
 
 /// `None` is the dimension of 0, which is any.
 pub type Measure = Option<Dimension>;
@@ -24,6 +24,11 @@ pub trait Dimensions {
     /// Number of arguments of a function that is not one of [`function`], and what follows the known ones in a message.
     fn arguments(&self, name: &str) -> Option<usize>;
 
+    /// A dimension in units that a reader of the file knows.
+    fn in_units(&self, dimension: Dimension) -> String {
+        familiar(dimension)
+    }
+
     /// The functions beside those of [`function`], for a message.
     fn functions(&self) -> &'static str;
 
@@ -44,8 +49,15 @@ pub trait Dimensions {
         wanted: Dimension,
         (at, what): (usize, &str),
     ) -> Result<(), Wrong> {
-        match self.node(place, scope)? {
+        let found = self.node(place, scope).map_err(|wrong| match wrong.is_of_units {
+            true if wanted != Dimension::NONE => {
+                Wrong { why: format!("{}; {what} is in {}", wrong.why, self.in_units(wanted)), ..wrong }
+            }
+            _ => wrong,
+        })?;
+        match found {
             Some(found) if found != wanted => {
+                let [wanted, found] = [wanted, found].map(|one| self.in_units(one));
                 Err(Wrong::new(at, format!("{what} is in {wanted}, and this is in {found}")))
             }
             _ => Ok(()),
@@ -66,12 +78,14 @@ pub trait Dimensions {
             Kind::Binary(operator, left, right) => {
                 let [a, b] = [self.node(*left, scope)?, self.node(*right, scope)?];
                 match operator {
-                    Binary::Add | Binary::Subtract => same(a, b, node.at, "sum"),
+                    Binary::Add | Binary::Subtract => self.same([(a, *left), (b, *right)], node.at, "sum"),
                     Binary::Multiply => Ok(a.zip(b).map(|(a, b)| a.times(b))),
                     Binary::Divide => Ok(a.map(|a| a.over(b.unwrap_or_default()))),
                     Binary::Power => self.power(a, b, *right, node.at),
                     Binary::And | Binary::Or => Ok(Some(Dimension::NONE)),
-                    _ => same(a, b, node.at, "comparison").map(|_| Some(Dimension::NONE)),
+                    _ => self
+                        .same([(a, *left), (b, *right)], node.at, "comparison")
+                        .map(|_| Some(Dimension::NONE)),
                 }
             }
             Kind::Call(name, arguments) => self.call(name, arguments, node.at, scope),
@@ -98,7 +112,8 @@ pub trait Dimensions {
         let power = number.and_then(|number| base.to_the(number));
         let why = || {
             format!(
-                "a value in {base} has a power with a number as exponent alone: divide it by a scale first"
+                "a value in {} has a power with a number as exponent alone: divide it by a scale first",
+                self.in_units(base)
             )
         };
         power.map(Some).ok_or_else(|| Wrong::new(at, why()))
@@ -146,32 +161,79 @@ pub trait Dimensions {
             "sign" | "not" => Ok(Some(Dimension::NONE)),
             "sqrt" => Ok(measures[0].and_then(|measure| measure.to_the(0.5))),
             "min" | "max" => {
-                measures[1..].iter().try_fold(measures[0], |all, more| same(all, *more, at, name))
+                let mut all = measures.iter().zip(arguments).map(|(measure, place)| (*measure, *place));
+                let first = all.next().expect("the number of arguments was checked");
+                let first =
+                    all.try_fold(first, |all, more| Ok((self.same([all, more], at, name)?, all.1)))?;
+                Ok(first.0)
             }
-            "if" => same(measures[1], measures[2], at, name),
-            _ => takes(name, measures[0], Dimension::NONE, at).map(|()| Some(Dimension::NONE)),
+            "if" => {
+                let of = |index: usize| (measures[index], arguments[index]);
+                self.same([of(1), of(2)], at, name)
+            }
+            _ => self.takes(name, measures[0], Dimension::NONE, at).map(|()| Some(Dimension::NONE)),
+        }
+    }
+
+    /// Checks the dimension of a function's argument.
+    ///
+    /// # Errors
+    /// [`Wrong`] where it is another.
+    fn takes(&self, name: &str, measure: Measure, wanted: Dimension, at: usize) -> Result<(), Wrong> {
+        match measure {
+            Some(found) if found != wanted => {
+                let [wanted, found] = [wanted, found].map(|one| self.in_units(one));
+                Err(Wrong::of_units(at, format!("{name} takes a value in {wanted}, and this is in {found}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that two operands have one dimension, which one of them may leave open.
+    ///
+    /// # Errors
+    /// [`Wrong`] where they have not.
+    fn same(&self, operands: [(Measure, Place); 2], at: usize, what: &str) -> Result<Measure, Wrong> {
+        let [(a, left), (b, right)] = operands;
+        match (a, b) {
+            (Some(a), Some(b)) if a != b => {
+                let [a, b] = [a, b].map(|one| self.in_units(one));
+                let [left, right] = [left, right].map(|place| self.written(place));
+                Err(Wrong::of_units(at, format!("{what} of {left} in {a} and {right} in {b}")))
+            }
+            _ => Ok(a.or(b)),
+        }
+    }
+
+    /// A node as a message names it: what is short as it is written, else a value.
+    fn written(&self, place: Place) -> String {
+        match &self.at(place).kind {
+            Kind::Number(value, None) => format!("the number {value}"),
+            Kind::Name(name) if is_of_file(name) => format!("'{name}'"),
+            Kind::Call(name, _) if is_of_file(name) => format!("'{name}(…)'"),
+            Kind::Binary(Binary::Multiply, left, _) => match &self.at(*left).kind {
+                Kind::Name(name) if is_of_file(name) => format!("'{name}*…'"),
+                _ => "a value".into(),
+            },
+            _ => "a value".into(),
         }
     }
 }
 
-/// Checks the dimension of a function's argument.
-///
-/// # Errors
-/// [`Wrong`] where it is another.
-pub fn takes(name: &str, measure: Measure, wanted: Dimension, at: usize) -> Result<(), Wrong> {
-    match measure {
-        Some(found) if found != wanted => {
-            Err(Wrong::new(at, format!("{name} takes a value in {wanted}, and this is in {found}")))
-        }
-        _ => Ok(()),
-    }
+/// Units of mechanics and circuits by which a dimension is known better than by those of SI.
+const FAMILIAR: [&str; 18] = [
+    "N", "m/s", "m/s^2", "N/m", "N s/m", "N s", "N m", "Pa", "Pa/s", "m^3/s", "kg/s", "J", "W", "V", "V/s",
+    "ohm", "1/s", "W/K",
+];
+
+/// A dimension in a familiar unit, else in base units.
+#[must_use]
+pub fn familiar(dimension: Dimension) -> String {
+    let is_it = |unit: &&&str| Unit::parse(unit).is_ok_and(|unit| unit.dimension == dimension);
+    FAMILIAR.iter().find(is_it).map_or_else(|| dimension.to_string(), |unit| (*unit).to_owned())
 }
 
-fn same(a: Measure, b: Measure, at: usize, what: &str) -> Result<Measure, Wrong> {
-    match (a, b) {
-        (Some(a), Some(b)) if a != b => {
-            Err(Wrong::new(at, format!("{what} of a value in {a} and one in {b}")))
-        }
-        _ => Ok(a.or(b)),
-    }
+/// Whether a name is one that the reader wrote.
+fn is_of_file(name: &str) -> bool {
+    name.starts_with(|first: char| first.is_alphabetic() || first == '_')
 }

@@ -250,7 +250,7 @@ mod tests {
     fn what_cannot_run_is_refused_at_its_byte() {
         for (text, at, why) in [
             ("c*w", 102, "'w' is unknown here; known are pi, x, v, c"),
-            ("c*x", 100, "force is in kg m s^-2, and this is in kg m s^-1"),
+            ("c*x", 100, "force is in N, and this is in N s"),
             ("c*v/x*1[m]", 103, "divides by a value that may be 0 (0 to 1)"),
             ("c*v + exp(abs(v)/0.01[m/s])*1[N]", 106, "counts as not finite"),
             ("c*v*(", 105, "ends where a value should stand"),

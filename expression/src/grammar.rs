@@ -67,11 +67,17 @@ pub struct Nodes(Vec<Node>);
 pub struct Wrong {
     pub at: usize,
     pub why: String,
+    /// Two units that do not fit: which is asked for depends on the whole expression.
+    pub is_of_units: bool,
 }
 
 impl Wrong {
     pub fn new(at: usize, why: impl Into<String>) -> Self {
-        Self { at, why: why.into() }
+        Self { at, why: why.into(), is_of_units: false }
+    }
+
+    pub fn of_units(at: usize, why: impl Into<String>) -> Self {
+        Self { is_of_units: true, ..Self::new(at, why) }
     }
 }
 

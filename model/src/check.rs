@@ -3,9 +3,10 @@
 use crate::compile::{frictions_hold, tapes};
 use crate::file::{Change, Expression, Model, Target};
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, resolve};
+use crate::own_units::unit_of;
 use crate::rows::reads_inputs_alone;
 use crate::units::{Dimension, Unit};
-use expression::dimensions::{Dimensions, Measure, takes};
+use expression::dimensions::{Dimensions, Measure};
 use expression::grammar::{Node, Place, Wrong};
 use std::collections::HashMap;
 
@@ -50,11 +51,11 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
     tapes(model, &all).map(|_| ())
 }
 
-/// The SI unit of a definition.
+/// The unit of a definition, in those of the file.
 pub(crate) fn definition_unit(model: &Model, index: usize) -> Unit {
     let mut dimensions = Checker { model, known: HashMap::new(), open: Vec::new() };
     let dimension = dimensions.definition(index, 0).ok().flatten().unwrap_or_default();
-    Unit { text: dimension.to_string(), dimension, factor: 1.0 }
+    unit_of(model, dimension)
 }
 
 /// The dimension of an expression of the model's own names; that of 0 is none.
@@ -143,15 +144,19 @@ impl Dimensions for Checker<'_> {
         if name == "delay" { Some(2) } else { is_table.then_some(1) }
     }
 
+    fn in_units(&self, dimension: Dimension) -> String {
+        unit_of(self.model, dimension).text
+    }
+
     fn functions(&self) -> &'static str {
         ", delay, and the tables"
     }
 
     fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure, Wrong> {
         if let Some(table) = self.model.tables.iter().find(|table| table.name == name) {
-            takes(name, measures[0], table.from, at)?;
+            self.takes(name, measures[0], table.from, at)?;
             return Ok(Some(table.to));
         }
-        takes(name, measures[1], Dimension::TIME, at).map(|()| measures[0])
+        self.takes(name, measures[1], Dimension::TIME, at).map(|()| measures[0])
     }
 }

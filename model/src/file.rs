@@ -353,7 +353,7 @@ impl Model {
         Some(other)
     }
 
-    /// The SI unit of a definition, as it follows from what it is made of.
+    /// The unit of a definition, as it follows from what it is made of, in those of the file.
     #[must_use]
     pub fn definition_unit(&self, index: usize) -> Unit {
         check::definition_unit(self, index)

@@ -11,7 +11,7 @@
 //! | `rows` | which rows count, and over what a model is judged |
 //! | `library` | ready suspects in variables of their own |
 //! | `names` | what names mean |
-//! | `check` | names, numbers of arguments, dimensions |
+//! | `check`, `own_units` | names, numbers of arguments, dimensions; these in units of the file |
 //! | `compile` | suspects in their places, bytecode |
 //! | `simulate`, `failure` | integration with sensitivities; why it ends |
 //!
@@ -29,6 +29,7 @@ mod failure;
 mod file;
 mod library;
 mod names;
+mod own_units;
 mod read;
 mod rows;
 mod simulate;

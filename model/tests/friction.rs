@@ -187,7 +187,7 @@ fn friction_that_cannot_hold_is_refused_with_line_and_column() {
         (
             "sliding = \"sliding\"\n",
             "sliding = \"mass\"\n",
-            "model.toml:11:12: sliding of rub is in kg m s^-2, and this is in kg",
+            "model.toml:11:12: sliding of rub is in N, and this is in kg",
         ),
         ("(spring - rub)/mass", "spring/mass", "the equation of v does not read rub, which is to hold it"),
         (

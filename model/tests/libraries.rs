@@ -130,7 +130,7 @@ fn a_suspect_of_a_library_that_cannot_be_used_is_refused_with_line_and_column() 
         ),
         ("speed - 1[mm/s]", "sped", "model.toml:16:11: 'sped' is unknown here"),
         ("speed - 1[mm/s]", "excess", "parameters.velocity.value is missing"),
-        ("{ unit = \"N s/mm\"", "{ unit = \"N\"", "more-viscous is in kg m s^-2, and this is in"),
+        ("{ unit = \"N s/mm\"", "{ unit = \"N\"", "more-viscous is in N, and this is in W"),
         (
             "parameters.viscous",
             "parameters.vicsous",

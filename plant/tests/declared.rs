@@ -185,7 +185,7 @@ fn what_a_term_keeps_is_refused_where_it_cannot_run() {
     };
     let c = "parameters.dt = { unit = \"N/m\", value = 4 }";
     for (add, numbers, message) in [
-        ("1[N/m]*w", memory("[0, 1]", "x", "w + v"), "sum of a value in m and one in m s^-1"),
+        ("1[N/m]*w", memory("[0, 1]", "x", "w + v"), "sum of 'w' in m and 'v' in m/s"),
         ("1[N/m]*w", memory("[0, 1]", "w", "x"), "'w' is unknown here"),
         ("1[N/m]*w", memory("[0, 1]", "x", "x/v*1[m/s]"), "divides by a value that may be 0"),
         ("1[N/m]*w", memory("[1, 1]", "x", "x"), "range: needed are two numbers"),
@@ -236,7 +236,7 @@ fn whatever_is_wrong_is_named_with_line_column_and_what_is_allowed() {
             13,
             "'w' is unknown here; known are pi, x, v, p_a, p_b, u, s, t, c",
         ),
-        ("drive.force", "-c*x", number, 3, 8, "drive.force is in kg m s^-2, and this is in kg m s^-1"),
+        ("drive.force", "-c*x", number, 3, 8, "drive.force is in N, and this is in N s"),
         ("drive.force", "F*0.1", "", 3, 8, "'F' is unknown here"),
         ("drive.force", "c*v/v*1[m/s]", number, 3, 11, "divides by a value that may be 0 (-1000 to 1000)"),
         (
