@@ -28,6 +28,11 @@ install_tools() {
         install_pinned linters "${linters[@]}" && install_bare_root
 }
 
+# Images of containers have apt keep no index of the package lists, and each of its calls takes a second of CPU to make one.
+apt_index=(-o "Dir::Cache::pkgcache=$tools/apt/packages.bin" -o "Dir::Cache::srcpkgcache=$tools/apt/lists.bin")
+apt-get() { mkdir -p "$tools/apt" && command apt-get "${apt_index[@]}" "$@"; }
+apt-cache() { mkdir -p "$tools/apt" && command apt-cache "${apt_index[@]}" "$@"; }
+
 apt_updated=no
 apt_get() {
     if [ $apt_updated = no ]; then
@@ -313,7 +318,7 @@ install_libfuzzer() {
     newest_of_clang() { apt-cache search --names-only '^libclang-rt-[0-9]+-dev$' 2>/dev/null | cut -d ' ' -f 1 | sort -V | tail -n 1; }
     package=$(newest_of_clang)
     if [ -z "$package" ]; then
-        [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null && apt_get check -q >/dev/null || return 1 # with package lists
+        [ "$(id -u)" = 0 ] && type -P apt-get >/dev/null && apt_get check -q >/dev/null || return 1 # with package lists
         package=$(newest_of_clang) && [ -n "$package" ] || return 1
     fi
     packages=$(mktemp -d) || return 1
