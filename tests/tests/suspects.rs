@@ -4,6 +4,7 @@
 use plant::RigParameters;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use system_tests::binaries::Build;
 use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::launch::{Pace, run_both};
 use system_tests::records::{Table, count, json};
@@ -92,16 +93,20 @@ fn a_suspect_in_a_file_is_named_over_the_bus_and_runs_in_real_time_in_the_extend
         assert!((found - value).abs() < 4.0 * error + 0.1 * value, "{number}");
     }
 
-    // The extended rig file holds the term, and the emulator runs it with time.
+    // The extended rig file holds the term, and the emulator runs it with time, without an allocation.
     let extended = out.join("rig.toml");
     let term = &RigParameters::from_toml(&std::fs::read_to_string(&extended).unwrap(), "rig.toml").unwrap();
     assert_eq!(term.terms()[0].expression(), "-(c0 + c1*x)*v");
     let _machine = turn::take();
-    run_both(&scene.emulator(Pace::Real).rig(&extended), &scene.controller(Pace::Real));
+    let emulator = scene.emulator(Pace::Real).rig(&extended).build(Build::CountingAllocations);
+    run_both(&emulator, &scene.controller(Pace::Real));
     let truth = Table::read(&scene.path("emulator/truth.csv"));
     let [brake, velocity] =
         ["drive_force_declared_N", "drive_rod_velocity_m_per_s"].map(|name| truth.column(name));
     let most = brake.iter().zip(&velocity).map(|(force, speed)| force * speed).fold(0.0, f64::min);
     assert!(most < -1.0, "the brake takes power: {most} W");
-    assert!(count(&json(&scene.path("emulator/summary.json")), "/cycles") > 1000);
+    let summary = json(&scene.path("emulator/summary.json"));
+    assert!(count(&summary, "/cycles") > 1000);
+    assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], true);
+    assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
 }
