@@ -111,7 +111,7 @@ pub trait Compile {
     }
 }
 
-fn code_of(operator: Binary) -> Code {
+pub(crate) fn code_of(operator: Binary) -> Code {
     match operator {
         Binary::Add => Code::Add,
         Binary::Subtract => Code::Subtract,

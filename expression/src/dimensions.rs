@@ -79,10 +79,16 @@ pub trait Dimensions {
                 let [a, b] = [self.node(*left, scope)?, self.node(*right, scope)?];
                 match operator {
                     Binary::Add | Binary::Subtract => self.same([(a, *left), (b, *right)], node.at, "sum"),
-                    Binary::Multiply => Ok(a.zip(b).map(|(a, b)| a.times(b))),
-                    Binary::Divide => Ok(a.map(|a| a.over(b.unwrap_or_default()))),
+                    // 0 alone has any dimension; as a factor it is a number like others.
+                    Binary::Multiply | Binary::Divide if a.or(b).is_none() => Ok(None),
+                    Binary::Multiply => Ok(Some(a.unwrap_or_default().times(b.unwrap_or_default()))),
+                    Binary::Divide => Ok(Some(a.unwrap_or_default().over(b.unwrap_or_default()))),
                     Binary::Power => self.power(a, b, *right, node.at),
-                    Binary::And | Binary::Or => Ok(Some(Dimension::NONE)),
+                    Binary::And | Binary::Or => {
+                        let name = if *operator == Binary::And { "and" } else { "or" };
+                        [a, b].into_iter().try_for_each(|one| self.truth(name, one, node.at))?;
+                        Ok(Some(Dimension::NONE))
+                    }
                     _ => self
                         .same([(a, *left), (b, *right)], node.at, "comparison")
                         .map(|_| Some(Dimension::NONE)),
@@ -100,7 +106,9 @@ pub trait Dimensions {
         if exponent.is_some_and(|exponent| exponent != Dimension::NONE) {
             return Err(Wrong::new(at, "an exponent has no unit"));
         }
-        let Some(base) = base.filter(|base| *base != Dimension::NONE) else { return Ok(base) };
+        let Some(base) = base.filter(|base| *base != Dimension::NONE) else {
+            return Ok(Some(Dimension::NONE));
+        };
         let number = match self.at(place).kind {
             Kind::Number(value, None) => Some(value),
             Kind::Negation(inner) => match self.at(inner).kind {
@@ -158,8 +166,18 @@ pub trait Dimensions {
         }
         match name {
             "abs" => Ok(measures[0]),
-            "sign" | "not" => Ok(Some(Dimension::NONE)),
-            "sqrt" => Ok(measures[0].and_then(|measure| measure.to_the(0.5))),
+            "sign" => Ok(Some(Dimension::NONE)),
+            "not" => self.truth(name, measures[0], at).map(|()| Some(Dimension::NONE)),
+            "sqrt" => {
+                let Some(squared) = measures[0] else { return Ok(None) };
+                let why = || {
+                    format!(
+                        "sqrt of a value in {}: powers of units are twelfths: divide it by a scale first",
+                        self.in_units(squared)
+                    )
+                };
+                squared.to_the(0.5).map(Some).ok_or_else(|| Wrong::new(at, why()))
+            }
             "min" | "max" => {
                 let mut all = measures.iter().zip(arguments).map(|(measure, place)| (*measure, *place));
                 let first = all.next().expect("the number of arguments was checked");
@@ -168,6 +186,7 @@ pub trait Dimensions {
                 Ok(first.0)
             }
             "if" => {
+                self.truth(name, measures[0], at)?;
                 let of = |index: usize| (measures[index], arguments[index]);
                 self.same([of(1), of(2)], at, name)
             }
@@ -184,6 +203,20 @@ pub trait Dimensions {
             Some(found) if found != wanted => {
                 let [wanted, found] = [wanted, found].map(|one| self.in_units(one));
                 Err(Wrong::of_units(at, format!("{name} takes a value in {wanted}, and this is in {found}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks what is taken as true or false.
+    ///
+    /// # Errors
+    /// [`Wrong`] where it has a unit.
+    fn truth(&self, name: &str, measure: Measure, at: usize) -> Result<(), Wrong> {
+        match measure {
+            Some(found) if found != Dimension::NONE => {
+                let found = self.in_units(found);
+                Err(Wrong::new(at, format!("{name} takes a condition, and this is in {found}: compare it")))
             }
             _ => Ok(()),
         }

@@ -13,7 +13,10 @@
 //! A truth is a number: 0 is false, any other true, and a comparison gives 1 or 0. A number has no dimension unless a unit in
 //! square brackets follows it.
 
+mod chains;
+
 use crate::units::Unit;
+use chains::{Operand, Operator};
 
 /// Most nodes of all expressions of a file.
 pub const MOST_NODES: usize = 10_000;
@@ -86,6 +89,11 @@ impl Nodes {
         &self.0[place as usize]
     }
 
+    /// All of them, what a node is made of before it.
+    pub fn all(&self) -> &[Node] {
+        &self.0
+    }
+
     fn push(&mut self, kind: Kind, at: usize) -> Result<Place, Wrong> {
         let below: &[Place] = match &kind {
             Kind::Number(..) | Kind::Name(_) => &[],
@@ -95,10 +103,7 @@ impl Nodes {
         };
         let depth = 1 + below.iter().map(|place| self.get(*place).depth).max().unwrap_or(0);
         if depth > DEEPEST {
-            return Err(Wrong::new(
-                at,
-                format!("nested deeper than {DEEPEST}: name a part of it under [define]"),
-            ));
+            return Err(Wrong::new(at, too_deep()));
         }
         if self.0.len() >= MOST_NODES {
             return Err(Wrong::new(
@@ -177,11 +182,11 @@ const LEVELS: [&[(&str, Operator)]; 5] = [
     &[("*", Operator::Plain(Binary::Multiply)), ("/", Operator::Plain(Binary::Divide))],
 ];
 
-#[derive(Clone, Copy)]
-enum Operator {
-    Plain(Binary),
-    /// The same with its operands exchanged.
-    Swapped(Binary),
+fn too_deep() -> String {
+    format!(
+        "nested deeper than {DEEPEST} brackets, signs, calls and operators: \
+         in a model file name a part of it under [define]"
+    )
 }
 
 impl Parser<'_> {
@@ -223,13 +228,15 @@ impl Parser<'_> {
         is_there && !goes_on
     }
 
-    /// Brackets and signs within each other are bounded before the stack is.
-    fn deeper<T>(&mut self, inner: impl FnOnce(&mut Self) -> Result<T, Wrong>) -> Result<T, Wrong> {
+    /// Brackets and signs within each other are bounded before the stack is; `at` is the place of the outer one.
+    fn deeper<T>(
+        &mut self,
+        at: usize,
+        inner: impl FnOnce(&mut Self) -> Result<T, Wrong>,
+    ) -> Result<T, Wrong> {
         self.nested += 1;
         if self.nested > DEEPEST {
-            return Err(
-                self.wrong(&format!("nested deeper than {DEEPEST}: name a part of it under [define]"))
-            );
+            return Err(Wrong::new(at, too_deep()));
         }
         let value = inner(self)?;
         self.nested -= 1;
@@ -238,37 +245,32 @@ impl Parser<'_> {
 
     fn level(&mut self, level: usize) -> Result<Place, Wrong> {
         let Some(operators) = LEVELS.get(level) else { return self.negation() };
-        let mut left = self.level(level + 1)?;
+        let first = self.level(level + 1)?;
+        let mut rest = Vec::new();
         loop {
             self.skip_blanks();
             let at = self.place();
-            let Some((_, operator)) = operators.iter().find(|(sign, _)| self.take(sign)) else {
-                return Ok(left);
-            };
-            let right = self.level(level + 1)?;
-            let kind = match *operator {
-                Operator::Plain(binary) => Kind::Binary(binary, left, right),
-                Operator::Swapped(binary) => Kind::Binary(binary, right, left),
-            };
-            left = self.nodes.push(kind, at)?;
+            let Some((_, operator)) = operators.iter().find(|(sign, _)| self.take(sign)) else { break };
+            rest.push(Operand { operator: *operator, at, place: self.level(level + 1)? });
         }
+        self.nodes.chain(first, &rest)
     }
 
     fn negation(&mut self) -> Result<Place, Wrong> {
         self.skip_blanks();
         let at = self.place();
         if self.take("-") {
-            let inner = self.deeper(Self::negation)?;
+            let inner = self.deeper(at, Self::negation)?;
             return self.nodes.push(Kind::Negation(inner), at);
         }
         if self.take("+") {
-            return self.deeper(Self::negation);
+            return self.deeper(at, Self::negation);
         }
         let base = self.atom()?;
         self.skip_blanks();
         let at = self.place();
         if self.take("^") {
-            let exponent = self.deeper(Self::negation)?;
+            let exponent = self.deeper(at, Self::negation)?;
             return self.nodes.push(Kind::Binary(Binary::Power, base, exponent), at);
         }
         Ok(base)
@@ -278,7 +280,7 @@ impl Parser<'_> {
         self.skip_blanks();
         let at = self.place();
         if self.take("(") {
-            let inner = self.deeper(|parser| parser.level(0))?;
+            let inner = self.deeper(at, |parser| parser.level(0))?;
             return if self.take(")") {
                 Ok(inner)
             } else {
@@ -307,7 +309,7 @@ impl Parser<'_> {
         let mut arguments = Vec::new();
         if !self.take(")") {
             loop {
-                arguments.push(self.deeper(|parser| parser.level(0))?);
+                arguments.push(self.deeper(at, |parser| parser.level(0))?);
                 if self.take(")") {
                     break;
                 }
@@ -449,13 +451,16 @@ mod tests {
             format!("{}1{}", "(".repeat(100_000), ")".repeat(100_000)),
             "-".repeat(100_000) + "1",
             "abs(".repeat(100_000) + "1",
-            vec!["1"; 1_000_000].join("+"),
             vec!["1"; 100_000].join("^"),
+            vec!["1"; 1000].join("<"),
         ] {
             let why = read(&text).expect_err("too large").why;
             assert!(why.contains("deeper than 64"), "{why}");
         }
-        let flat = format!("max({})", vec!["1"; 20_000].join(","));
-        assert!(read(&flat).expect_err("too many").why.contains("more than 10000"));
+        for text in [format!("max({})", vec!["1"; 20_000].join(",")), vec!["1"; 1_000_000].join("+")] {
+            assert!(read(&text).expect_err("too many").why.contains("more than 10000"));
+        }
+        let brackets = format!("{}1{}", "(".repeat(65), ")".repeat(65));
+        assert_eq!(read(&brackets).expect_err("too deep").at, 64, "at the first bracket that is too many");
     }
 }

@@ -11,6 +11,7 @@
 //! | `units` | units and dimensions |
 //! | `dimensions` | the dimension of a tree |
 //! | `bounds` | the smallest and the largest value of a tree |
+//! | `constants` | what numbers alone are, and where they are none |
 //! | `compile` | tree to operations |
 //! | `operation` | what an operation does, and its derivatives |
 //! | `tape` | operations in their order, computed with or without derivatives |
@@ -22,6 +23,7 @@
 
 pub mod bounds;
 pub mod compile;
+pub mod constants;
 pub mod curve;
 pub mod dimensions;
 pub mod formula;

@@ -6,8 +6,9 @@ use crate::names::{DEEPEST_CHAIN, Symbol, chain, resolve};
 use crate::own_units::unit_of;
 use crate::rows::reads_inputs_alone;
 use crate::units::{Dimension, Unit};
+use expression::constants::constants;
 use expression::dimensions::{Dimensions, Measure};
-use expression::grammar::{Node, Place, Wrong};
+use expression::grammar::{Kind, Node, Place, Wrong};
 use std::collections::HashMap;
 
 /// Checks a model.
@@ -47,8 +48,25 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
     }
     let is_suspect = |index: &usize| !model.suspects[*index].is_term;
     let all: Vec<usize> = (0..model.suspects.len()).filter(is_suspect).collect();
+    let constants = constants(&model.nodes)?;
+    delays_look_back(model, &constants)?;
     frictions_hold(model, &all)?;
     tapes(model, &all).map(|_| ())
+}
+
+/// Refuses a delay by a constant below 0, which would read what is still to come.
+fn delays_look_back(model: &Model, constants: &[Option<f64>]) -> Result<(), Wrong> {
+    for node in model.nodes.all() {
+        if let Kind::Call(name, arguments) = &node.kind
+            && name == "delay"
+            && let Some(by) = arguments.get(1)
+            && let Some(value) = constants[*by as usize].filter(|value| *value < 0.0)
+        {
+            let why = format!("delay: {value} s looks into the future: a delay is at least 0");
+            return Err(Wrong::new(model.nodes.get(*by).at, why));
+        }
+    }
+    Ok(())
 }
 
 /// The unit of a definition, in those of the file.
@@ -108,7 +126,11 @@ impl Checker<'_> {
             return Err(Wrong::new(at, chain()));
         }
         self.open.push(index);
-        let measure = self.node(definition.value.root, definition.suspect)?;
+        let mut measure = self.node(definition.value.root, definition.suspect)?;
+        // What a suspect puts in place of a bare 0 has one unit.
+        if self.model.suspects.iter().any(|suspect| suspect.target == Target::Definition(index)) {
+            measure = Some(measure.unwrap_or_default());
+        }
         self.open.pop();
         self.known.insert(index, measure);
         Ok(measure)

@@ -4,7 +4,7 @@
 //!   equation of its file ──► + the suspects that are switched on, in their order ──► tape of rates, outputs, memories
 //! ```
 
-use crate::file::{Change, Expression, Model, State, Target};
+use crate::file::{Change, Expression, Model, Parameter, State, Target};
 use crate::inputs::Inputs;
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, name_of, resolve};
 use crate::tape::{Builder, Code, Leaves, Register, Registers, Tape};
@@ -115,6 +115,38 @@ pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs
     inputs.time_s.iter().enumerate().map(value).collect()
 }
 
+/// The input that an expression names as what is delayed, or as it is without the suspect at it, and its name.
+fn delayed_input(model: &Model, place: Place, suspect: Option<usize>) -> Option<(Symbol, String)> {
+    let node = model.nodes.get(place);
+    let Kind::Name(name) = &node.kind else { return None };
+    let symbol = resolve(model, name, suspect, node.at).ok()?;
+    let is_input = match symbol {
+        Symbol::Input(_) => true,
+        Symbol::Before(suspect) => matches!(model.suspects[suspect].target, Target::Input(_)),
+        _ => false,
+    };
+    is_input.then(|| (symbol, name_of(model, symbol).to_owned()))
+}
+
+/// Whether a suspect at an input is one that delays it.
+pub(crate) fn delays_its_place(model: &Model, suspect: usize) -> bool {
+    fn is_in(model: &Model, place: Place, suspect: usize) -> bool {
+        let inner = |place: &Place| is_in(model, *place, suspect);
+        match &model.nodes.get(place).kind {
+            Kind::Number(..) | Kind::Name(_) => false,
+            Kind::Negation(place) => inner(place),
+            Kind::Binary(_, left, right) => inner(left) || inner(right),
+            Kind::Call(name, arguments) => {
+                let delayed = || delayed_input(model, arguments[0], Some(suspect));
+                name == "delay" && delayed().is_some_and(|(symbol, _)| symbol == Symbol::Before(suspect))
+                    || arguments.iter().any(inner)
+            }
+        }
+    }
+    matches!(model.suspects[suspect].target, Target::Input(_))
+        && is_in(model, model.suspects[suspect].expression.root, suspect)
+}
+
 /// Where an expression stands: the suspect whose own names it may use, and the value that its place has without it.
 #[derive(Clone, Copy)]
 struct Scope {
@@ -131,12 +163,28 @@ struct Compiler<'a> {
     open: Vec<Symbol>,
     /// The friction of whose speed the rate is computed, and the force that it has there.
     held: Option<(usize, Register)>,
+    earlier: Earlier,
 }
+
+/// An earlier instant, at which a delayed input is computed with what changes it.
+#[derive(Default)]
+struct Earlier {
+    /// By how much it is earlier, and what messages call what is delayed.
+    by: Option<(Register, String)>,
+    /// What is known there, for each delay.
+    known: HashMap<(Register, Symbol), Register>,
+    /// How many were computed: delays of delays multiply.
+    count: usize,
+}
+
+/// Most delays of a model, those within delays counted each time.
+const MOST_DELAYS: usize = 1000;
 
 impl<'a> Compiler<'a> {
     fn new(model: &'a Model, suspects: &'a [usize]) -> Self {
         let builder = Builder::new(leaves(model));
-        Self { model, suspects, builder, known: HashMap::new(), open: Vec::new(), held: None }
+        let earlier = Earlier::default();
+        Self { model, suspects, builder, known: HashMap::new(), open: Vec::new(), held: None, earlier }
     }
 
     fn rate(&mut self, state: usize) -> Result<Register, Wrong> {
@@ -214,7 +262,12 @@ impl<'a> Compiler<'a> {
     fn base(&mut self, target: Target) -> Result<Register, Wrong> {
         let model = self.model;
         let (root, suspect) = match target {
-            Target::Input(index) => return Ok(self.builder.leaves().input(index)),
+            Target::Input(index) => {
+                return Ok(match &self.earlier.by {
+                    None => self.builder.leaves().input(index),
+                    Some((by, _)) => self.builder.push(Code::Delayed(index as u16), &[*by]),
+                });
+            }
             Target::State(index) => return Ok(self.builder.leaves().state(index)),
             Target::Definition(index) => {
                 let definition = &model.definitions[index];
@@ -233,14 +286,10 @@ impl<'a> Compiler<'a> {
     /// A value with the suspects at its place, or with those that act before this one.
     fn changed(&mut self, target: Target, base: Register, until: Option<usize>) -> Result<Register, Wrong> {
         let mut value = base;
-        let terms = (0..self.model.suspects.len()).filter(|index| self.model.suspects[*index].is_term);
-        for index in terms.chain(self.suspects.iter().copied()) {
+        for index in self.model.changes_of(target, self.suspects) {
             let suspect = &self.model.suspects[index];
             if until == Some(index) {
                 break;
-            }
-            if suspect.target != target {
-                continue;
             }
             let scope = Scope { suspect: Some(index), before: Some(value) };
             let change = self.node(suspect.expression.root, scope)?;
@@ -255,8 +304,22 @@ impl<'a> Compiler<'a> {
 
     fn symbol(&mut self, symbol: Symbol, at: usize) -> Result<Register, Wrong> {
         let leaves = self.builder.leaves();
-        if let Some(register) = self.known.get(&symbol) {
+        let known = match &self.earlier.by {
+            None => self.known.get(&symbol),
+            Some((by, _)) => self.earlier.known.get(&(*by, symbol)),
+        };
+        if let Some(register) = known {
             return Ok(*register);
+        }
+        if let (Some((_, delayed)), Symbol::State(_) | Symbol::Memory(_) | Symbol::Friction(_)) =
+            (&self.earlier.by, symbol)
+        {
+            let name = name_of(self.model, symbol);
+            let why = format!(
+                "{delayed} is delayed, and what changes it reads {name}, of which no earlier value is kept: \
+                 name the delayed input under [define], and change it there"
+            );
+            return Err(Wrong::new(at, why));
         }
         if let Some(first) = self.open.iter().position(|open| *open == symbol) {
             let circle: Vec<&str> =
@@ -271,7 +334,10 @@ impl<'a> Compiler<'a> {
         }
         self.open.push(symbol);
         let register = match symbol {
-            Symbol::Time => 0,
+            Symbol::Time => match &self.earlier.by {
+                None => 0,
+                Some((by, _)) => self.builder.push(Code::Subtract, &[0, *by]),
+            },
             Symbol::Pi => self.builder.constant(core::f64::consts::PI),
             Symbol::Input(index) => self.whole(Target::Input(index), None)?,
             Symbol::State(index) => leaves.state(index),
@@ -283,8 +349,53 @@ impl<'a> Compiler<'a> {
             Symbol::Before(suspect) => self.whole(self.model.suspects[suspect].target, Some(suspect))?,
         };
         self.open.pop();
-        self.known.insert(symbol, register);
+        match &self.earlier.by {
+            None => self.known.insert(symbol, register),
+            Some((by, _)) => self.earlier.known.insert((*by, symbol), register),
+        };
         Ok(register)
+    }
+
+    /// How much earlier: never later. A number whose range is its own bound, any other value counts as 0 where it is below.
+    fn duration(&mut self, by: Place, scope: Scope) -> Result<Register, Wrong> {
+        let model = self.model;
+        let node = model.nodes.get(by);
+        let register = self.node(by, scope)?;
+        if let Kind::Name(name) = &node.kind
+            && let Symbol::Parameter(index) = resolve(model, name, scope.suspect, node.at)?
+        {
+            let Parameter { unit, values_si, range_si: [least, _], .. } = &model.parameters[index];
+            let smallest =
+                values_si.iter().copied().fold(if least.is_finite() { *least } else { 0.0 }, f64::min);
+            if smallest < 0.0 {
+                let (smallest, unit) = ((smallest / unit.factor) as f32, &unit.text);
+                let why = format!("delay: '{name}' may be {smallest} {unit}: a delay is at least 0");
+                return Err(Wrong::new(node.at, why));
+            }
+            if *least >= 0.0 {
+                return Ok(register);
+            }
+        }
+        let zero = self.builder.constant(0.0);
+        Ok(self.builder.push(Code::Max, &[register, zero]))
+    }
+
+    /// An input some time earlier, with the terms and suspects that change it.
+    fn delayed(&mut self, [input, by]: [Place; 2], at: usize, scope: Scope) -> Result<Register, Wrong> {
+        let Some((symbol, name)) = delayed_input(self.model, input, scope.suspect) else {
+            return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
+        };
+        self.earlier.count += 1;
+        if self.earlier.count > MOST_DELAYS {
+            return Err(Wrong::new(at, format!("more than {MOST_DELAYS} delays, those of delays included")));
+        }
+        let by = self.duration(by, scope)?;
+        let outer = self.earlier.by.take();
+        let by = outer.as_ref().map_or(by, |(outer, _)| self.builder.push(Code::Add, &[*outer, by]));
+        self.earlier.by = Some((by, name));
+        let register = self.symbol(symbol, at);
+        self.earlier.by = outer;
+        register
     }
 }
 
@@ -314,15 +425,7 @@ impl Compile for Compiler<'_> {
         scope: Scope,
     ) -> Result<Option<Register>, Wrong> {
         if name == "delay" {
-            let Kind::Name(input) = &self.model.nodes.get(arguments[0]).kind else {
-                return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
-            };
-            let input = self.model.inputs.iter().position(|one| one.name == *input);
-            let Some(input) = input else {
-                return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
-            };
-            let earlier = self.node(arguments[1], scope)?;
-            return Ok(Some(self.builder.push(Code::Delayed(input as u16), &[earlier])));
+            return self.delayed([arguments[0], arguments[1]], at, scope).map(Some);
         }
         let Some(table) = self.model.tables.iter().position(|table| table.name == name) else {
             return Ok(None);

@@ -375,6 +375,16 @@ impl Model {
         owner.is_none_or(|owner| self.suspects[owner].is_term || suspects.contains(&owner))
     }
 
+    /// Terms and switched-on suspects at a place in the order in which they act: those that delay an input come first, since no
+    /// earlier value is kept of a lag or of a play in front of them.
+    pub(crate) fn changes_of(&self, target: Target, suspects: &[usize]) -> Vec<usize> {
+        let terms = (0..self.suspects.len()).filter(|index| self.suspects[*index].is_term);
+        let all = terms.chain(suspects.iter().copied());
+        let mut all: Vec<usize> = all.filter(|index| self.suspects[*index].target == target).collect();
+        all.sort_by_key(|index| !compile::delays_its_place(self, *index));
+        all
+    }
+
     /// Values of an expression that reads inputs alone, at each sample.
     ///
     /// # Panics

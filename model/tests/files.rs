@@ -113,6 +113,73 @@ fn an_error_has_line_and_column_and_says_what_is_allowed() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+#[test]
+fn constants_that_are_no_numbers_are_refused_at_their_operator() {
+    for (value, column, message) in [
+        ("1/0", 11, "this divides by 0"),
+        ("t/(2[s] - 2[s])", 11, "this divides by 0"),
+        ("1 + sqrt(-1)", 14, "no finite number: not a number"),
+        ("log(0)", 10, "no finite number: -inf"),
+        ("1e308*1e308", 15, "no finite number: inf"),
+        ("(-8)^(1/3)", 14, "no finite number: not a number"),
+    ] {
+        let found = refused(&with_output("", value));
+        let place = format!("model.toml:3:{column}: ");
+        assert!(found.starts_with(&place) && found.contains(message), "{value}: {found}");
+    }
+}
+
+#[test]
+fn a_flat_sum_of_a_thousand_terms_is_no_nesting() {
+    let sum = vec!["1"; 1000].join("+");
+    assert_eq!(read(&with_output("", &sum)).outputs.len(), 1);
+}
+
+#[test]
+fn every_value_has_one_unit() {
+    let lines = "[inputs.u]\nunit = \"V\"\n";
+    let of = |value: &str| with_output(lines, value);
+    for (value, message) in [
+        ("0*u", "y is in 1, and this is in V"),
+        ("0/u", "y is in 1, and this is in 1/V"),
+        ("if(u, 1, 2)", "if takes a condition, and this is in V: compare it"),
+        ("u and 1", "and takes a condition, and this is in V"),
+        ("1 or u", "or takes a condition, and this is in V"),
+        ("not(u)", "not takes a condition, and this is in V"),
+        ("sqrt(1[m^0.08333333333])", "sqrt of a value in m^"),
+    ] {
+        let found = refused(&of(value));
+        assert!(found.starts_with("model.toml:") && found.contains(message), "{value}: {found}");
+    }
+    read(&of("if(u > 0 and not(t > 1[s]), 1, 0) + 0*u/1[V]"));
+    // What a suspect adds to a bare 0 has no unit, and what reads it sees that.
+    let changed = "[define]\nextra = \"0\"\n[outputs.y]\nunit = \"V\"\nvalue = \"u + extra\"\n\
+                   [[suspects]]\nname = \"s\"\nplace = \"extra\"\nadd = \"k\"\nparameters.k.value = 1\n";
+    let found = refused(&format!("{lines}{changed}"));
+    assert!(found.contains("sum of 'u' in V and 'extra' in 1"), "{found}");
+    read(&format!(
+        "{lines}{}",
+        changed.replace("\"0\"", "\"0[V]\"").replace("k.value", "k.unit = \"V\"\nparameters.k.value")
+    ));
+}
+
+#[test]
+fn a_delay_looks_back() {
+    for (lines, by, message) in [
+        ("", "-0.1[s]", "model.toml:6:19: delay: -0.1 s looks into the future"),
+        (
+            "[parameters.d]\nunit = \"ms\"\nvalue = 1\nrange = [-2, 5]\n",
+            "d",
+            "delay: 'd' may be -2 ms: a delay",
+        ),
+        ("[parameters.d]\nunit = \"s\"\nvalue = -1\n", "d", "delay: 'd' may be -1 s"),
+    ] {
+        let text = with_output(&format!("[inputs.u]\nunit = \"1\"\n\n{lines}"), &format!("delay(u, {by})"));
+        let found = refused(&text);
+        assert!(found.contains(message), "{found}");
+    }
+}
+
 fn with_output(lines: &str, value: &str) -> String {
     format!("{lines}\n[outputs.y]\nvalue = \"{value}\"\n")
 }
@@ -124,7 +191,7 @@ fn hostile_files_are_refused_with_line_and_column() {
     let mut chain = String::from("[define]\na0 = \"1\"\n");
     (1..400).for_each(|index| chain += &format!("a{index} = \"a{} + 1\"\n", index - 1));
     for (text, message) in [
-        (with_output("", &terms), "nested deeper than 64"),
+        (with_output("", &terms), "more than 10000 numbers, names and operators in this file"),
         (with_output("", &brackets), "nested deeper than 64"),
         (
             with_output("[tables.f]\nx = [1]\ny = [2]", "f(1)"),

@@ -1,6 +1,6 @@
 //! What is integrated, against closed forms, against an integrator by others, derivatives against differences.
 
-use crate::{first_values, read, simulated};
+use crate::{first_values, read, refused, simulated};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator};
 use nalgebra::DVector;
 use ode_solvers::dop_shared::OutputType;
@@ -189,6 +189,80 @@ fn a_delayed_input_is_the_input_of_then_and_differentiates_by_the_delay() {
     let computed = simulated(&program, &[Direction::Parameter(0)], &inputs, &first_values(&model)).unwrap();
     let expected = [(0.0, vec![0.0]), (1.5, vec![-2.0]), (0.5, vec![2.0]), (7.0, vec![-4.0])];
     assert_eq!(computed, expected);
+}
+
+/// An input with a term, a suspect and what delays it, at samples 1 s apart: `u` is 0, 2, 0, 8, 4.
+fn delayed(changes: &str, suspects: &[usize]) -> Vec<f64> {
+    let model = read(&format!(
+        "[inputs.u]\nhold = \"linear\"\n[inputs.w]\nhold = \"linear\"\n[define]\nlate = \"delay(u, 1[s])\"\n\
+         [outputs.y]\nvalue = \"late\"\n[outputs.z]\nvalue = \"u\"\n{changes}"
+    ));
+    let time_s = [0.0, 1.0, 2.0, 3.0, 4.0];
+    let samples = [vec![0.0, 2.0, 0.0, 8.0, 4.0], vec![0.0, 10.0, 20.0, 30.0, 40.0]];
+    let inputs = Inputs { time_s: &time_s, samples_si: &samples };
+    let program = Program::new(&model, suspects).unwrap();
+    simulated(&program, &[], &inputs, &first_values(&model))
+        .unwrap()
+        .into_iter()
+        .map(|(value, _)| value)
+        .collect()
+}
+
+/// `delay` read the samples of the record, and dropped every term and suspect at its input.
+#[test]
+fn a_delay_is_of_the_input_with_all_that_changes_it() {
+    let gain = "[[terms]]\nname = \"gain\"\nplace = \"u\"\nadd = \"u + w*t/1[s]\"\n";
+    // u' = 2 u + w t: 0, 14, 40, 106, 168.
+    assert_eq!(delayed(gain, &[]), [0.0, 0.0, 0.0, 14.0, 14.0, 40.0, 40.0, 106.0, 106.0, 168.0]);
+    // What delays an input comes before what else changes it: 2 u(t - 1) + w t, and in y all of it a second earlier.
+    let dead = "[[suspects]]\nuse = \"actuator/dead-time\"\nplace = \"u\"\nwith.u = \"u\"\n\
+                parameters.late = { unit = \"s\", value = 1 }\n";
+    let both = format!("{gain}{dead}");
+    assert_eq!(delayed(&both, &[1]), [0.0, 0.0, 0.0, 10.0, 10.0, 44.0, 44.0, 90.0, 90.0, 176.0]);
+}
+
+/// A lag and a dead time at one input: the lag follows the delayed input, so that the answer of both is that of the lag, late.
+#[test]
+fn a_lag_and_a_dead_time_at_one_input_are_both_there() {
+    let text = "[inputs.u]\nhold = \"linear\"\n[outputs.y]\nvalue = \"u\"\n\
+                [[suspects]]\nuse = \"actuator/lag\"\nplace = \"u\"\nparameters.lag = { value = 0.5 }\n\
+                [[suspects]]\nuse = \"actuator/dead-time\"\nplace = \"u\"\nwith.u = \"u\"\n\
+                parameters.late = { unit = \"s\", value = 2 }\n";
+    let model = read(text);
+    let time_s: Vec<f64> = (0..200_u32).map(|index| 0.1 * f64::from(index)).collect();
+    let samples = [time_s.iter().map(|time_s| (time_s - 1.0).max(0.0)).collect()];
+    let inputs = Inputs { time_s: &time_s, samples_si: &samples };
+    let values = |suspects: &[usize]| -> Vec<f64> {
+        let program = Program::new(&model, suspects).unwrap();
+        let all = simulated(&program, &[], &inputs, &first_values(&model)).unwrap();
+        all.into_iter().map(|(value, _)| value).collect()
+    };
+    let (lag, orders) = (values(&[0]), [values(&[0, 1]), values(&[1, 0])]);
+    for late in orders {
+        for row in 20..200 {
+            assert!((late[row] - lag[row - 20]).abs() < 1e-4, "row {row}: {} {}", late[row], lag[row - 20]);
+        }
+    }
+}
+
+#[test]
+fn a_delay_of_what_a_state_changes_is_refused_with_its_place() {
+    let text = "[inputs.u]\n[states.x]\nstart = 0\nderivative = \"(delay(u, 1[s]) - x)/1[s]\"\n\
+                [outputs.y]\nvalue = \"x\"\n[[terms]]\nname = \"back\"\nplace = \"u\"\nadd = \"-x\"\n";
+    let found = refused(text);
+    assert!(found.starts_with("model.toml:10:9: u is delayed, and what changes it reads x"), "{found}");
+    // Delays of delays multiply.
+    let mut text = String::from("[outputs.y]\nvalue = \"u0\"\n");
+    for index in 0..30 {
+        text += &format!("[inputs.u{index}]\n");
+    }
+    for index in 0..29 {
+        let next = index + 1;
+        text += &format!(
+            "[[terms]]\nname = \"s{index}\"\nplace = \"u{index}\"\nadd = \"delay(u{next}, 1[s]) + delay(u{next}, 2[s])\"\n"
+        );
+    }
+    assert!(refused(&text).contains("more than 1000 delays"), "{}", refused(&text));
 }
 
 /// An exponential, whose value and derivative are known; zero at the start would divide its error by 0.
