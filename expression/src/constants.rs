@@ -1,7 +1,7 @@
 //! Constants: parts of expressions that numbers alone stand in, and what of them is no finite number.
 //!
-//! `1/0`, `sqrt(-1)` and `1e308*1e308` are refused where they stand, and so is a division by a part that is 0 whatever is above it.
-//! What depends on a name can be 0 at some samples alone, or be guarded by a condition: that is seen when it is computed.
+//! `1/0`, `sqrt(-1)` and `1e308*1e308` are refused where they stand, and so is a division by a part that is 0, whatever is above
+//! it. What depends on a name can be 0 at some samples alone, or be guarded by a condition: that is seen when it is computed.
 
 use crate::compile::{code_of, function};
 use crate::grammar::{Binary, Kind, Nodes, Wrong};
