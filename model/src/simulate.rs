@@ -7,7 +7,10 @@
 //! ```
 //! Every step ends at a sample at the latest, so that an input that jumps there jumps between two steps. The same operations that
 //! step x step S (forward derivatives through the scheme), so that S is the derivative of what is computed; steps are chosen by
-//! x alone. Memories are renewed after each step. A step ends where dry friction stops or breaks away (`frictions`).
+//! x alone. Memories are renewed at each sample and after each step; what their change within a step does to x is added by
+//! Simpson's rule, and is part of the adaptive method's error (`memories`). A step ends where dry friction stops or breaks away
+//! (`frictions`). What else jumps is found by step control: steps become shorter, until one of a millionth of the samples'
+//! distance goes over the jump.
 //!
 //! The scheme is written out here: the kept libraries were tried and allocate in each step (ode_solvers 0.6 clones its state some
 //! six times a step and stores it; diffsol 0.12 brings faer and 90 crates), and both would restart at each sample. ode_solvers is
@@ -17,6 +20,7 @@
 //! Bock 1983, internal numerical differentiation.
 
 mod frictions;
+mod memories;
 mod steps;
 
 use crate::compile::{Tapes, direction_of, tapes};
@@ -130,6 +134,11 @@ pub struct Simulator<'a> {
     stages: [Vec<f64>; STAGES],
     largest: Vec<f64>,
     memory: Vec<f64>,
+    /// Memories at the head of a step, those of its end in two parts, and states with their sensitivities within it.
+    memory_before: Vec<f64>,
+    memory_in_two: Vec<f64>,
+    largest_memory: Vec<f64>,
+    middle: Vec<f64>,
     step_s: f64,
     /// Steps of the record, refused ones too, and how many it may take.
     steps: usize,
@@ -176,6 +185,10 @@ impl<'a> Simulator<'a> {
             stages: core::array::from_fn(|_| room.clone()),
             largest: vec![0.0; program.tapes.states.len()],
             memory: vec![0.0; program.tapes.memories.len() * width],
+            memory_before: vec![0.0; program.tapes.memories.len() * width],
+            memory_in_two: vec![0.0; program.tapes.memories.len() * width],
+            largest_memory: vec![0.0; program.tapes.memories.len()],
+            middle: room.clone(),
             step_s: 0.0,
             steps: 0,
             most_steps: usize::MAX,
@@ -254,20 +267,9 @@ impl<'a> Simulator<'a> {
         }
         for (place, memory) in self.program.tapes.memories.iter().enumerate() {
             self.memory[place * width] = memories[*memory];
+            self.largest_memory[place] = memories[*memory].abs();
         }
         self.put_memories();
-    }
-
-    fn put_memories(&mut self) {
-        let (leaves, width) = (self.program.leaves(), self.width());
-        for (place, memory) in self.program.tapes.memories.iter().enumerate() {
-            let value = &self.memory[place * width..(place + 1) * width];
-            for registers in [&mut self.rates, &mut self.outputs, &mut self.updates, &mut self.guards] {
-                registers.set(leaves.memory(*memory), value[0]);
-                registers.slope_mut(leaves.memory(*memory)).copy_from_slice(&value[1..]);
-            }
-            self.plain_guards.set(leaves.memory(*memory), value[0]);
-        }
     }
 
     /// Reads the outputs at a sample.

@@ -3,6 +3,7 @@
 mod files;
 mod friction;
 mod integration;
+mod jumps;
 mod libraries;
 mod schema;
 

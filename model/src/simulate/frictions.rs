@@ -217,6 +217,7 @@ impl Simulator<'_> {
             }
             length_s -= late_s;
         }
+        let _ = self.remember(inputs, (row, time_s), length_s);
         core::mem::swap(&mut self.x, &mut self.tried);
         let instant = (row, time_s + length_s);
         let width = self.width();

@@ -1,5 +1,6 @@
 //! Steps from a sample to the next one, by either method.
 
+use super::memories::At;
 use super::{MOST_STEPS, STAGES, Simulator, failure, put};
 use crate::failure::Failure;
 use crate::file::Solver;
@@ -23,6 +24,9 @@ const E: [f64; STAGES] =
 const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
+/// The shortest step over the distance of two samples. It is taken whatever its error, which is that of a jump within it, or of a
+/// state that leaves 0 by a power of time: its error over its change does not fall with the step.
+const SHORTEST: f64 = 1e-6;
 
 impl Simulator<'_> {
     /// From a sample to the next one.
@@ -35,6 +39,8 @@ impl Simulator<'_> {
             self.steps += 1;
             return Ok(());
         }
+        // An input that jumps at the sample.
+        self.renew(inputs, (row, from_s));
         match self.program.solver {
             Solver::Fixed { step_s } => {
                 // A step that is longer by a rounding error is no step more.
@@ -131,6 +137,7 @@ impl Simulator<'_> {
     fn adapt(&mut self, inputs: &Inputs<'_>, row: usize, tolerance: f64) -> Result<(), Failure> {
         let (from_s, to_s) = (inputs.time_s[row], inputs.time_s[row + 1]);
         let mut time_s = from_s;
+        let shortest_s = SHORTEST * (to_s - from_s);
         self.release(inputs, (row, time_s));
         self.first_stage(inputs, row, time_s)?;
         for _ in 0..MOST_STEPS.min(self.most_steps - self.steps) {
@@ -138,15 +145,15 @@ impl Simulator<'_> {
             let left_s = to_s - time_s;
             let wished_s = if self.step_s > 0.0 { self.step_s } else { left_s };
             // The last step ends on the sample, and no sliver is left behind it.
-            let is_last = wished_s >= 0.999 * left_s;
-            let step_s = if is_last { left_s } else { wished_s.min(0.5 * left_s).max(left_s * 1e-6) };
+            let is_last = wished_s >= 0.999 * left_s || left_s <= shortest_s;
+            let step_s = if is_last { left_s } else { wished_s.min(0.5 * left_s).max(shortest_s) };
             self.dormand_prince(inputs, (row, time_s), step_s);
-            let error = self.error(step_s) / tolerance;
+            let error = self.error(step_s).max(self.remember(inputs, (row, time_s), step_s)) / tolerance;
             let factor = if error > 0.0 { SAFETY * libm::pow(error, -0.2) } else { GROW };
             let factor = if factor.is_nan() { SHRINK } else { factor.clamp(SHRINK, GROW) };
-            if error <= 1.0
-                && let Some(event) = self.event(inputs, (row, time_s), step_s)
-            {
+            let is_good = error <= 1.0 || error.is_finite() && step_s <= shortest_s;
+            if is_good && let Some(event) = self.event(inputs, (row, time_s), step_s) {
+                self.forget();
                 time_s += self.switch(inputs, (row, time_s), step_s, event)?;
                 if time_s >= to_s {
                     return Ok(());
@@ -154,7 +161,7 @@ impl Simulator<'_> {
                 self.stage(inputs, row, time_s, 0, false);
                 continue;
             }
-            if error <= 1.0 {
+            if is_good {
                 self.step_s = if is_last { self.step_s.max(step_s * factor) } else { step_s * factor };
                 time_s = if is_last { to_s } else { time_s + step_s };
                 core::mem::swap(&mut self.x, &mut self.tried);
@@ -168,12 +175,9 @@ impl Simulator<'_> {
                     self.stage(inputs, row, time_s, 0, false);
                 }
             } else {
-                if step_s <= left_s * 1e-6 {
-                    return Err(if error.is_finite() {
-                        Failure::Steps { time_s: from_s }
-                    } else {
-                        self.lost(time_s)
-                    });
+                self.forget();
+                if step_s <= shortest_s {
+                    return Err(self.lost(time_s));
                 }
                 self.step_s = step_s * factor.min(1.0);
             }
@@ -185,13 +189,10 @@ impl Simulator<'_> {
     fn error(&self, step_s: f64) -> f64 {
         let width = self.width();
         let mut worst: f64 = 0.0;
-        for (place, largest) in self.largest.iter().enumerate() {
+        for place in 0..self.largest.len() {
             let at = place * width;
             let error: f64 = E.iter().zip(&self.stages).map(|(weight, stage)| weight * stage[at]).sum();
-            // A state that has not moved yet is as large as its first step.
-            let size =
-                largest.max((step_s * self.stages[0][at]).abs()).max((self.tried[at] - self.x[at]).abs());
-            let relative = (step_s * error).abs() / size.max(f64::MIN_POSITIVE);
+            let relative = (step_s * error).abs() / self.size(place, step_s);
             worst = if relative.is_nan() { f64::INFINITY } else { worst.max(relative) };
             if worst.is_infinite() {
                 return worst;
@@ -200,11 +201,27 @@ impl Simulator<'_> {
         worst
     }
 
+    /// What the error of a state in the step that was tried is compared with. A state that has not moved yet is as large as its
+    /// first step.
+    pub(super) fn size(&self, place: usize, step_s: f64) -> f64 {
+        let at = place * self.width();
+        let moved = (step_s * self.stages[0][at]).abs().max((self.tried[at] - self.x[at]).abs());
+        self.largest[place].max(moved).max(f64::MIN_POSITIVE)
+    }
+
     /// Rates at a stage, from `tried` or `x`.
     pub(super) fn stage(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64, stage: usize, tried: bool) {
+        self.stage_at(inputs, (row, time_s), stage, if tried { At::End } else { At::Head });
+    }
+
+    pub(super) fn stage_at(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), stage: usize, at: At) {
         let program = self.program;
-        let x = if tried { &self.tried } else { &self.x };
-        put(program, &mut self.rates, inputs, (row, time_s), x);
+        let x = match at {
+            At::Head => &self.x,
+            At::Middle => &self.middle,
+            At::End => &self.tried,
+        };
+        put(program, &mut self.rates, inputs, instant, x);
         program.tapes.rates.evaluate(&mut self.rates, inputs);
         let width = self.width();
         for place in 0..program.tapes.states.len() {
@@ -217,7 +234,7 @@ impl Simulator<'_> {
 
     /// What follows a step: memories, sizes, and whether all is finite.
     pub(super) fn taken(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64) -> Result<(), Failure> {
-        let (program, width) = (self.program, self.width());
+        let width = self.width();
         for place in 0..self.largest.len() {
             let value = self.x[place * width];
             if !value.is_finite() {
@@ -225,19 +242,10 @@ impl Simulator<'_> {
             }
             self.largest[place] = self.largest[place].max(value.abs());
         }
-        if self.memory.is_empty() {
-            return Ok(());
+        if !self.memory.is_empty() {
+            self.renew(inputs, (row, time_s));
+            self.release(inputs, (row, time_s));
         }
-        put(program, &mut self.updates, inputs, (row, time_s), &self.x);
-        program.tapes.updates.evaluate(&mut self.updates, inputs);
-        for place in 0..program.tapes.memories.len() {
-            let register = program.tapes.updates.result(place);
-            let kept = &mut self.memory[place * width..(place + 1) * width];
-            kept[0] = self.updates.value(register);
-            kept[1..].copy_from_slice(self.updates.slope(register));
-        }
-        self.put_memories();
-        self.release(inputs, (row, time_s));
         Ok(())
     }
 

@@ -1,0 +1,147 @@
+//! Memories: renewed at each sample and after each step, and what their change within a step does to the states.
+//!
+//! ```text
+//!   m is held over a step in the rates; within it, it goes m0 -> m1 -> m2 -> m3 -> m4 in four equal parts
+//!   x += h/6 (4 d2 + d4)      d2 = f(x2, m2) - f(x2, m0), d4 = f(x4, m4) - f(x4, m0)      Simpson's rule
+//!   x += h/3 (f(x + that, m4) - f(x, m4))                     what that moves in turn, which grows with the square of time
+//!   errors: of x    h |2 d2 - d4| / 3                         the rule's distance from the trapezoidal one; and the second term
+//!           of m4   its distance from that in two parts       a play that turns back between two looks
+//! ```
+//! A memory that jumps (a relay) has an error in proportion to the step, so that step control finds the instant of the jump.
+
+use super::{STAGES, Simulator, put};
+use crate::inputs::Inputs;
+
+/// Stages of a step that are no longer needed when its memories are looked at: rates in its middle with the memories of its head
+/// and with those there, and rates at its end with those there.
+const MIDDLE_BEFORE: usize = 1;
+const MIDDLE: usize = 2;
+const END: usize = 3;
+/// The same as END with the states that this moves.
+const MOVED: usize = 4;
+
+impl Simulator<'_> {
+    pub(super) fn put_memories(&mut self) {
+        let (leaves, width) = (self.program.leaves(), self.width());
+        for (place, memory) in self.program.tapes.memories.iter().enumerate() {
+            let value = &self.memory[place * width..(place + 1) * width];
+            for registers in [&mut self.rates, &mut self.outputs, &mut self.updates, &mut self.guards] {
+                registers.set(leaves.memory(*memory), value[0]);
+                registers.slope_mut(leaves.memory(*memory)).copy_from_slice(&value[1..]);
+            }
+            self.plain_guards.set(leaves.memory(*memory), value[0]);
+        }
+    }
+
+    /// Renews the memories at an instant with these states, which are those of `x`, `tried` or `middle`.
+    fn renew_at(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), place: At) {
+        let (program, width) = (self.program, self.width());
+        let x = match place {
+            At::Head => &self.x,
+            At::Middle => &self.middle,
+            At::End => &self.tried,
+        };
+        put(program, &mut self.updates, inputs, instant, x);
+        program.tapes.updates.evaluate(&mut self.updates, inputs);
+        for place in 0..program.tapes.memories.len() {
+            let register = program.tapes.updates.result(place);
+            let kept = &mut self.memory[place * width..(place + 1) * width];
+            kept[0] = self.updates.value(register);
+            kept[1..].copy_from_slice(self.updates.slope(register));
+        }
+        self.put_memories();
+    }
+
+    /// Renews the memories at an instant.
+    pub(super) fn renew(&mut self, inputs: &Inputs<'_>, instant: (usize, f64)) {
+        if !self.memory.is_empty() {
+            self.renew_at(inputs, instant, At::Head);
+            let width = self.width();
+            for (largest, kept) in self.largest_memory.iter_mut().zip(self.memory.chunks_exact(width)) {
+                *largest = largest.max(kept[0].abs());
+            }
+        }
+    }
+
+    /// Adds to the step that was tried what its memories change within it; they are those of its end then. Returns the error
+    /// over the size of its state.
+    pub(super) fn remember(&mut self, inputs: &Inputs<'_>, (row, time_s): (usize, f64), step_s: f64) -> f64 {
+        if self.memory.is_empty() {
+            return 0.0;
+        }
+        self.memory_before.copy_from_slice(&self.memory);
+        let end = (row, time_s + step_s);
+        self.between(step_s, 0.5);
+        let middle = (row, time_s + 0.5 * step_s);
+        self.stage_at(inputs, middle, MIDDLE_BEFORE, At::Middle);
+        self.renew_at(inputs, middle, At::Middle);
+        self.renew_at(inputs, end, At::End);
+        self.memory_in_two.copy_from_slice(&self.memory);
+        self.forget();
+        for share in [0.25, 0.5, 0.75] {
+            self.between(step_s, share);
+            let instant = (row, time_s + share * step_s);
+            self.renew_at(inputs, instant, At::Middle);
+            if share == 0.5 {
+                self.stage_at(inputs, instant, MIDDLE, At::Middle);
+            }
+        }
+        self.renew_at(inputs, end, At::End);
+        self.stage_at(inputs, end, END, At::End);
+        let width = self.width();
+        let mut worst: f64 = 0.0;
+        for (place, largest) in self.largest_memory.iter().enumerate() {
+            let [before, in_two, now] =
+                [&self.memory_before, &self.memory_in_two, &self.memory].map(|memory| memory[place * width]);
+            let size = largest.max(before.abs()).max(now.abs()).max(f64::MIN_POSITIVE);
+            worst = worst.max((now - in_two).abs() / size);
+        }
+        for index in 0..self.tried.len() {
+            let in_middle = self.stages[MIDDLE][index] - self.stages[MIDDLE_BEFORE][index];
+            let at_end = self.stages[END][index] - self.stages[STAGES - 1][index];
+            if index % width == 0 {
+                let error = step_s * (2.0 * in_middle - at_end) / 3.0;
+                worst = worst.max(error.abs() / self.size(index / width, step_s));
+            }
+            self.tried[index] += step_s / 6.0 * (4.0 * in_middle + at_end);
+        }
+        self.stage_at(inputs, end, MOVED, At::End);
+        for index in 0..self.tried.len() {
+            let moved = step_s / 3.0 * (self.stages[MOVED][index] - self.stages[END][index]);
+            if index % width == 0 {
+                worst = worst.max(moved.abs() / self.size(index / width, step_s));
+            }
+            self.tried[index] += moved;
+        }
+        worst
+    }
+
+    /// States within the step that was tried, with their sensitivities, by the cubic of its ends and their rates.
+    fn between(&mut self, step_s: f64, share: f64) {
+        for (index, middle) in self.middle.iter_mut().enumerate() {
+            let (from, to) = (self.x[index], self.tried[index]);
+            let [head, end] = [0, STAGES - 1].map(|stage| step_s * self.stages[stage][index]);
+            let bent = (1.0 - 2.0 * share) * (to - from) + (share - 1.0) * head + share * end;
+            *middle = (1.0 - share) * from + share * to + share * (share - 1.0) * bent;
+        }
+    }
+
+    /// Memories as they were at the head of a step that is refused.
+    pub(super) fn forget(&mut self) {
+        if !self.memory.is_empty() {
+            self.memory.copy_from_slice(&self.memory_before);
+            self.put_memories();
+        }
+    }
+}
+
+/// Where in a step rates and memories are evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum At {
+    /// With the states `x`.
+    Head,
+    /// With the states `middle`.
+    Middle,
+    /// With the states `tried`.
+    End,
+}
