@@ -161,17 +161,20 @@ fn parameter(parameter: &Parameter) -> String {
 }
 
 fn structure_in_words(structure: &Structure, weak: Vec<String>) -> String {
-    let undetermined = structure.undetermined.iter();
+    let idle = structure.without_effect.iter().map(|name| format!("{name}: changes no output"));
+    let is_moved = |name: &&String| !structure.without_effect.contains(name);
+    let undetermined = structure.undetermined.iter().filter(is_moved);
     let undetermined = undetermined
         .map(|name| format!("{name}: not determined: other numbers move the outputs in the same way"));
-    let hidden = structure.hidden.iter();
+    let hidden = structure.hidden.iter().filter(is_moved);
     let hidden = hidden.map(|name| format!("suspect {name}: looks like a change of the model's own numbers"));
     let twins = structure.twins.iter().map(|twins| {
         let [one, other] = &twins.suspects;
         format!("{one} and {other}: the same to these records (cosine {:.3})", twins.cosine)
     });
     let advice = structure.advice.iter().map(Advice::in_words);
-    let mut lines: Vec<String> = undetermined.chain(weak).chain(hidden).chain(twins).chain(advice).collect();
+    let mut lines: Vec<String> =
+        idle.chain(undetermined).chain(weak).chain(hidden).chain(twins).chain(advice).collect();
     if lines.is_empty() {
         lines.push("every number, and every suspect from each other".into());
     }

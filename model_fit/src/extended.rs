@@ -8,6 +8,9 @@ use model::{Entry, Library, Model};
 use serde::Deserialize;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, value};
 
+/// What stands above a term that a held-out record takes back.
+const TAKEN_BACK: &str = "# Taken back: a held-out record gets worse with this term.";
+
 /// Why a model file cannot be extended.
 #[derive(Debug, thiserror::Error)]
 pub enum ExtendError {
@@ -31,6 +34,9 @@ pub struct ReportedModel {
     parameters: Vec<ReportedNumber>,
     /// Absent in reports of before 0.1.0.
     #[serde(default)]
+    taken_back: bool,
+    /// Absent in reports of before 0.1.0.
+    #[serde(default)]
     equations: Vec<String>,
 }
 
@@ -47,6 +53,15 @@ impl ReportedModel {
             Some(equation) => Err(ExtendError::Other { equation: equation.clone() }),
             None => Ok(()),
         }
+    }
+
+    /// A term, with a comment where a held-out record takes it back.
+    fn marked(&self, mut term: Table) -> Table {
+        if self.taken_back {
+            let before = term.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or("\n").to_owned();
+            term.decor_mut().set_prefix(format!("{before}{TAKEN_BACK}\n"));
+        }
+        term
     }
 }
 
@@ -87,6 +102,7 @@ impl From<&super::ModelReport> for ReportedModel {
             named: named.collect(),
             discovered: discovered.collect(),
             parameters: parameters.collect(),
+            taken_back: report.taken_back,
             equations: report.equations.clone(),
         }
     }
@@ -113,14 +129,14 @@ pub fn extended(text: &str, report: &ReportedModel) -> Result<String, ExtendErro
         let mut term = suspects.get(place).expect("it was found").clone();
         suspects.remove(place);
         put(&mut term, report, Some(suspect));
-        push(&mut document, term)?;
+        push(&mut document, report.marked(term))?;
     }
     for ReportedTerm { name, text } in &report.discovered {
         let text: DocumentMut = text.parse()?;
         let first = text.get("suspects").and_then(Item::as_array_of_tables).and_then(|all| all.get(0));
         let mut term = first.ok_or(ExtendError::Form)?.clone();
         put(&mut term, report, Some(name));
-        push(&mut document, term)?;
+        push(&mut document, report.marked(term))?;
     }
     Ok(document.to_string())
 }
@@ -239,6 +255,14 @@ name = "offset"
         let nameless = extended(&model.replace("name = \"drag\"\n", ""), &reported).unwrap();
         let term = &nameless.parse::<toml::Table>().unwrap()["terms"][0];
         assert_eq!(term["parameters"]["c"]["value"].as_float(), Some(4.5), "{nameless}");
+    }
+
+    #[test]
+    fn a_term_that_was_taken_back_is_marked() {
+        let plain = extended(MODEL, &report("drag")).unwrap();
+        let marked = extended(MODEL, &ReportedModel { taken_back: true, ..report("drag") }).unwrap();
+        assert!(marked.contains(&format!("{TAKEN_BACK}\n[[terms]]\nname = \"drag\"")), "{marked}");
+        assert_eq!(marked.replace(&format!("{TAKEN_BACK}\n"), ""), plain);
     }
 
     #[test]

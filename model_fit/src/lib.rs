@@ -140,7 +140,7 @@ pub struct ClosedModel {
     pub not_judged: Option<String>,
     /// `report.html`, self-contained.
     pub page: String,
-    /// The model file with what was named; `None` where nothing was.
+    /// The model file with what was named; `None` where nothing was, or a held-out record takes it back.
     pub extended: Option<String>,
 }
 
@@ -226,7 +226,7 @@ pub fn close_with(
     report.equations = report::equations(&model);
     report.rate(adequacy::residuals(&found.extended)?);
     let page = page::page(&model, &report, &traces, not_judged.as_deref());
-    let is_named = !report.named.is_empty() || !report.discovered.is_empty();
+    let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
     let extended = is_named.then(|| extended(model.text(), &ReportedModel::from(&report)).ok()).flatten();
     Ok(ClosedModel { report, not_judged, page, extended })
 }

@@ -34,9 +34,9 @@ pub(crate) fn page(
     let sections = [
         ("notes", "Notes", notes),
         ("records", "Measured, and both models", pictures(model, report, traces)),
-        ("named", "What is missing", named(report)),
+        ("named", named_title(report), named(report)),
         ("located", "Where it comes from", located(report)),
-        ("discovered", "What a search found", discovered(report)),
+        ("discovered", discovered_title(report), discovered(report)),
         (
             "held-out",
             "On held-out records",
@@ -147,7 +147,12 @@ fn named(report: &ModelReport) -> String {
             words(if one.alternatives.is_empty() { "none".into() } else { one.alternatives.join(", ") }),
         ]
     });
-    table("What is missing", &["suspect", "place", "term", "of what is left, on folds", "as good"], rows)
+    let heads = ["suspect", "place", "term", "of what is left, on folds", "as good"];
+    table(named_title(report), &heads, rows)
+}
+
+fn named_title(report: &ModelReport) -> &'static str {
+    if report.taken_back { "What was named, and is taken back" } else { "What is missing" }
 }
 
 fn discovered(report: &ModelReport) -> String {
@@ -165,6 +170,10 @@ fn discovered(report: &ModelReport) -> String {
     let heads =
         ["term", "how it stands there", "reads", "of what is left, on folds", "best in halves", "as good"];
     table("Terms that no suspect describes", &heads, rows)
+}
+
+fn discovered_title(report: &ModelReport) -> &'static str {
+    if report.taken_back { "What a search found, and is taken back" } else { "What a search found" }
 }
 
 fn located(report: &ModelReport) -> String {
@@ -267,9 +276,12 @@ fn numbers(all: &[Number]) -> String {
 
 fn structure(report: &ModelReport) -> String {
     let structure = &report.structure;
-    let undetermined = structure.undetermined.iter().map(|name| format!("{name} is not determined."));
-    let hidden =
-        structure.hidden.iter().map(|name| format!("{name} looks like a change of the model's own numbers."));
+    let idle = structure.without_effect.iter().map(|name| format!("{name} changes no output."));
+    let is_moved = |name: &&String| !structure.without_effect.contains(name);
+    let undetermined = structure.undetermined.iter().filter(is_moved);
+    let undetermined = undetermined.map(|name| format!("{name} is not determined."));
+    let hidden = structure.hidden.iter().filter(is_moved);
+    let hidden = hidden.map(|name| format!("{name} looks like a change of the model's own numbers."));
     let twins = structure.twins.iter().map(|twins| {
         let [one, other] = &twins.suspects;
         let is_other = |name: &String| name == one || name == other;
@@ -285,7 +297,7 @@ fn structure(report: &ModelReport) -> String {
         )
     });
     let advice = structure.advice.iter().map(|advice| sentence(&advice.in_words()));
-    let all: Vec<String> = undetermined.chain(hidden).chain(twins).chain(advice).collect();
+    let all: Vec<String> = idle.chain(undetermined).chain(hidden).chain(twins).chain(advice).collect();
     pagekit::markup::list(&all, "Every number, and every suspect from each other.")
 }
 

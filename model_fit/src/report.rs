@@ -6,11 +6,11 @@ use super::covariance;
 use super::discover::{DiscoveredTerm, Located};
 use super::fit::Fitting;
 use super::held_out::{Alternative, Judged, Traces};
-use super::judge::Evaluation;
+use super::judge::{Evaluation, is_one_effect};
 use super::look;
 use super::normal::standard_errors;
 use super::record::Measured;
-use super::select::{Fitted, Found};
+use super::select::{Fitted, Found, Taken};
 use super::structure::Structure;
 use crate::Verdict;
 use crate::estimator::Outcome;
@@ -35,6 +35,8 @@ pub struct ModelReport {
     pub headline: String,
     /// Whether held-out records get better with what was named; `None` without any, or where nothing was named.
     pub confirmed: Option<bool>,
+    /// Whether a held-out record that gets worse takes back what `named` and `discovered` have.
+    pub taken_back: bool,
     /// Whether the reported model leaves no more than noise and declared error on the training records.
     pub adequate: bool,
     /// What it leaves of each output, and its noise.
@@ -111,7 +113,7 @@ pub struct Named {
     /// How it stands there.
     pub term: String,
     pub share_explained: f64,
-    /// Others that explain the records as well.
+    /// Others that explain the records as well, also where they fail another gate than the likelihood.
     pub alternatives: Vec<String>,
 }
 
@@ -149,9 +151,13 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         })
         .filter_map(|[other, taken]| (other != taken).then_some(other))
         .collect();
+    let is_near_another = found
+        .taken
+        .iter()
+        .any(|taken| taken.near.iter().any(|other| !is_one_effect(model, *other, taken.evaluation.suspect)));
     let verdict = match () {
         () if found.decoy.is_some() => Verdict::OutsideCatalogue,
-        () if !others.is_empty() => Verdict::Ambiguous,
+        () if !others.is_empty() || is_near_another => Verdict::Ambiguous,
         () if found.taken.is_empty() => Verdict::NothingMissing,
         () => Verdict::Named,
     };
@@ -167,6 +173,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
             alternatives: taken
                 .alternatives
                 .iter()
+                .chain(&taken.near)
                 .map(|other| model.suspects[*other].name.clone())
                 .collect(),
         })
@@ -182,22 +189,26 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
                 "Something is missing that is no suspect: the decoy {decoy} does better than each of them"
             )
         }
-        Verdict::Ambiguous => {
+        Verdict::Ambiguous if !others.is_empty() => {
             format!("{} is missing, or {}: the records cannot tell", names.join(" and "), others.join(" or "))
         }
         _ => format!("{} {} missing", names.join(" and "), if names.len() == 1 { "is" } else { "are" }),
     };
-    let forms = named.iter().filter(|one| others.is_empty() && !one.alternatives.is_empty());
+    let either = |all: &[usize]| {
+        all.iter().map(|one| model.suspects[*one].name.as_str()).collect::<Vec<_>>().join(" or ")
+    };
+    let name = |taken: &Taken| model.suspects[taken.evaluation.suspect].name.as_str();
+    let forms = found.taken.iter().filter(|one| others.is_empty() && !one.alternatives.is_empty());
     let forms: String = forms
         .map(|one| {
-            format!(
-                ", in the form of {} or {}: the records cannot tell",
-                one.suspect,
-                one.alternatives.join(" or ")
-            )
+            let others = either(&one.alternatives);
+            format!(", in the form of {} or {others}: the records cannot tell", name(one))
         })
         .collect();
-    let headline = headline + &forms;
+    let near = found.taken.iter().filter(|one| !one.near.is_empty());
+    let near: String =
+        near.map(|one| format!("; {} cannot be told from {}", name(one), either(&one.near))).collect();
+    let headline = headline + &forms + &near;
     let mut suspects: Vec<Judgement> =
         found.first.iter().map(|evaluation| judgement(fitting, evaluation, found)).collect();
     suspects.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.gain.total_cmp(&a.gain)));
@@ -227,6 +238,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         verdict,
         headline,
         confirmed: None,
+        taken_back: false,
         adequate: true,
         residuals: Vec::new(),
         parameters,
@@ -277,22 +289,36 @@ impl ModelReport {
             self.held_out.iter().filter(|left| left.rms_after > WORSE * left.rms_before).collect();
         let better = self.held_out.iter().any(|left| left.rms_after < left.rms_before / WORSE);
         self.confirmed = Some(better && worse.is_empty());
-        let about = match worse.first() {
-            Some(first) => format!(
-                "; taken back: on {} it makes {} worse, {} to {} {} rms",
-                first.record,
-                first.output,
-                significant(first.rms_before),
-                significant(first.rms_after),
-                first.unit
-            ),
-            None if better => match self.much_worse().first() {
+        if let Some(Left { record, output, unit, rms_before, rms_after, .. }) = worse.first() {
+            let [before, after] = [rms_before, rms_after].map(|rms| significant(*rms));
+            self.headline = format!(
+                "{} taken back: on {record} {output} gets worse, {before} to {after} {unit} rms; \
+                 the training records alone say: {}",
+                self.found_in_words(),
+                self.headline
+            );
+            self.taken_back = true;
+            return;
+        }
+        let about = match () {
+            () if better => match self.much_worse().first() {
                 Some(much) => format!("; better on what was held out, though {much}"),
                 None => "; confirmed on what was held out".to_owned(),
             },
-            None => "; what was held out gets neither better nor worse with it".to_owned(),
+            () => "; what was held out gets neither better nor worse with it".to_owned(),
         };
         self.headline += &about;
+    }
+
+    /// What was found, as the beginning of a sentence.
+    fn found_in_words(&self) -> String {
+        let names: Vec<&str> =
+            self.named.iter().map(|one| one.effect.as_ref().unwrap_or(&one.suspect).as_str()).collect();
+        match names.len() {
+            0 => "What the search found is".to_owned(),
+            1 => format!("{} is", names[0]),
+            _ => format!("{} are", names.join(" and ")),
+        }
     }
 }
 
@@ -407,6 +433,9 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
         (Some(round), _) => format!("taken, number {}", round + 1),
         _ if found.taken.iter().any(|taken| taken.alternatives.contains(&evaluation.suspect)) => {
             "explains the records as well as what was taken".to_owned()
+        }
+        _ if found.taken.first().is_some_and(|taken| taken.near.contains(&evaluation.suspect)) => {
+            format!("cannot be told from what was taken, though it fails: {}", evaluation.gate)
         }
         (None, Some(last)) if last.passes => "passes, but another was better".to_owned(),
         (None, Some(last)) => format!("rejected: {}", last.gate),

@@ -56,6 +56,8 @@ pub(crate) struct Taken {
     pub(crate) evaluation: Evaluation,
     /// Others that explain the records as well.
     pub(crate) alternatives: Vec<usize>,
+    /// Others whose likelihood does too, and that fail another gate.
+    pub(crate) near: Vec<usize>,
 }
 
 /// What came of the search.
@@ -161,16 +163,20 @@ pub(crate) fn search<'a>(
             found.decoy = Some(evaluation.suspect);
             return Ok(found);
         }
-        let alternatives = round
-            .iter()
-            .filter(|other| other.suspect != evaluation.suspect && other.passes)
-            .filter(|other| !model.suspects[other.suspect].is_decoy && !apart(model, &evaluation, other))
-            .map(|other| other.suspect)
-            .collect();
+        let is_near = |other: &&Evaluation| {
+            other.suspect != evaluation.suspect
+                && !model.suspects[other.suspect].is_decoy
+                && (other.passes || other.worth() > 0.0)
+                && !apart(model, &evaluation, other)
+        };
+        let (alternatives, near): (Vec<&Evaluation>, Vec<&Evaluation>) =
+            round.iter().filter(is_near).partition(|other| other.passes);
+        let [alternatives, near] =
+            [alternatives, near].map(|all| all.iter().map(|one| one.suspect).collect());
         found.extended = fits.swap_remove(best);
         let name = &model.suspects[evaluation.suspect].name;
         progress(&format!("with {name}: {}", left(&found.extended)));
-        found.taken.push(Taken { evaluation, alternatives });
+        found.taken.push(Taken { evaluation, alternatives, near });
     }
     Ok(found)
 }
@@ -192,7 +198,11 @@ impl<'a> Found<'a> {
         self.notes.push(format!("{one} and {other} were found together: neither passes alone"));
         self.extended = pair.fit;
         progress(&format!("with {one} and {other}: {}", left(&self.extended)));
-        let taken = pair.members.map(|(evaluation, alternatives)| Taken { evaluation, alternatives });
+        let taken = pair.members.map(|(evaluation, alternatives)| Taken {
+            evaluation,
+            alternatives,
+            near: Vec::new(),
+        });
         self.taken.extend(taken);
     }
 }

@@ -7,7 +7,7 @@
 use super::fit::Fitting;
 use super::record::Measured;
 use super::select::Fitted;
-use super::structure::{Advice, Seen, cosine, seen};
+use super::structure::{Advice, Hardly, Seen, TWINS, cosine, seen};
 use crate::stats::mean_and_variance;
 use model::{Model, Program};
 
@@ -15,13 +15,17 @@ use model::{Model, Program};
 const RESTS: f64 = 1e-20;
 
 /// A sensor that helps is no close call: cosine of two suspects at most, and share of a suspect that is seen at least. Choices,
-/// well beyond the bounds of what counts as a twin (0.98) and as hidden (0.05).
+/// well beyond the bounds of what counts as a twin (0.98) and as hidden (0.05). One between these and those helps a little.
 const APART: f64 = 0.9;
 const SHOWN: f64 = 0.2;
 
 /// For each of `confused`, one suspect that hides or two that are twins, the states that would help; nothing where all states are
 /// measured.
-pub(super) fn advice(baseline: &Fitted<'_>, scale: &[f64], confused: &[Vec<usize>]) -> Vec<Advice> {
+pub(super) fn advice(
+    (baseline, values_si): (&Fitted<'_>, &[f64]),
+    scale: &[f64],
+    confused: &[Vec<usize>],
+) -> Vec<Advice> {
     let model = baseline.fitting.model;
     let is_measured = |name: &str| model.outputs.iter().any(|output| output.value.text == name);
     let states = model.states.iter().enumerate();
@@ -33,29 +37,48 @@ pub(super) fn advice(baseline: &Fitted<'_>, scale: &[f64], confused: &[Vec<usize
     let name = |suspect: &usize| model.suspects[*suspect].name.clone();
     let mut advice: Vec<Advice> = confused
         .iter()
-        .map(|suspects| Advice { suspects: suspects.iter().map(name).collect(), measure: Vec::new() })
+        .map(|suspects| Advice {
+            suspects: suspects.iter().map(name).collect(),
+            measure: Vec::new(),
+            hardly: Vec::new(),
+        })
         .collect();
     for state in unmeasured {
-        let Some(seen) = with_sensor(baseline, scale, state, confused) else { continue };
+        let Some(seen) = with_sensor((baseline, values_si), scale, state, confused) else { continue };
         for (suspects, advice) in confused.iter().zip(&mut advice) {
-            if is_solved(&seen, suspects) {
-                advice.measure.push(model.states[state].name.clone());
+            let state = model.states[state].name.clone();
+            match with(&seen, suspects) {
+                Some(Shown { share, cosine })
+                    if share > SHOWN && cosine.is_none_or(|cosine| cosine < APART) =>
+                {
+                    advice.measure.push(state);
+                }
+                Some(Shown { share, cosine }) => advice.hardly.push(Hardly { state, share, cosine }),
+                None => {}
             }
         }
     }
     advice
 }
 
-/// Whether all of these are seen, and are apart.
-fn is_solved(seen: &[Seen], suspects: &[usize]) -> bool {
-    let of = |suspect: &usize| seen.iter().find(|one| one.suspect == *suspect && one.share > SHOWN);
-    let all: Option<Vec<&Seen>> = suspects.iter().map(of).collect();
-    all.is_some_and(|all| all.windows(2).all(|pair| cosine(pair[0], pair[1]) < APART))
+/// The least share that is seen of suspects, and the cosine of two.
+struct Shown {
+    share: f64,
+    cosine: Option<f64>,
+}
+
+/// What a sensor shows of these; `None` where one of them stays hidden, or two stay twins.
+fn with(seen: &[Seen], suspects: &[usize]) -> Option<Shown> {
+    let of = |suspect: &usize| seen.iter().find(|one| one.suspect == *suspect && !one.is_hidden());
+    let all: Vec<&Seen> = suspects.iter().map(of).collect::<Option<_>>()?;
+    let share = all.iter().map(|one| one.share).fold(f64::INFINITY, f64::min);
+    let cosine = (all.len() == 2).then(|| cosine(all[0], all[1]));
+    cosine.is_none_or(|cosine| cosine <= TWINS).then_some(Shown { share, cosine })
 }
 
 /// What the suspects in question do to the outputs and to a state; `None` where it cannot be computed, or the state rests.
 fn with_sensor(
-    baseline: &Fitted<'_>,
+    (baseline, values_si): (&Fitted<'_>, &[f64]),
     scale: &[f64],
     state: usize,
     confused: &[Vec<usize>],
@@ -65,7 +88,6 @@ fn with_sensor(
     let taken = &baseline.suspects;
     let program = Program::new(&measuring, taken).ok()?;
     let fitting = Fitting::new(&measuring, program, &records, taken);
-    let values_si = &baseline.point.values_si;
     let said = fitting.residuals(values_si).ok()?;
     let state: Vec<f64> =
         said.into_iter().filter_map(|mut record| record.pop()).flat_map(|[_, x]| x).collect();
@@ -78,7 +100,7 @@ fn with_sensor(
     let mut asked: Vec<usize> = confused.iter().flatten().copied().collect();
     asked.sort_unstable();
     asked.dedup();
-    seen(&fitting, (taken, values_si), &scale, &asked).ok().map(|(seen, _)| seen)
+    seen(&fitting, (taken, values_si), &scale, &asked).ok().map(|(seen, ..)| seen)
 }
 
 /// The least that is left of an output over its variation.

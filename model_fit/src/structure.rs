@@ -22,13 +22,13 @@ use super::judge::GAIN_APART;
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
 use super::sensors;
-use model::{Failure, Program};
+use model::{Failure, Program, Solver};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 /// Cosine above which two suspects do the same to these records; a choice, below which an interval of 90 % at ten times the noise
 /// would still tell them apart.
-const TWINS: f64 = 0.98;
+pub(super) const TWINS: f64 = 0.98;
 /// Share below which a suspect looks like the model's own numbers.
 const HIDDEN: f64 = 0.05;
 
@@ -39,6 +39,8 @@ pub struct Structure {
     pub undetermined: Vec<String>,
     /// Suspects that look like a change of the model's own numbers.
     pub hidden: Vec<String>,
+    /// Numbers and suspects of these two lists that change no output at all.
+    pub without_effect: Vec<String>,
     /// Suspects that do the same to these records, with the cosine.
     pub twins: Vec<Twins>,
     /// For each of these what would have to be measured beside; none where all states are.
@@ -58,19 +60,40 @@ pub struct Advice {
     pub suspects: Vec<String>,
     /// States, of which a sensor of one would do; empty where none does.
     pub measure: Vec<String>,
+    /// States of which a sensor shows or tells them apart a little.
+    pub hardly: Vec<Hardly>,
+}
+
+/// A sensor that is better than none, and a close call.
+#[derive(Clone, Debug, Serialize)]
+pub struct Hardly {
+    pub state: String,
+    /// Of what the suspect does there, or that of two which shows less, the part that the model's own numbers cannot do.
+    pub share: f64,
+    /// Of two suspects with that sensor.
+    pub cosine: Option<f64>,
 }
 
 impl Advice {
     /// A line of a report.
     pub(crate) fn in_words(&self) -> String {
         let measure = self.measure.join(" or ");
-        match (self.suspects.as_slice(), self.measure.is_empty()) {
-            ([one, other], false) => {
+        let hardly = |one: &Hardly| match one.cosine {
+            Some(cosine) => format!("{} (cosine {cosine:.3})", one.state),
+            None => format!("{} ({:.0} % of what it does)", one.state, one.share * 100.0),
+        };
+        let hardly = self.hardly.iter().map(hardly).collect::<Vec<_>>().join(" or ");
+        match (self.suspects.as_slice(), self.measure.is_empty(), self.hardly.is_empty()) {
+            ([one, other], false, _) => {
                 format!("to tell {one} and {other} apart you would need a sensor of {measure}")
             }
-            ([one, other], true) => format!("no sensor of a state would tell {one} and {other} apart"),
-            (all, false) => format!("to see {} you would need a sensor of {measure}", all.join(" and ")),
-            (all, true) => format!("no sensor of a state would show {}", all.join(" and ")),
+            ([one, other], true, false) => {
+                format!("a sensor would tell {one} and {other} apart a little: of {hardly}")
+            }
+            ([one, other], true, true) => format!("no sensor of a state would tell {one} and {other} apart"),
+            (all, false, _) => format!("to see {} you would need a sensor of {measure}", all.join(" and ")),
+            (all, true, false) => format!("a sensor would show {} a little: of {hardly}", all.join(" and ")),
+            (all, true, true) => format!("no sensor of a state would show {}", all.join(" and ")),
         }
     }
 }
@@ -88,10 +111,14 @@ pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     let is_asked = |suspect: &model::Suspect| !suspect.is_decoy && !suspect.is_term;
     let asked: Vec<usize> = (0..model.suspects.len()).filter(|one| is_asked(&model.suspects[*one])).collect();
     let seen = seen(fitting, (&baseline.suspects, &point.values_si), &scale, &asked);
-    let Ok((seen, base)) = seen else {
+    let Ok((seen, base, moved)) = seen else {
         return Structure { undetermined, ..Structure::default() };
     };
     let name = |suspect: usize| model.suspects[suspect].name.clone();
+    let idle = fitting.unknowns.iter().zip(&moved).filter(|(_, moved)| **moved == 0.0);
+    let numbers = idle.map(|(unknown, _)| fitting.name_of(unknown));
+    let suspects = seen.iter().filter(|one| one.change == 0.0).map(|one| name(one.suspect));
+    let without_effect = numbers.chain(suspects).collect();
     let hidden: Vec<usize> = seen.iter().filter(|one| one.is_hidden()).map(|one| one.suspect).collect();
     let left = DVector::from_vec(fitting.measured(&scale)) - base;
     let cost = |one: &Seen, other: &Seen| {
@@ -115,10 +142,16 @@ pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     let twins = twins(&seen, predicted);
     let confused: Vec<Vec<usize>> =
         hidden.iter().map(|one| vec![*one]).chain(twins.iter().map(|(pair, _)| pair.to_vec())).collect();
-    let advice = sensors::advice(baseline, &scale, &confused);
+    // A number that moves nothing measured stands where its fit happened to begin.
+    let values_si = fitting.unknowns.iter().zip(&point.values_si).zip(&moved);
+    let values_si: Vec<f64> = values_si
+        .map(|((unknown, value), moved)| if *moved == 0.0 { unknown.start_si } else { *value })
+        .collect();
+    let advice = sensors::advice((baseline, &values_si), &scale, &confused);
     Structure {
         undetermined,
         hidden: hidden.into_iter().map(name).collect(),
+        without_effect,
         twins: twins.into_iter().map(|(pair, cosine)| Twins { suspects: pair.map(name), cosine }).collect(),
         advice,
     }
@@ -129,11 +162,13 @@ pub(super) struct Seen {
     pub(super) suspect: usize,
     /// Share of its change that is left, and its direction.
     pub(super) share: f64,
+    /// Size of its change, in units of what the model leaves.
+    change: f64,
     direction: DVector<f64>,
 }
 
 impl Seen {
-    fn is_hidden(&self) -> bool {
+    pub(super) fn is_hidden(&self) -> bool {
         self.share <= HIDDEN
     }
 }
@@ -158,23 +193,33 @@ fn twins(seen: &[Seen], predicted: impl Fn(&Seen, &Seen) -> f64) -> Vec<([usize;
     twins
 }
 
-/// What these suspects do, each beside the model with what was `taken`, and what that says; one that cannot be simulated is left
-/// out.
+/// Suspects, what the model says, and how much each of its numbers moves that.
+type Sight = (Vec<Seen>, DVector<f64>, Vec<f64>);
+
+/// What these suspects do, each beside the model with what was `taken`, what that says, and how much each of its numbers moves it;
+/// a suspect that cannot be simulated is left out.
 pub(super) fn seen(
     fitting: &Fitting<'_>,
     (taken, values_si): (&[usize], &[f64]),
     scale: &[f64],
     asked: &[usize],
-) -> Result<(Vec<Seen>, DVector<f64>), Failure> {
+) -> Result<Sight, Failure> {
     let (columns, base) = columns(fitting, values_si, scale)?;
+    // Other steps of the integration move outputs, too, by no more than this.
+    let least = match fitting.model.solver {
+        Solver::Adaptive { relative_tolerance } => 10.0 * relative_tolerance * base.norm(),
+        Solver::Fixed { .. } => 0.0,
+    };
     let of = |suspect: &usize| {
         let change = changed(fitting, (taken, values_si), *suspect, &[], scale).ok()? - &base;
         let rest = &change - &columns * projected(&columns, &change);
-        let share = if change.norm() > 0.0 { rest.norm() / change.norm() } else { 0.0 };
-        Some(Seen { suspect: *suspect, share, direction: rest.normalize() })
+        let size = if change.norm() > least { change.norm() } else { 0.0 };
+        let share = if size > 0.0 { rest.norm() / size } else { 0.0 };
+        Some(Seen { suspect: *suspect, share, change: size, direction: rest.normalize() })
     };
     let all = asked.iter().filter_map(of).collect();
-    Ok((all, base))
+    let moved = columns.column_iter().map(|column| column.norm()).collect();
+    Ok((all, base, moved))
 }
 
 /// Coefficients of the columns that come nearest to a change.
@@ -244,4 +289,34 @@ pub(super) fn changed(
         })
         .collect();
     Ok(DVector::from_vec(extended.said(&values, scale)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Advice, Hardly};
+
+    #[test]
+    fn a_sensor_that_helps_a_little_is_not_said_to_be_none() {
+        let words = |suspects: &[&str], measure: &[&str], cosine: Option<Option<f64>>| {
+            let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+            let hardly = |cosine| Hardly { state: "z".into(), share: 0.124, cosine };
+            let hardly = cosine.map(hardly).into_iter().collect();
+            Advice { suspects: owned(suspects), measure: owned(measure), hardly }.in_words()
+        };
+        let said = [
+            words(&["leak"], &[], None),
+            words(&["leak"], &[], Some(None)),
+            words(&["leak"], &["x"], Some(None)),
+            words(&["leak", "gain"], &[], None),
+            words(&["leak", "gain"], &[], Some(Some(0.95))),
+        ];
+        let expected = [
+            "no sensor of a state would show leak",
+            "a sensor would show leak a little: of z (12 % of what it does)",
+            "to see leak you would need a sensor of x",
+            "no sensor of a state would tell leak and gain apart",
+            "a sensor would tell leak and gain apart a little: of z (cosine 0.950)",
+        ];
+        assert_eq!(said, expected);
+    }
 }

@@ -95,6 +95,26 @@ fn a_sensor_is_advised_that_shows_a_suspect_which_hides() {
 }
 
 #[test]
+fn a_sensor_is_advised_of_a_state_that_changes_no_output() {
+    let folder = tempfile::tempdir().unwrap();
+    // Its rate is fitted from several starts, of which the record prefers none.
+    let third = "[parameters]\nrate = { unit = \"1/s\", value = 0.5 }\n[states.third]\nunit = \"m\"\nstart = 0\n\
+                 derivative = \"rate*(lower - third)\"\n[define]";
+    let leak = "[[suspects]]\nname = \"leak\"\nplace = \"third\"\nadd = \"-k*third\"\n\
+                parameters.k = { unit = \"1/s\", value = 0.1, range = [0, 5] }\n";
+    let model = TANKS.replace("starts = 0\n", "starts = 8\n").replace("[define]", third);
+    let (plant, _) = model.split_once("[[suspects]]").unwrap();
+    let [file, record] = files(folder.path(), &format!("{plant}{leak}"));
+    let text = explain(&file, &[record]).unwrap();
+    for line in
+        ["rate: changes no output", "leak: changes no output", "to see leak you would need a sensor of third"]
+    {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    assert!(!text.contains("looks like a change") && !text.contains("rate: not determined"), "{text}");
+}
+
+#[test]
 fn no_sensor_is_advised_where_two_suspects_do_the_same_to_every_state() {
     let folder = tempfile::tempdir().unwrap();
     let twin = TANKS.replace("\"flow-gain\"\nplace = \"flow\"", "\"flow-gain\"\nplace = \"u\"");

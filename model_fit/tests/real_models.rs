@@ -109,6 +109,9 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
     assert_eq!(report.named[0].suspect, "root-of-pressure");
     assert_eq!(report.named[0].alternatives, ["proportional-to-pressure"]);
     assert!(report.headline.contains("in the form of root-of-pressure or proportional-to-pressure"));
+    assert!(
+        report.taken_back && report.headline.starts_with("pressure-dependent-friction is taken back: on ")
+    );
     let probability =
         |name: &str| report.suspects.iter().find(|one| one.suspect == name).unwrap().probability;
     let [root, line] = ["root-of-pressure", "proportional-to-pressure"].map(probability);
@@ -146,4 +149,30 @@ fn an_x_ring_does_too_but_at_seven_bar_it_rubs_more_than_any_law_of_the_others_s
     );
     assert!(seven.ratio.unwrap() < 0.70 && seven.rms_after > 5.0, "{seven:?}");
     assert!(report.confirmed == Some(false) && report.headline.contains("taken back"), "{}", report.headline);
+}
+
+#[test]
+fn what_fails_a_gate_beside_a_name_that_is_no_likelier_is_said_beside_it() {
+    let Some(folder) = data("what_fails_a_gate_beside_a_name_that_is_no_likelier_is_said_beside_it") else {
+        return;
+    };
+    let drop = |number: usize| [folder.join(format!("falling-balls/baseball_{number}.csv"))];
+    let report = closed(&shipped("falling-ball.toml"), &drop(2), &drop(1));
+    let [scale, buoyancy] = ["height-scale", "buoyancy"]
+        .map(|name| report.suspects.iter().find(|one| one.suspect == name).unwrap());
+    assert!((scale.probability - buoyancy.probability).abs() < 0.01, "{scale:?} {buoyancy:?}");
+    assert!(scale.decision.starts_with("taken"), "{scale:?}");
+    assert!(
+        buoyancy.decision.starts_with("cannot be told from what was taken, though it fails: folds"),
+        "{buoyancy:?}"
+    );
+    assert_eq!(
+        (report.verdict, &report.named[0].alternatives[..]),
+        (Verdict::Ambiguous, &["buoyancy".to_owned()][..])
+    );
+    assert!(
+        report.headline.starts_with("height-scale is missing; height-scale cannot be told from buoyancy"),
+        "{}",
+        report.headline
+    );
 }

@@ -56,6 +56,48 @@ class Missing:
     """Suspects that explain the records as well."""
 
 
+@dataclass(frozen=True)
+class Found:
+    """A term of a search, which no suspect describes."""
+
+    name: str
+    place: str
+    term: str
+    """How it stands there."""
+    variables: tuple[str, ...]
+    """Inputs and states that it reads."""
+    share_explained: float
+    stability: float
+    """Share of halves of the records in which the best term is one like it."""
+
+
+@dataclass(frozen=True)
+class Located:
+    """Where what the model alone leaves comes from."""
+
+    place: str
+    variables: tuple[str, ...]
+    share: float
+    """Of what the model leaves, that a function of these explains there."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What both models leave of an output of a record."""
+
+    record: str
+    output: str
+    unit: str
+    rms_before: float
+    """By the model alone, in `unit`."""
+    rms_after: float
+    """By the extended model."""
+    ratio: float | None
+    """After over before."""
+    rows: int
+    """Samples that are compared."""
+
+
 class ModelFile:
     """A model file that fits its schema. Names, units and expressions are checked by `explain` and `close_model`, which parse them."""
 
@@ -119,12 +161,27 @@ class ModelReport:
         self.headline: str = self.data["headline"]
         self.confirmed: bool | None = self.data["confirmed"]
         """Whether held-out records get better with what was named, and none worse; None without one, or where nothing was named."""
+        self.taken_back: bool = self.data["taken_back"]
+        """Whether a held-out record that gets worse takes back what `named` and `discovered` have."""
         self.adequate: bool = self.data["adequate"]
         """Whether the reported model leaves no more than noise and declared model error on the training records."""
         self.named = tuple(
             Missing(each["suspect"], each["place"], each["term"], each["share_explained"], tuple(each["alternatives"]))
             for each in self.data["named"]
         )
+        self.discovered = tuple(
+            Found(each["name"], each["place"], each["term"], tuple(each["variables"]), each["share_explained"], each["stability"])
+            for each in self.data["discovered"]
+        )
+        """Terms of a search that no suspect describes; their coefficients are `report["NAME.k_found"]`."""
+        self.located = None if (at := self.data["located"]) is None else Located(at["place"], tuple(at["variables"]), at["share"])
+        """Where what the model alone leaves comes from, whatever the suspects are; None where no place explains enough of it."""
+        self.training = tuple(Left(**each) for each in self.data["training"])
+        self.held_out = tuple(Left(**each) for each in self.data["held_out"])
+        """What both models leave of each output of each held-out record."""
+        self.structure: dict[str, Any] = self.data["structure"]
+        """What the records can tell apart: `undetermined`, `hidden`, `without_effect`, `twins`, `advice`."""
+        self.notes: list[str] = self.data["notes"]
         self.parameters = tuple(
             ModelNumber(each["name"], each["suspect"], each["value"], each["unit"], each["standard_error"], each["baseline"])
             for each in self.data["parameters"]
@@ -149,9 +206,10 @@ class ModelReport:
 
     @property
     def model_file(self) -> Path | None:
-        """The model file with what was named; None where nothing was."""
+        """The model file with what was named, or found by a search; None where nothing was, or it is taken back."""
         file = self.folder / Path(self.data["model"]).name
-        return file if self.named and file.is_file() else None
+        is_found = (self.named or self.discovered) and not self.taken_back
+        return file if is_found and file.is_file() else None
 
     def __repr__(self) -> str:
         return f"<ModelReport {self.folder}: {self.verdict}: {self.headline}>"
@@ -163,6 +221,8 @@ def close_model(
     test: Record | Sequence[Record] = (),
     *,
     out: StrPath | None = None,
+    discover: bool | None = None,
+    threads: int | None = None,
     binaries: StrPath | None = None,
 ) -> ModelReport:
     """Finds which suspect a model file lacks against measured records, and writes the extended file: `discrepancy close`.
@@ -171,6 +231,8 @@ def close_model(
     :param train: records to fit: files, or frames of pandas with the columns of the model, the time as a column or as index.
     :param test: records that are used only to judge both models.
     :param out: folder of the results; None: a new one in ./runs.
+    :param discover: where no suspect is named, searches for a term that none of them describes; None: if more than noise is left.
+    :param threads: most threads that compute; None: all.
     :param binaries: folder of the programs; None: `programs.program` looks for them.
     :raises BadModel: the file does not fit its schema.
     :raises ProgramFailed: other bad input, with the program's message and exit code.
@@ -178,6 +240,8 @@ def close_model(
     known = model if isinstance(model, ModelFile) else ModelFile(model)
     where = tasks.folder(out, "close")
     words = [str(programs.program("discrepancy", binaries)), "close", "--model", str(known.path), "--out", str(where)]
+    words += [] if discover is None else ["--discover" if discover else "--no-discover"]
+    words += ["--threads", str(threads)] if threads is not None else []
     for option, asked in (("train", train), ("test", test)):
         places = [where / "records" / f"{option}-{number}" for number, _ in enumerate(records.several(asked), 1)]
         files = [records.file(each, place, known.time) for each, place in zip(records.several(asked), places, strict=True)]

@@ -68,7 +68,7 @@ fn reports_campaigns_robot_and_the_wheel_for_python_do_what_they_say() {
     tests.args(
         [RIG, PLUGIN].concat().iter().map(|file| format!("--ignore={}", folder().join(file).display())),
     );
-    expect_all_passed(Running::start("pytest", &mut tests).wait(), 33);
+    expect_all_passed(Running::start("pytest", &mut tests).wait(), 35);
 }
 
 #[test]

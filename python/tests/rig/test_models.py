@@ -67,6 +67,34 @@ def test_a_model_is_closed_and_its_report_is_an_object(report):
 
 
 @pytest.mark.xdist_group("models")
+def test_a_name_that_is_taken_back_is_in_no_model_file(report, tmp_path):
+    """The held-out body falls without drag."""
+    frames = [dict(zip(("t_s", "v"), fall(3), strict=True)), {"t_s": fall(3)[0], "v": [-9.81 * t for t in fall(3)[0]]}]
+    files = [tmp_path / "drag.csv", tmp_path / "free.csv"]
+    for file, frame in zip(files, frames, strict=True):
+        file.write_text("t_s,v\n" + "".join(f"{t},{v}\n" for t, v in zip(frame["t_s"], frame["v"], strict=True)))
+    (tmp_path / "fall.toml").write_text(DECAY)
+    back = close_model(tmp_path / "fall.toml", files[0], files[1], out=tmp_path / "out", threads=1)
+    assert back.taken_back and back.confirmed is False and [one.suspect for one in back.named] == ["drag"]
+    assert back.headline.startswith("drag is taken back: on free.csv v gets worse, ")
+    assert back.model_file is None and not (tmp_path / "out/fall.toml").exists()
+    [left] = back.held_out
+    assert (left.record, left.output) == ("free.csv", "v") and left.rms_after > left.rms_before
+    assert "What was named, and is taken back" in back.page.read_text()
+    assert not report.taken_back and report.located is not None and report.notes == report.data["notes"]
+
+
+@pytest.mark.xdist_group("models")
+def test_a_search_writes_its_term_into_the_model_file(tmp_path):
+    (tmp_path / "fall.toml").write_text(DECAY.partition("[[suspects]]")[0])
+    (tmp_path / "drag.csv").write_text("t_s,v\n" + "".join(f"{t},{v}\n" for t, v in zip(*fall(3), strict=True)))
+    found = close_model(tmp_path / "fall.toml", tmp_path / "drag.csv", discover=True, out=tmp_path / "out")
+    assert found.verdict == "outside-catalogue" and found.discovered and not found.named
+    assert found[f"{found.discovered[0].name}.k_found"].value != 0 and found.discovered[0].place == "equation of speed"
+    assert ModelFile(found.model_file).data["terms"]
+
+
+@pytest.mark.xdist_group("models")
 def test_a_report_that_does_not_fit_says_where(report, tmp_path):
     damaged = json.loads((report.folder / "report.json").read_text())
     damaged["suspects"][1]["probability"] = 2
