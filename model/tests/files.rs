@@ -135,6 +135,12 @@ fn a_flat_sum_of_a_thousand_terms_is_no_nesting() {
     assert_eq!(read(&with_output("", &sum)).outputs.len(), 1);
 }
 
+/// A fuzz target takes a seed that is refused without a word.
+#[test]
+fn the_fuzz_seed_of_libraries_is_a_model() {
+    assert_eq!(read(include_str!("../../fuzz/seeds/model_toml/library.toml")).suspects.len(), 5);
+}
+
 #[test]
 fn every_value_has_one_unit() {
     let lines = "[inputs.u]\nunit = \"V\"\n";

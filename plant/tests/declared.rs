@@ -308,3 +308,10 @@ fn a_suspect_adds_nothing_while_it_is_off() {
         assert!(error.starts_with("s.toml:") && error.contains(message), "{text}\n{error}");
     }
 }
+
+/// A fuzz target takes a seed that is refused without a word.
+#[test]
+fn the_fuzz_seed_of_suspects_is_a_file_of_them() {
+    let text = include_str!("../../fuzz/seeds/rig_toml/suspects");
+    assert_eq!(suspects(text, "suspects").unwrap_or_else(|error| panic!("{error}")).len(), 2);
+}
