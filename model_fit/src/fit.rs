@@ -91,7 +91,7 @@ pub(crate) struct Point {
     pub(crate) squares: Vec<f64>,
     is_at_bound: bool,
     /// Steps of its longest simulation.
-    steps: usize,
+    pub(crate) steps: usize,
 }
 
 impl Iterate for Point {

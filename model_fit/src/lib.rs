@@ -155,6 +155,10 @@ pub enum Search {
     Never,
 }
 
+/// Most steps of a simulation with which a formula is searched that nobody asked for: at a microsecond each, and hundreds of
+/// simulations, some minutes.
+const MOST_STEPS_UNASKED: usize = 100_000;
+
 /// Closes a model: names what it lacks by the training records, and compares both models on the held-out ones. Where no suspect
 /// is named and more than noise is left, a formula is searched.
 ///
@@ -184,13 +188,12 @@ pub fn close_with(
     let found = select::search(&model, &records, progress)?;
     progress("structure");
     let structure = structure::structure(&found.baseline, &found.extended);
-    let is_searched = found.taken.is_empty()
-        && match search {
-            Search::MoreThanNoise => !adequacy::residuals(&found.extended)?.iter().all(|left| left.is_noise),
-            Search::NothingNamed => true,
-            Search::Never => false,
-        };
-    let grown = is_searched.then(|| discover::grown(&found.baseline));
+    let grown = is_searched(&found, search)?.then(|| match (search, found.baseline.point.steps) {
+        (Search::MoreThanNoise, steps) if steps > MOST_STEPS_UNASKED => Err(format!(
+            "a simulation has {steps} steps, and a search makes hundreds: --discover asks for one"
+        )),
+        _ => discover::grown(&found.baseline),
+    });
     let located =
         watch::watched(progress, ("where it comes from: steps", 1), |_| discover::located(&found.baseline));
     let (found, mut report) = match &grown {
@@ -229,6 +232,16 @@ pub fn close_with(
     let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
     let extended = is_named.then(|| extended(model.text(), &ReportedModel::from(&report)).ok()).flatten();
     Ok(ClosedModel { report, not_judged, page, extended })
+}
+
+/// Whether a formula is searched.
+fn is_searched(found: &select::Found<'_>, search: Search) -> Result<bool, ModelError> {
+    Ok(found.taken.is_empty()
+        && match search {
+            Search::MoreThanNoise => !adequacy::residuals(&found.extended)?.iter().all(|left| left.is_noise),
+            Search::NothingNamed => true,
+            Search::Never => false,
+        })
 }
 
 /// What there is to say of a record before anything is fitted.

@@ -116,3 +116,25 @@ fn nothing_is_searched_where_it_is_switched_off_or_noise_is_left() {
     assert_eq!(report.verdict, Verdict::NothingMissing, "{report:#?}");
     assert!(report.discovered.is_empty() && report.notes.is_empty(), "{report:#?}");
 }
+
+/// A search simulates hundreds of times; 107 000 steps each are minutes.
+#[test]
+fn a_search_that_takes_minutes_is_not_made_unasked() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, train] = ["decay.toml", "train.csv"].map(|name| folder.path().join(name));
+    let model = "[fit]\nstarts = 0\n[solver]\nmethod = \"fixed\"\nstep_s = 1.83e-4\n[inputs.u]\n[parameters]\n\
+                 k = { unit = \"1/s\", value = 0.3 }\n[states.x]\nstart = 2\nderivative = \"k*(u - x)\"\n\
+                 [outputs.y]\nvalue = \"x\"\n";
+    // x' = -x^3/2 from 2.
+    let row = |row: u32| format!("{},0,{}\n", 0.5 * f64::from(row), (0.25 + 0.5 * f64::from(row)).powf(-0.5));
+    fs::write(&file, model).unwrap();
+    fs::write(&train, "t_s,u,y\n".to_owned() + &(0..40).map(row).collect::<String>()).unwrap();
+    let report = close_with(&file, (&[train], &[]), Search::MoreThanNoise, &mut |_| {}).unwrap().report;
+    assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{report:#?}");
+    assert!(report.discovered.is_empty());
+    assert!(
+        report.notes.iter().any(|note| note.starts_with("nothing was searched: a simulation has 10")),
+        "{:?}",
+        report.notes
+    );
+}
