@@ -18,6 +18,7 @@
 //! Sources: Karnopp 1985, J. Dyn. Sys., Meas., Control 107 (the force that holds); Hiskens, Pai 2000, IEEE Trans. Circuits and
 //! Systems I 47(2), eq. 38 (jump of sensitivities).
 
+use super::steps::cubic;
 use super::{STAGES, Simulator, put};
 use crate::failure::Failure;
 use crate::file::Solver;
@@ -133,8 +134,7 @@ impl Simulator<'_> {
             let at = place * width;
             let (from, to) = (self.x[at], self.tried[at]);
             let [head, end] = [0, STAGES - 1].map(|stage| step_s * self.stages[stage][at]);
-            let bent = (1.0 - 2.0 * share) * (to - from) + (share - 1.0) * head + share * end;
-            *within = (1.0 - share) * from + share * to + share * (share - 1.0) * bent;
+            *within = cubic([from, to], [head, end], share);
         }
     }
 

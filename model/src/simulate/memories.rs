@@ -9,6 +9,7 @@
 //! ```
 //! A memory that jumps (a relay) has an error in proportion to the step, so that step control finds the instant of the jump.
 
+use super::steps::cubic;
 use super::{STAGES, Simulator, put};
 use crate::inputs::Inputs;
 
@@ -66,7 +67,8 @@ impl Simulator<'_> {
     /// Adds to the step that was tried what its memories change within it; they are those of its end then. Returns the error
     /// over the size of its state.
     pub(super) fn remember(&mut self, inputs: &Inputs<'_>, (row, time_s): (usize, f64), step_s: f64) -> f64 {
-        if self.memory.is_empty() {
+        // Without states there is nothing to add to, and inputs go straight from sample to sample.
+        if self.memory.is_empty() || self.x.is_empty() {
             return 0.0;
         }
         self.memory_before.copy_from_slice(&self.memory);
@@ -121,14 +123,13 @@ impl Simulator<'_> {
         for (index, middle) in self.middle.iter_mut().enumerate() {
             let (from, to) = (self.x[index], self.tried[index]);
             let [head, end] = [0, STAGES - 1].map(|stage| step_s * self.stages[stage][index]);
-            let bent = (1.0 - 2.0 * share) * (to - from) + (share - 1.0) * head + share * end;
-            *middle = (1.0 - share) * from + share * to + share * (share - 1.0) * bent;
+            *middle = cubic([from, to], [head, end], share);
         }
     }
 
     /// Memories as they were at the head of a step that is refused.
     pub(super) fn forget(&mut self) {
-        if !self.memory.is_empty() {
+        if !self.memory.is_empty() && !self.x.is_empty() {
             self.memory.copy_from_slice(&self.memory_before);
             self.put_memories();
         }

@@ -4,7 +4,7 @@ use super::memories::At;
 use super::{MOST_STEPS, STAGES, Simulator, failure, put};
 use crate::failure::Failure;
 use crate::file::Solver;
-use crate::inputs::Inputs;
+use crate::inputs::{Hold, Inputs};
 
 /// Its coefficients [HNW 1993, table 5.2].
 const A: [[f64; 6]; STAGES] = [
@@ -28,6 +28,12 @@ const GROW: f64 = 5.0;
 /// state that leaves 0 by a power of time: its error over its change does not fall with the step.
 const SHORTEST: f64 = 1e-6;
 
+/// A value within a step from those at its ends and their changes over it, were they even [HNW 1993, II.6, eq. 6.7].
+pub(super) fn cubic([from, to]: [f64; 2], [head, end]: [f64; 2], share: f64) -> f64 {
+    let bent = (1.0 - 2.0 * share) * (to - from) + (share - 1.0) * head + share * end;
+    (1.0 - share) * from + share * to + share * (share - 1.0) * bent
+}
+
 impl Simulator<'_> {
     /// From a sample to the next one.
     pub(super) fn advance(&mut self, inputs: &Inputs<'_>, row: usize) -> Result<(), Failure> {
@@ -39,8 +45,10 @@ impl Simulator<'_> {
             self.steps += 1;
             return Ok(());
         }
-        // An input that jumps at the sample.
-        self.renew(inputs, (row, from_s));
+        if row == 0 || self.program.holds.contains(&Hold::Zero) {
+            // An input that jumps at the sample.
+            self.renew(inputs, (row, from_s));
+        }
         match self.program.solver {
             Solver::Fixed { step_s } => {
                 // A step that is longer by a rounding error is no step more.
