@@ -205,7 +205,7 @@ def judged(row, report):
     if isinstance(report, str):
         return {"failed": report, "named": [], "right": False, "located": False, "intervals": []}
     # A name that the headline takes back, since a held-out record gets worse with it, is no name.
-    report["named"] = [] if "taken back" in report["headline"] else report["named"]
+    report["named"] = [] if report["taken_back"] else report["named"]
     named = [each["suspect"] for each in report["named"]]
     others = {other for each in report["named"] for other in each["alternatives"]}
     pairs = [set(pair["suspects"]) for pair in report["structure"]["twins"]]
