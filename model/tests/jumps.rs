@@ -1,7 +1,7 @@
 //! What jumps or leaves zero within a step, against closed forms and against short steps: step control finds it.
 
 use crate::{first_values, read, simulated};
-use model::{Direction, Failure, Inputs, Program};
+use model::{Direction, Failure, Inputs, Program, Simulator};
 
 /// The first output at samples `period_s` apart; inputs in SI.
 fn output(text: &str, period_s: f64, rows: usize, inputs: &[Vec<f64>]) -> Result<Vec<f64>, Failure> {
@@ -110,6 +110,22 @@ fn a_relay_with_hysteresis_switches_at_its_levels() {
         // Each of seventeen switches comes late by a millionth of a sample at most, and so does what follows.
         assert!((computed - expected).abs() < 1e-4, "{time_s} s: {computed} in place of {expected}");
     }
+}
+
+/// A relay without hysteresis at 0 switches at each of the shortest steps; that is said at once, and a fit goes on elsewhere.
+#[test]
+fn a_relay_without_hysteresis_is_refused_at_once() {
+    let text = "[inputs.u]\nunit = \"1\"\n[parameters]\nrate = { unit = \"1/s\", value = 10.0 }\n\
+                [states.x]\nstart = 0\nderivative = \"if(x > 0, -rate, rate) + 0*u*rate\"\n[outputs.y]\nvalue = \"x\"\n";
+    let model = read(text);
+    let (time_s, samples) = ([0.0, 0.5, 1.0], [vec![0.0; 3]]);
+    let inputs = Inputs { time_s: &time_s, samples_si: &samples };
+    let program = Program::new(&model, &[]).expect("it compiles");
+    let mut simulator = Simulator::new(&program, &[]);
+    let values = first_values(&model);
+    let failed = simulator.run(&inputs, values.each_ref().map(Vec::as_slice), |_, _, _, _| {});
+    assert_eq!(failed, Err(Failure::Steps { time_s: 0.0 }));
+    assert!(simulator.steps() < 1000, "{} steps", simulator.steps());
 }
 
 /// A hold that jumps at a sample moves a memory of it there, not a step later: the command behind a play of 0.2 is integrated.
