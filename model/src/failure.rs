@@ -31,8 +31,8 @@ pub enum Failure {
     },
     /// Steps that would never end.
     #[error(
-        "more than {MOST_STEPS} steps from {time_s} s to the next sample, or too many of the shortest: a fixed step is too short, \
-         or the equations are stiff or jump to and fro without end"
+        "more than {MOST_STEPS} steps from {time_s} s to the next sample, or too many of the shortest: a fixed step is too \
+         short, or the equations are stiff or jump to and fro without end"
     )]
     Steps {
         /// Time of the sample before, s.
