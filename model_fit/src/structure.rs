@@ -196,8 +196,8 @@ fn twins(seen: &[Seen], predicted: impl Fn(&Seen, &Seen) -> f64) -> Vec<([usize;
 /// Suspects, what the model says, and how much each of its numbers moves that.
 type Sight = (Vec<Seen>, DVector<f64>, Vec<f64>);
 
-/// What these suspects do, each beside the model with what was `taken`, what that says, and how much each of its numbers moves it;
-/// a suspect that cannot be simulated is left out.
+/// What these suspects do, each beside the model with what was `taken`, what that says, and how much each of
+/// its numbers moves it; a suspect that cannot be simulated is left out.
 pub(super) fn seen(
     fitting: &Fitting<'_>,
     (taken, values_si): (&[usize], &[f64]),
