@@ -9,6 +9,7 @@ mod library_fits;
 mod looks;
 mod model_files;
 mod numbers;
+mod pneumatic_axis;
 #[path = "../../discrepancy/tests/real/mod.rs"]
 mod real;
 mod real_models;
