@@ -105,13 +105,16 @@ fetch_kernel() {
     kernel_version=$(<"$folder/version")
 }
 
-# Unpacks the versioned package behind META into $cache/kernel-work/root.
+# Unpacks the versioned package behind META into $cache/kernel-work/root: the kernel, and of its 4000 modules those of the folders in
+# which $kernel_modules and what they need lie.
 unpack_kernel() {
     local package
     package=$(apt-cache "${apt_options[@]}" depends "$1" | awk '/Depends: linux-image-/ { print $2; exit }')
     [[ -n $package ]] || return 1
     say "fetching $package"
-    download "$cache/kernel-work" "$package" && dpkg -x "$cache"/kernel-work/*.deb "$cache/kernel-work/root"
+    download "$cache/kernel-work" "$package" && mkdir "$cache/kernel-work/root" &&
+        dpkg-deb --fsys-tarfile "$cache"/kernel-work/*.deb | tar -x -C "$cache/kernel-work/root" --wildcards './boot/vmlinuz-*' \
+            './lib/modules/*/modules.*' './lib/modules/*/kernel/net/can' './lib/modules/*/kernel/drivers/'{block,net/can,virtio}
 }
 
 # prune_kernel TREE FOLDER: copies the kernel and the wanted modules, decompressed, and indexes them for modprobe.
