@@ -140,10 +140,25 @@ pub struct Parameter {
     pub is_fixed: bool,
     /// Each record has its own.
     pub is_per_record: bool,
+    /// Known values that differ by record: the end of its path, and the value in SI. Empty where all share one.
+    pub of_records_si: Vec<(String, f64)>,
     /// A time constant of a library, whose range the file leaves to it: samples bound it from below.
     pub is_bound_by_samples: bool,
     /// The suspect that it belongs to.
     pub suspect: Option<usize>,
+}
+
+impl Parameter {
+    /// The known value of a record, which may differ by record; `None` where the file lists records, and not this one. Of two
+    /// ends of its path the longer is meant.
+    #[must_use]
+    pub fn known_si(&self, record: &Path) -> Option<f64> {
+        if self.of_records_si.is_empty() {
+            return self.values_si.first().copied();
+        }
+        let own = self.of_records_si.iter().filter(|(name, _)| record.ends_with(name));
+        own.max_by_key(|(name, _)| Path::new(name).components().count()).map(|(_, value_si)| *value_si)
+    }
 }
 
 /// Value of a state at the first sample of a record.

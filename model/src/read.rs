@@ -280,6 +280,7 @@ impl Reader<'_> {
                 range_si: [f64::NEG_INFINITY, f64::INFINITY],
                 is_fixed: false,
                 is_per_record: false,
+                of_records_si: Vec::new(),
                 is_bound_by_samples: false,
                 suspect,
             };
@@ -327,6 +328,8 @@ impl Reader<'_> {
             [] if !section.has("value") => before.values_si,
             values => values.iter().map(|value| value * unit.factor).collect(),
         };
+        let of_records_si = self.of_records(&mut section, &unit)?;
+        let values_si = of_records_si.first().map_or(values_si, |(_, first)| vec![*first]);
         if values_si.is_empty() || values_si.len() > 8 {
             return Err(
                 section.wrong_at("value", "value: allowed is a number, or up to 8 from which a fit starts")
@@ -348,7 +351,8 @@ impl Reader<'_> {
             _ => return Err(section.wrong_at("tolerance", "tolerance: allowed is a number above 0")),
         };
         let given = section.flag("fixed")?;
-        let is_fixed = if section.has("fixed") { given } else { before.is_fixed };
+        let is_fixed =
+            if section.has("fixed") { given } else { before.is_fixed } || !of_records_si.is_empty();
         let is_per_record = section.flag("per_record")?;
         if is_fixed && is_per_record {
             return Err(section
@@ -363,10 +367,37 @@ impl Reader<'_> {
             range_si,
             is_fixed,
             is_per_record,
+            of_records_si,
             is_bound_by_samples,
             ..before
         });
         Ok(())
+    }
+
+    /// Known values of records, by the end of their path.
+    fn of_records(
+        &self,
+        section: &mut Section<'_>,
+        unit: &Unit,
+    ) -> Result<Vec<(String, f64)>, SettingsError> {
+        let Some(mut given) = section.section("values")? else { return Ok(Vec::new()) };
+        let more = ["value", "range", "tolerance", "per_record"].into_iter().find(|key| section.has(key));
+        if let Some(key) = more {
+            let why = format!("{key}: the number is known of each record under values, and has none");
+            return Err(section.wrong_at(key, &why));
+        }
+        let mut all = Vec::new();
+        for name in given.keys() {
+            match given.numbers(&name)?.as_slice() {
+                [value] => all.push((name, value * unit.factor)),
+                _ => return Err(given.wrong_at(&name, &format!("{name}: allowed is one number"))),
+            }
+        }
+        if all.is_empty() {
+            return Err(given.wrong("values is empty: the file name of each record, and its value"));
+        }
+        given.finish()?;
+        Ok(all)
     }
 
     fn start(&mut self, section: &mut Section<'_>, unit: &Unit) -> Result<Start, SettingsError> {

@@ -97,6 +97,21 @@ fn an_error_has_line_and_column_and_says_what_is_allowed() {
         ("mm/(V s)", "degC", "'degC' has an offset: write K"),
         ("add = ", "addd = ", "suspects[1].one of add, multiply, replace is missing"),
         ("-rate*level", "-rate", "leak is in mm/s, and this is in 1/h"),
+        (
+            "value = 5.0, range = [0, 100]",
+            "values = { \"a.csv\" = 5 }, range = [0, 100]",
+            "model.toml:13:63: parameters.gain.range: the number is known of each record under values, and has none",
+        ),
+        (
+            "value = 5.0, range = [0, 100]",
+            "values = { \"a.csv\" = [5, 6] }",
+            "parameters.gain.values.a.csv: allowed is one number",
+        ),
+        (
+            "value = 5.0, range = [0, 100]",
+            "values = {}",
+            "values is empty: the file name of each record, and its value",
+        ),
         ("noise = 0.5", "noise = -1", "model.toml:24:9: outputs.level_mm.noise: allowed is one number"),
         ("noise = 0.5", "nose = 0.5", "model.toml:24:1: unknown key outputs.level_mm.nose; allowed is"),
         ("[inputs.pump]", "[inputs.level]", "states.level.the name is taken"),

@@ -133,6 +133,12 @@ fn rows(rows: &Rows) -> Vec<String> {
 fn parameter(parameter: &Parameter) -> String {
     let factor = parameter.unit.factor;
     let value = |value: &f64| significant(value / factor);
+    if !parameter.of_records_si.is_empty() {
+        let unit = &parameter.unit.text;
+        let of = parameter.of_records_si.iter();
+        let of = of.map(|(record, si)| format!("{} {unit} of {record}", value(si))).collect::<Vec<_>>();
+        return format!("{} = {}, known", parameter.name, of.join(", "));
+    }
     let mut text = format!("{} = {} {}", parameter.name, value(&parameter.values_si[0]), parameter.unit.text);
     if let [_, further @ ..] = parameter.values_si.as_slice()
         && !further.is_empty()

@@ -14,7 +14,7 @@ use super::cuts::Cut;
 use super::normal::{Normal, solved};
 use super::record::Measured;
 use crate::estimator::{Convergence, Estimator, Iterate, Options, Step};
-use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start, Unit};
+use model::{Direction, Failure, Inputs, Model, Parameter, Program, Simulator, Start, Unit};
 use nalgebra::{DMatrix, DVector};
 
 /// Numbers that a record hardly tells apart make a narrow valley, which bends: between no damping and one that ends all motion
@@ -113,6 +113,13 @@ fn fastest_s(records: &[Measured]) -> f64 {
     FASTEST * records.iter().map(period_s).fold(f64::INFINITY, f64::min)
 }
 
+/// Values of all parameters before a fit, with those that are known of a record.
+fn known(model: &Model, record: &Measured) -> Vec<f64> {
+    // Reading a record refuses one that is not listed.
+    let known = |one: &Parameter| one.known_si(&record.file).unwrap_or(one.values_si[0]);
+    model.parameters.iter().map(known).collect()
+}
+
 impl<'a> Fitting<'a> {
     /// Everything that the model leaves open, with these suspects.
     pub(crate) fn new(
@@ -175,7 +182,7 @@ impl<'a> Fitting<'a> {
             records,
             unknowns,
             in_score: records.iter().map(|record| 0..record.time_s.len()).collect(),
-            parameters_si: vec![model.parameters.iter().map(|one| one.values_si[0]).collect(); records.len()],
+            parameters_si: records.iter().map(|record| known(model, record)).collect(),
             starts_si,
             memories_si: model.memories.iter().map(|memory| memory.start_si).collect(),
             floor: floor.collect(),

@@ -161,7 +161,20 @@ impl Grid {
         let (first_s, last_s) = (sampled_s[0], sampled_s[sampled_s.len() - 1]);
         let inside = |at_s: &f64| at_s - first_s >= of_model.ends_s && last_s - at_s >= of_model.ends_s;
         let is_judged = time_s.iter().map(inside).collect();
-        Ok(Measured { name, sampled_s, inputs, rows, time_s, outputs, thinning, is_judged, folds, notes })
+        let file = file.into();
+        Ok(Measured {
+            file,
+            name,
+            sampled_s,
+            inputs,
+            rows,
+            time_s,
+            outputs,
+            thinning,
+            is_judged,
+            folds,
+            notes,
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use super::look::{self, Column, StuckFrom};
 use super::processing::{Grid, Names};
 use model::{Input, Model};
 use records::{ColumnOptions, Columns, ReadError, read_columns};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Fewest samples of a record.
 pub(super) const FEWEST_ROWS: usize = 8;
@@ -39,6 +39,10 @@ pub enum RecordError {
     Far { file: String, line: u64, time_s: f64, rows: usize, period_s: f64 },
     #[error("{file}: low_pass_hz of input {name} is {edge_hz}; allowed is below half of {sampling_hz} Hz")]
     Edge { file: String, name: String, edge_hz: f64, sampling_hz: f64 },
+    #[error(
+        "{file}: parameters.{name}.values of the model has no value of this record; it has {known}: name its file there"
+    )]
+    Unlisted { file: String, name: String, known: String },
     #[error("{file}: {rows} rows meet [rows] of the model; {FEWEST_ROWS} are needed")]
     FewMeet { file: String, rows: usize },
 }
@@ -58,6 +62,8 @@ pub(crate) struct Measured {
     pub(crate) outputs: Vec<Vec<Option<f64>>>,
     /// What measured and modelled outputs go through.
     pub(crate) thinning: Option<LowPass>,
+    /// Where it was read from, by which known values are found.
+    pub(crate) file: PathBuf,
     /// Rows that judge, and what the folds of the model go over, at the rows.
     pub(crate) is_judged: Vec<bool>,
     pub(crate) folds: Vec<Vec<f64>>,
@@ -87,6 +93,7 @@ impl Measured {
 
     fn of(model: &Model, columns: Columns) -> Result<Self, RecordError> {
         let Columns { file, time_s, lines, mut values, warnings } = columns;
+        all_listed(model, &file)?;
         let file = file.display().to_string();
         if time_s.len() < FEWEST_ROWS {
             return Err(RecordError::Few { file, rows: time_s.len() });
@@ -146,6 +153,14 @@ impl Measured {
             Path::new(&file).file_name().map_or(file.clone(), |name| name.to_string_lossy().into_owned());
         grid.compared(model, Names { file, name, notes }, inputs, outputs)
     }
+}
+
+/// Refuses a record that a number lacks whose known values differ by record.
+fn all_listed(model: &Model, file: &Path) -> Result<(), RecordError> {
+    let Some(one) = model.parameters.iter().find(|one| one.known_si(file).is_none()) else { return Ok(()) };
+    let known: Vec<&str> = one.of_records_si.iter().map(|(record, _)| record.as_str()).collect();
+    let (file, name) = (file.display().to_string(), one.name.clone());
+    Err(RecordError::Unlisted { file, name, known: known.join(", ") })
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ mod advice;
 mod balances;
 mod chamber;
 mod discover;
+mod known_values;
 mod library_fits;
 mod looks;
 mod model_files;

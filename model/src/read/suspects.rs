@@ -302,6 +302,7 @@ impl Reader<'_> {
                 ],
                 is_fixed: number.is_fixed,
                 is_per_record: false,
+                of_records_si: Vec::new(),
                 is_bound_by_samples: !bound.entry.states.is_empty() && unit.dimension == Dimension::TIME,
                 suspect: Some(bound.index),
                 unit,
