@@ -138,7 +138,8 @@ pub struct NewArguments {
 /// Which suspects are listed.
 #[derive(Args, Clone, Debug)]
 pub struct SuspectsArguments {
-    /// A library, such as friction, or one suspect of it, such as friction/stribeck; without it all are listed, a line each.
+    /// A library, such as friction, or one suspect of it, such as friction/stribeck; of a library of your own its file, and
+    /// FILE.toml/SUSPECT. Without it all that ship are listed, a line each.
     pub name: Option<String>,
 }
 

@@ -3,12 +3,16 @@
 //! ```text
 //!   [[suspects]] ──► declared term (plant) ──► data sheet: places, numbers with ranges ──► candidate
 //! ```
+//! `use` names a law of a library, shipped or the user's, whose variables are the rig's (`plant/src/parameters/laws.rs`).
+//!
 //! A number without a value is an amplitude: 0 is the rig without the suspect, its `prior`, else half of its range, is a
 //! coordinate of 1, and a tenth of that is the smallest that is named. A number with a value is a shape, which starts there.
 
+use model::{Change, EntryParameter, Library};
 use plant::effects::declared::{Declared, Number};
 use plant::effects::sheet::{EffectKey, Group, Place, PlaceKind, Sheet};
-use plant::parameters::{ParameterError, suspects};
+use plant::parameters::{Law, LawNumber, LawVariable, ParameterError, suspects_using};
+use std::path::Path;
 
 /// A suspect with its data sheet.
 #[derive(Debug)]
@@ -18,13 +22,55 @@ pub struct Suspect {
     pub place: Place,
 }
 
-/// Reads a file of suspects. What is read lives as long as the program, as the catalogue does.
+/// Reads a file of suspects, which may use libraries as a model file does. What is read lives as long as the program, as the
+/// catalogue does.
 ///
 /// # Errors
 /// [`ParameterError`] with file, line and column.
 pub fn read(text: &str, file: &str) -> Result<Vec<&'static Suspect>, ParameterError> {
-    let all = suspects(text, file)?;
+    let folder = Path::new(file).parent().unwrap_or(Path::new(""));
+    let all = suspects_using(text, file, &|used| law(used, folder))?;
     Ok(all.into_iter().map(|declared| &*Box::leak(Box::new(Suspect::of(declared)))).collect())
+}
+
+/// The law that `use` of a file in this folder names, where the rig can have it: a term that is added.
+///
+/// # Errors
+/// What is no law of a library, or none for the rig.
+fn law(used: &str, folder: &Path) -> Result<Law, String> {
+    let found = Library::find(used, folder)?;
+    let entry = found.entry();
+    let keeps = !entry.states.is_empty() || !entry.memories.is_empty() || !entry.frictions.is_empty();
+    if entry.change != Change::Add || keeps || entry.reads_place() || entry.expression.contains("delay(") {
+        let why = "the rig takes terms that are added, without states, memory and the value at the place; write one with add";
+        return Err(format!("{used}: {why}"));
+    }
+    let variables = found.library.variables_of(entry).into_iter().map(|one| LawVariable {
+        name: one.name.clone(),
+        about: format!("{}, usually in {}", one.about, one.unit.text),
+        default: one.default.clone(),
+    });
+    let number = |one: &EntryParameter| LawNumber {
+        name: one.name.clone(),
+        unit: one.quantity.unit.text.clone(),
+        value_si: one.values_si.first().copied(),
+        range_si: one.range_si,
+        is_fixed: one.is_fixed,
+        is_amplitude: is_amplitude(one),
+    };
+    Ok(Law {
+        name: entry.name.clone(),
+        add: entry.expression.clone(),
+        variables: variables.collect(),
+        numbers: entry.parameters.iter().map(number).collect(),
+    })
+}
+
+/// Whether a law is off where the number is 0: it has the dimension of its place over something, or begins at 0.
+fn is_amplitude(one: &EntryParameter) -> bool {
+    let begins = |text: &String| text.split(['/', ' ', '^']).next() == Some("place");
+    !one.is_fixed
+        && (one.quantity.dimension.as_ref().is_some_and(begins) || one.values_si.first() == Some(&0.0))
 }
 
 impl Suspect {

@@ -1,6 +1,6 @@
 //! Claims about naming, on records that the plant makes here with something hidden in it.
 
-use crate::record::{both_gridded, gridded, hiding};
+use crate::record::{both_gridded, gridded, gridded_briefly, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{ExplanationKind, SelectionResult, is_large, name};
@@ -196,5 +196,45 @@ fn a_smaller_dead_volume_is_no_larger_machine() {
     assert_eq!(names(&found), ["dead-volume drive"]);
     for (at, (factor, _)) in factors(&found).into_iter().enumerate() {
         assert!((factor - 1.0).abs() < 0.05, "parameter {at}: {factor}");
+    }
+}
+
+/// A suspect of the library that ships and one of a user's own, beside a friction along the stroke that is hidden.
+#[test]
+fn a_law_of_a_library_is_screened_beside_a_rig_and_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("suspects.toml").display().to_string();
+    std::fs::write(
+        folder.path().join("seals.toml"),
+        "about = \"seals\"\nunit = \"N\"\n[variables]\nv = { unit = \"m/s\", about = \"speed\" }\n\
+         p = { unit = \"Pa\", about = \"gauge pressure\" }\n\
+         [[suspects]]\nname = \"lip\"\nabout = \"pressed on\"\nadd = \"growth*sign(v)*max(p, 0)\"\n\
+         parameters.growth = { unit = \"N/bar\", dimension = \"place/p\", value = 2, range = [0, 100] }\n",
+    )
+    .unwrap();
+    let text = "[[suspects]]\nuse = \"friction/position-dependent\"\nplace = \"drive.force\"\ntimes = \"-1\"\n\
+                parameters.slope = { range = [0, 500], prior = 100 }\n\
+                [[suspects]]\nuse = \"seals.toml/lip\"\nplace = \"drive.force\"\ntimes = \"-1\"\nwith.p = \"p_b - 1[bar]\"\n";
+    let suspects = discrepancy::suspects::read(text, &file).unwrap_or_else(|error| panic!("{error}"));
+    let expressions: Vec<&str> = suspects.iter().map(|one| one.declared.expression()).collect();
+    assert_eq!(expressions, ["(-1)*(slope*x*(sign(v)))", "(-1)*(growth*sign(v)*max((p_b - 1[bar]), 0))"]);
+    let rig = RigParameters::baseline();
+    let hidden = rig.with_term(&suspects[0].declared.with(&[120.0]).unwrap());
+    let records = [gridded_briefly(&hidden, &rig)];
+    let engine = Engine::new(&records, &rig);
+    let found = name(&engine, Candidate::of_suspects(&rig, [true, false], &suspects), &mut |_| ());
+    assert_eq!(names(&found), ["position-dependent drive"]);
+    let placed = &found.model.placed[0];
+    let slope = placed.candidate.effect_parameters(&placed.coordinates)[0];
+    let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
+    assert!((slope - 120.0).abs() < 4.0 * error + 1.0, "{slope} +- {error}");
+    // What keeps values, or is no term that is added, is not for a rig.
+    for used in ["friction/presliding", "friction/stick-slip", "sensor/gain", "stiffness/play"] {
+        let text = text.replacen("friction/position-dependent", used, 1);
+        let message = discrepancy::suspects::read(&text, &file).unwrap_err().to_string();
+        assert!(
+            message.contains(&format!("suspects.toml:2:8: use: {used}: the rig takes terms that are added")),
+            "{message}"
+        );
     }
 }

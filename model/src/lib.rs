@@ -43,7 +43,7 @@ pub use file::{
     Smoothing, Solver, Start, State, Suspect, Target,
 };
 pub use library::{
-    Entry, EntryFriction, EntryMemory, EntryParameter, EntryState, Library, Quantity, Variable,
+    Entry, EntryFriction, EntryMemory, EntryParameter, EntryState, Found, Library, Quantity, Variable,
 };
 pub use rows::Rows;
 pub use simulate::{Direction, Program, Simulator};

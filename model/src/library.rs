@@ -8,6 +8,10 @@
 //! `dimension = "place/v"` is another dimension in a model than that of the unit, the unit becomes the SI one of place over v,
 //! and values other than 0 are the model's to give.
 
+mod user;
+
+pub use user::Found;
+
 use crate::file::Change;
 use crate::units::{Dimension, Unit};
 use expression::grammar::renamed;
@@ -33,8 +37,8 @@ pub(crate) const PLACE: &str = "place";
 /// A library of suspects.
 #[derive(Clone, Debug)]
 pub struct Library {
-    /// Its name, the first part of `use`.
-    pub name: &'static str,
+    /// Its name, the first part of `use`; of a library of a user the path of its file as `use` has it.
+    pub name: String,
     /// What its suspects are about.
     pub about: String,
     /// Unit that the place of a suspect usually has.
@@ -155,7 +159,8 @@ impl Library {
     pub fn all() -> &'static [Self] {
         static ALL: OnceLock<Vec<Library>> = OnceLock::new();
         let read = |(name, text): &(&'static str, &str)| {
-            library(name, text).unwrap_or_else(|error| panic!("a library that ships is one: {error}"))
+            library(name, text, Path::new(&format!("{name}.toml")))
+                .unwrap_or_else(|error| panic!("a library that ships is one: {error}"))
         };
         ALL.get_or_init(|| FILES.iter().map(read).collect())
     }
@@ -259,9 +264,8 @@ pub(crate) fn names(text: &str) -> Vec<String> {
     found.into_inner()
 }
 
-fn library(name: &'static str, text: &str) -> Result<Library, SettingsError> {
-    let path = format!("{name}.toml");
-    let source = Source::parse(text, Path::new(&path))?.with_columns();
+fn library(name: &str, text: &str, file: &Path) -> Result<Library, SettingsError> {
+    let source = Source::parse(text, file)?.with_columns();
     let mut root = source.root();
     let about = root.needed_text("about", "what it is about")?.text;
     let place = unit(&mut root, "unit")?;
@@ -274,7 +278,7 @@ fn library(name: &'static str, text: &str) -> Result<Library, SettingsError> {
     }
     let entries = root.sections("suspects")?.into_iter().map(entry).collect::<Result<_, _>>()?;
     root.finish()?;
-    Ok(Library { name, about, place, variables, entries })
+    Ok(Library { name: name.to_owned(), about, place, variables, entries })
 }
 
 fn entry(mut section: Section<'_>) -> Result<Entry, SettingsError> {

@@ -15,7 +15,7 @@ use settings::{Section, SettingsError, Source, Text};
 use std::path::Path;
 
 /// Names that expressions have from the start.
-const RESERVED: [&str; 19] = [
+pub(crate) const RESERVED: [&str; 19] = [
     "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
     "cos", "atan", "floor", "delay",
 ];

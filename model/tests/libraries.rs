@@ -1,7 +1,7 @@
 //! Suspects of libraries: bound to names of a model, with its units, and refused with line and column.
 
 use crate::{first_values, read, refused, simulated};
-use model::{Change, Inputs, Program, Start, Target};
+use model::{Change, Inputs, Model, Program, Start, Target};
 
 /// A balance whose names are those of a library's numbers, too.
 const BALANCE: &str = r#"[inputs.speed]
@@ -159,6 +159,61 @@ fn a_suspect_of_a_library_that_cannot_be_used_is_refused_with_line_and_column() 
     let found = refused(at_state);
     if !found.contains("place: lag changes an input, a definition or an output") {
         wrong.push(found);
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+const SEALS: &str = r#"about = "seals"
+unit = "N"
+[variables]
+v = { unit = "m/s", about = "sliding speed" }
+direction = { default = "sign(v)", about = "direction of motion" }
+[[suspects]]
+name = "lip"
+about = "a lip that is pressed on"
+add = "growth*direction"
+parameters.growth = { unit = "N", dimension = "place", value = 4, range = [0, 9] }
+"#;
+
+#[test]
+fn a_library_that_a_user_keeps_in_a_file_is_used_by_its_path() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("mine")).unwrap();
+    let library = folder.path().join("mine/seals.toml");
+    let file = folder.path().join("model.toml");
+    let text = BALANCE.replacen("friction/stribeck", "mine/seals.toml/lip", 1);
+    let read = |seals: &str, text: &str| {
+        std::fs::write(&library, seals).unwrap();
+        Model::parse(text, &file).map_err(|error| error.to_string())
+    };
+    let model = read(SEALS, &text).unwrap();
+    assert_eq!(model.suspects[0].name, "lip");
+    assert_eq!(model.suspects[0].expression.text, "growth*sign(speed - 1[mm/s])");
+    assert_eq!(model.parameters[2].range_si, [0.0, 9.0]);
+    let mut wrong = Vec::new();
+    for (seals, text, message) in [
+        (SEALS.to_owned(), text.replace("/lip", "/lap"), "use: 'lap' is not in mine/seals.toml; it has lip"),
+        (SEALS.to_owned(), text.replace("mine/", "yours/"), "yours/seals.toml: No such file"),
+        (
+            SEALS.replace("growth*direction", "growth*speed"),
+            text.clone(),
+            "seals.toml:7: lip: 'speed' is no variable of the library and no number of the suspect",
+        ),
+        (
+            SEALS.replace("sign(v)", "sign(w)"),
+            text.clone(),
+            "seals.toml:5: direction: 'w' is no variable above it: a default is over these",
+        ),
+        (
+            SEALS.replace("about = \"a lip", "abuot = \"a lip"),
+            text.clone(),
+            "seals.toml:6:1: suspects[1].about is missing",
+        ),
+    ] {
+        let found = read(&seals, &text).expect_err(message);
+        if !found.contains(message) || !found.contains("model.toml:14:8: use: ") {
+            wrong.push(format!("{found}\n  {message}"));
+        }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

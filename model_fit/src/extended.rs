@@ -4,8 +4,9 @@
 //! with the model in the next run.
 
 use super::report::equations;
-use model::{Entry, Library, Model};
+use model::{Found, Library, Model};
 use serde::Deserialize;
+use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, value};
 
 /// What stands above a term that a held-out record takes back.
@@ -108,35 +109,40 @@ impl From<&super::ModelReport> for ReportedModel {
     }
 }
 
-/// The text of a model file with what its report names.
+/// The text of a model file, which stands in this folder, with what its report names. A library of the user is named by its whole
+/// path, since the text may be written elsewhere.
 ///
 /// # Errors
 /// A text that is no TOML, or a report of another model.
-pub fn extended(text: &str, report: &ReportedModel) -> Result<String, ExtendError> {
+pub fn extended(text: &str, folder: &Path, report: &ReportedModel) -> Result<String, ExtendError> {
     let mut document: DocumentMut = text.parse()?;
-    put(document.as_table_mut(), report, None);
+    put(document.as_table_mut(), report, (None, folder));
     let terms = document.get_mut("terms").and_then(Item::as_array_of_tables_mut);
     for term in terms.into_iter().flat_map(ArrayOfTables::iter_mut) {
-        let name = name_of(term);
-        put(term, report, name.as_deref());
+        let name = name_of(term, folder);
+        put(term, report, (name.as_deref(), folder));
     }
     for ReportedName { suspect } in &report.named {
         let suspects = document.get_mut("suspects").and_then(Item::as_array_of_tables_mut);
         let suspects = suspects.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
-        let is_it = |table: &Table| name_of(table).as_ref() == Some(suspect);
+        let is_it = |table: &Table| name_of(table, folder).as_ref() == Some(suspect);
         let place = suspects.iter().position(is_it);
         let place = place.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
         let mut term = suspects.get(place).expect("it was found").clone();
         suspects.remove(place);
-        put(&mut term, report, Some(suspect));
+        put(&mut term, report, (Some(suspect), folder));
         push(&mut document, report.marked(term))?;
     }
     for ReportedTerm { name, text } in &report.discovered {
         let text: DocumentMut = text.parse()?;
         let first = text.get("suspects").and_then(Item::as_array_of_tables).and_then(|all| all.get(0));
         let mut term = first.ok_or(ExtendError::Form)?.clone();
-        put(&mut term, report, Some(name));
+        put(&mut term, report, (Some(name), folder));
         push(&mut document, report.marked(term))?;
+    }
+    for key in ["terms", "suspects"] {
+        let all = document.get_mut(key).and_then(Item::as_array_of_tables_mut);
+        all.into_iter().flat_map(ArrayOfTables::iter_mut).for_each(|table| find_again(table, folder));
     }
     Ok(document.to_string())
 }
@@ -147,21 +153,35 @@ fn push(document: &mut DocumentMut, term: Table) -> Result<(), ExtendError> {
     Ok(())
 }
 
-fn library_of(table: &dyn TableLike) -> Option<(&'static Library, &'static Entry)> {
-    table.get("use").and_then(Item::as_str).and_then(Library::entry)
+fn library_of(table: &dyn TableLike, folder: &Path) -> Option<Found> {
+    table.get("use").and_then(Item::as_str).and_then(|used| Library::find(used, folder).ok())
+}
+
+/// Names a library of the user by its whole path.
+fn find_again(table: &mut Table, folder: &Path) {
+    let Some((library, suspect)) =
+        table.get("use").and_then(Item::as_str).and_then(|used| used.rsplit_once('/'))
+    else {
+        return;
+    };
+    if let Ok(whole) = folder.join(library).canonicalize()
+        && library.ends_with(".toml")
+    {
+        table["use"] = value(format!("{}/{suspect}", whole.display()));
+    }
 }
 
 /// What reports call a suspect or a term: its name, else that in its library.
-fn name_of(table: &dyn TableLike) -> Option<String> {
+fn name_of(table: &dyn TableLike, folder: &Path) -> Option<String> {
     let own = table.get("name").and_then(Item::as_str);
-    own.or_else(|| library_of(table).map(|(_, entry)| entry.name.as_str())).map(str::to_owned)
+    own.map(str::to_owned).or_else(|| library_of(table, folder).map(|found| found.entry().name.clone()))
 }
 
 /// Writes fitted numbers over the values of a table's parameters. One at an end of its range keeps that of the file.
-fn put(table: &mut dyn TableLike, report: &ReportedModel, suspect: Option<&str>) {
+fn put(table: &mut dyn TableLike, report: &ReportedModel, (suspect, folder): (Option<&str>, &Path)) {
     let numbers = report.parameters.iter().filter(|number| number.suspect.as_deref() == suspect);
     // Numbers that stand in a library get a place of their own.
-    let library = library_of(table);
+    let library = library_of(table, folder);
     let parameters = match table.get_mut("parameters") {
         None if library.is_none() => return,
         None => {
@@ -173,7 +193,7 @@ fn put(table: &mut dyn TableLike, report: &ReportedModel, suspect: Option<&str>)
     };
     let Some(parameters) = parameters.as_table_like_mut() else { return };
     for number in numbers {
-        let is_of_library = library.is_some_and(|(_, entry)| entry.has_parameter(&number.name));
+        let is_of_library = library.as_ref().is_some_and(|found| found.entry().has_parameter(&number.name));
         if is_of_library && !number.is_at_bound {
             let inner = || value(InlineTable::new());
             let parameter = parameters.entry(&number.name).or_insert_with(inner);
@@ -224,7 +244,7 @@ name = "offset"
 
     #[test]
     fn what_is_named_becomes_a_term_with_its_number() {
-        let text = extended(MODEL, &report("drag")).unwrap();
+        let text = extended(MODEL, Path::new(""), &report("drag")).unwrap();
         let read: toml::Table = text.parse().unwrap();
         assert_eq!(read["suspects"].as_array().unwrap().len(), 1, "{text}");
         assert_eq!(read["terms"][0]["parameters"]["k"]["value"].as_float(), Some(0.25), "{text}");
@@ -236,15 +256,19 @@ name = "offset"
     fn a_number_of_a_library_stands_with_the_term_that_uses_it() {
         let model =
             "[[suspects]]\nname = \"drag\"\nuse = \"damping/turbulent\"\nplace = \"v\"\nwith.v = \"v\"\n";
-        let text = extended(model, &report("drag").with("c", 2.5)).unwrap();
+        let text = extended(model, Path::new(""), &report("drag").with("c", 2.5)).unwrap();
         let term = &text.parse::<toml::Table>().unwrap()["terms"][0];
         assert_eq!(term["parameters"]["c"]["value"].as_float(), Some(2.5), "{text}");
         assert_eq!(term["use"].as_str(), Some("damping/turbulent"), "{text}");
         // `k` of the report is no number of this suspect.
         assert!(term["parameters"].get("k").is_none(), "{text}");
         // Once more, over the number that stands there now.
-        let again =
-            extended(&text.replace("[[terms]]", "[[suspects]]"), &report("drag").with("c", 3.5)).unwrap();
+        let again = extended(
+            &text.replace("[[terms]]", "[[suspects]]"),
+            Path::new(""),
+            &report("drag").with("c", 3.5),
+        )
+        .unwrap();
         assert!(again.contains("3.5") && !again.contains("2.5"), "{again}");
         // Without a name of its own it is called as in the library.
         let reported: ReportedModel = serde_json::from_value(serde_json::json!({
@@ -252,22 +276,37 @@ name = "offset"
             "parameters": [{"name": "c", "suspect": "turbulent", "value": 4.5, "is_at_bound": false}],
         }))
         .unwrap();
-        let nameless = extended(&model.replace("name = \"drag\"\n", ""), &reported).unwrap();
+        let nameless = extended(&model.replace("name = \"drag\"\n", ""), Path::new(""), &reported).unwrap();
         let term = &nameless.parse::<toml::Table>().unwrap()["terms"][0];
         assert_eq!(term["parameters"]["c"]["value"].as_float(), Some(4.5), "{nameless}");
     }
 
     #[test]
     fn a_term_that_was_taken_back_is_marked() {
-        let plain = extended(MODEL, &report("drag")).unwrap();
-        let marked = extended(MODEL, &ReportedModel { taken_back: true, ..report("drag") }).unwrap();
+        let plain = extended(MODEL, Path::new(""), &report("drag")).unwrap();
+        let marked =
+            extended(MODEL, Path::new(""), &ReportedModel { taken_back: true, ..report("drag") }).unwrap();
         assert!(marked.contains(&format!("{TAKEN_BACK}\n[[terms]]\nname = \"drag\"")), "{marked}");
         assert_eq!(marked.replace(&format!("{TAKEN_BACK}\n"), ""), plain);
     }
 
     #[test]
     fn the_report_of_another_model_is_refused() {
-        let message = extended(MODEL, &report("leak")).unwrap_err().to_string();
+        let message = extended(MODEL, Path::new(""), &report("leak")).unwrap_err().to_string();
         assert!(message.contains("suspect leak of the report is not in the model file"), "{message}");
+    }
+
+    #[test]
+    fn a_library_of_the_user_is_found_from_wherever_the_text_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let library = "about = \"\"\n[[suspects]]\nname = \"drag\"\nabout = \"\"\nadd = \"k\"\nparameters.k = { value = 1 }\n";
+        std::fs::write(folder.path().join("own.toml"), library).unwrap();
+        let model = "[[suspects]]\nuse = \"own.toml/drag\"\n[[suspects]]\nuse = \"damping/linear\"\nname = \"other\"\n";
+        let text = extended(model, folder.path(), &report("drag")).unwrap();
+        let read: toml::Table = text.parse().unwrap();
+        let whole = folder.path().canonicalize().unwrap().join("own.toml/drag");
+        assert_eq!(read["terms"][0]["use"].as_str(), whole.to_str(), "{text}");
+        assert_eq!(read["terms"][0]["parameters"]["k"]["value"].as_float(), Some(0.25), "{text}");
+        assert_eq!(read["suspects"][0]["use"].as_str(), Some("damping/linear"), "{text}");
     }
 }

@@ -229,8 +229,10 @@ pub fn close_with(
     report.equations = report::equations(&model);
     report.rate(adequacy::residuals(&found.extended)?);
     let page = page::page(&model, &report, &traces, not_judged.as_deref());
+    let folder = file.parent().unwrap_or(Path::new(""));
     let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
-    let extended = is_named.then(|| extended(model.text(), &ReportedModel::from(&report)).ok()).flatten();
+    let extended =
+        is_named.then(|| extended(model.text(), folder, &ReportedModel::from(&report)).ok()).flatten();
     Ok(ClosedModel { report, not_judged, page, extended })
 }
 

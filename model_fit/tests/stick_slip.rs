@@ -152,6 +152,7 @@ with.v = "v"
     // The extended file is read, explained, and has nothing missing.
     let text = model_fit::extended(
         &fs::read_to_string(folder.path().join("pulled.toml")).unwrap(),
+        folder.path(),
         &model_fit::ReportedModel::from(report),
     )
     .unwrap();

@@ -9,6 +9,7 @@
 pub mod table;
 
 mod declared;
+mod laws;
 mod reader;
 mod switched;
 mod tabulated;
@@ -23,7 +24,8 @@ pub use table::{
     SensorParameters, StartParameters, SupplyParameters, VALVE_POINTS, ValveParameters,
 };
 
-pub use declared::suspects;
+pub use declared::{suspects, suspects_using};
+pub use laws::{Law, LawNumber, LawVariable, Laws};
 
 use crate::effects::declared::Declared;
 use crate::effects::sheet::{Place, Switched};

@@ -13,6 +13,7 @@ mod effects;
 mod effects_file;
 mod effects_sheets;
 mod faults;
+mod laws;
 mod parameters;
 mod properties;
 mod rig;

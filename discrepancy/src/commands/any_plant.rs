@@ -88,7 +88,7 @@ pub(super) fn extended_text(
     report: &ReportedModel,
 ) -> Result<String, CommandError> {
     let is_of = report.is_of(&read(model)?);
-    let extended = is_of.and_then(|()| extended(text, report));
+    let extended = is_of.and_then(|()| extended(text, model.parent().unwrap_or(Path::new("")), report));
     extended.map_err(|why| CommandError::BadData(format!("{}: {why}", model.display())))
 }
 

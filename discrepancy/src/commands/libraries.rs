@@ -3,14 +3,27 @@
 use super::{CommandError, Exit, print};
 use model::{Change, Entry, EntryParameter, Library};
 use std::fmt::Write as _;
+use std::path::Path;
 
 pub(super) fn suspects_command(name: Option<&str>) -> Result<Exit, CommandError> {
     let text = match name {
         None => Library::all().iter().map(lines).collect::<Vec<_>>().join("\n"),
+        Some(name) if name.contains(".toml") => of_user(name).map_err(CommandError::BadData)?,
         Some(name) => listed(name).ok_or_else(|| unknown(name))?,
     };
     print(&text)?;
     Ok(Exit::Good)
+}
+
+/// A library that a user keeps in a file, or one suspect of it.
+fn of_user(name: &str) -> Result<String, String> {
+    if !name.ends_with(".toml") {
+        let found = Library::find(name, Path::new(""))?;
+        return Ok(in_words(&found.library, found.entry()));
+    }
+    let library = Library::of_user(name, Path::new(name))?;
+    let all = library.entries.iter().map(|entry| in_words(&library, entry));
+    Ok(format!("{name}: {}\n\n{}", library.about, all.collect::<Vec<_>>().join("\n")))
 }
 
 fn listed(name: &str) -> Option<String> {
@@ -28,7 +41,7 @@ fn unknown(name: &str) -> CommandError {
         Some(library) => {
             library.entries.iter().map(|entry| format!("{}/{}", library.name, entry.name)).collect()
         }
-        None => Library::all().iter().map(|library| library.name.to_owned()).collect(),
+        None => Library::all().iter().map(|library| library.name.clone()).collect(),
     };
     CommandError::BadData(format!(
         "{name}: no library of suspects and none of theirs; known are {}",
@@ -136,6 +149,27 @@ mod tests {
         );
         let all: Vec<String> = Library::all().iter().map(lines).collect();
         assert!(all.iter().all(|library| library.lines().all(|line| !line.ends_with(' '))), "{all:?}");
+    }
+
+    #[test]
+    fn a_library_of_a_user_is_listed_by_its_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("seals.toml");
+        let text = "about = \"seals\"\nunit = \"N\"\n[variables]\nv = { unit = \"m/s\", about = \"speed\" }\n\
+                    [[suspects]]\nname = \"lip\"\nabout = \"a lip\"\nadd = \"k*v\"\n\
+                    parameters.k = { unit = \"N s/m\", dimension = \"place/v\", value = 0 }\n";
+        std::fs::write(&file, text).unwrap();
+        let path = file.display().to_string();
+        let one = of_user(&format!("{path}/lip")).unwrap();
+        assert!(one.contains("seals.toml/lip: a lip\n  place + k*v\n  with v [m/s]: speed\n"), "{one}");
+        assert!(of_user(&path).unwrap().ends_with(&one));
+        assert!(of_user(&format!("{path}/lap")).unwrap_err().contains("'lap' is not in"));
+        std::fs::write(&file, text.replace("k*v", "k*w")).unwrap();
+        let why = of_user(&path).unwrap_err();
+        assert!(
+            why.contains("seals.toml:6: lip: 'w' is no variable of the library and no number of the suspect"),
+            "{why}"
+        );
     }
 
     #[test]

@@ -3,11 +3,12 @@
 use super::Reader;
 use crate::check::{dimension, target_dimension};
 use crate::file::{Change, Expression, Memory, Parameter, Start, State, Suspect, Target};
-use crate::library::{Entry, EntryFriction, Library, PLACE, Quantity};
+use crate::library::{Entry, EntryFriction, Found, Library, PLACE, Quantity};
 use crate::names::own_name;
 use crate::units::{Dimension, Unit};
 use expression::grammar::{Kind, Place, Stands, Wrong, is_of_name, renamed};
 use settings::{Section, SettingsError, Text};
+use std::path::Path;
 
 /// Where a suspect of a library stands, and what it is bound to.
 struct Bound<'a> {
@@ -62,7 +63,8 @@ impl Reader<'_> {
     pub(super) fn suspect(&mut self, mut section: Section<'_>, is_term: bool) -> Result<(), SettingsError> {
         let index = self.model.suspects.len();
         let used = section.text("use")?;
-        let library = used.as_ref().map(|used| self.entry(used)).transpose()?;
+        let found = used.as_ref().map(|used| self.found(used)).transpose()?;
+        let library = found.as_ref().map(|found| (&*found.library, found.entry()));
         let name = match (&library, section.text("name")?) {
             (_, Some(name)) => name.text,
             (Some((_, entry)), None) => entry.name.clone(),
@@ -128,29 +130,17 @@ impl Reader<'_> {
         })
     }
 
-    fn entry(&self, used: &Text) -> Result<(&'static Library, &'static Entry), SettingsError> {
-        let wrong = |why: &str| Err(self.source.wrong_from(used.at, why));
-        let (library, suspect) = used.text.split_once('/').unwrap_or((&used.text, ""));
-        let Some(library) = Library::all().iter().find(|one| one.name == library) else {
-            let known: Vec<&str> = Library::all().iter().map(|one| one.name).collect();
-            return wrong(&format!(
-                "use: '{library}' is no library; allowed is LIBRARY/SUSPECT, of {}",
-                known.join(", ")
-            ));
-        };
-        let Some(entry) = library.entries.iter().find(|entry| entry.name == suspect) else {
-            let known: Vec<&str> = library.entries.iter().map(|entry| entry.name.as_str()).collect();
-            let name = library.name;
-            return wrong(&format!("use: '{suspect}' is not in {name}; it has {}", known.join(", ")));
-        };
-        Ok((library, entry))
+    fn found(&self, used: &Text) -> Result<Found, SettingsError> {
+        let folder = self.model.file.parent().unwrap_or(Path::new(""));
+        Library::find(&used.text, folder)
+            .map_err(|why| self.source.wrong_from(used.at, &format!("use: {why}")))
     }
 
     /// The expression of a suspect of a library, whose numbers, states and memories become those of the model.
     fn instance(
         &mut self,
         section: &mut Section<'_>,
-        (library, entry): (&'static Library, &'static Entry),
+        (library, entry): (&Library, &Entry),
         (index, target, at): (usize, Target, usize),
     ) -> Result<Expression, SettingsError> {
         if entry.reads_place() && matches!(target, Target::State(_)) {

@@ -19,6 +19,7 @@
 //! A term needs the value of each number, and its range is that value alone where the file gives none. A suspect needs ranges,
 //! and its values are those at which it adds nothing, 0 where the file gives none.
 
+use super::laws::{Laws, used};
 use super::reader::ParameterError;
 use crate::effects::declared::{
     Declared, MOST_PARAMETERS, MOST_REMEMBERED, MOST_TERMS, Number, Target, VARIABLES, dimension,
@@ -45,7 +46,15 @@ const OFF_AT: [[f64; 8]; 3] = [
 /// [`ParameterError`] with file, line and column: no TOML, unknown and missing keys, expressions that are none, of another
 /// dimension than their place, or not proven finite, and suspects that add something when they are off.
 pub fn suspects(text: &str, file: &str) -> Result<Vec<Declared>, ParameterError> {
-    let suspects = read(text, file, "suspects")?;
+    suspects_using(text, file, &|_| Err("no library is known here".into()))
+}
+
+/// The same of a file that may use the laws of libraries.
+///
+/// # Errors
+/// As [`suspects`], and a law that there is none of, or that lacks a variable or a range.
+pub fn suspects_using(text: &str, file: &str, laws: Laws<'_>) -> Result<Vec<Declared>, ParameterError> {
+    let suspects = read_with(text, file, "suspects", Some(laws))?;
     if suspects.is_empty() {
         return Err(ParameterError::at(file, 1, "no [[suspects]] in this file"));
     }
@@ -54,6 +63,15 @@ pub fn suspects(text: &str, file: &str) -> Result<Vec<Declared>, ParameterError>
 
 /// The terms under a key of a file. Other keys are the caller's, except in a file of suspects, which has none.
 pub(super) fn read(text: &str, file: &str, key: &str) -> Result<Vec<Declared>, ParameterError> {
+    read_with(text, file, key, None)
+}
+
+fn read_with(
+    text: &str,
+    file: &str,
+    key: &str,
+    laws: Option<Laws<'_>>,
+) -> Result<Vec<Declared>, ParameterError> {
     let source = Source::parse(text, Path::new(file))?.with_columns();
     let mut root = source.root();
     let mut all: Vec<Declared> = Vec::new();
@@ -61,7 +79,7 @@ pub(super) fn read(text: &str, file: &str, key: &str) -> Result<Vec<Declared>, P
         if all.len() == MOST_TERMS {
             return Err(section.wrong(&format!("more than {MOST_TERMS} of a kind in one file")).into());
         }
-        let mut reader = Reader { source: &source, is_suspect: key == "suspects" };
+        let mut reader = Reader { source: &source, is_suspect: key == "suspects", laws };
         let at = section.at("name");
         let term = reader.term(section)?;
         if let Some(other) = all.iter().find(|other| other.is_same(&term)) {
@@ -113,19 +131,38 @@ fn is_name(section: &Section<'_>, name: &str) -> Result<(), SettingsError> {
     Err(section.wrong_at(name, &format!("{name}: a name has letters, digits and _ alone")))
 }
 
+/// The unit of a section, 1 when it is absent.
+pub(super) fn unit_of(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit, SettingsError> {
+    match section.text("unit")? {
+        None => Ok(Unit::one()),
+        Some(text) => {
+            Unit::parse(&text.text).map_err(|wrong| source.wrong_from(text.at + wrong.at, &wrong.why))
+        }
+    }
+}
+
 struct Reader<'a> {
     source: &'a Source<'a>,
     is_suspect: bool,
+    /// Libraries whose laws the file may use.
+    laws: Option<Laws<'a>>,
 }
 
 impl Reader<'_> {
     fn term(&mut self, mut section: Section<'_>) -> Result<Declared, SettingsError> {
-        let name = section.needed_text("name", "what reports call it")?;
+        let used = match self.laws {
+            Some(laws) => used(&mut section, self.source, laws)?,
+            None => None,
+        };
+        let name = match &used {
+            Some(used) => used.name.clone(),
+            None => section.needed_text("name", "what reports call it")?.text,
+        };
         let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
-        if name.text.is_empty() || name.text.len() > 64 || !name.text.chars().all(is_plain) {
+        if name.is_empty() || name.len() > 64 || !name.chars().all(is_plain) {
             return Err(section.wrong_at("name", "name: allowed are up to 64 of a-z, A-Z, 0-9, - and _"));
         }
-        if sheet(&name.text).is_some() {
+        if sheet(&name).is_some() {
             return Err(section.wrong_at("name", "name: an effect of the catalogue has it"));
         }
         let places = || -> Vec<(String, Axis, Target)> {
@@ -139,8 +176,17 @@ impl Reader<'_> {
             let why = format!("place = \"{}\"; allowed is {}", place.text, known());
             return Err(self.source.wrong_from(place.at, &why));
         };
-        let add = section.needed_text("add", "the expression that is added")?;
-        let numbers = self.named(&mut section, "parameters", MOST_PARAMETERS, Self::number)?;
+        let library = used.as_ref().map(|used| used.at);
+        let (add, at, numbers) = match used {
+            Some(used) => (used.add, used.at, used.numbers),
+            None => {
+                let add = section.needed_text("add", "the expression that is added")?;
+                (add.text, add.at, self.named(&mut section, "parameters", MOST_PARAMETERS, Self::number)?)
+            }
+        };
+        if numbers.len() > MOST_PARAMETERS {
+            return Err(section.wrong(&format!("more than {MOST_PARAMETERS} names under parameters")));
+        }
         let kept = self.named(&mut section, "memory", MOST_REMEMBERED, Self::kept)?;
         let twins = section.texts("twins")?;
         section.finish()?;
@@ -164,8 +210,13 @@ impl Reader<'_> {
             })
             .collect();
         let wanted = (dimension(target.unit()), place.text.as_str());
-        let formula = Formula::compile((&add.text, add.at), &variables, &parameters, wanted)
-            .map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))?;
+        let formula = Formula::compile((&add, at), &variables, &parameters, wanted).map_err(|wrong| {
+            match library {
+                // The expression is the library's, so that the file has no place of its parts.
+                Some(used) => self.source.wrong_from(used, &format!("{}, in {add}", wrong.why)),
+                None => self.source.wrong_from(wrong.at, &wrong.why),
+            }
+        })?;
         let before = Target::Force.variables();
         let (name_of_step, unit_of_step, range) = STEP;
         let step = Variable { name: name_of_step, dimension: dimension(unit_of_step), range };
@@ -187,11 +238,10 @@ impl Reader<'_> {
                 Ok(one.with(formulas))
             })
             .collect::<Result<Vec<_>, SettingsError>>()?;
-        let mut term =
-            Declared { name: name.text, axis, target, add: add.text, numbers, memory, twins, formula };
+        let mut term = Declared { name, axis, target, add, numbers, memory, twins, formula };
         term.set_formulas();
         if self.is_suspect {
-            self.adds_nothing(&term, add.at)?;
+            self.adds_nothing(&term, at)?;
         }
         Ok(term)
     }
@@ -263,11 +313,7 @@ impl Reader<'_> {
     }
 
     fn unit(&self, section: &mut Section<'_>) -> Result<Unit, SettingsError> {
-        match section.text("unit")? {
-            None => Ok(Unit::one()),
-            Some(text) => Unit::parse(&text.text)
-                .map_err(|wrong| self.source.wrong_from(text.at + wrong.at, &wrong.why)),
-        }
+        unit_of(section, self.source)
     }
 
     fn number(&self, name: String, mut section: Section<'_>) -> Result<Number, SettingsError> {
