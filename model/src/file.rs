@@ -57,6 +57,8 @@ pub struct RecordLayout {
     pub time_column: String,
     /// Seconds in a unit of that column.
     pub time_unit_s: f64,
+    /// It holds times of a calendar, ISO 8601, which become seconds since the first row.
+    pub is_calendar: bool,
     /// One character between two cells.
     pub separator: String,
     /// Whether decimals are written with a comma.

@@ -19,6 +19,8 @@ pub(crate) const RESERVED: [&str; 19] = [
     "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
     "cos", "atan", "floor", "delay",
 ];
+/// Unit of a column that holds times of a calendar.
+const CALENDAR: &str = "iso8601";
 /// Points from which fits start unless the file says how many.
 const STARTS: usize = 8;
 /// Most names of each kind.
@@ -95,6 +97,7 @@ fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, S
         period_s: None,
         time_column: "t_s".into(),
         time_unit_s: 1.0,
+        is_calendar: false,
         separator: ",".into(),
         is_decimal_comma: false,
         comment: "#".into(),
@@ -105,10 +108,17 @@ fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, S
     if let Some(column) = section.text("time")? {
         layout.time_column = column.text;
     }
-    let unit = unit(&mut section, source)?;
-    if section.has("unit") {
+    layout.is_calendar = section.peek("unit") == Some(CALENDAR);
+    let unit = if layout.is_calendar {
+        section.text("unit").map(|_| Unit::one())?
+    } else {
+        unit(&mut section, source)?
+    };
+    if section.has("unit") && !layout.is_calendar {
         if unit.dimension != Dimension::TIME {
-            return Err(section.wrong_at("unit", "unit: no unit of time; allowed is s, ms, us, min, h"));
+            return Err(
+                section.wrong_at("unit", "unit: no unit of time; allowed is s, ms, us, min, h, or iso8601")
+            );
         }
         layout.time_unit_s = unit.factor;
     }

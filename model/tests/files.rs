@@ -116,7 +116,7 @@ fn an_error_has_line_and_column_and_says_what_is_allowed() {
         ("noise = 0.5", "nose = 0.5", "model.toml:24:1: unknown key outputs.level_mm.nose; allowed is"),
         ("[inputs.pump]", "[inputs.level]", "states.level.the name is taken"),
         ("[inputs.pump]", "[inputs.sqrt]", "the name has a meaning in expressions"),
-        ("unit = \"ms\"", "unit = \"m\"", "no unit of time"),
+        ("unit = \"ms\"", "unit = \"m\"", "no unit of time; allowed is s, ms, us, min, h, or iso8601"),
         ("[outputs.level_mm]", "[output.level_mm]", "[outputs] is missing"),
     ] {
         assert!(TANK.contains(from), "{from}");

@@ -25,6 +25,10 @@ pub enum NewError {
     Head { file: String },
     #[error("{file}: no column grows from row to row: a record has a column of the time")]
     Time { file: String },
+    #[error(
+        "{file}:{line}: {column} = '{cell}'; the rows above it have times such as 2026-11-27T14:05:03.250"
+    )]
+    Calendar { file: String, line: u64, column: String, cell: String },
     #[error("{file}: beside the time {name} no column changes: nothing is measured")]
     Flat { file: String, name: String },
     #[error(transparent)]
@@ -324,6 +328,44 @@ mod tests {
         });
         let (text, model) = of(&format!("time\tsin\tpi\n{body}")).unwrap();
         assert_eq!(model.record.absent, ["NaN"], "{text}");
+    }
+
+    #[test]
+    fn a_byte_order_mark_quotes_and_times_of_a_calendar_are_read() {
+        let second = |t: f64| format!("2026-11-27T23:59:{:02}.500Z", t as u32);
+        let body = rows(|t| format!("{},{},{}\n", second(t), f64::from(u8::from(t > 20.0)), (0.2 * t).cos()));
+        let text = format!("\u{feff}\"at\",\"valve, upper [V]\",\"level [mm]\"\n{body}");
+        let (written, model) = of(&text).unwrap();
+        assert_eq!((model.record.time_column.as_str(), model.record.is_calendar), ("at", true), "{written}");
+        assert_eq!(model.inputs[0].column, "valve, upper [V]", "{written}");
+        assert!(
+            written.contains("unit = \"iso8601\"") && written.contains("range = [0.5, 390.0]"),
+            "{written}"
+        );
+        // A column in seconds is taken before it.
+        let body = rows(|t| format!("{};{t};{}\n", second(t), (0.2 * t).cos()));
+        let (written, model) = of(&format!("\u{feff}# logger\nat;time_s;y\n{body}")).unwrap();
+        assert_eq!(
+            (model.record.time_column.as_str(), model.record.is_calendar),
+            ("time_s", false),
+            "{written}"
+        );
+        assert!(written.contains("Column at is left out: it holds no numbers"), "{written}");
+        for (from, to, message) in [
+            (
+                "2026-11-27T23:59:07.500Z",
+                "27.11.2026 23:59:07",
+                ":9: at = '27.11.2026 23:59:07'; the rows above it have times such as",
+            ),
+            (
+                "2026-11-27T23:59:07.500Z",
+                "2026-11-27T23:59:07.500",
+                ":9: at = '2026-11-27T23:59:07.500'; allowed is a time such as",
+            ),
+        ] {
+            let found = of(&text.replace(from, to)).expect_err(to);
+            assert!(found.contains(message), "{found}");
+        }
     }
 
     #[test]

@@ -81,6 +81,7 @@ impl Measured {
         let options = ColumnOptions {
             time: &layout.time_column,
             time_unit_s: layout.time_unit_s,
+            is_calendar: layout.is_calendar,
             columns: &wanted,
             separator: &layout.separator,
             is_decimal_comma: layout.is_decimal_comma,

@@ -2,9 +2,14 @@
 //!
 //! A missing cell is `None`, never NaN and never interpolated; time is checked by whoever uses it.
 
+use super::calendar::CalendarTime;
 use super::table::{Layout, Separator, Table};
 use super::{ReadError, Warning};
 use std::path::{Path, PathBuf};
+
+/// What a cell with a time of a calendar holds.
+const CALENDAR: &str =
+    "a time such as 2026-11-27T14:05:03.250, in all rows with a zone (Z or +01:00) or in none";
 
 /// How a table is laid out, and which columns are wanted.
 #[derive(Clone, Debug)]
@@ -13,6 +18,8 @@ pub struct ColumnOptions<'a> {
     pub time: &'a str,
     /// Seconds in a unit of that column.
     pub time_unit_s: f64,
+    /// It holds times of a calendar, which become seconds since the first row.
+    pub is_calendar: bool,
     /// Columns that must be there.
     pub columns: &'a [&'a str],
     /// One character, or `whitespace`.
@@ -66,10 +73,18 @@ pub fn read_columns(file: &Path, options: &ColumnOptions<'_>) -> Result<Columns,
         values: vec![Vec::with_capacity(table.rows.len()); places.len()],
         warnings: Vec::new(),
     };
+    let mut first = None;
     for (line, row) in &table.rows {
         let cell = |place: usize| row.get(place).unwrap_or_default();
         let value = |place: usize| table.number(*line, place, cell(place), options.is_decimal_comma);
-        columns.time_s.push(value(time)? * options.time_unit_s);
+        columns.time_s.push(match options.is_calendar {
+            true => {
+                let since_s =
+                    CalendarTime::parse(cell(time)).and_then(|now| now.since_s(*first.get_or_insert(now)));
+                since_s.ok_or_else(|| table.refused(*line, options.time, cell(time), CALENDAR))?
+            }
+            false => value(time)? * options.time_unit_s,
+        });
         columns.lines.push(*line);
         for (place, values) in places.iter().zip(&mut columns.values) {
             let is_absent = cell(*place).is_empty() || options.absent.iter().any(|text| text == cell(*place));
@@ -95,6 +110,7 @@ mod tests {
         let options = ColumnOptions {
             time: "Zeit",
             time_unit_s: 1e-3,
+            is_calendar: false,
             columns,
             separator: ";",
             is_decimal_comma: true,
@@ -112,6 +128,34 @@ mod tests {
         assert_eq!(columns.time_s, [0.0, 0.01, 0.03]);
         assert_eq!(columns.values, [[Some(2.0), None, Some(4.0)], [Some(1.5), None, Some(3.0)]]);
         assert_eq!((columns.lines, columns.warnings[0].line), (vec![3, 4, 5], Some(6)));
+    }
+
+    #[test]
+    fn times_of_a_calendar_are_seconds_since_the_first_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("any.csv");
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            let options = ColumnOptions {
+                time: "at",
+                time_unit_s: 1.0,
+                is_calendar: true,
+                columns: &["u"],
+                separator: ",",
+                is_decimal_comma: false,
+                comment: "#",
+                skip_lines: 0,
+                absent: &[],
+            };
+            read_columns(&path, &options).map_err(|error| error.to_string())
+        };
+        let text = "at,u\n2026-11-27T23:59:59.5Z,1\n2026-11-28T00:00:00.25Z,2\n";
+        assert_eq!(read(text).unwrap().time_s, [0.0, 0.75]);
+        for (from, to) in [("00.25Z", "00.25"), ("2026-11-28T00", "28.11.2026 00")] {
+            let message = read(&text.replace(from, to)).unwrap_err();
+            let expected = "allowed is a time such as 2026-11-27T14:05:03.250, in all rows with a zone";
+            assert!(message.contains("any.csv:3: at = '") && message.contains(expected), "{message}");
+        }
     }
 
     #[test]

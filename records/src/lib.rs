@@ -18,16 +18,19 @@ pub mod mapping;
 
 mod acting;
 mod bus_log;
+mod calendar;
 mod columns;
 mod cycles;
 mod foreign;
 mod measurement;
 mod table;
 
+pub use calendar::CalendarTime;
 pub use channel::{Channel, Quantity, Signal};
 pub use columns::{ColumnOptions, Columns, read_columns};
 pub use error::ReadError;
 pub use mapping::Mapping;
+pub use table::cells;
 
 use plant::Axis;
 use serde::Deserialize;

@@ -45,6 +45,18 @@ pub(super) struct Table {
     pub(super) cut: Option<u64>,
 }
 
+/// The cells of a line, as a table with this separator has them: quoted ones may hold it.
+#[must_use]
+pub fn cells(line: &str, separator: u8) -> Vec<String> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(separator)
+        .trim(csv::Trim::All)
+        .from_reader(line.as_bytes());
+    let row = reader.records().next().and_then(Result::ok);
+    row.map_or(Vec::new(), |row| row.iter().map(str::to_owned).collect())
+}
+
 impl Table {
     pub(super) fn read(file: &Path, layout: &Layout) -> Result<Self, ReadError> {
         let bytes = std::fs::read(file)

@@ -1,6 +1,7 @@
 //! How a table is laid out, as far as it can be seen: separator, decimal sign, head, cells without a value.
 
 use super::NewError;
+use records::CalendarTime;
 use std::path::Path;
 
 /// Rows that are looked at.
@@ -18,10 +19,13 @@ pub(super) struct Table {
     pub(super) head: Vec<String>,
     /// Whether each column holds numbers.
     pub(super) is_number: Vec<bool>,
+    /// Whether each column holds times of a calendar.
+    pub(super) is_calendar: Vec<bool>,
 }
 
 impl Table {
     pub(super) fn of(record: &Path, text: &str) -> Result<Self, NewError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let lines: Vec<(usize, &str)> = text
             .lines()
             .enumerate()
@@ -33,7 +37,9 @@ impl Table {
         let separator = separator(lines.last().ok_or_else(no_head)?.1);
         let cells: Vec<Vec<String>> = lines.iter().map(|(_, line)| split(line, separator)).collect();
         let decimal = |is_comma: bool| {
-            let is_number = move |cell: &String| is_missing(cell) || number(cell, is_comma).is_some();
+            let is_number = move |cell: &String| {
+                is_missing(cell) || number(cell, is_comma).is_some() || CalendarTime::parse(cell).is_some()
+            };
             let named = |row: &[String]| row.iter().any(|cell| cell.chars().any(char::is_alphabetic));
             let full = |row: &[String], next: &[String]| row.len() == next.len() && row.len() > 1;
             (1..cells.len()).find(|row| {
@@ -51,8 +57,7 @@ impl Table {
             .filter(|cell| number(cell, false).is_none() && number(cell, true).is_some());
         let is_decimal_comma = separator != "," && commas.count() > 0;
         let first = decimal(is_decimal_comma).ok_or_else(no_head)?;
-        let head: Vec<String> =
-            cells[first - 1].iter().map(|name| name.trim_matches('"').trim().to_owned()).collect();
+        let head: Vec<String> = cells[first - 1].clone();
         let mut absent: Vec<String> = Vec::new();
         for cell in cells[first..].iter().flatten().filter(|cell| !cell.is_empty() && is_missing(cell)) {
             if !absent.contains(cell) {
@@ -67,16 +72,40 @@ impl Table {
             cells[first..].iter().all(cell)
         };
         let is_number = (0..head.len()).map(is_number).collect();
+        let is_time = |column: usize, row: usize| {
+            cells[row].get(column).is_some_and(|cell| CalendarTime::parse(cell).is_some())
+        };
+        let is_calendar: Vec<bool> = (0..head.len()).map(|column| is_time(column, first)).collect();
+        for column in (0..head.len()).filter(|column| is_calendar[*column]) {
+            if let Some(row) = (first..cells.len()).find(|row| !is_time(column, *row)) {
+                return Err(NewError::Calendar {
+                    file: record.display().to_string(),
+                    line: lines[row].0 as u64 + 1,
+                    column: head[column].clone(),
+                    cell: cells[row].get(column).cloned().unwrap_or_default(),
+                });
+            }
+        }
         let skip_lines = lines[first - 1].0 as u64;
         // Comments above the head are passed over as it is.
         let is_comment = |line: &str| line.trim().is_empty() || line.trim_start().starts_with('#');
         let is_clean = text.lines().take(skip_lines as usize).all(is_comment);
         let skip_lines = if is_clean { 0 } else { skip_lines };
-        Ok(Self { separator: separator.into(), is_decimal_comma, skip_lines, absent, head, is_number })
+        Ok(Self {
+            separator: separator.into(),
+            is_decimal_comma,
+            skip_lines,
+            absent,
+            head,
+            is_number,
+            is_calendar,
+        })
     }
 }
 
 fn separator(line: &str) -> &'static str {
+    // Outside of quotes.
+    let line: String = line.split('"').step_by(2).collect();
     let count = |character: char| line.matches(character).count();
     match () {
         () if count(';') > 0 => ";",
@@ -90,11 +119,10 @@ fn split(line: &str, separator: &str) -> Vec<String> {
     if separator == "whitespace" {
         return line.split_whitespace().map(str::to_owned).collect();
     }
-    line.trim_end_matches('\r').split(separator).map(|cell| cell.trim().to_owned()).collect()
+    records::cells(line, separator.as_bytes()[0])
 }
 
 fn number(cell: &str, is_comma: bool) -> Option<f64> {
-    let cell = cell.trim_matches('"');
     let text = if is_comma { cell.replace(',', ".") } else { cell.to_owned() };
     text.parse().ok().filter(|value: &f64| value.is_finite())
 }

@@ -82,9 +82,11 @@ pub(super) fn columns(record: &Path, table: &Table) -> Result<(Time, Vec<Column>
         .map(|index| table.head[index].as_str())
         .collect();
     let Some(first) = numbers.first() else { return Err(NewError::Head { file: file() }) };
+    let calendar = table.head.iter().zip(&table.is_calendar).find(|(_, is)| **is).map(|(name, _)| name);
     let options = ColumnOptions {
-        time: first,
+        time: calendar.map_or(first, String::as_str),
         time_unit_s: 1.0,
+        is_calendar: calendar.is_some(),
         columns: &numbers,
         separator: &table.separator,
         is_decimal_comma: table.is_decimal_comma,
@@ -92,7 +94,8 @@ pub(super) fn columns(record: &Path, table: &Table) -> Result<(Time, Vec<Column>
         skip_lines: table.skip_lines,
         absent: &table.absent,
     };
-    let values: Vec<Vec<f64>> = read_columns(record, &options)?.values.into_iter().map(filled).collect();
+    let read = read_columns(record, &options)?;
+    let values: Vec<Vec<f64>> = read.values.into_iter().map(filled).collect();
     let grows =
         |index: &usize| values[*index].len() > 1 && values[*index].windows(2).all(|pair| pair[0] < pair[1]);
     let is_time = |index: &usize| {
@@ -104,9 +107,17 @@ pub(super) fn columns(record: &Path, table: &Table) -> Result<(Time, Vec<Column>
             || name.starts_with("t ")
     };
     let growing: Vec<usize> = (0..numbers.len()).filter(grows).collect();
-    let place = growing.iter().find(|index| is_time(index)).or(growing.first());
-    let Some(place) = place.copied() else { return Err(NewError::Time { file: file() }) };
-    let time = time(numbers[place], &values[place]);
+    let named = growing.iter().find(|index| is_time(index)).copied();
+    let is_growing = read.time_s.len() > 1 && read.time_s.windows(2).all(|pair| pair[0] < pair[1]);
+    let time = match (named, calendar.filter(|_| is_growing)) {
+        (None, Some(column)) => of_calendar(column, &read.time_s),
+        _ => {
+            let Some(place) = named.or(growing.first().copied()) else {
+                return Err(NewError::Time { file: file() });
+            };
+            time(numbers[place], &values[place])
+        }
+    };
     let mut all: Vec<Column> = Vec::new();
     for (index, name) in table.head.iter().enumerate().filter(|(_, name)| **name != time.column) {
         let samples = numbers.iter().position(|number| number == name).filter(|_| table.is_number[index]);
@@ -130,6 +141,11 @@ fn filled(values: Vec<Option<f64>>) -> Vec<f64> {
         last
     };
     values.into_iter().map(fill).collect()
+}
+
+/// A column with times of a calendar.
+fn of_calendar(column: &str, time_s: &[f64]) -> Time {
+    Time { column: column.into(), unit: "iso8601".into(), ..time("", time_s) }
 }
 
 fn time(column: &str, values: &[f64]) -> Time {
