@@ -1,7 +1,8 @@
 //! Whether a report says that what is left is more than noise.
 
+use crate::closing::close;
+use model_fit::ClosedModel;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, close};
 use std::fs;
 
 const LINE: &str = r#"

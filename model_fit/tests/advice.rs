@@ -6,7 +6,8 @@
 //! A gain of the input and a gain of the flow between the two do the same to `lower`, and only the first one changes `upper`. A
 //! gain of the sensor that is fitted hides them both.
 
-use model_fit::{close, explain};
+use crate::closing::close;
+use model_fit::explain;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,8 @@
 //! Model files of one balance, which integrate nothing, on records that are made here.
 
+use crate::closing::close_with;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, ModelError, Search, close_with};
+use model_fit::{ClosedModel, ModelError, Search};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};

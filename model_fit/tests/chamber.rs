@@ -1,8 +1,9 @@
 //! The model file of a chamber on records that the plant made: a hidden volume, a valve that passes more, nothing.
 
+use crate::closing::close_with;
 use crate::real::crate_folder;
 use model_fit::Verdict;
-use model_fit::{ModelReport, Search, close_with};
+use model_fit::{ModelReport, Search};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use std::fmt::Write as _;
 

@@ -4,9 +4,10 @@
 //!   1.2 v' = force - 50 x - 1.3 v - hidden(x, v, low)        x' = v        low' = (x - low)/0.8 s
 //! ```
 
+use crate::closing::close_with;
 use crate::model_files::OSCILLATOR;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, Search, close_with, read};
+use model_fit::{ClosedModel, Search, read};
 use std::fs;
 use std::path::Path;
 

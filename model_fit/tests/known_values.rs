@@ -1,6 +1,7 @@
 //! Numbers that are known of each record, and differ.
 
-use model_fit::{close, explain};
+use crate::closing::close;
+use model_fit::explain;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -6,8 +6,9 @@
 //! Its numbers are a fifth larger than a value of the library's; those that the library has at 0 are as large as makes it do
 //! half a unit. Records are of the same integrator, so that the laws and their fits are tested here, and not the integration.
 
+use crate::closing::close_with;
 use model::{Entry, Inputs, Library, Model, Program, Simulator, Start};
-use model_fit::{Search, close_with};
+use model_fit::Search;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! What is said of a record before a model file is fitted to it.
 
-use model_fit::{close, look};
+use crate::closing::close;
+use model_fit::look;
 use std::fs;
 
 /// A tank that drains, a pump that fills it.

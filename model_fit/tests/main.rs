@@ -4,6 +4,7 @@ mod adequacy;
 mod advice;
 mod balances;
 mod chamber;
+mod closing;
 mod discover;
 mod known_values;
 mod library_fits;

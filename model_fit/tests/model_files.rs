@@ -1,7 +1,8 @@
 //! Model files closed on records that are simulated here, by another integrator, with a term hidden or none.
 
+use crate::closing::close;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, close, explain};
+use model_fit::{ClosedModel, explain};
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,7 @@
 //! What is said of the numbers of a model file, and of a report that is another model's.
 
-use model_fit::{ClosedModel, ReportedModel, close, explain, read};
+use crate::closing::close;
+use model_fit::{ClosedModel, ReportedModel, explain, read};
 use std::fs;
 use std::path::Path;
 

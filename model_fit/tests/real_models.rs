@@ -3,9 +3,10 @@
 //! The records lie in `../shared/data` beside the project and are not for copying into it; where they are absent a test says so
 //! and is skipped.
 
+use crate::closing::close_with;
 use crate::real::{crate_folder, data};
 use model_fit::Verdict;
-use model_fit::{Left, ModelReport, Search, close_with};
+use model_fit::{Left, ModelReport, Search};
 use std::path::{Path, PathBuf};
 
 fn shipped(name: &str) -> String {

@@ -1,6 +1,7 @@
 //! Dry friction that sticks and slips, in records of another integrator: a mass that a spring pulls over a table.
 
-use model_fit::{ClosedModel, Verdict, close};
+use crate::closing::close;
+use model_fit::{ClosedModel, Verdict};
 use std::fmt::Write as _;
 use std::fs;
 

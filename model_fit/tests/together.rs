@@ -1,7 +1,8 @@
 //! Suspects that pay together where neither does alone, and fits that need several starts to find what a suspect does.
 
+use crate::closing::close;
+use model_fit::ClosedModel;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, close};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
