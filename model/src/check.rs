@@ -4,7 +4,7 @@ use crate::compile::{frictions_hold, tapes};
 use crate::file::{Change, Expression, Model, Target};
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, resolve};
 use crate::own_units::unit_of;
-use crate::rows::reads_inputs_alone;
+use crate::rows::{reads_inputs_alone, reads_numbers_alone};
 use crate::units::{Dimension, Unit};
 use expression::constants::constants;
 use expression::dimensions::{Dimensions, Measure};
@@ -22,7 +22,12 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
         dimensions.check(&state.derivative, state.suspect, wanted, &format!("the rate of {}", state.name))?;
     }
     for memory in &model.memories {
-        dimensions.check(&memory.update, memory.suspect, memory.unit.dimension, &memory.name)?;
+        let (suspect, unit, name) = (memory.suspect, memory.unit.dimension, &memory.name);
+        dimensions.check(&memory.update, suspect, unit, name)?;
+        if let Some(start) = &memory.start {
+            dimensions.check(start, suspect, unit, &format!("the start of {name}"))?;
+            reads_numbers_alone(model, start.root, suspect)?;
+        }
     }
     for friction in &model.frictions {
         let (unit, name) = (friction.unit.dimension, &friction.name);

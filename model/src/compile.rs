@@ -18,6 +18,8 @@ pub(crate) struct Tapes {
     pub(crate) rates: Tape,
     pub(crate) outputs: Tape,
     pub(crate) updates: Tape,
+    /// Starts of memories, expressions of parameters; empty where all are numbers of the file.
+    pub(crate) starts: Option<Tape>,
     /// Of each friction that is there the force that holds its speed, that at which it breaks away, and by how much a unit of
     /// force brakes it.
     pub(crate) guards: Tape,
@@ -66,10 +68,23 @@ pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
     let updates = updates.collect::<Result<Vec<_>, _>>()?;
     let updates = compiler.builder.tape(&updates, curves());
     let mut compiler = Compiler::new(model, suspects);
+    let starts = memories.iter().map(|index| {
+        let memory = &model.memories[*index];
+        let scope = Scope { suspect: memory.suspect, before: None };
+        let constant = memory.start_si;
+        match &memory.start {
+            Some(start) => compiler.node(start.root, scope),
+            None => Ok(compiler.builder.constant(constant)),
+        }
+    });
+    let starts = starts.collect::<Result<Vec<_>, _>>()?;
+    let is_computed = memories.iter().any(|index| model.memories[*index].start.is_some());
+    let starts = is_computed.then(|| compiler.builder.tape(&starts, curves()));
+    let mut compiler = Compiler::new(model, suspects);
     let guards = frictions.iter().map(|friction| compiler.guards(*friction));
     let guards = guards.collect::<Result<Vec<_>, _>>()?.concat();
     let guards = compiler.builder.tape(&guards, curves());
-    Ok(Tapes { rates, outputs, updates, guards, states, memories, frictions })
+    Ok(Tapes { rates, outputs, updates, starts, guards, states, memories, frictions })
 }
 
 /// Whether the force of each friction stands in the equation of its speed, and in a way that says which force holds it.

@@ -151,6 +151,11 @@ pub struct Parameter {
 }
 
 impl Parameter {
+    /// It is known, and one number for all records.
+    pub(crate) fn is_one_constant(&self) -> bool {
+        self.is_fixed && self.of_records_si.is_empty()
+    }
+
     /// The known value of a record, which may differ by record; `None` where the file lists records, and not this one. Of two
     /// ends of its path the longer is meant.
     #[must_use]
@@ -212,8 +217,10 @@ pub struct Memory {
     pub name: String,
     /// Unit in which it is written and reported.
     pub unit: Unit,
-    /// Its value before the first step.
+    /// Its value before the first step, where that is a number of the file.
     pub start_si: f64,
+    /// The same as an expression of parameters.
+    pub start: Option<Expression>,
     /// Its value after a step, from what holds at its end and its own old value.
     pub update: Expression,
     /// The suspect that it belongs to.

@@ -309,11 +309,14 @@ impl Reader<'_> {
         for (name, mut section) in named(parent, "memory")? {
             self.is_new(&name, suspect, &section)?;
             let unit = unit(&mut section, self.source)?;
-            let start_si = one_or(&mut section, "start", 0.0, [-1e300, 1e300])? * unit.factor;
+            let (start_si, start) = match section.peek("start") {
+                Some(_) => (0.0, section.text("start")?.map(|text| self.expression(text)).transpose()?),
+                None => (one_or(&mut section, "start", 0.0, [-1e300, 1e300])? * unit.factor, None),
+            };
             let update = section.needed_text("update", "its value after a step, an expression")?;
             let update = self.expression(update)?;
             section.finish()?;
-            self.model.memories.push(Memory { name, unit, start_si, update, suspect });
+            self.model.memories.push(Memory { name, unit, start_si, start, update, suspect });
         }
         self.frictions(parent, suspect)?;
         let Some(mut section) = parent.section("define")? else { return Ok(()) };

@@ -49,7 +49,7 @@ pub(crate) fn reads_inputs_alone(model: &Model, place: Place) -> Result<(), Wron
         Kind::Number(..) => Ok(()),
         Kind::Name(name) => match resolve(model, name, None, node.at)? {
             Symbol::Time | Symbol::Pi | Symbol::Input(_) => Ok(()),
-            Symbol::Parameter(index) if model.parameters[index].is_fixed => Ok(()),
+            Symbol::Parameter(index) if model.parameters[index].is_one_constant() => Ok(()),
             _ => Err(Wrong::new(
                 node.at,
                 format!("'{name}': rows and folds read inputs and fixed numbers alone"),
@@ -62,6 +62,26 @@ pub(crate) fn reads_inputs_alone(model: &Model, place: Place) -> Result<(), Wron
         }
         Kind::Call(_, arguments) => {
             arguments.iter().try_for_each(|argument| reads_inputs_alone(model, *argument))
+        }
+    }
+}
+
+/// Refuses an expression that reads more than numbers: what a memory is before the first sample.
+pub(crate) fn reads_numbers_alone(model: &Model, place: Place, suspect: Option<usize>) -> Result<(), Wrong> {
+    let node = model.nodes.get(place);
+    match &node.kind {
+        Kind::Number(..) => Ok(()),
+        Kind::Name(name) => match resolve(model, name, suspect, node.at)? {
+            Symbol::Pi | Symbol::Parameter(_) => Ok(()),
+            _ => Err(Wrong::new(node.at, format!("'{name}': the start of a memory reads parameters alone"))),
+        },
+        Kind::Negation(inner) => reads_numbers_alone(model, *inner, suspect),
+        Kind::Binary(_, left, right) => {
+            reads_numbers_alone(model, *left, suspect)?;
+            reads_numbers_alone(model, *right, suspect)
+        }
+        Kind::Call(_, arguments) => {
+            arguments.iter().try_for_each(|argument| reads_numbers_alone(model, *argument, suspect))
         }
     }
 }

@@ -119,6 +119,7 @@ pub struct Simulator<'a> {
     rates: Registers,
     outputs: Registers,
     updates: Registers,
+    memory_starts: Option<Registers>,
     guards: Registers,
     /// The same without derivatives, for the search of the instant at which friction stops or breaks away.
     plain_guards: Registers,
@@ -175,6 +176,7 @@ impl<'a> Simulator<'a> {
             rates: registers(&program.tapes.rates),
             outputs: registers(&program.tapes.outputs),
             updates: registers(&program.tapes.updates),
+            memory_starts: program.tapes.starts.as_ref().map(registers),
             guards: registers(&program.tapes.guards),
             plain_guards: Registers::new(&program.tapes.guards, 0, |_| false),
             direction: vec![0.0; program.held.len()],
@@ -228,6 +230,9 @@ impl<'a> Simulator<'a> {
             for registers in self.all_registers() {
                 registers.set(register, *value);
             }
+            if let Some(registers) = &mut self.memory_starts {
+                registers.set(register, *value);
+            }
         }
         let tapes = &self.program.tapes;
         tapes.rates.prepare(&mut self.rates);
@@ -236,6 +241,7 @@ impl<'a> Simulator<'a> {
         tapes.guards.prepare(&mut self.guards);
         tapes.guards.prepare(&mut self.plain_guards);
         self.begin(starts, memories);
+        self.begin_memories(inputs)?;
         self.settle(inputs)?;
         for row in 0..inputs.time_s.len() {
             if row > 0 {

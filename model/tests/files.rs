@@ -303,6 +303,11 @@ fn rates_and_rows_that_cannot_be_computed_are_refused() {
         ("rate_of = \"x\"", "rate_of = \"x\"\ncolumn = \"v\"", "it is the rate of another input"),
         ("abs(v) > slow", "abs(v) > mass", "comparison of 'mass' in kg and 'abs(…)' in m/s"),
         ("and t > 1[s]", "and mass > 1[kg]", "'mass': rows and folds read inputs and fixed numbers alone"),
+        (
+            "value = 3, fixed = true",
+            "values = { \"a.csv\" = 3 }",
+            "'slow': rows and folds read inputs and fixed numbers alone",
+        ),
         ("low_pass_hz = 100", "moving_average = 4", "allowed is an odd number"),
         ("scale = 35.2", "scale = 0", "allowed is a number that is not 0"),
         ("every = 20", "every = 0", "allowed is one number, 1 to 1000"),

@@ -1,6 +1,6 @@
 //! What jumps or leaves zero within a step, against closed forms and against short steps: step control finds it.
 
-use crate::{first_values, read, simulated};
+use crate::{first_values, read, refused, simulated};
 use model::{Direction, Failure, Inputs, Program, Simulator};
 
 /// The first output at samples `period_s` apart; inputs in SI.
@@ -144,5 +144,39 @@ fn a_memory_of_an_input_follows_its_jump_at_the_sample() {
             play = play.max(input[row] - 0.2).min(input[row] + 0.2);
             expected += 0.1 * play;
         }
+    }
+}
+
+/// A play of an input: w is 0.5 from the start, and 2 behind an input that was held at 3, less a half width of 1.
+#[test]
+fn a_memory_starts_from_parameters_and_has_their_derivatives() {
+    let text = "[inputs.u]\nunit = \"m\"\n[parameters]\nat = { unit = \"mm\", value = 250 }\nhalf = { unit = \"m\", value = 1 }\n\
+                [memory.w]\nunit = \"m\"\nstart = \"2*at\"\nupdate = \"min(max(w, u - half), u + half)\"\n\
+                [memory.other]\nunit = \"m\"\nstart = 3\nupdate = \"other\"\n[outputs.y]\nunit = \"m\"\nvalue = \"w + other\"\n";
+    let model = read(text);
+    let program = Program::new(&model, &[]).unwrap();
+    let inputs = [vec![0.0, 3.0, 3.0]];
+    let inputs = Inputs { time_s: &[0.0, 1.0, 2.0], samples_si: &inputs };
+    let directions = [0, 1].map(Direction::Parameter);
+    let mut values = first_values(&model);
+    let computed = simulated(&program, &directions, &inputs, &values).unwrap();
+    for (row, (y, slope)) in
+        [(3.5, [2.0, 0.0]), (3.5, [2.0, 0.0]), (5.0, [0.0, -1.0])].into_iter().enumerate()
+    {
+        assert!(
+            (computed[row].0 - y).abs() < 1e-12 && computed[row].1 == slope,
+            "{row}: {:?}",
+            computed[row]
+        );
+    }
+    values[0][0] = 0.1;
+    assert!((simulated(&program, &[], &inputs, &values).unwrap()[0].0 - 3.2).abs() < 1e-12);
+    for (from, to, message) in [
+        ("2*at", "u", "'u': the start of a memory reads parameters alone"),
+        ("2*at", "2", "the start of w is in m, and this is in 1"),
+        ("2*at", "2*ta", "'ta' is unknown here"),
+    ] {
+        let found = refused(&text.replace(from, to));
+        assert!(found.starts_with("model.toml:8:") && found.contains(message), "{found}");
     }
 }

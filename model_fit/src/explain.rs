@@ -61,7 +61,10 @@ pub(crate) fn in_words(model: &Model) -> String {
         format!("{} = {}    in {}", one.name, one.value.text, model.definition_unit(index).text)
     };
     section("with", definitions.map(definition).collect());
-    let memory = |one: &model::Memory| format!("{} becomes {} after each step", one.name, one.update.text);
+    let memory = |one: &model::Memory| {
+        let start = one.start.as_ref().map_or(String::new(), |start| format!(", from {}", start.text));
+        format!("{} becomes {} after each step{start}", one.name, one.update.text)
+    };
     section("memory", model.memories.iter().filter(|one| own(one.suspect)).map(memory).collect());
     let frictions = model.frictions.iter().filter(|one| own(one.suspect));
     section("friction", frictions.map(|one| friction(model, one)).collect());

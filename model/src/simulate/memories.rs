@@ -11,6 +11,7 @@
 
 use super::steps::cubic;
 use super::{STAGES, Simulator, put};
+use crate::failure::Failure;
 use crate::inputs::Inputs;
 
 /// Stages of a step that are no longer needed when its memories are looked at: rates in its middle with the memories of its head
@@ -22,6 +23,29 @@ const END: usize = 3;
 const MOVED: usize = 4;
 
 impl Simulator<'_> {
+    /// Starts of memories that are expressions of parameters, with their derivatives.
+    pub(super) fn begin_memories(&mut self, inputs: &Inputs<'_>) -> Result<(), Failure> {
+        let program = self.program;
+        let width = self.width();
+        let (Some(tape), Some(registers)) = (&program.tapes.starts, &mut self.memory_starts) else {
+            return Ok(());
+        };
+        tape.prepare(registers);
+        tape.evaluate(registers, inputs);
+        for (place, memory) in self.memory.chunks_mut(width).enumerate() {
+            let start = tape.result(place);
+            memory[0] = registers.value(start);
+            memory[1..].copy_from_slice(registers.slope(start));
+            if !memory[0].is_finite() {
+                let time_s = inputs.time_s.first().copied().unwrap_or(0.0);
+                return Err(Failure::NotFinite { what: "the start of a memory".into(), time_s });
+            }
+            self.largest_memory[place] = memory[0].abs();
+        }
+        self.put_memories();
+        Ok(())
+    }
+
     pub(super) fn put_memories(&mut self) {
         let (leaves, width) = (self.program.leaves(), self.width());
         for (place, memory) in self.program.tapes.memories.iter().enumerate() {
