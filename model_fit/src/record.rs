@@ -124,6 +124,7 @@ impl Measured {
                 return Err(RecordError::Output { file, column, name });
             }
         }
+        notes.extend(twice(model));
         notes.extend(look::holes(&time_s, &lines, !model.states.is_empty()));
         let of_inputs = measured.iter().map(|input| Column { name: &input.column, output: None });
         let of_outputs =
@@ -154,6 +155,15 @@ impl Measured {
             Path::new(&file).file_name().map_or(file.clone(), |name| name.to_string_lossy().into_owned());
         grid.compared(model, Names { file, name, notes }, inputs, outputs)
     }
+}
+
+/// Columns that stand for several outputs.
+fn twice(model: &Model) -> impl Iterator<Item = String> + '_ {
+    model.outputs.iter().enumerate().filter_map(|(place, output)| {
+        let first = model.outputs[..place].iter().find(|other| other.column == output.column)?;
+        let (column, first, name) = (&output.column, &first.name, &output.name);
+        Some(format!("column {column} is both {first} and {name}: its noise counts as two measurements"))
+    })
 }
 
 /// Refuses a record that a number lacks whose known values differ by record.
@@ -188,6 +198,21 @@ mod tests {
         }
         assert_eq!(measured.outputs[0][..3], [Some(1e-3), None, Some(2e-3)]);
         assert!(measured.notes[0].contains("2 samples of u are missing"), "{:?}", measured.notes);
+    }
+
+    #[test]
+    fn a_column_of_two_outputs_is_noted() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "t_s,y\n0,1\n1,2\n2,4\n3,3\n4,5\n5,1\n6,2\n7,8\n").unwrap();
+        let notes = |second: &str| {
+            let text = format!(
+                "[outputs.y]\nvalue = \"1\"\n[outputs.again]\ncolumn = \"{second}\"\nvalue = \"t/1[s]\"\n"
+            );
+            Measured::read(&Model::parse(&text, Path::new("m.toml")).unwrap(), file.path()).unwrap().notes
+        };
+        assert!(notes("t_s").iter().all(|note| !note.contains("two measurements")));
+        let expected = "column y is both y and again: its noise counts as two measurements";
+        assert!(notes("y").iter().any(|note| note == expected), "{:?}", notes("y"));
     }
 
     #[test]
