@@ -1,8 +1,7 @@
 //! Dry friction that sticks and slips, against the closed form of a mass that is pulled by a spring.
 
-use crate::{first_values, read, refused, simulated};
+use crate::{counting, first_values, read, refused, simulated};
 use model::{Direction, Failure, Inputs, Program, Simulator};
-use realtime::allocations::{counted, reset, watch};
 
 /// A mass on a spring whose other end moves slowly and evenly.
 const PULLED: &str = r#"
@@ -165,11 +164,8 @@ fn a_run_with_friction_allocates_nothing() {
     let inputs = Inputs { time_s: &time_s, samples_si: &[] };
     let mut simulator = Simulator::new(&program, &[Direction::Parameter(3), Direction::Parameter(4)]);
     let [parameters, starts, memories] = first_values(&model);
-    reset();
-    let watching = watch();
-    let ran = simulator.run(&inputs, [&parameters, &starts, &memories], |_, _, _, _| ());
-    drop(watching);
-    assert_eq!((ran, counted()), (Ok(()), 0));
+    let run = || simulator.run(&inputs, [&parameters, &starts, &memories], |_, _, _, _| ());
+    assert_eq!(counting(run), (Ok(()), 0));
 }
 
 #[test]

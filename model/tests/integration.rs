@@ -1,11 +1,10 @@
 //! What is integrated, against closed forms, against an integrator by others, derivatives against differences.
 
-use crate::{first_values, read, refused, simulated};
+use crate::{counting, first_values, read, refused, simulated};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator};
 use nalgebra::DVector;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dopri5, System};
-use realtime::allocations::{counted, reset, watch};
 
 /// An oscillator with dry friction that is smooth, driven by an input.
 const OSCILLATOR: &str = r#"
@@ -313,16 +312,11 @@ fn a_run_allocates_nothing() {
     let mut simulator = Simulator::new(&program, &[Direction::Parameter(0), Direction::Start(0)]);
     let [parameters, starts, memories] = first_values(&model);
     let mut sum = 0.0;
-    reset();
-    let watching = watch();
-    let ran = simulator.run(&inputs, [&parameters, &starts, &memories], |_, _, value, _| sum += value);
-    drop(watching);
-    assert_eq!((ran, counted()), (Ok(()), 0));
+    let run = || simulator.run(&inputs, [&parameters, &starts, &memories], |_, _, value, _| sum += value);
+    assert_eq!(counting(run), (Ok(()), 0));
     assert!(sum != 0.0);
-    let counting = watch();
-    drop(vec![0_u8; 100]);
-    drop(counting);
-    assert!(counted() > 0, "the allocator counts");
+    let (_, calls) = counting(|| drop(vec![0_u8; 100]));
+    assert!(calls > 0, "the allocator counts");
 }
 
 #[test]

@@ -11,7 +11,20 @@ mod schema;
 static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;
 
 use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start};
+use realtime::allocations::{counted, reset, watch};
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// What it gives, and its calls to the allocator. The count is one of all threads, so one test at a time has it.
+pub(crate) fn counting<R>(run: impl FnOnce() -> R) -> (R, u64) {
+    static COUNT: Mutex<()> = Mutex::new(());
+    let _mine = COUNT.lock().unwrap_or_else(PoisonError::into_inner);
+    reset();
+    let watching = watch();
+    let result = run();
+    drop(watching);
+    (result, counted())
+}
 
 pub(crate) fn read(text: &str) -> Model {
     Model::parse(text, Path::new("model.toml")).unwrap_or_else(|error| panic!("{error}"))

@@ -33,6 +33,7 @@ fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
     scene.wait_for_rows("emulator", UNDER_WAY);
     let second = alone(&scene, "second");
     emulator.wait_for("fault two-sources: two senders on the drive command, valve shut");
+    emulator.wait_for("fault two-sources: two senders on the load command, valve shut");
     scene.wait_for_more_rows("emulator", 200);
     second.into_iter().for_each(|controller| drop(controller.kill()));
     emulator.wait_for("one sender left on the drive command, valve follows");
