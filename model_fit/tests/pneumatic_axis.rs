@@ -27,10 +27,13 @@ fn record() -> (Vec<f64>, Vec<[f64; 4]>) {
 fn simulated(model: &Model, valve: &[f64], first: [f64; 4]) -> Vec<[f64; 4]> {
     let program = Program::new(model, &[]).unwrap();
     let time_s: Vec<f64> = (0..ROWS).map(|k| k as f64 * 1e-3).collect();
-    let starts = model.states.iter().map(|state| match state.start {
-        Start::Known { value_si } | Start::Fitted { guess_si: value_si, .. } => value_si,
-        Start::Input { .. } => valve[0],
-        Start::Record { output } => first[output],
+    let starts = model.states.iter().map(|state| match (state.name.as_str(), state.start) {
+        ("x", Start::Fitted { .. }) => first[0],
+        ("p_a", Start::Fitted { .. }) => first[1],
+        ("p_b", Start::Fitted { .. }) => first[2],
+        (_, Start::Known { value_si }) => value_si,
+        (_, Start::Input { .. }) => valve[0],
+        (name, start) => panic!("{name} starts at {start:?}"),
     });
     let (starts, parameters): (Vec<f64>, Vec<f64>) =
         (starts.collect(), model.parameters.iter().map(|one| one.values_si[0]).collect());
