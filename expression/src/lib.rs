@@ -17,6 +17,7 @@
 //! | `tape` | operations in their order, computed with or without derivatives |
 //! | `curve` | tables |
 //! | `inputs` | inputs over time between their samples |
+//! | `mathml` | a tree as a formula that browsers set |
 //! | `formula` | one expression over named variables |
 //!
 //! Grammar and functions: `docs/model-files.md`.
@@ -29,6 +30,7 @@ pub mod dimensions;
 pub mod formula;
 pub mod grammar;
 pub mod inputs;
+pub mod mathml;
 mod operation;
 pub mod tape;
 pub mod units;

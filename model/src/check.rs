@@ -81,6 +81,16 @@ pub(crate) fn definition_unit(model: &Model, index: usize) -> Unit {
     unit_of(model, dimension)
 }
 
+/// The unit of a suspect's expression, in those of the file.
+pub(crate) fn suspect_unit(model: &Model, index: usize) -> Unit {
+    let suspect = &model.suspects[index];
+    let dimension = match suspect.change {
+        Change::Multiply => Dimension::NONE,
+        Change::Add | Change::Replace => target_dimension(model, suspect.target).unwrap_or_default(),
+    };
+    unit_of(model, dimension)
+}
+
 /// The dimension of an expression of the model's own names; that of 0 is none.
 pub(crate) fn dimension(model: &Model, root: Place) -> Result<Dimension, Wrong> {
     let mut dimensions = Checker { model, known: HashMap::new(), open: Vec::new() };

@@ -288,7 +288,10 @@ impl<'a> Compiler<'a> {
                 let definition = &model.definitions[index];
                 (definition.value.root, definition.suspect)
             }
-            Target::Output(index) => (model.outputs[index].value.root, None),
+            Target::Output(index) => {
+                let output = &model.outputs[index];
+                (output.value.root, output.suspect)
+            }
         };
         self.node(root, Scope { suspect, before: None })
     }

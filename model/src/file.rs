@@ -268,10 +268,23 @@ pub struct Output {
     pub unit: Unit,
     /// What the model says it is.
     pub value: Expression,
+    /// The suspect whose own names that may use.
+    pub(crate) suspect: Option<usize>,
     /// Standard deviation of the sensor's noise; estimated where it is absent.
     pub noise_si: Option<f64>,
     /// Error of the model, or of who simulated the record, that is no term: standard deviation.
     pub model_error_si: f64,
+}
+
+/// What a model is asked to report beside its outputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// An input, with what changes it.
+    Input(usize),
+    /// A state.
+    State(usize),
+    /// The expression of a suspect, before it acts on its place.
+    Suspect(usize),
 }
 
 /// A part of the model that a suspect changes.
@@ -364,17 +377,38 @@ impl Model {
         format!("{}:{line}:{column}", self.file.display())
     }
 
-    /// The same model with a state as its last output, called as the state; `None` where the file is full.
+    /// The same model with a part of it as its last output; `None` where the file is full.
     #[must_use]
-    pub fn measuring(&self, state: usize) -> Option<Self> {
+    pub fn measuring(&self, part: Part) -> Option<Self> {
         let mut other = self.clone();
-        let State { name, unit, derivative, .. } = &self.states[state];
-        let root = other.nodes.name(name, derivative.at).ok()?;
-        let value = Expression { text: name.clone(), root, at: derivative.at };
-        let (name, column, unit) = (name.clone(), name.clone(), unit.clone());
+        let mut named = |name: &str, at: usize| {
+            let root = other.nodes.name(name, at).ok()?;
+            Some(Expression { text: name.into(), root, at })
+        };
+        let (name, unit, value, suspect) = match part {
+            Part::Input(index) => {
+                let Input { name, unit, .. } = &self.inputs[index];
+                (name, unit.clone(), named(name, 0)?, None)
+            }
+            Part::State(index) => {
+                let State { name, unit, derivative, .. } = &self.states[index];
+                (name, unit.clone(), named(name, derivative.at)?, None)
+            }
+            Part::Suspect(index) => {
+                let Suspect { name, expression, .. } = &self.suspects[index];
+                (name, check::suspect_unit(self, index), expression.clone(), Some(index))
+            }
+        };
+        let (name, column) = (name.clone(), name.clone());
         let (scale, noise_si, model_error_si) = (1.0, None, 0.0);
-        other.outputs.push(Output { name, column, scale, unit, value, noise_si, model_error_si });
+        other.outputs.push(Output { name, column, scale, unit, value, suspect, noise_si, model_error_si });
         Some(other)
+    }
+
+    /// An expression as MathML, without the element `math` around it.
+    #[must_use]
+    pub fn mathml(&self, of: &Expression) -> String {
+        expression::mathml::expression(&self.nodes, of.root)
     }
 
     /// The unit of a definition, as it follows from what it is made of, in those of the file.

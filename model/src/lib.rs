@@ -36,10 +36,11 @@ mod simulate;
 
 pub use expression::grammar::{DEEPEST, MOST_NODES};
 pub use expression::inputs::{Hold, Inputs};
+pub use expression::mathml::name as mathml_name;
 pub use expression::units::{Dimension, Unit, UnitError};
 pub use failure::Failure;
 pub use file::{
-    Change, Definition, Expression, Friction, Input, Memory, Model, Output, Parameter, RecordLayout,
+    Change, Definition, Expression, Friction, Input, Memory, Model, Output, Parameter, Part, RecordLayout,
     Smoothing, Solver, Start, State, Suspect, Target,
 };
 pub use library::{

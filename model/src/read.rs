@@ -469,7 +469,17 @@ impl Reader<'_> {
             let noise_si = (noise > 0.0).then_some(noise * unit.factor);
             let model_error_si = one_or(&mut section, "model_error", 0.0, [0.0, 1e300])? * unit.factor;
             section.finish()?;
-            self.model.outputs.push(Output { name, column, scale, unit, value, noise_si, model_error_si });
+            let suspect = None;
+            self.model.outputs.push(Output {
+                name,
+                column,
+                scale,
+                unit,
+                value,
+                suspect,
+                noise_si,
+                model_error_si,
+            });
         }
         Ok(())
     }

@@ -31,6 +31,8 @@
 //! | `report` | the report |
 //! | `explain` | equations, units, suspects in words |
 //! | `page` | the page |
+//! | `typeset` | equations as MathML |
+//! | `term_curves` | a term over the variable that it depends on most |
 //! | `extended` | the model file with what was found |
 //! | [`estimator`] | Gauss-Newton of every nonlinear fit, that of the rig too: options, globalisation, outcome |
 //! | [`stats`], [`quantum`], [`equal_runs`] | order statistics and means; rounding and stuck values of a column |
@@ -68,6 +70,8 @@ mod select;
 mod sensors;
 mod starts;
 mod structure;
+mod term_curves;
+mod typeset;
 mod verdict;
 mod watch;
 
@@ -228,7 +232,8 @@ pub fn close_with(
     };
     report.equations = report::equations(&model);
     report.rate(adequacy::residuals(&found.extended)?);
-    let page = page::page(&model, &report, &traces, not_judged.as_deref());
+    let curves = term_curves::curves(&found.extended);
+    let page = page::page(&model, &report, (&traces, &curves), not_judged.as_deref());
     let folder = file.parent().unwrap_or(Path::new(""));
     let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
     let extended =

@@ -5,6 +5,8 @@ use super::explain::in_words;
 use super::held_out::Traces;
 use super::judge::share_in_words;
 use super::report::{Judgement, Left, ModelReport, Number, significant};
+use super::term_curves::TermCurve;
+use super::typeset;
 use model::Model;
 use pagekit::markup::{Cell, charts, number, paragraph, section, table, words};
 use pagekit::page::{document, escaped};
@@ -19,7 +21,7 @@ const STRETCH_ROWS: usize = 400;
 pub(crate) fn page(
     model: &Model,
     report: &ModelReport,
-    traces: &[Traces],
+    (traces, curves): (&[Traces], &[TermCurve]),
     not_judged: Option<&str>,
 ) -> String {
     let mut head =
@@ -35,6 +37,7 @@ pub(crate) fn page(
         ("notes", "Notes", notes),
         ("records", "Measured, and both models", pictures(model, report, traces)),
         ("named", named_title(report), named(report)),
+        ("term-curves", "What it looks like", term_curves(curves)),
         ("located", "Where it comes from", located(report)),
         ("discovered", discovered_title(report), discovered(report)),
         (
@@ -50,7 +53,7 @@ pub(crate) fn page(
         ("suspects", "Suspects, the most likely first", suspects(&report.suspects)),
         ("parameters", "Numbers of the model", numbers(&report.parameters)),
         ("structure", "What these records can tell apart", structure(report)),
-        ("equations", "The model", format!("<pre>{}</pre>\n", escaped(&in_words(model)))),
+        ("equations", "The model", equations(model, report)),
     ];
     let body: String = sections
         .iter()
@@ -103,6 +106,40 @@ fn pictures(model: &Model, report: &ModelReport, traces: &[Traces]) -> String {
         }
     }
     charts(&all)
+}
+
+/// Each term over its variable.
+fn term_curves(curves: &[TermCurve]) -> String {
+    let drawn = curves.iter().enumerate().filter_map(|(place, curve)| {
+        let column = |at: usize| curve.bins.iter().map(|bin| bin[at]).collect::<Vec<f64>>();
+        let [x, low, mean, high] = [0, 1, 2, 3].map(column);
+        let bounds = range(low.iter().chain(&high).copied())?;
+        let (x_label, y_label) =
+            (labelled(&curve.variable, &curve.variable_unit), labelled(&curve.suspect, &curve.unit));
+        let mut plot = Plot::new((x[0], x[x.len() - 1]), bounds, &x_label, &y_label);
+        plot.band(&x, &low, &high);
+        plot.line("line s0", x.iter().copied().zip(mean));
+        let caption = format!("{} at {}, over {}", curve.suspect, curve.place, curve.variable);
+        let about = format!(
+            "Along the training records as the extended model has them; {} is what most of it depends on \
+             ({:.0} % of its variance).",
+            curve.variable,
+            curve.share * 100.0
+        );
+        let legend = [(Sample::Line("line s0"), "mean"), (Sample::Area("area"), "smallest to largest")];
+        let drawing = plot.drawn(
+            &format!("term-{place}"),
+            &caption,
+            "The term over its variable, with the spread of its values.",
+        );
+        Some(figure(&caption, &about, &legend, &drawing))
+    });
+    charts(&drawn.collect::<Vec<_>>())
+}
+
+/// A name with its unit.
+fn labelled(name: &str, unit: &str) -> String {
+    if unit == "1" { name.into() } else { format!("{name} {unit}") }
 }
 
 /// All rows, or the stretch around the largest difference of the model alone.
@@ -299,6 +336,16 @@ fn structure(report: &ModelReport) -> String {
     let advice = structure.advice.iter().map(|advice| sentence(&advice.in_words()));
     let all: Vec<String> = idle.chain(undetermined).chain(hidden).chain(twins).chain(advice).collect();
     pagekit::markup::list(&all, "Every number, and every suspect from each other.")
+}
+
+fn equations(model: &Model, report: &ModelReport) -> String {
+    let named: Vec<&str> = report.named.iter().map(|one| one.suspect.as_str()).collect();
+    format!(
+        "<div class=\"chart\">\n{}</div>\n<details>\n<summary>As text, with units and numbers</summary>\n<pre>{}</pre>\n\
+         </details>\n",
+        typeset::equations(model, &named),
+        escaped(&in_words(model))
+    )
 }
 
 /// With a capital and a full stop.

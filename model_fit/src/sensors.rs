@@ -9,7 +9,7 @@ use super::record::Measured;
 use super::select::Fitted;
 use super::structure::{Advice, Hardly, Seen, TWINS, cosine, seen};
 use crate::stats::mean_and_variance;
-use model::{Model, Program};
+use model::{Model, Part, Program};
 
 /// Variance over the square of the mean of a state that rests, up to rounding.
 const RESTS: f64 = 1e-20;
@@ -83,7 +83,7 @@ fn with_sensor(
     state: usize,
     confused: &[Vec<usize>],
 ) -> Option<Vec<Seen>> {
-    let measuring: Model = baseline.fitting.model.measuring(state)?;
+    let measuring: Model = baseline.fitting.model.measuring(Part::State(state))?;
     let records: Vec<Measured> = baseline.fitting.records.iter().map(with_one_more).collect();
     let taken = &baseline.suspects;
     let program = Program::new(&measuring, taken).ok()?;
@@ -113,8 +113,18 @@ fn least_noise(baseline: &Fitted<'_>, scale: &[f64]) -> f64 {
     scale.iter().enumerate().map(of).fold(1.0, f64::min)
 }
 
+/// A part of a fitted model at the rows of its records, SI; `None` where it cannot be computed.
+pub(super) fn said(fitted: &Fitted<'_>, part: Part) -> Option<Vec<f64>> {
+    let measuring = fitted.fitting.model.measuring(part)?;
+    let records: Vec<Measured> = fitted.fitting.records.iter().map(with_one_more).collect();
+    let program = Program::new(&measuring, &fitted.suspects).ok()?;
+    let fitting = Fitting::new(&measuring, program, &records, &fitted.suspects);
+    let said = fitting.residuals(&fitted.point.values_si).ok()?;
+    Some(said.into_iter().filter_map(|mut record| record.pop()).flat_map(|[_, said]| said).collect())
+}
+
 /// A record with a further output, measured at each row.
-pub(super) fn with_one_more(record: &Measured) -> Measured {
+fn with_one_more(record: &Measured) -> Measured {
     let mut record = record.clone();
     record.outputs.push(vec![Some(0.0); record.time_s.len()]);
     record

@@ -12,10 +12,9 @@
 //!
 //! Source: Brunton, Proctor, Kutz 2016, PNAS 113(15) (library of candidate terms).
 
-use super::super::fit::Fitting;
 use super::super::select::Fitted;
-use super::super::sensors::with_one_more;
-use model::{Model, Program, Target};
+use super::super::sensors::said;
+use model::{Model, Part, Target};
 use std::fmt::Write as _;
 
 /// Most terms of a search: names and numbers of a file are limited.
@@ -85,13 +84,7 @@ pub(super) fn variables(baseline: &Fitted<'_>) -> Vec<Variable> {
     });
     let states = model.states.iter().enumerate().filter(|(_, state)| state.suspect.is_none());
     let states = states.filter_map(|(index, state)| {
-        let measuring = model.measuring(index)?;
-        let records: Vec<_> = records.iter().map(with_one_more).collect();
-        let program = Program::new(&measuring, &baseline.suspects).ok()?;
-        let fitting = Fitting::new(&measuring, program, &records, &baseline.suspects);
-        let said = fitting.residuals(&baseline.point.values_si).ok()?;
-        let values = said.into_iter().filter_map(|mut record| record.pop()).flat_map(|[_, x]| x).collect();
-        variable((&state.name, &state.unit, true), values)
+        variable((&state.name, &state.unit, true), said(baseline, Part::State(index))?)
     });
     inputs.chain(states).collect()
 }

@@ -1,0 +1,216 @@
+//! Expressions as MathML Core, which browsers set without a script.
+//!
+//! Brackets stand where they are needed: fractions, roots and powers bring their own. `p_a` is p with the index a, and names of
+//! Greek letters are these letters.
+//!
+//! Source: W3C MathML Core, Candidate Recommendation.
+
+use crate::grammar::{Binary, Kind, Nodes, Place};
+
+/// How tightly a node holds: one in a place that asks for more stands in brackets.
+const OR: u8 = 10;
+const AND: u8 = 20;
+const COMPARISON: u8 = 30;
+const SUM: u8 = 40;
+const NEGATION: u8 = 45;
+const PRODUCT: u8 = 50;
+const FRACTION: u8 = 60;
+const POWER: u8 = 70;
+const ATOM: u8 = 90;
+
+const GREEK: [(&str, char); 24] = [
+    ("alpha", 'α'),
+    ("beta", 'β'),
+    ("gamma", 'γ'),
+    ("delta", 'δ'),
+    ("epsilon", 'ε'),
+    ("zeta", 'ζ'),
+    ("eta", 'η'),
+    ("theta", 'θ'),
+    ("iota", 'ι'),
+    ("kappa", 'κ'),
+    ("lambda", 'λ'),
+    ("mu", 'μ'),
+    ("nu", 'ν'),
+    ("xi", 'ξ'),
+    ("pi", 'π'),
+    ("rho", 'ρ'),
+    ("sigma", 'σ'),
+    ("tau", 'τ'),
+    ("upsilon", 'υ'),
+    ("phi", 'φ'),
+    ("chi", 'χ'),
+    ("psi", 'ψ'),
+    ("omega", 'ω'),
+    ("Delta", 'Δ'),
+];
+
+/// An expression, without the element `math` around it.
+#[must_use]
+pub fn expression(nodes: &Nodes, root: Place) -> String {
+    at_least(nodes, root, 0)
+}
+
+/// A name, with what stands behind its first `_` as index.
+#[must_use]
+pub fn name(name: &str) -> String {
+    let name = name.trim_start_matches('#');
+    let letter = |part: &str| match GREEK.iter().find(|(word, _)| *word == part) {
+        Some((_, letter)) => format!("<mi>{letter}</mi>"),
+        None => format!("<mi>{}</mi>", escaped(part)),
+    };
+    match name.split_once('_').filter(|(base, index)| !base.is_empty() && !index.is_empty()) {
+        Some((base, index)) => {
+            format!("<msub>{}<mtext>{}</mtext></msub>", letter(base), escaped(&index.replace('_', " ")))
+        }
+        None => letter(name),
+    }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+fn row(inner: &str) -> String {
+    format!("<mrow>{inner}</mrow>")
+}
+
+/// In brackets, which grow with what is tall alone.
+fn bracketed(inner: &str) -> String {
+    let is_tall = ["<mfrac", "<mtable", "<msqrt"].iter().any(|tall| inner.contains(tall));
+    let mo = if is_tall { "<mo>" } else { "<mo stretchy=\"false\">" };
+    format!("{mo}(</mo>{inner}{mo})</mo>")
+}
+
+fn at_least(nodes: &Nodes, place: Place, least: u8) -> String {
+    let (written, holds) = written(nodes, place);
+    if holds < least { row(&bracketed(&written)) } else { written }
+}
+
+/// A node and how tightly it holds.
+fn written(nodes: &Nodes, place: Place) -> (String, u8) {
+    match &nodes.get(place).kind {
+        Kind::Number(si, unit) => {
+            let value = unit.as_ref().map_or(*si, |unit| si / unit.factor);
+            // As many digits as somebody writes; a factor leaves rounding in the last ones.
+            let value: f64 = format!("{value:.9e}").parse().unwrap_or(value);
+            let number = format!("<mn>{value}</mn>");
+            match unit.as_ref().filter(|unit| unit.text != "1") {
+                Some(unit) => {
+                    let unit = format!("<mspace width=\"0.2em\"/><mtext>{}</mtext>", escaped(&unit.text));
+                    (row(&(number + &unit)), PRODUCT)
+                }
+                None => (number, ATOM),
+            }
+        }
+        Kind::Name(text) => (name(text), ATOM),
+        Kind::Negation(inner) => (row(&format!("<mo>−</mo>{}", at_least(nodes, *inner, PRODUCT))), NEGATION),
+        Kind::Binary(operator, left, right) => binary(nodes, *operator, [*left, *right]),
+        Kind::Call(function, arguments) => (call(nodes, function, arguments), ATOM),
+    }
+}
+
+fn binary(nodes: &Nodes, operator: Binary, [left, right]: [Place; 2]) -> (String, u8) {
+    let (sign, holds, [of_left, of_right]) = match operator {
+        Binary::Divide => {
+            let [over, under] = [left, right].map(|part| row(&at_least(nodes, part, 0)));
+            return (format!("<mfrac>{over}{under}</mfrac>"), FRACTION);
+        }
+        Binary::Power => {
+            let (base, exponent) = (at_least(nodes, left, ATOM), at_least(nodes, right, 0));
+            return (format!("<msup>{}{}</msup>", row(&base), row(&exponent)), POWER);
+        }
+        Binary::Or => ("∨", OR, [OR, AND]),
+        Binary::And => ("∧", AND, [AND, COMPARISON]),
+        Binary::Less => ("&lt;", COMPARISON, [SUM, SUM]),
+        Binary::LessOrEqual => ("≤", COMPARISON, [SUM, SUM]),
+        Binary::Equal => ("=", COMPARISON, [SUM, SUM]),
+        Binary::NotEqual => ("≠", COMPARISON, [SUM, SUM]),
+        Binary::Add => ("+", SUM, [SUM, PRODUCT]),
+        Binary::Subtract => ("−", SUM, [SUM, PRODUCT]),
+        Binary::Multiply => ("⋅", PRODUCT, [PRODUCT, FRACTION]),
+    };
+    let (left, right) = (at_least(nodes, left, of_left), at_least(nodes, right, of_right));
+    (row(&format!("{left}<mo>{sign}</mo>{right}")), holds)
+}
+
+fn call(nodes: &Nodes, function: &str, arguments: &[Place]) -> String {
+    let of = |place: &Place| at_least(nodes, *place, 0);
+    match (function, arguments) {
+        ("sqrt", [inner]) => format!("<msqrt>{}</msqrt>", of(inner)),
+        ("abs", [inner]) => {
+            row(&format!("<mo stretchy=\"false\">|</mo>{}<mo stretchy=\"false\">|</mo>", of(inner)))
+        }
+        ("exp", [inner]) => format!("<msup><mi>e</mi>{}</msup>", row(&of(inner))),
+        ("if", [condition, yes, no]) => {
+            let line =
+                |value: &Place, when: &str| format!("<mtr><mtd>{}</mtd><mtd>{when}</mtd></mtr>", of(value));
+            let condition = row(&format!("<mtext>if </mtext>{}", of(condition)));
+            let lines = line(yes, &condition) + &line(no, "<mtext>otherwise</mtext>");
+            row(&format!("<mo>{{</mo><mtable>{lines}</mtable>"))
+        }
+        _ => {
+            let inner: Vec<String> = arguments.iter().map(of).collect();
+            let inner = inner.join("<mo>,</mo>");
+            row(&(name(function) + &bracketed(&inner)))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(text: &str) -> String {
+        let mut nodes = Nodes::default();
+        let root = nodes.parse(text, 0).unwrap();
+        let set = expression(&nodes, root).replace(" stretchy=\"false\"", "");
+        set.replace("<mrow>", "").replace("</mrow>", "")
+    }
+
+    #[test]
+    fn brackets_stand_where_they_are_needed() {
+        let plain = |text: &str| {
+            let marked = ["mi", "mn", "mo"].iter().fold(set(text), |text, tag| {
+                text.replace(&format!("<{tag}>"), "").replace(&format!("</{tag}>"), "")
+            });
+            marked
+                .replace("<mfrac>", "[")
+                .replace("</mfrac>", "]")
+                .replace("<msup>", "^[")
+                .replace("</msup>", "]")
+        };
+        for (text, wanted) in [
+            ("a - (b - c)", "a−(b−c)"),
+            ("a - b - c", "a−b−c"),
+            ("(a - b)*c", "(a−b)⋅c"),
+            ("a*(b*c)", "a⋅(b⋅c)"),
+            ("-(a + b)", "−(a+b)"),
+            ("a + -b", "a+(−b)"),
+            ("-a^2", "−^[a2]"),
+            ("(-a)^2", "^[(−a)2]"),
+            ("(a + b)/(c - d)", "[a+bc−d]"),
+            ("(a/b)^2", "^[([ab])2]"),
+            ("a^b", "^[ab]"),
+        ] {
+            assert_eq!(plain(text), wanted, "{text}");
+        }
+    }
+
+    #[test]
+    fn names_numbers_and_functions_have_their_forms() {
+        assert_eq!(set("p_a"), "<msub><mi>p</mi><mtext>a</mtext></msub>");
+        assert_eq!(set("omega_in_x"), "<msub><mi>ω</mi><mtext>in x</mtext></msub>");
+        assert_eq!(set("sqrt(x)"), "<msqrt><mi>x</mi></msqrt>");
+        assert_eq!(set("abs(x)"), "<mo>|</mo><mi>x</mi><mo>|</mo>");
+        assert_eq!(set("exp(x)"), "<msup><mi>e</mi><mi>x</mi></msup>");
+        assert_eq!(set("tanh(x)"), "<mi>tanh</mi><mo>(</mo><mi>x</mi><mo>)</mo>");
+        assert_eq!(set("0.3[bar]"), "<mn>0.3</mn><mspace width=\"0.2em\"/><mtext>bar</mtext>");
+        let cases = set("if(x < 1, a, b)");
+        assert!(
+            cases.starts_with("<mo>{</mo><mtable><mtr><mtd><mi>a</mi></mtd><mtd><mtext>if </mtext>"),
+            "{cases}"
+        );
+        assert!(cases.contains("<mo>&lt;</mo>"), "{cases}");
+    }
+}
