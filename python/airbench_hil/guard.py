@@ -1,6 +1,7 @@
 """The guard of a rig's processes, a process of its own: when whoever asked for it is gone, however it went, nothing is left.
 
-Started as a file with the standard library alone: `python -I -S guard.py SOCKET PARENT FOLDER`. It reads lines of JSON:
+Started as a file with the standard library alone: `python -I -S guard.py SOCKET PARENT FOLDER`. It makes FOLDER, says
+{"ready": true}, or {"why"} and ends, and reads lines of JSON:
 
     {"do": "start", "name", "words", "env", "cwd", "out", "err"}    →  {"started": name, "pid"} or {"failed": name, "why"}
     {"do": "signal", "name", "signal"}                              →  nothing
@@ -174,6 +175,12 @@ def main() -> None:
     signal.signal(signal.SIGCHLD, lambda *_: None)
     signal.signal(signal.SIGTERM, lambda *_: ended.append(1))
     guard = Guard(socket.socket(fileno=descriptor), folder)
+    try:
+        os.mkdir(folder, 0o700)
+    except OSError as error:
+        guard.say({"why": error.strerror})
+        return
+    guard.say({"ready": True})
     poll = select.poll()
     poll.register(descriptor, select.POLLIN)
     poll.register(wake_read, select.POLLIN)

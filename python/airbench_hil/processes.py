@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
 import select
 import socket
 import subprocess
@@ -24,10 +25,11 @@ class Processes:
     """Programs by name, their exit codes, and what they said."""
 
     def __init__(self, private: Path, output: Path) -> None:
-        """Starts the guard.
+        """Starts the guard, and waits until it has made the folder.
 
-        :param private: a folder that is removed when all is over, however it ended: bus, telemetry, locks.
+        :param private: a folder that the guard makes, and removes when all is over, however it ended: bus, telemetry, locks.
         :param output: where NAME.txt and NAME.err of each program are written.
+        :raises AirbenchError: the folder cannot be made.
         """
         self.output = output
         ours, theirs = socket.socketpair()
@@ -43,6 +45,12 @@ class Processes:
         #: Exit codes of those that have ended; negative: the signal.
         self.ended: dict[str, int] = {}
         self.pids: dict[str, int] = {}
+        event = self._event(30.0)
+        if event is None or "ready" not in event:
+            why = event.get("why") if event else "the guard of the rig's processes does not answer"
+            self._guard.kill()
+            self._guard.wait()
+            raise AirbenchError(f"{private}: {why}")
 
     def start(self, name: str, words: list[str], env: dict[str, str] | None = None, cwd: Path | None = None) -> None:
         """Starts a program.
@@ -140,7 +148,10 @@ class Processes:
 
 
 def private_folder() -> Path:
-    """A folder for sockets, whose paths have 107 bytes at most: where a long one is set for temporary files, /tmp."""
+    """Where a folder for sockets will be, whose paths have 107 bytes at most: where a long one is set for temporary files, /tmp.
+
+    The guard makes it: who is killed before there is one leaves nothing behind.
+    """
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     places = [runtime if os.path.isabs(runtime) and os.access(runtime, os.W_OK) else tempfile.gettempdir(), "/tmp"]
-    return Path(tempfile.mkdtemp(prefix="airbench-rig-", dir=next((each for each in places if len(each) <= _LONGEST), "/tmp")))
+    return Path(next((each for each in places if len(each) <= _LONGEST), "/tmp"), f"airbench-rig-{secrets.token_hex(4)}")

@@ -130,13 +130,13 @@ def test_a_guard_that_is_killed_takes_its_programs_along(tmp_path):
 
 def test_a_guard_whose_kernel_has_no_pidfd_open_is_told_by_its_socket(tmp_path):
     ours, theirs = socket.socketpair()
-    (tmp_path / "private").mkdir()
     code = f"import os, runpy; del os.pidfd_open; runpy.run_path({str(programs.PACKAGE / 'guard.py')!r}, run_name='__main__')"
     words = [sys.executable, "-I", "-S", "-c", code, str(theirs.fileno()), str(os.getpid()), str(tmp_path / "private")]
     guard = subprocess.Popen(words, pass_fds=[theirs.fileno()])
     theirs.close()
     files = {"out": "/dev/null", "err": "/dev/null"}
     asked = {"do": "start", "name": "one", "words": ["sleep", "1000"], "env": None, "cwd": None, **files}
+    assert json.loads(ours.recv(1000)) == {"ready": True} and (tmp_path / "private").is_dir()
     ours.sendall(json.dumps(asked).encode() + b"\n")
     pid = json.loads(ours.recv(1000))["pid"]
     ours.close()
