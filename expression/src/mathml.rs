@@ -8,6 +8,8 @@
 use crate::grammar::{Binary, Kind, Nodes, Place};
 
 /// How tightly a node holds: one in a place that asks for more stands in brackets.
+/// Cases end with their last line, so that whatever stands behind would read as a part of it.
+const CASES: u8 = 5;
 const OR: u8 = 10;
 const AND: u8 = 20;
 const COMPARISON: u8 = 30;
@@ -106,7 +108,7 @@ fn written(nodes: &Nodes, place: Place) -> (String, u8) {
         Kind::Name(text) => (name(text), ATOM),
         Kind::Negation(inner) => (row(&format!("<mo>−</mo>{}", at_least(nodes, *inner, PRODUCT))), NEGATION),
         Kind::Binary(operator, left, right) => binary(nodes, *operator, [*left, *right]),
-        Kind::Call(function, arguments) => (call(nodes, function, arguments), ATOM),
+        Kind::Call(function, arguments) => call(nodes, function, arguments),
     }
 }
 
@@ -134,25 +136,26 @@ fn binary(nodes: &Nodes, operator: Binary, [left, right]: [Place; 2]) -> (String
     (row(&format!("{left}<mo>{sign}</mo>{right}")), holds)
 }
 
-fn call(nodes: &Nodes, function: &str, arguments: &[Place]) -> String {
+fn call(nodes: &Nodes, function: &str, arguments: &[Place]) -> (String, u8) {
     let of = |place: &Place| at_least(nodes, *place, 0);
     match (function, arguments) {
-        ("sqrt", [inner]) => format!("<msqrt>{}</msqrt>", of(inner)),
+        ("sqrt", [inner]) => (format!("<msqrt>{}</msqrt>", of(inner)), ATOM),
         ("abs", [inner]) => {
-            row(&format!("<mo stretchy=\"false\">|</mo>{}<mo stretchy=\"false\">|</mo>", of(inner)))
+            (row(&format!("<mo stretchy=\"false\">|</mo>{}<mo stretchy=\"false\">|</mo>", of(inner))), ATOM)
         }
-        ("exp", [inner]) => format!("<msup><mi>e</mi>{}</msup>", row(&of(inner))),
+        ("exp", [inner]) => (format!("<msup><mi>e</mi>{}</msup>", row(&of(inner))), POWER),
         ("if", [condition, yes, no]) => {
             let line =
                 |value: &Place, when: &str| format!("<mtr><mtd>{}</mtd><mtd>{when}</mtd></mtr>", of(value));
             let condition = row(&format!("<mtext>if </mtext>{}", of(condition)));
             let lines = line(yes, &condition) + &line(no, "<mtext>otherwise</mtext>");
-            row(&format!("<mo>{{</mo><mtable>{lines}</mtable>"))
+            (row(&format!("<mo>{{</mo><mtable>{lines}</mtable>")), CASES)
         }
         _ => {
-            let inner: Vec<String> = arguments.iter().map(of).collect();
+            let least = if arguments.len() > 1 { OR } else { 0 };
+            let inner: Vec<String> = arguments.iter().map(|one| at_least(nodes, *one, least)).collect();
             let inner = inner.join("<mo>,</mo>");
-            row(&(name(function) + &bracketed(&inner)))
+            (row(&(name(function) + &bracketed(&inner))), ATOM)
         }
     }
 }
@@ -192,6 +195,8 @@ mod tests {
             ("(a + b)/(c - d)", "[a+bc−d]"),
             ("(a/b)^2", "^[([ab])2]"),
             ("a^b", "^[ab]"),
+            ("exp(a)^2", "^[(^[ea])2]"),
+            ("2*exp(a)", "2⋅^[ea]"),
         ] {
             assert_eq!(plain(text), wanted, "{text}");
         }
@@ -212,5 +217,12 @@ mod tests {
             "{cases}"
         );
         assert!(cases.contains("<mo>&lt;</mo>"), "{cases}");
+        // Without brackets its last line goes on with what stands behind.
+        for text in
+            ["if(x < 1, a, b)*c", "if(x < 1, a, b) + c", "max(if(x < 1, a, b), c)", "if(x < 1, a, b)^2"]
+        {
+            let bracketed = format!("<mo>(</mo>{cases}<mo>)</mo>");
+            assert!(set(text).contains(&bracketed), "{text}: {}", set(text));
+        }
     }
 }
