@@ -5,7 +5,7 @@ use super::record::Measured;
 use super::report::{friction, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
 use super::{ModelError, read, select};
-use model::{Model, Parameter, Program, Rows, Smoothing, Solver, Start};
+use model::{Hold, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -37,34 +37,23 @@ pub(crate) fn in_words(model: &Model) -> String {
     let input = |input: &model::Input| {
         let from = match input.rate_of {
             Some(of) => format!("the rate of {}", model.inputs[of].name),
-            None => format!("from column {}", input.column),
+            None => format!("from {}", column(&input.column, input.scale)),
         };
-        format!("{} [{}] {from}{}", input.name, input.unit.text, smoothed(input.smoothing))
+        let hold = match input.hold {
+            Hold::Zero => "kept between samples",
+            Hold::Linear => "straight between samples",
+        };
+        let smoothed = smoothed(input.smoothing);
+        format!("{} [{}] {from}{smoothed}, {hold}", input.name, input.unit.text)
     };
+    section("record", record(&model.record));
     section("inputs", model.inputs.iter().map(input).collect());
     let own = |suspect: Option<usize>| suspect.is_none();
-    let equation = |state: &model::State| {
-        let unit = &state.unit;
-        let start = match state.start {
-            Start::Known { value_si } => format!("starts at {}", significant(value_si / unit.factor)),
-            Start::Fitted { .. } => "its start is fitted in each record".into(),
-            Start::Record { output } => {
-                format!("starts at the first sample of {}", model.outputs[output].name)
-            }
-            Start::Input { input } => format!("starts at the first sample of {}", model.inputs[input].name),
-        };
-        format!("d{}/dt = {}    {} in {}, {start}", state.name, state.derivative.text, state.name, unit.text)
-    };
-    section("equations", model.states.iter().filter(|one| own(one.suspect)).map(equation).collect());
-    let definitions = model.definitions.iter().enumerate().filter(|(_, one)| own(one.suspect));
-    let definition = |(index, one): (usize, &model::Definition)| {
-        format!("{} = {}    in {}", one.name, one.value.text, model.definition_unit(index).text)
-    };
-    section("with", definitions.map(definition).collect());
-    let memory = |one: &model::Memory| {
-        let start = one.start.as_ref().map_or(String::new(), |start| format!(", from {}", start.text));
-        format!("{} becomes {} after each step{start}", one.name, one.update.text)
-    };
+    section(
+        "equations",
+        model.states.iter().filter(|one| own(one.suspect)).map(|one| equation(model, one)).collect(),
+    );
+    section("with", definitions(model, None).collect());
     section("memory", model.memories.iter().filter(|one| own(one.suspect)).map(memory).collect());
     let frictions = model.frictions.iter().filter(|one| own(one.suspect));
     section("friction", frictions.map(|one| friction(model, one)).collect());
@@ -72,7 +61,18 @@ pub(crate) fn in_words(model: &Model) -> String {
         let noise = output.noise_si.map_or("noise estimated".into(), |noise| {
             format!("noise {} {}", significant(noise / output.unit.factor), output.unit.text)
         });
-        format!("{} [{}] = {}    {noise}", output.name, output.unit.text, output.value.text)
+        let error = match output.model_error_si {
+            0.0 => String::new(),
+            error => {
+                format!(
+                    ", error of the model {} {}",
+                    significant(error / output.unit.factor),
+                    output.unit.text
+                )
+            }
+        };
+        let column = column(&output.column, output.scale);
+        format!("{} [{}] = {}    {noise}{error}, {column}", output.name, output.unit.text, output.value.text)
     };
     section("outputs", model.outputs.iter().map(output).collect());
     section("parameters", model.parameters.iter().filter(|one| own(one.suspect)).map(parameter).collect());
@@ -85,10 +85,18 @@ pub(crate) fn in_words(model: &Model) -> String {
             twins => format!("; does the same as {}", twins.join(", ")),
         };
         let head = format!("{}{decoy}, {}: {}{twins}", suspect.name, place(model, index), term(model, index));
-        let frictions = model.frictions.iter().filter(move |one| one.suspect == Some(index));
-        let frictions = frictions.map(|one| format!("  {}", friction(model, one)));
-        let own = model.parameters.iter().filter(move |one| one.suspect == Some(index));
-        std::iter::once(head).chain(frictions).chain(own.map(|one| format!("  {}", parameter(one))))
+        let is_own = move |owner: Option<usize>| owner == Some(index);
+        let states = model.states.iter().filter(move |one| is_own(one.suspect));
+        let memories = model.memories.iter().filter(move |one| is_own(one.suspect));
+        let frictions = model.frictions.iter().filter(move |one| is_own(one.suspect));
+        let parameters = model.parameters.iter().filter(move |one| is_own(one.suspect));
+        let brought = states
+            .map(|one| equation(model, one))
+            .chain(definitions(model, Some(index)))
+            .chain(memories.map(memory))
+            .chain(frictions.map(|one| friction(model, one)))
+            .chain(parameters.map(parameter));
+        std::iter::once(head).chain(brought.map(|line| format!("  {line}")))
     };
     for (name, is_term) in [("terms", true), ("suspects", false)] {
         let all = (0..model.suspects.len()).filter(|index| model.suspects[*index].is_term == is_term);
@@ -103,6 +111,60 @@ pub(crate) fn in_words(model: &Model) -> String {
     let operations = Program::new(model, &[]).map_or(0, |program| program.operations());
     let _ = write!(text, "\nintegrated: {solver}; {operations} operations for all rates\n");
     text
+}
+
+/// How a record is laid out; cells as they are read from a text table.
+fn record(layout: &RecordLayout) -> Vec<String> {
+    let unit = match layout.time_unit_s {
+        _ if layout.is_calendar => "times of a calendar (ISO 8601)".to_owned(),
+        1.0 => "in s".to_owned(),
+        unit_s => format!("in units of {unit_s} s"),
+    };
+    let mut lines = vec![format!("time from column {}, {unit}", layout.time_column)];
+    lines.extend(layout.period_s.map(|period_s| format!("on an even grid of {period_s} s")));
+    let (separator, comment) = (&layout.separator, &layout.comment);
+    let decimal = if layout.is_decimal_comma { "comma" } else { "point" };
+    lines.push(format!("separator {separator:?}, decimal {decimal}, comments begin with {comment:?}"));
+    if layout.skip_lines > 0 {
+        lines.push(format!("lines before the head: {}", layout.skip_lines));
+    }
+    if !layout.absent.is_empty() {
+        let absent = layout.absent.iter().map(|cell| format!("{cell:?}")).collect::<Vec<_>>();
+        lines.push(format!("no value: {}", absent.join(", ")));
+    }
+    lines
+}
+
+fn column(name: &str, scale: f64) -> String {
+    if scale == 1.0 { format!("column {name}") } else { format!("column {name} times {scale}") }
+}
+
+fn equation(model: &Model, state: &model::State) -> String {
+    let unit = &state.unit;
+    let start = match state.start {
+        Start::Known { value_si } => format!("starts at {}", significant(value_si / unit.factor)),
+        Start::Fitted { .. } => "its start is fitted in each record".into(),
+        Start::Record { output } => format!("starts at the first sample of {}", model.outputs[output].name),
+        Start::Input { input } => format!("starts at the first sample of {}", model.inputs[input].name),
+    };
+    format!("d{}/dt = {}    {} in {}, {start}", state.name, state.derivative.text, state.name, unit.text)
+}
+
+/// Definitions of the model itself, or of a suspect.
+fn definitions(model: &Model, suspect: Option<usize>) -> impl Iterator<Item = String> {
+    let own = model.definitions.iter().enumerate().filter(move |(_, one)| one.suspect == suspect);
+    own.map(|(index, one)| {
+        format!("{} = {}    in {}", one.name, one.value.text, model.definition_unit(index).text)
+    })
+}
+
+fn memory(memory: &model::Memory) -> String {
+    let start = match &memory.start {
+        Some(start) => start.text.clone(),
+        None => significant(memory.start_si / memory.unit.factor),
+    };
+    let (name, unit) = (&memory.name, &memory.unit.text);
+    format!("{name} becomes {} after each step, from {start}    in {unit}", memory.update.text)
 }
 
 fn smoothed(smoothing: Smoothing) -> String {

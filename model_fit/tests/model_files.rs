@@ -257,3 +257,61 @@ fn a_model_is_explained_with_its_equations_and_units() {
         assert!(text.contains(line), "{line}\n{text}");
     }
 }
+
+/// How records are read, and all that a suspect brings.
+#[test]
+fn a_model_is_explained_with_its_record_and_what_suspects_bring() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("oscillator.toml");
+    let record = r#"
+[record]
+time = "t_ms"
+unit = "ms"
+period_s = 0.02
+separator = ";"
+decimal = ","
+skip_lines = 2
+absent = ["-", "nan"]
+[inputs.force]
+hold = "linear"
+scale = 0.5"#;
+    let inputs = r#"
+[inputs.table]
+[inputs.jolt]
+rate_of = "force"
+unit = "N/s"
+[parameters]"#;
+    let bringing = r#"
+[[suspects]]
+name = "creep"
+place = "v"
+add = "-k*(side + bent)/mass"
+define.bent = "x - crept"
+parameters.k = { unit = "N/m", value = 3 }
+states.crept = { unit = "mm", start = 4, derivative = "(x - crept)/2[s]" }
+memory.side = { unit = "mm", start = 5, update = "min(max(side, x - 1[mm]), x + 1[mm])" }
+"#;
+    let text = OSCILLATOR
+        .replacen("\n[inputs.force]", record, 1)
+        .replacen("\n[parameters]", inputs, 1)
+        .replacen("column = \"x_mm\"", "column = \"x_cm\"\nscale = 10\nmodel_error = 0.25", 1);
+    fs::write(&path, text + bringing).unwrap();
+    let text = explain(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+    for lines in [
+        "record\n  time from column t_ms, in units of 0.001 s\n  on an even grid of 0.02 s\n",
+        "  separator \";\", decimal comma, comments begin with \"#\"\n  lines before the head: 2\n",
+        "  no value: \"-\", \"nan\"\n",
+        "  force [N] from column force_N times 0.5, straight between samples\n",
+        "  table [1] from column table, kept between samples\n",
+        "  jolt [N/s] the rate of force, kept between samples\n",
+        "  position [mm] = x    noise estimated, error of the model 0.250 mm, column x_cm times 10\n",
+        "  creep, equation of v: dv/dt = … + (-k*(side + bent)/mass)\n    \
+         dcrept/dt = (x - crept)/2[s]    crept in mm, starts at 4.00\n    \
+         bent = x - crept    in m\n    \
+         side becomes min(max(side, x - 1[mm]), x + 1[mm]) after each step, from 5.00    in mm\n    \
+         k = 3.00 N/m, fitted\n",
+    ] {
+        assert!(text.contains(lines), "{lines}\n{text}");
+    }
+    assert_eq!(text.matches("crept/dt").count(), 1, "a suspect's state is none of the model:\n{text}");
+}
