@@ -53,6 +53,8 @@ pub struct Program {
     names: Names,
     /// Of each friction the place of its speed among the states, and the register of its direction.
     held: Vec<(usize, Register)>,
+    /// Of each state whether derivatives take it as given.
+    is_given: Vec<bool>,
 }
 
 /// What messages call the parts, with the places of their equations.
@@ -91,7 +93,17 @@ impl Program {
         });
         let held = held.collect();
         let holds = model.inputs.iter().map(|input| input.hold).collect();
-        Ok(Self { tapes, solver: model.solver, holds, names, held })
+        let is_given = vec![false; tapes.states.len()];
+        Ok(Self { tapes, solver: model.solver, holds, names, held, is_given })
+    }
+
+    /// The same where derivatives take the states of the model itself as given, and follow those of suspects alone: of a term
+    /// they are then those of its law, not of what the law does to the states that it reads.
+    #[must_use]
+    pub fn along_states(mut self, model: &Model) -> Self {
+        self.is_given =
+            self.tapes.states.iter().map(|state| model.states[*state].suspect.is_none()).collect();
+        self
     }
 
     /// Operations of one evaluation of all rates.
@@ -333,6 +345,10 @@ fn put(
     for (place, state) in program.tapes.states.iter().enumerate() {
         let register = leaves.state(*state);
         registers.set(register, x[place * width]);
-        registers.slope_mut(register).copy_from_slice(&x[place * width + 1..(place + 1) * width]);
+        let slope = registers.slope_mut(register);
+        match program.is_given[place] {
+            true => slope.fill(0.0),
+            false => slope.copy_from_slice(&x[place * width + 1..(place + 1) * width]),
+        }
     }
 }

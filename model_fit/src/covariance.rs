@@ -17,10 +17,72 @@
 //!
 //! Sources: Künsch 1989, Annals of Statistics 17(3) (blocks); Bell, McCaffrey 2002, Survey Methodology 28(2) (few blocks).
 
-use nalgebra::DVector;
+use super::bounds;
+use super::fit::What;
+use super::normal::{correlations, standard_errors};
+use super::select::Fitted;
+use nalgebra::{DMatrix, DVector};
+
+/// Error of a number, SI: by the records, and by a law that is only near.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NumberError {
+    of_records: f64,
+    of_law: f64,
+}
+
+impl NumberError {
+    pub(super) fn whole(self) -> f64 {
+        self.of_records.hypot(self.of_law)
+    }
+}
+
+/// Errors of the numbers of a fit: the larger of what a coloured residual is worth and of the jackknife over blocks of time, and
+/// beside it, where a law was named, what one that is only near leaves to them. `None` for one that the records do not determine.
+pub(super) fn errors(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) -> Vec<Option<NumberError>> {
+    let fitting = &fitted.fitting;
+    let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();
+    let inflation = (counts / fitted.effective.iter().sum::<f64>().max(1.0)).max(1.0).sqrt();
+    let errors = standard_errors(&fitted.normal);
+    let of_blocks = of_blocks(&fitted.steps);
+    let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors.into_iter().zip(of_blocks));
+    all.map(|((unknown, value), (error, of_blocks))| {
+        let of_law = if has_law { of_law(*value, before(baseline, unknown.what)) } else { 0.0 };
+        error.map(|error| NumberError { of_records: (error * inflation).max(of_blocks), of_law })
+    })
+    .collect()
+}
+
+/// What a number is in another fit.
+pub(super) fn before(baseline: &Fitted<'_>, what: What) -> Option<f64> {
+    let place = baseline.fitting.unknowns.iter().position(|other| other.what == what);
+    place.map(|place| baseline.point.values_si[place])
+}
+
+/// Covariance of numbers at these places, SI; one at the end of its range does not vary. The errors by the records are
+/// correlated as the normal equations have them, those of the law are not. `None` where the records do not determine one.
+pub(super) fn of_numbers(
+    fitted: &Fitted<'_>,
+    errors: &[Option<NumberError>],
+    places: &[usize],
+) -> Option<DMatrix<f64>> {
+    let correlations = correlations(&fitted.normal);
+    let of_place = |place: &usize| {
+        let range_si = fitted.fitting.unknowns[*place].range_si;
+        match bounds::is_at_bound(fitted.point.values_si[*place], range_si) {
+            true => Some(NumberError { of_records: 0.0, of_law: 0.0 }),
+            false => errors[*place],
+        }
+    };
+    let errors: Vec<NumberError> = places.iter().map(of_place).collect::<Option<_>>()?;
+    let of_law = |row: usize, column: usize| if row == column { errors[row].of_law.powi(2) } else { 0.0 };
+    Some(DMatrix::from_fn(places.len(), places.len(), |row, column| {
+        let of_records = errors[row].of_records * errors[column].of_records;
+        correlations[(places[row], places[column])] * of_records + of_law(row, column)
+    }))
+}
 
 /// Standard errors from what the fit moves by without each block; zero for a number that none moves.
-pub(super) fn of_blocks(steps: &[DVector<f64>]) -> Vec<f64> {
+fn of_blocks(steps: &[DVector<f64>]) -> Vec<f64> {
     let count = steps.len() as f64;
     let of_number = |place: usize| {
         let mean = steps.iter().map(|step| step[place]).sum::<f64>() / count;
@@ -35,7 +97,7 @@ pub(super) fn of_blocks(steps: &[DVector<f64>]) -> Vec<f64> {
 const LAW: f64 = 0.1;
 
 /// Error of a number beside a law that is only near; `baseline` is its value without the law, `None` for a number of the law.
-pub(super) fn of_law(value: f64, baseline: Option<f64>) -> f64 {
+fn of_law(value: f64, baseline: Option<f64>) -> f64 {
     LAW * (value - baseline.unwrap_or(0.0)).abs()
 }
 

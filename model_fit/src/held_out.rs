@@ -3,7 +3,7 @@
 
 use super::fit::{Fitting, OPTIONS, OfRecord};
 use super::record::Measured;
-use super::select::{Fitted, Found, fitted};
+use super::select::{Fitted, Found, Rival};
 use super::starts;
 use model::Failure;
 
@@ -82,33 +82,26 @@ pub(crate) struct Alternative {
     pub(crate) judged: Vec<Judged>,
 }
 
-/// The extended model with each alternative in place of what was named, on the same records.
+/// What the extended model with each alternative that is as good leaves of the same records.
 pub(crate) fn alternatives(
-    found: &Found<'_>,
+    rivals: &[Rival<'_>],
     records: &[Measured],
     judged: &[Judged],
 ) -> Result<Vec<Alternative>, JudgeError> {
-    let mut all = Vec::new();
-    for taken in &found.taken {
-        let instead_of = taken.evaluation.suspect;
-        for suspect in &taken.alternatives {
-            let others =
-                found.extended.suspects.iter().filter(|other| **other != instead_of && *other != suspect);
-            let suspects: Vec<usize> = others.chain([suspect]).copied().collect();
-            let of_training = &found.extended.fitting;
-            let fit = fitted(of_training.model, of_training.records, &suspects, Some(&found.extended));
-            let fit = fit.map_err(|why| JudgeError::Failure { record: "training".into(), why })?;
-            let of_record = |one: &Judged| {
-                let record = std::slice::from_ref(&records[one.record]);
-                let (left, first_row) = residuals(&fit, record)?;
-                let rms_si = [one.rms_si[0], rms_of(&left[one.output][0], first_row)];
-                Ok(Judged { rms_si, ..one.clone() })
-            };
-            let judged = judged.iter().map(of_record).collect::<Result<_, JudgeError>>()?;
-            all.push(Alternative { suspect: *suspect, instead_of, judged });
-        }
-    }
-    Ok(all)
+    let of_rival = |rival: &Rival<'_>| {
+        let Rival { suspect, instead_of, .. } = *rival;
+        let failed = |why: &Failure| JudgeError::Failure { record: "training".into(), why: why.clone() };
+        let fit = rival.fit.as_ref().map_err(failed)?;
+        let of_record = |one: &Judged| {
+            let record = std::slice::from_ref(&records[one.record]);
+            let (left, first_row) = residuals(fit, record)?;
+            let rms_si = [one.rms_si[0], rms_of(&left[one.output][0], first_row)];
+            Ok(Judged { rms_si, ..one.clone() })
+        };
+        let judged = judged.iter().map(of_record).collect::<Result<_, JudgeError>>()?;
+        Ok(Alternative { suspect, instead_of, judged })
+    };
+    rivals.iter().filter(|rival| !rival.is_near).map(of_rival).collect()
 }
 
 /// Of what is left from a row on.

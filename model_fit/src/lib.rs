@@ -218,7 +218,8 @@ pub fn close_with(
         }
     };
     report.located = located;
-    let held_out = judged(&model, &found, tests, progress);
+    let rivals = found.rivals();
+    let held_out = judged(&model, (&found, &rivals), tests, progress);
     let (traces, not_judged): (Vec<Traces>, _) = match held_out {
         Ok(None) => (held_out::trained(&found)?, None),
         Ok(Some((judged, alternatives, traces, notes))) => {
@@ -232,7 +233,7 @@ pub fn close_with(
     };
     report.equations = report::equations(&model);
     report.rate(adequacy::residuals(&found.extended)?);
-    let curves = term_curves::curves(&found.extended);
+    let curves = term_curves::curves(&found, &rivals);
     let page = page::page(&model, &report, (&traces, &curves), not_judged.as_deref());
     let folder = file.parent().unwrap_or(Path::new(""));
     let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
@@ -288,7 +289,7 @@ type Judgement = (Vec<held_out::Judged>, Vec<held_out::Alternative>, Vec<Traces>
 /// Both models on the held-out records; `None` where there is none.
 fn judged(
     model: &Model,
-    found: &select::Found<'_>,
+    (found, rivals): (&select::Found<'_>, &[select::Rival<'_>]),
     tests: &[PathBuf],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Option<Judgement>, String> {
@@ -302,7 +303,8 @@ fn judged(
     }
     look::beside_model(model, &mut records);
     let (judged, traces) = held_out::judge(found, &records).map_err(|error| error.to_string())?;
-    let alternatives = held_out::alternatives(found, &records, &judged).map_err(|error| error.to_string())?;
+    let alternatives =
+        held_out::alternatives(rivals, &records, &judged).map_err(|error| error.to_string())?;
     Ok(Some((judged, alternatives, traces, report::notes_of(&records))))
 }
 

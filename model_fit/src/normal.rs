@@ -81,3 +81,40 @@ pub(crate) fn standard_errors(normal: &Normal) -> Vec<Option<f64>> {
     }
     errors
 }
+
+/// Correlations of what errors of the measured samples do to the numbers, in the directions that the records determine; 0 beside
+/// a number that none determines.
+pub(crate) fn correlations(normal: &Normal) -> DMatrix<f64> {
+    let count = normal.slope.len();
+    let places: Vec<usize> = (0..count).filter(|place| normal.matrix[(*place, *place)] > 0.0).collect();
+    let (vectors, values, _) = eigen(normal, &places);
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    let mut inverse = DMatrix::zeros(places.len(), places.len());
+    for (column, value) in values.iter().enumerate().filter(|(_, value)| **value > DETERMINED * largest) {
+        let direction = vectors.column(column);
+        inverse += direction * direction.transpose() / *value;
+    }
+    let mut correlations = DMatrix::identity(count, count);
+    for (row, place) in places.iter().enumerate() {
+        for (column, other) in places.iter().enumerate().filter(|(column, _)| *column != row) {
+            let scale = (inverse[(row, row)] * inverse[(column, column)]).sqrt();
+            correlations[(*place, *other)] = if scale > 0.0 { inverse[(row, column)] / scale } else { 0.0 };
+        }
+    }
+    correlations
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn correlations_are_those_of_the_inverse() {
+        // The inverse of [[4, 2], [2, 9]] is [[9, -2], [-2, 4]]/32: -2/sqrt(36).
+        let matrix = DMatrix::from_row_slice(3, 3, &[4.0, 2.0, 0.0, 2.0, 9.0, 0.0, 0.0, 0.0, 0.0]);
+        let found = correlations(&Normal { matrix, slope: DVector::zeros(3), squares: 1.0 });
+        let expected =
+            DMatrix::from_row_slice(3, 3, &[1.0, -1.0 / 3.0, 0.0, -1.0 / 3.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        assert!((&found - expected).amax() < 1e-12, "{found}");
+    }
+}

@@ -5,7 +5,7 @@ use super::explain::in_words;
 use super::held_out::Traces;
 use super::judge::share_in_words;
 use super::report::{Judgement, Left, ModelReport, Number, significant};
-use super::term_curves::TermCurve;
+use super::term_curves::{Bin, TermCurve};
 use super::typeset;
 use model::Model;
 use pagekit::markup::{Cell, charts, number, paragraph, section, table, words};
@@ -111,26 +111,48 @@ fn pictures(model: &Model, report: &ModelReport, traces: &[Traces]) -> String {
 /// Each term over its variable.
 fn term_curves(curves: &[TermCurve]) -> String {
     let drawn = curves.iter().enumerate().filter_map(|(place, curve)| {
-        let column = |at: usize| curve.bins.iter().map(|bin| bin[at]).collect::<Vec<f64>>();
-        let [x, low, mean, high] = [0, 1, 2, 3].map(column);
-        let bounds = range(low.iter().chain(&high).copied())?;
+        let column = |value: &dyn Fn(&Bin) -> f64| curve.bins.iter().map(value).collect::<Vec<f64>>();
+        let [x, least, mean, most] = [
+            column(&|bin| bin.x),
+            column(&|bin| bin.least),
+            column(&|bin| bin.mean),
+            column(&|bin| bin.most),
+        ];
+        let side = |sign: f64| {
+            let error = |bin: &Bin| Some(bin.mean + sign * 2.0 * bin.error?);
+            curve.bins.iter().map(error).collect::<Option<Vec<f64>>>()
+        };
+        let band = side(-1.0).zip(side(1.0));
+        let of_band = band.iter().flat_map(|(low, high)| low.iter().chain(high));
+        let bounds = range(least.iter().chain(&most).chain(of_band).copied())?;
         let (x_label, y_label) =
             (labelled(&curve.variable, &curve.variable_unit), labelled(&curve.suspect, &curve.unit));
         let mut plot = Plot::new((x[0], x[x.len() - 1]), bounds, &x_label, &y_label);
-        plot.band(&x, &low, &high);
+        let mut legend =
+            vec![(Sample::Line("line s0"), "mean"), (Sample::Line("line r0"), "smallest, largest")];
+        if let Some((low, high)) = &band {
+            plot.band(&x, low, high);
+            legend.insert(1, (Sample::Area("area"), "± 2 standard errors of its numbers"));
+        }
+        for edge in [&least, &most] {
+            plot.line("line r0", x.iter().copied().zip(edge.iter().copied()));
+        }
         plot.line("line s0", x.iter().copied().zip(mean));
-        let caption = format!("{} at {}, over {}", curve.suspect, curve.place, curve.variable);
+        let instead =
+            curve.instead_of.as_ref().map_or(String::new(), |named| format!(" in place of {named}"));
+        let caption = format!("{}{instead} at {}, over {}", curve.suspect, curve.place, curve.variable);
+        let without =
+            if band.is_some() { "" } else { " The records do not determine its numbers: it has no band." };
         let about = format!(
-            "Along the training records as the extended model has them; {} is what most of it depends on \
-             ({:.0} % of its variance).",
+            "Along the training records as the model with it has them; {} is what most of it depends on \
+             ({:.0} % of its variance).{without}",
             curve.variable,
             curve.share * 100.0
         );
-        let legend = [(Sample::Line("line s0"), "mean"), (Sample::Area("area"), "smallest to largest")];
         let drawing = plot.drawn(
             &format!("term-{place}"),
             &caption,
-            "The term over its variable, with the spread of its values.",
+            "The term over its variable, with its standard errors and the spread of its values.",
         );
         Some(figure(&caption, &about, &legend, &drawing))
     });

@@ -8,7 +8,6 @@ use super::fit::Fitting;
 use super::held_out::{Alternative, Judged, Traces};
 use super::judge::{Evaluation, is_one_effect};
 use super::look;
-use super::normal::standard_errors;
 use super::record::Measured;
 use super::select::{Fitted, Found, Taken};
 use super::structure::Structure;
@@ -393,30 +392,21 @@ pub(crate) fn term(model: &Model, suspect: usize) -> String {
     }
 }
 
-/// Numbers of a fit; their errors are the larger of what a coloured residual is worth and of the jackknife over blocks of time,
-/// and beside it, where a law was named, what one that is only near leaves to them. A formula that was searched for claims none.
+/// Numbers of a fit, with their errors.
 pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) -> Vec<Number> {
     let fitting = &fitted.fitting;
-    let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();
-    let inflation = (counts / fitted.effective.iter().sum::<f64>().max(1.0)).max(1.0).sqrt();
-    let errors = standard_errors(&fitted.normal);
-    let of_blocks = covariance::of_blocks(&fitted.steps);
-    let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors.into_iter().zip(&of_blocks));
-    all.map(|((unknown, value), (error, of_blocks))| {
+    let errors = covariance::errors(fitted, baseline, has_law);
+    let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors);
+    all.map(|((unknown, value), error)| {
         let unit = fitting.unit_of(unknown);
         let is_at_bound = bounds::is_at_bound(*value, unknown.range_si);
-        let before = baseline.fitting.unknowns.iter().position(|other| other.what == unknown.what);
-        let before = before.map(|place| baseline.point.values_si[place]);
-        let of_law = if has_law { covariance::of_law(*value, before) } else { 0.0 };
         Number {
             name: fitting.name_of(unknown),
             suspect: fitting.suspect_of(unknown).map(|suspect| fitting.model.suspects[suspect].name.clone()),
             unit: unit.text.clone(),
             value: value / unit.factor,
-            standard_error: error
-                .filter(|_| !is_at_bound)
-                .map(|error| (error * inflation).max(*of_blocks).hypot(of_law) / unit.factor),
-            baseline: before.map(|before| before / unit.factor),
+            standard_error: error.filter(|_| !is_at_bound).map(|error| error.whole() / unit.factor),
+            baseline: covariance::before(baseline, unknown.what).map(|before| before / unit.factor),
             is_at_bound,
             is_of_one_sign: unknown.range_si[0] >= 0.0 || unknown.range_si[1] <= 0.0,
         }

@@ -60,6 +60,15 @@ pub(crate) struct Taken {
     pub(crate) near: Vec<usize>,
 }
 
+/// A suspect that could not be told from a taken one, fitted in its place.
+pub(crate) struct Rival<'a> {
+    pub(crate) suspect: usize,
+    pub(crate) instead_of: usize,
+    /// It fails another gate than the likelihood.
+    pub(crate) is_near: bool,
+    pub(crate) fit: Result<Fitted<'a>, Failure>,
+}
+
 /// What came of the search.
 pub(crate) struct Found<'a> {
     pub(crate) baseline: Fitted<'a>,
@@ -190,6 +199,26 @@ impl<'a> Found<'a> {
     fn is_over(&self) -> bool {
         let is_little = || most_share(self.sides()) <= SHARE_FLOOR;
         self.taken.len() >= MOST_TERMS || !self.taken.is_empty() && is_little()
+    }
+
+    /// Fits each suspect that could not be told from what was taken in its place, beside what else was taken.
+    pub(crate) fn rivals(&self) -> Vec<Rival<'a>> {
+        let in_place = |(suspect, instead_of, is_near): (usize, usize, bool)| {
+            let others = self.extended.suspects.iter().copied();
+            let others = others.filter(|other| *other != instead_of && *other != suspect);
+            let suspects: Vec<usize> = others.chain([suspect]).collect();
+            let (model, records) = (self.extended.fitting.model, self.extended.fitting.records);
+            let fit = fitted(model, records, &suspects, Some(&self.extended));
+            Rival { suspect, instead_of, is_near, fit }
+        };
+        let of = |taken: &Taken| {
+            let instead_of = taken.evaluation.suspect;
+            let as_good = taken.alternatives.iter().map(move |suspect| (*suspect, instead_of, false));
+            let near = taken.near.iter().map(move |suspect| (*suspect, instead_of, true));
+            as_good.chain(near).collect::<Vec<_>>()
+        };
+        let all: Vec<_> = self.taken.iter().flat_map(of).collect();
+        all.into_par_iter().map(in_place).collect()
     }
 
     fn take_pair(&mut self, pair: Pair<'a>, progress: &mut dyn FnMut(&str)) {

@@ -124,7 +124,7 @@ pub(super) fn said(fitted: &Fitted<'_>, part: Part) -> Option<Vec<f64>> {
 }
 
 /// A record with a further output, measured at each row.
-fn with_one_more(record: &Measured) -> Measured {
+pub(super) fn with_one_more(record: &Measured) -> Measured {
     let mut record = record.clone();
     record.outputs.push(vec![Some(0.0); record.time_s.len()]);
     record

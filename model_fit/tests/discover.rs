@@ -69,6 +69,7 @@ fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written()
         "{term:?}"
     );
     assert!(term.stability >= 0.6 && closed.page.contains("What a search found"), "{term:?}");
+    assert!(closed.page.contains("± 2 standard errors of its numbers"), "what it looks like");
     assert!(report.located.is_some() && closed.page.contains("Where it comes from"), "{:?}", report.located);
     let extended = folder.path().join("extended.toml");
     fs::write(&extended, closed.extended.unwrap()).unwrap();

@@ -166,8 +166,17 @@ fn two_suspects_with_the_same_law_cannot_be_told_apart() {
         "[[suspects]]\nname = \"cubic-too\"\nplace = \"v\"\nadd = \"-k2*x*abs(x)^2/mass\"\n\
          parameters.k2 = { unit = \"N/m^3\", value = 100, range = [0, 1e6] }\n[[suspects]]\nname = \"quadratic-damping\"",
     );
-    let report = closed(folder.path(), &twin, |x, _| 400.0 * x * x * x).report;
+    let closed = closed(folder.path(), &twin, |x, _| 400.0 * x * x * x);
+    let report = &closed.report;
     assert_eq!(report.verdict, Verdict::Ambiguous, "{}", report.headline);
+    let named = &report.named[0];
+    let caption = format!("{} in place of {} at equation of v, over x", named.alternatives[0], named.suspect);
+    assert!(closed.page.contains(&caption), "what the other one looks like");
+    assert_eq!(
+        closed.page.matches("± 2 standard errors of its numbers").count(),
+        2,
+        "a band for each of both"
+    );
     let mut names = [report.named[0].suspect.as_str(), report.named[0].alternatives[0].as_str()];
     names.sort_unstable();
     assert_eq!(names, ["cubic-stiffness", "cubic-too"]);
