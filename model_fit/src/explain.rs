@@ -1,10 +1,9 @@
 //! A model file in words: equations, numbers, units, suspects; with records also what these can tell apart.
 
 use super::bounds;
-use super::record::Measured;
 use super::report::{friction, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
-use super::{ModelError, read, select};
+use super::{ModelError, read, read_all, select};
 use model::{Hold, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,7 +18,7 @@ pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
     if train.is_empty() {
         return Ok(text);
     }
-    let records = train.iter().map(|path| Measured::read(&model, path)).collect::<Result<Vec<_>, _>>()?;
+    let records = read_all(&model, train)?;
     let baseline = select::fitted(&model, &records, &[], None)?;
     let weak = bounds::remarks(&numbers(&baseline, &baseline, false));
     text += &structure_in_words(&structure(&baseline, &baseline), weak);

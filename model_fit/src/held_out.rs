@@ -1,11 +1,11 @@
 //! Both models on records that were not used: shared numbers frozen, the record's own fitted on its first samples, which are not
 //! scored.
 
-use super::fit::{Fitting, OPTIONS, OfRecord};
+use super::fit::{Fitting, OPTIONS, OfRecord, What};
 use super::record::Measured;
 use super::select::{Fitted, Found, Rival};
 use super::starts;
-use model::Failure;
+use model::{Failure, Model, Program};
 
 /// Largest ratio of a signal's rms after to before.
 pub const WORSE: f64 = 1.02;
@@ -42,6 +42,29 @@ pub enum JudgeError {
     Short { record: String, rows: usize, start: usize },
     #[error("{record}: {why}")]
     Failure { record: String, why: Failure },
+}
+
+/// Whether records have enough samples for the numbers that the model itself has of each record, before anything is fitted.
+pub(crate) fn check(model: &Model, records: &[Measured]) -> Result<(), JudgeError> {
+    let program = Program::new(model, &[]).expect("it was compiled when the file was read");
+    for record in records {
+        let one = std::slice::from_ref(record);
+        let fitting = Fitting::new(model, program.clone(), one, &[]);
+        if fitting.unknowns.iter().any(|unknown| !matches!(unknown.what, What::Shared(_))) {
+            has_start(model.start_samples, record)?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a record has samples for its start, and others.
+fn has_start(start: usize, record: &Measured) -> Result<(), JudgeError> {
+    let (name, rows) = (&record.name, record.time_s.len());
+    match start {
+        0 => Err(JudgeError::NoStart),
+        start if start >= rows => Err(JudgeError::Short { record: name.clone(), rows, start }),
+        _ => Ok(()),
+    }
 }
 
 /// Judges both models.
@@ -122,12 +145,7 @@ fn residuals(fitted: &Fitted<'_>, record: &[Measured]) -> Result<(OfRecord, usiz
         let residuals = frozen.whole().residuals(&[]).map_err(failed)?;
         return Ok((residuals.into_iter().next().expect("one record"), 0));
     }
-    if rows == 0 {
-        return Err(JudgeError::NoStart);
-    }
-    if rows >= record[0].time_s.len() {
-        return Err(JudgeError::Short { record: name(), rows: record[0].time_s.len(), start: rows });
-    }
+    has_start(rows, &record[0])?;
     let (point, _) = frozen.fit_from(starts::starts(&frozen, &[], None), OPTIONS.steps).map_err(failed)?;
     let residuals = frozen.whole().residuals(&point.values_si).map_err(failed)?;
     Ok((residuals.into_iter().next().expect("one record"), rows))

@@ -38,7 +38,8 @@
 //! | [`stats`], [`quantum`], [`equal_runs`] | order statistics and means; rounding and stuck values of a column |
 //! | `verdict` | what is concluded |
 //!
-//! Nothing of a held-out record is read before the terms are chosen and fitted. Keys and figures: `docs/model-files.md`.
+//! Held-out records are read and checked before a fit starts, and no value of theirs enters one: they wait until the terms are
+//! chosen and fitted. Keys and figures: `docs/model-files.md`.
 
 pub mod equal_runs;
 pub mod estimator;
@@ -100,6 +101,8 @@ pub enum ModelError {
     File(#[from] settings::SettingsError),
     #[error(transparent)]
     Record(#[from] RecordError),
+    #[error(transparent)]
+    HeldOut(#[from] JudgeError),
     #[error("the model cannot be simulated with its first values: {0}")]
     Failure(#[from] Failure),
 }
@@ -167,7 +170,7 @@ const MOST_STEPS_UNASKED: usize = 100_000;
 /// is named and more than noise is left, a formula is searched.
 ///
 /// # Errors
-/// [`ModelError`] for a model or a training record that cannot be used.
+/// [`ModelError`] for a model or a record that cannot be used.
 pub fn close(
     file: &Path,
     train: &[PathBuf],
@@ -189,6 +192,8 @@ pub fn close_with(
 ) -> Result<ClosedModel, ModelError> {
     let model = read(file)?;
     let records = looked_at(&model, train)?;
+    let waiting = read_all(&model, tests)?;
+    held_out::check(&model, &waiting)?;
     let found = select::search(&model, &records, progress)?;
     progress("structure");
     let structure = structure::structure(&found.baseline, &found.extended);
@@ -219,7 +224,7 @@ pub fn close_with(
     };
     report.located = located;
     let rivals = found.rivals();
-    let held_out = judged(&model, (&found, &rivals), tests, progress);
+    let held_out = judged(&model, (&found, &rivals), waiting, progress);
     let (traces, not_judged): (Vec<Traces>, _) = match held_out {
         Ok(None) => (held_out::trained(&found)?, None),
         Ok(Some((judged, alternatives, traces, notes))) => {
@@ -278,9 +283,13 @@ pub fn look(file: &Path, records: &[PathBuf]) -> Result<Vec<Look>, ModelError> {
 
 /// Records with what they look like beside the model among their notes.
 fn looked_at(model: &Model, files: &[PathBuf]) -> Result<Vec<Measured>, ModelError> {
-    let mut records = files.iter().map(|path| Measured::read(model, path)).collect::<Result<Vec<_>, _>>()?;
+    let mut records = read_all(model, files)?;
     look::beside_model(model, &mut records);
     Ok(records)
+}
+
+fn read_all(model: &Model, files: &[PathBuf]) -> Result<Vec<Measured>, RecordError> {
+    files.iter().map(|path| Measured::read(model, path)).collect()
 }
 
 /// What both models leave, what alternatives do, what both models say, and notes of the records.
@@ -290,17 +299,13 @@ type Judgement = (Vec<held_out::Judged>, Vec<held_out::Alternative>, Vec<Traces>
 fn judged(
     model: &Model,
     (found, rivals): (&select::Found<'_>, &[select::Rival<'_>]),
-    tests: &[PathBuf],
+    mut records: Vec<Measured>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Option<Judgement>, String> {
-    if tests.is_empty() {
+    if records.is_empty() {
         return Ok(None);
     }
-    let mut records = Vec::new();
-    for test in tests {
-        progress(&format!("held out: {}", test.display()));
-        records.push(Measured::read(model, test).map_err(|error| error.to_string())?);
-    }
+    records.iter().for_each(|record| progress(&format!("held out: {}", record.file.display())));
     look::beside_model(model, &mut records);
     let (judged, traces) = held_out::judge(found, &records).map_err(|error| error.to_string())?;
     let alternatives =

@@ -238,13 +238,35 @@ fn a_number_that_the_records_do_not_determine_is_said() {
 }
 
 #[test]
-fn a_start_that_is_fitted_needs_samples_of_the_held_out_record() {
+fn a_held_out_record_that_cannot_be_judged_is_refused_before_a_fit() {
     let folder = tempfile::tempdir().unwrap();
     let fitted = OSCILLATOR.replacen("start = 0", "start = \"fitted\"\nguess = 0.01", 1);
-    let refused = closed(folder.path(), &fitted, |_, _| 0.0);
-    assert!(refused.not_judged.is_some_and(|why| why.contains("held_out.start_samples of the model is 0")));
-    let allowed = format!("{fitted}\n[held_out]\nstart_samples = 40\n");
-    let judged = closed(folder.path(), &allowed, |_, _| 0.0);
+    let with_start = |samples: u32| format!("{fitted}\n[held_out]\nstart_samples = {samples}\n");
+    let good = record(3, |_, _| 0.0);
+    let short: String = good.lines().take(31).map(|line| format!("{line}\n")).collect();
+    let no_force = good.replacen("force_N", "force", 1);
+    let no_position = good.replacen("x_mm", "x_m", 1);
+    let words = good.replacen("0.02,", "0.02,low", 1);
+    for (model, test, hint) in [
+        (OSCILLATOR, &no_force, "force_N"),
+        (OSCILLATOR, &no_position, "x_mm"),
+        (OSCILLATOR, &words, "test.csv:3"),
+        (&fitted, &good, "held_out.start_samples of the model is 0"),
+        (&with_start(40), &short, "test.csv: 30 samples, of which the first 40 are for its start"),
+    ] {
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            fs::write(&path, text).unwrap();
+            path
+        };
+        let (model, train) = (file("oscillator.toml", model), file("train.csv", &good));
+        let progress = &mut |said: &str| panic!("{hint}: {said} before the held-out record was checked");
+        let refused =
+            close(&model, &[train], &[file("test.csv", test)], progress).map(|closed| closed.report.headline);
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains(hint), "{hint}: {message}");
+    }
+    let judged = closed(folder.path(), &with_start(40), |_, _| 0.0);
     assert_eq!((judged.not_judged, judged.report.held_out[0].rows), (None, 960));
 }
 
