@@ -14,6 +14,11 @@ impl Curve {
         Self { x, y }
     }
 
+    /// Its points, x growing.
+    pub fn points(&self) -> impl ExactSizeIterator<Item = [f64; 2]> + DoubleEndedIterator + '_ {
+        self.x.iter().zip(&self.y).map(|(x, y)| [*x, *y])
+    }
+
     /// Value and slope.
     pub(crate) fn at(&self, x: f64) -> (f64, f64) {
         let last = self.x.len() - 1;

@@ -191,8 +191,8 @@ impl Dimensions for Checker<'_> {
 
     fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure, Wrong> {
         if let Some(table) = self.model.tables.iter().find(|table| table.name == name) {
-            self.takes(name, measures[0], table.from, at)?;
-            return Ok(Some(table.to));
+            self.takes(name, measures[0], table.from.dimension, at)?;
+            return Ok(Some(table.to.dimension));
         }
         self.takes(name, measures[1], Dimension::TIME, at).map(|()| measures[0])
     }

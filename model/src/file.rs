@@ -5,7 +5,7 @@ use crate::compile;
 use crate::inputs::{Hold, Inputs};
 use crate::read;
 use crate::rows::Rows;
-use crate::units::{Dimension, Unit};
+use crate::units::Unit;
 use expression::curve::Curve;
 use expression::grammar::{Nodes, Place};
 use settings::SettingsError;
@@ -42,7 +42,8 @@ pub struct Model {
     pub outputs: Vec<Output>,
     /// Terms that may be missing.
     pub suspects: Vec<Suspect>,
-    pub(crate) tables: Vec<Table>,
+    /// Curves that expressions read by name.
+    pub tables: Vec<Table>,
     pub(crate) nodes: Nodes,
     pub(crate) text: String,
     pub(crate) file: PathBuf,
@@ -336,13 +337,17 @@ pub struct Suspect {
     pub is_decoy: bool,
 }
 
-/// A curve of the file.
+/// A curve of the file, which expressions read by its name.
 #[derive(Clone, Debug)]
-pub(crate) struct Table {
-    pub(crate) name: String,
-    pub(crate) curve: Curve,
-    pub(crate) from: Dimension,
-    pub(crate) to: Dimension,
+pub struct Table {
+    /// Its name in expressions.
+    pub name: String,
+    /// Its points, in SI.
+    pub curve: Curve,
+    /// Unit in which what it is read at is written.
+    pub from: Unit,
+    /// Unit in which its values are written.
+    pub to: Unit,
 }
 
 impl Model {

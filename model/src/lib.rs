@@ -41,7 +41,7 @@ pub use expression::units::{Dimension, Unit, UnitError};
 pub use failure::Failure;
 pub use file::{
     Change, Definition, Expression, Friction, Input, Memory, Model, Output, Parameter, Part, RecordLayout,
-    Smoothing, Solver, Start, State, Suspect, Target,
+    Smoothing, Solver, Start, State, Suspect, Table, Target,
 };
 pub use library::{
     Entry, EntryFriction, EntryMemory, EntryParameter, EntryState, Found, Library, Quantity, Variable,

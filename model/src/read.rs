@@ -272,7 +272,6 @@ impl Reader<'_> {
                 );
             }
             section.finish()?;
-            let (from, to) = (from.dimension, to.dimension);
             self.model.tables.push(Table { name, curve: Curve::new(x, y), from, to });
         }
         Ok(())

@@ -4,7 +4,7 @@ use super::bounds;
 use super::report::{friction, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
 use super::{ModelError, read, read_all, select};
-use model::{Hold, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start};
+use model::{Hold, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start, Suspect, Table};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -73,24 +73,24 @@ pub(crate) fn in_words(model: &Model) -> String {
         let column = column(&output.column, output.scale);
         format!("{} [{}] = {}    {noise}{error}, {column}", output.name, output.unit.text, output.value.text)
     };
+    section("tables", model.tables.iter().map(table).collect());
     section("outputs", model.outputs.iter().map(output).collect());
     section("parameters", model.parameters.iter().filter(|one| own(one.suspect)).map(parameter).collect());
     section("rows", rows(&model.rows));
+    section("held out", vec![held_out(model.start_samples)]);
+    section("fit", vec![fit(model.starts)]);
     let suspect = |index: usize| {
         let suspect = &model.suspects[index];
         let decoy = if suspect.is_decoy { ", a decoy" } else { "" };
-        let twins = match suspect.twins.as_slice() {
-            [] => String::new(),
-            twins => format!("; does the same as {}", twins.join(", ")),
-        };
-        let head = format!("{}{decoy}, {}: {}{twins}", suspect.name, place(model, index), term(model, index));
+        let head = format!("{}{decoy}, {}: {}", suspect.name, place(model, index), term(model, index));
         let is_own = move |owner: Option<usize>| owner == Some(index);
         let states = model.states.iter().filter(move |one| is_own(one.suspect));
         let memories = model.memories.iter().filter(move |one| is_own(one.suspect));
         let frictions = model.frictions.iter().filter(move |one| is_own(one.suspect));
         let parameters = model.parameters.iter().filter(move |one| is_own(one.suspect));
-        let brought = states
-            .map(|one| equation(model, one))
+        let brought = kind(suspect)
+            .into_iter()
+            .chain(states.map(|one| equation(model, one)))
             .chain(definitions(model, Some(index)))
             .chain(memories.map(memory))
             .chain(frictions.map(|one| friction(model, one)))
@@ -99,7 +99,11 @@ pub(crate) fn in_words(model: &Model) -> String {
     };
     for (name, is_term) in [("terms", true), ("suspects", false)] {
         let all = (0..model.suspects.len()).filter(|index| model.suspects[*index].is_term == is_term);
-        section(name, all.flat_map(suspect).collect());
+        let prior = match all.clone().count() {
+            count if is_term || count == 0 => None,
+            count => Some(format!("before the records as likely as none of them: 1/{} each", count + 1)),
+        };
+        section(name, prior.into_iter().chain(all.flat_map(suspect)).collect());
     }
     let solver = match model.solver {
         Solver::Adaptive { relative_tolerance } => {
@@ -110,6 +114,59 @@ pub(crate) fn in_words(model: &Model) -> String {
     let operations = Program::new(model, &[]).map_or(0, |program| program.operations());
     let _ = write!(text, "\nintegrated: {solver}; {operations} operations for all rates\n");
     text
+}
+
+/// What a suspect is beside its law.
+fn kind(suspect: &Suspect) -> Vec<String> {
+    let mut lines = Vec::new();
+    lines.extend(suspect.library.iter().map(|library| format!("from the library: {library}")));
+    lines.extend(
+        suspect
+            .effect
+            .iter()
+            .map(|effect| format!("a form of {effect}: forms that cannot be told apart are one finding")),
+    );
+    if suspect.is_local {
+        lines.push("local: bands of the folds do not judge it".into());
+    }
+    if !suspect.twins.is_empty() {
+        lines.push(format!("does the same as {}", suspect.twins.join(", ")));
+    }
+    lines
+}
+
+fn table(table: &Table) -> String {
+    let Table { name, curve, from, to } = table;
+    let point = |point: Option<[f64; 2]>| {
+        let [x, y] = point.expect("a table has two points at least");
+        format!(
+            "{} {} at {} {}",
+            significant(y / to.factor),
+            to.text,
+            significant(x / from.factor),
+            from.text
+        )
+    };
+    let mut points = curve.points();
+    let count = points.len();
+    let (first, last) = (point(points.next()), point(points.next_back()));
+    format!("{name}: {count} points from {first} to {last}, straight between them and level beyond")
+}
+
+fn held_out(start_samples: usize) -> String {
+    match start_samples {
+        0 => "every sample is scored".to_owned(),
+        samples => format!("the first {samples} samples of a record are for its start, and not scored"),
+    }
+}
+
+fn fit(starts: usize) -> String {
+    match starts {
+        0 => "starts from the values of the file alone".to_owned(),
+        starts => {
+            format!("starts from the values of the file, and from the best of {starts} points around them")
+        }
+    }
 }
 
 /// How a record is laid out; cells as they are read from a text table.

@@ -284,6 +284,7 @@ fn a_model_is_explained_with_its_equations_and_units() {
         "cubic-stiffness, equation of v: dv/dt = … + (-k*x^3/mass)",
         "drift, a decoy, output position: position + (rate*t)",
         "k = 100 N/m^3 (a fit starts from 1000 too), fitted",
+        "held out\n  every sample is scored\n",
     ] {
         assert!(text.contains(line), "{line}\n{text}");
     }
@@ -316,11 +317,27 @@ unit = "N/s"
 [[suspects]]
 name = "creep"
 place = "v"
+effect = "relaxation"
+local = true
+twins = ["offset"]
 add = "-k*(side + bent)/mass"
 define.bent = "x - crept"
 parameters.k = { unit = "N/m", value = 3 }
 states.crept = { unit = "mm", start = 4, derivative = "(x - crept)/2[s]" }
 memory.side = { unit = "mm", start = 5, update = "min(max(side, x - 1[mm]), x + 1[mm])" }
+[[suspects]]
+use = "stiffness/cubic"
+name = "stiff"
+place = "v"
+times = "-1/mass"
+with.x = "x"
+[tables.bump]
+x = [-10, 0, 20]
+y = [0, 1, 0.5]
+x_unit = "mm"
+y_unit = "N"
+[held_out]
+start_samples = 40
 "#;
     let text = OSCILLATOR
         .replacen("\n[inputs.force]", record, 1)
@@ -336,7 +353,15 @@ memory.side = { unit = "mm", start = 5, update = "min(max(side, x - 1[mm]), x + 
         "  table [1] from column table, kept between samples\n",
         "  jolt [N/s] the rate of force, kept between samples\n",
         "  position [mm] = x    noise estimated, error of the model 0.250 mm, column x_cm times 10\n",
+        "tables\n  bump: 3 points from 0 N at −10.0 mm to 0.500 N at 20.0 mm, straight between them and level beyond\n",
+        "held out\n  the first 40 samples of a record are for its start, and not scored\n",
+        "fit\n  starts from the values of the file alone\n",
+        "suspects\n  before the records as likely as none of them: 1/9 each\n  cubic-stiffness, ",
+        "  stiff, equation of v: dv/dt = … + (-1/mass*(k*x^3))\n    from the library: stiffness/cubic\n",
         "  creep, equation of v: dv/dt = … + (-k*(side + bent)/mass)\n    \
+         a form of relaxation: forms that cannot be told apart are one finding\n    \
+         local: bands of the folds do not judge it\n    \
+         does the same as offset\n    \
          dcrept/dt = (x - crept)/2[s]    crept in mm, starts at 4.00\n    \
          bent = x - crept    in m\n    \
          side becomes min(max(side, x - 1[mm]), x + 1[mm]) after each step, from 5.00    in mm\n    \
