@@ -314,9 +314,9 @@ fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
         .map_err(|why| CommandError::File { file: arguments.rig.clone(), why })?;
     let text = if is_model_file(&text) {
         current_form(&arguments.rig, &text)?;
-        any_plant::extended_text(&arguments.rig, &text, &read_report(&arguments.report)?)?
+        any_plant::extended_text(&arguments.rig, &text, &arguments.report)?
     } else {
-        let report = read_report(&arguments.report)?;
+        let report = any_plant::report_of(&arguments.report, false)?;
         workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?
     };
     spare(&arguments.out, &[&arguments.rig, &arguments.report])?;

@@ -4,7 +4,9 @@ use super::bounds;
 use super::report::{friction, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
 use super::{ModelError, read, read_all, select};
-use model::{Hold, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start, Suspect, Table};
+use model::{
+    Hold, Input, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start, Suspect, Table,
+};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -33,20 +35,8 @@ pub(crate) fn in_words(model: &Model) -> String {
             lines.iter().for_each(|line| text.push_str(&format!("  {line}\n")));
         }
     };
-    let input = |input: &model::Input| {
-        let from = match input.rate_of {
-            Some(of) => format!("the rate of {}", model.inputs[of].name),
-            None => format!("from {}", column(&input.column, input.scale)),
-        };
-        let hold = match input.hold {
-            Hold::Zero => "kept between samples",
-            Hold::Linear => "straight between samples",
-        };
-        let smoothed = smoothed(input.smoothing);
-        format!("{} [{}] {from}{smoothed}, {hold}", input.name, input.unit.text)
-    };
     section("record", record(&model.record));
-    section("inputs", model.inputs.iter().map(input).collect());
+    section("inputs", model.inputs.iter().map(|one| input(model, one)).collect());
     let own = |suspect: Option<usize>| suspect.is_none();
     section(
         "equations",
@@ -105,19 +95,22 @@ pub(crate) fn in_words(model: &Model) -> String {
         };
         section(name, prior.into_iter().chain(all.flat_map(suspect)).collect());
     }
-    let solver = match model.solver {
-        Solver::Adaptive { relative_tolerance } => {
-            format!("adaptive, relative tolerance {relative_tolerance:e}")
-        }
-        Solver::Fixed { step_s } => format!("fixed steps of at most {step_s:e} s"),
-    };
     let operations = Program::new(model, &[]).map_or(0, |program| program.operations());
-    let _ = write!(text, "\nintegrated: {solver}; {operations} operations for all rates\n");
+    let _ = write!(text, "\n{}; {operations} operations for all rates\n", solver(model.solver));
     text
 }
 
+pub(super) fn solver(solver: Solver) -> String {
+    match solver {
+        Solver::Adaptive { relative_tolerance } => {
+            format!("integrated: adaptive, relative tolerance {relative_tolerance:e}")
+        }
+        Solver::Fixed { step_s } => format!("integrated: fixed steps of at most {step_s:e} s"),
+    }
+}
+
 /// What a suspect is beside its law.
-fn kind(suspect: &Suspect) -> Vec<String> {
+pub(super) fn kind(suspect: &Suspect) -> Vec<String> {
     let mut lines = Vec::new();
     lines.extend(suspect.library.iter().map(|library| format!("from the library: {library}")));
     lines.extend(
@@ -153,14 +146,14 @@ fn table(table: &Table) -> String {
     format!("{name}: {count} points from {first} to {last}, straight between them and level beyond")
 }
 
-fn held_out(start_samples: usize) -> String {
+pub(super) fn held_out(start_samples: usize) -> String {
     match start_samples {
         0 => "every sample is scored".to_owned(),
         samples => format!("the first {samples} samples of a record are for its start, and not scored"),
     }
 }
 
-fn fit(starts: usize) -> String {
+pub(super) fn fit(starts: usize) -> String {
     match starts {
         0 => "starts from the values of the file alone".to_owned(),
         starts => {
@@ -170,7 +163,7 @@ fn fit(starts: usize) -> String {
 }
 
 /// How a record is laid out; cells as they are read from a text table.
-fn record(layout: &RecordLayout) -> Vec<String> {
+pub(super) fn record(layout: &RecordLayout) -> Vec<String> {
     let unit = match layout.time_unit_s {
         _ if layout.is_calendar => "times of a calendar (ISO 8601)".to_owned(),
         1.0 => "in s".to_owned(),
@@ -191,7 +184,20 @@ fn record(layout: &RecordLayout) -> Vec<String> {
     lines
 }
 
-fn column(name: &str, scale: f64) -> String {
+pub(super) fn input(model: &Model, input: &Input) -> String {
+    let from = match input.rate_of {
+        Some(of) => format!("the rate of {}", model.inputs[of].name),
+        None => format!("from {}", column(&input.column, input.scale)),
+    };
+    let hold = match input.hold {
+        Hold::Zero => "kept between samples",
+        Hold::Linear => "straight between samples",
+    };
+    let smoothed = smoothed(input.smoothing);
+    format!("{} [{}] {from}{smoothed}, {hold}", input.name, input.unit.text)
+}
+
+pub(super) fn column(name: &str, scale: f64) -> String {
     if scale == 1.0 { format!("column {name}") } else { format!("column {name} times {scale}") }
 }
 
@@ -235,12 +241,13 @@ fn smoothed(smoothing: Smoothing) -> String {
     text
 }
 
-fn rows(rows: &Rows) -> Vec<String> {
+pub(super) fn rows(rows: &Rows) -> Vec<String> {
     let mut lines = Vec::new();
     if rows.every > 1 {
-        let Rows { every, order, ripple_decibel, .. } = rows;
+        let Rows { every, order, ripple_decibel, edge, .. } = rows;
         lines.push(format!(
-            "every {every} samples, behind a zero-phase Chebyshev I of order {order} and {ripple_decibel} dB"
+            "every {every} samples, behind a zero-phase Chebyshev I of order {order} and {ripple_decibel} dB, edge at {edge} of their \
+             Nyquist frequency"
         ));
     }
     lines.extend(rows.condition.iter().map(|condition| format!("where {}", condition.text)));

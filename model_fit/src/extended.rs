@@ -3,7 +3,8 @@
 //! Numbers of a library are written beside its `use`. Everything else of the file stays, comments too. Terms are fitted again
 //! with the model in the next run.
 
-use super::report::equations;
+use super::declared::declared;
+use super::report::{SCHEMA_VERSION, equations};
 use model::{Found, Library, Model};
 use serde::Deserialize;
 use std::path::Path;
@@ -21,6 +22,10 @@ pub enum ExtendError {
     Unknown { name: String },
     #[error("the report is of another model: one of both has no '{equation}'; close this model again")]
     Other { equation: String },
+    #[error("the model file was changed since its report: one of both has no '{line}'; close it again")]
+    Version { line: String },
+    #[error("the report has schema version {version}; this program reads {SCHEMA_VERSION}")]
+    Schema { version: u32 },
     #[error("suspects and terms are written as [[suspects]] and [[terms]]")]
     Form,
 }
@@ -28,6 +33,7 @@ pub enum ExtendError {
 /// What a report of a model file says of the extended model.
 #[derive(Debug, Deserialize)]
 pub struct ReportedModel {
+    schema_version: u32,
     named: Vec<ReportedName>,
     /// Absent in reports of before 0.1.0.
     #[serde(default)]
@@ -39,19 +45,25 @@ pub struct ReportedModel {
     /// Absent in reports of before 0.1.0.
     #[serde(default)]
     equations: Vec<String>,
+    /// Absent in reports of before 0.1.0.
+    #[serde(default)]
+    declared: Vec<String>,
 }
 
 impl ReportedModel {
-    /// Whether it is the report of this model.
+    /// Whether it is the report of this model, and of this version of its file: only values from which a fit starts may differ.
     ///
     /// # Errors
-    /// The first equation in which they differ.
+    /// The first line in which they differ.
     pub fn is_of(&self, model: &Model) -> Result<(), ExtendError> {
-        let own = equations(model);
-        let unknown = self.equations.iter().find(|equation| !own.contains(equation));
-        let added = own.iter().find(|equation| !self.equations.contains(equation));
-        match unknown.or(added).filter(|_| !self.equations.is_empty()) {
-            Some(equation) => Err(ExtendError::Other { equation: equation.clone() }),
+        if self.schema_version != SCHEMA_VERSION {
+            return Err(ExtendError::Schema { version: self.schema_version });
+        }
+        if let Some(equation) = difference(&self.equations, &equations(model)) {
+            return Err(ExtendError::Other { equation });
+        }
+        match difference(&self.declared, &declared(model)) {
+            Some(line) => Err(ExtendError::Version { line }),
             None => Ok(()),
         }
     }
@@ -64,6 +76,13 @@ impl ReportedModel {
         }
         term
     }
+}
+
+/// The first line that one of both lacks; none where the report has none at all.
+fn difference(reported: &[String], own: &[String]) -> Option<String> {
+    let unknown = reported.iter().find(|line| !own.contains(line));
+    let added = own.iter().find(|line| !reported.contains(line));
+    unknown.or(added).filter(|_| !reported.is_empty()).cloned()
 }
 
 #[derive(Debug, Deserialize)]
@@ -100,11 +119,13 @@ impl From<&super::ModelReport> for ReportedModel {
             .iter()
             .map(|one| ReportedTerm { name: one.name.clone(), text: one.text.clone() });
         Self {
+            schema_version: report.schema_version,
             named: named.collect(),
             discovered: discovered.collect(),
             parameters: parameters.collect(),
             taken_back: report.taken_back,
             equations: report.equations.clone(),
+            declared: report.declared.clone(),
         }
     }
 }
@@ -227,7 +248,7 @@ name = "offset"
 
     fn report(suspect: &str) -> ReportedModel {
         let text = format!(
-            r#"{{"named": [{{"suspect": "{suspect}"}}], "parameters": [
+            r#"{{"schema_version": 1, "named": [{{"suspect": "{suspect}"}}], "parameters": [
                 {{"name": "mass", "suspect": null, "value": 1.5, "is_at_bound": false}},
                 {{"name": "k", "suspect": "drag", "value": 0.25, "is_at_bound": false}}]}}"#
         );
@@ -272,6 +293,7 @@ name = "offset"
         assert!(again.contains("3.5") && !again.contains("2.5"), "{again}");
         // Without a name of its own it is called as in the library.
         let reported: ReportedModel = serde_json::from_value(serde_json::json!({
+            "schema_version": 1,
             "named": [{"suspect": "turbulent"}],
             "parameters": [{"name": "c", "suspect": "turbulent", "value": 4.5, "is_at_bound": false}],
         }))

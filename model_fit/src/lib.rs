@@ -33,6 +33,7 @@
 //! | `page` | the page |
 //! | `typeset` | equations as MathML |
 //! | `term_curves` | a term over the variable that it depends on most |
+//! | `declared` | what a model file declares beside its equations, by which its versions are told apart |
 //! | `extended` | the model file with what was found |
 //! | [`estimator`] | Gauss-Newton of every nonlinear fit, that of the rig too: options, globalisation, outcome |
 //! | [`stats`], [`quantum`], [`equal_runs`] | order statistics and means; rounding and stuck values of a column |
@@ -51,6 +52,7 @@ mod begin;
 mod bounds;
 mod covariance;
 mod cuts;
+mod declared;
 mod discover;
 mod explain;
 mod extended;
@@ -237,6 +239,7 @@ pub fn close_with(
         Err(why) => (held_out::trained(&found)?, Some(why)),
     };
     report.equations = report::equations(&model);
+    report.declared = declared::declared(&model);
     report.rate(adequacy::residuals(&found.extended)?);
     let curves = term_curves::curves(&found, &rivals);
     let page = page::page(&model, &report, (&traces, &curves), not_judged.as_deref());

@@ -19,7 +19,7 @@ use serde::Serialize;
 use std::path::Path;
 
 /// Version of `report.json` of a model file.
-const SCHEMA_VERSION: u32 = 1;
+pub(super) const SCHEMA_VERSION: u32 = 1;
 
 /// `report.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -59,6 +59,8 @@ pub struct ModelReport {
     pub notes: Vec<String>,
     /// States, definitions, outputs and suspects as the file has them.
     pub equations: Vec<String>,
+    /// What it declares beside them: records, columns, units, ranges, known numbers.
+    pub declared: Vec<String>,
 }
 
 /// A number with its unit.
@@ -251,6 +253,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         structure: structure.clone(),
         notes,
         equations: Vec::new(),
+        declared: Vec::new(),
     }
 }
 

@@ -111,6 +111,7 @@ fn the_schema_refuses_nulls_keys_and_values_that_it_does_not_have() {
             "structure": {"undetermined": [], "hidden": [], "without_effect": [], "twins": [], "advice": []}, "notes": [],
         });
         report["equations"] = serde_json::json!([]);
+        report["declared"] = serde_json::json!([]);
         report
     };
     assert_eq!(

@@ -103,3 +103,46 @@ fn the_report_of_another_model_extends_none() {
         "{other}"
     );
 }
+
+/// Changes of a file, each with the line of its first version that tells them apart.
+const CHANGES: [[&str; 3]; 6] = [
+    ["unit = \"V\"", "unit = \"mV\"", "input u [V] from column u, kept between samples"],
+    ["[0, 2]", "[0, 3]", "number gain [mm/V] fitted within 0 to 2"],
+    ["[0, 9] }", "[0, 9], fixed = true }", "number c of square [mm/V^2] fitted within 0 to 9"],
+    ["unit = \"mm\"\nvalue", "unit = \"mm\"\nscale = 2\nvalue", "output y [mm], column y"],
+    ["y = [0, 2]", "y = [0, 2.5]", "table bump: 2 points, 1 over 1, area 1"],
+    [
+        "start_samples = 3",
+        "start_samples = 4",
+        "held out: the first 3 samples of a record are for its start, and not scored",
+    ],
+];
+
+/// What would change a number, or what it means, is another version; a report of another schema is none at all.
+#[test]
+fn the_report_of_another_version_of_a_file_extends_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = "[tables.bump]\nx = [0, 1]\ny = [0, 2]\n[held_out]\nstart_samples = 3\n";
+    let own = LINE.to_owned() + more;
+    let report = closed(folder.path(), &own, &record(0.5, |u| 1.5 * u + u * u), None).report;
+    let mut reported = serde_json::to_value(&report).unwrap();
+    let is_of = |reported: &serde_json::Value, text: &str| {
+        let file = folder.path().join("other.toml");
+        fs::write(&file, text).unwrap();
+        let reported: ReportedModel = serde_json::from_value(reported.clone()).unwrap();
+        reported.is_of(&read(&file).unwrap()).map_err(|error| error.to_string())
+    };
+    assert_eq!(is_of(&reported, &own), Ok(()));
+    assert_eq!(is_of(&reported, &format!("# A comment.\n{own}")), Ok(()));
+    for [from, to, line] in CHANGES {
+        assert!(own.contains(from), "{from}\n{own}");
+        let refused = is_of(&reported, &own.replacen(from, to, 1)).unwrap_err();
+        let message = format!(
+            "the model file was changed since its report: one of both has no '{line}'; close it again"
+        );
+        assert_eq!(refused, message, "{from} to {to}");
+    }
+    reported["schema_version"] = 2.into();
+    let refused = is_of(&reported, &own).unwrap_err();
+    assert_eq!(refused, "the report has schema version 2; this program reads 1");
+}

@@ -1,6 +1,6 @@
 //! `close` and `name` of a model file of any plant.
 
-use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress};
+use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress, read_report};
 use crate::cli::ReadArguments;
 use crate::folder::{self, Folder};
 use model_fit::{
@@ -8,6 +8,7 @@ use model_fit::{
     new_model, read,
 };
 use pagekit::significant;
+use serde::de::DeserializeOwned;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -82,14 +83,24 @@ fn no_options_of_a_rig(read: &ReadArguments, without: &[String]) -> Result<(), C
 }
 
 /// `extend`: the text of a model file with what its report names.
-pub(super) fn extended_text(
-    model: &Path,
-    text: &str,
-    report: &ReportedModel,
-) -> Result<String, CommandError> {
+pub(super) fn extended_text(model: &Path, text: &str, report: &Path) -> Result<String, CommandError> {
+    let report: ReportedModel = report_of(report, true)?;
     let is_of = report.is_of(&read(model)?);
-    let extended = is_of.and_then(|()| extended(text, model.parent().unwrap_or(Path::new("")), report));
+    let extended = is_of.and_then(|()| extended(text, model.parent().unwrap_or(Path::new("")), &report));
     extended.map_err(|why| CommandError::BadData(format!("{}: {why}", model.display())))
+}
+
+/// Reads the report of a model file, or of a rig file, and refuses one of the other.
+pub(super) fn report_of<T: DeserializeOwned>(file: &Path, is_of_model: bool) -> Result<T, CommandError> {
+    let report: serde_json::Value = read_report(file)?;
+    if report.get("headline").is_some() != is_of_model && report.get("schema_version").is_some() {
+        let [is, should] = if is_of_model { ["rig", "model"] } else { ["model", "rig"] };
+        return Err(CommandError::BadData(format!(
+            "{}: the report of a {is} file, and a {should} file is to be extended: give the report.json of its close",
+            file.display()
+        )));
+    }
+    serde_json::from_value(report).map_err(|why| CommandError::Report { file: file.to_owned(), why })
 }
 
 /// `new`: a first model file, printed or written where nothing stands yet.
@@ -156,4 +167,31 @@ fn in_words(report: &ModelReport) -> String {
         let _ = writeln!(text, "  {}", located.in_words());
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_report_of_a_rig_file_extends_no_model_file_and_the_other_way_round() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let read = |text: &str, is_of_model| {
+            std::fs::write(file.path(), text).unwrap();
+            report_of::<serde_json::Value>(file.path(), is_of_model).map_err(|why| why.to_string())
+        };
+        let of_rig = r#"{"schema_version": 1, "summary": ""}"#;
+        let of_model = r#"{"schema_version": 1, "headline": ""}"#;
+        assert!(read(of_rig, false).is_ok() && read(of_model, true).is_ok());
+        let refused = read(of_rig, true).unwrap_err();
+        assert!(
+            refused.contains("the report of a rig file, and a model file is to be extended"),
+            "{refused}"
+        );
+        let refused = read(of_model, false).unwrap_err();
+        assert!(
+            refused.contains("the report of a model file, and a rig file is to be extended"),
+            "{refused}"
+        );
+    }
 }
