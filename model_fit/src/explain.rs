@@ -246,8 +246,8 @@ pub(super) fn rows(rows: &Rows) -> Vec<String> {
     if rows.every > 1 {
         let Rows { every, order, ripple_decibel, edge, .. } = rows;
         lines.push(format!(
-            "every {every} samples, behind a zero-phase Chebyshev I of order {order} and {ripple_decibel} dB, edge at {edge} of their \
-             Nyquist frequency"
+            "every {every} samples, behind a zero-phase Chebyshev I of order {order} and {ripple_decibel} dB, edge at {edge} of \
+             their Nyquist frequency"
         ));
     }
     lines.extend(rows.condition.iter().map(|condition| format!("where {}", condition.text)));

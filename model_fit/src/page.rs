@@ -236,7 +236,9 @@ fn discovered_title(report: &ModelReport) -> &'static str {
 }
 
 fn located(report: &ModelReport) -> String {
-    report.located.as_ref().map_or_else(String::new, |located| paragraph(&sentence(&located.in_words())))
+    report
+        .located_beside_names()
+        .map_or_else(String::new, |located| paragraph(&sentence(&located.in_words())))
 }
 
 fn left(label: &str, all: &[Left]) -> String {

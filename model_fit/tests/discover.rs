@@ -70,7 +70,9 @@ fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written()
     );
     assert!(term.stability >= 0.6 && closed.page.contains("What a search found"), "{term:?}");
     assert!(closed.page.contains("± 2 standard errors of its numbers"), "what it looks like");
-    assert!(report.located.is_some() && closed.page.contains("Where it comes from"), "{:?}", report.located);
+    // The formula says it, and nothing but noise is left.
+    assert!(report.adequate && report.located.is_some(), "{:?}", report.located);
+    assert!(!closed.page.contains("Where it comes from"));
     let extended = folder.path().join("extended.toml");
     fs::write(&extended, closed.extended.unwrap()).unwrap();
     let extended = read(&extended).unwrap_or_else(|error| panic!("{error}"));
@@ -111,7 +113,9 @@ fn nothing_is_found_where_nothing_is_missing() {
 #[test]
 fn nothing_is_searched_where_it_is_switched_off_or_noise_is_left() {
     let folder = tempfile::tempdir().unwrap();
-    let report = closed(folder.path(), Search::Never, |x, v, _| 60.0 * x * x * v).report;
+    let missed = closed(folder.path(), Search::Never, |x, v, _| 60.0 * x * x * v);
+    assert!(missed.page.contains("Where it comes from"), "{:?}", missed.report.located);
+    let report = missed.report;
     assert!(report.discovered.is_empty() && report.notes.is_empty(), "{report:#?}");
     assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{report:#?}");
     let report = closed(folder.path(), Search::MoreThanNoise, |_, _, _| 0.0).report;

@@ -2,7 +2,7 @@
 
 use crate::closing::close;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, explain};
+use model_fit::{ClosedModel, ModelReport, explain};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -121,6 +121,7 @@ fn a_hidden_term_is_named_and_confirmed_with_its_number() {
     roxmltree::Document::parse_with_options(&closed.page, options)
         .unwrap_or_else(|error| panic!("the page is well-formed: {error}"));
     assert!(closed.page.contains("cubic-stiffness") && closed.page.contains("dv/dt = "));
+    said_once(report);
     // A line without a colour in the style sheet is not seen.
     assert!(closed.page.contains("cubic-stiffness at equation of v, over x"), "what the term looks like");
     assert!(closed.page.contains("<mfrac><mrow><mi>d</mi><mi>v</mi></mrow>"), "equations are set");
@@ -128,6 +129,22 @@ fn a_hidden_term_is_named_and_confirmed_with_its_number() {
         assert!(closed.page.contains(&format!(".{name}{{--c:")), "line {name} is drawn without a colour");
     }
     assert!(closed.page.contains("class=\"line s0\""), "the measured line");
+}
+
+/// Where the misfit comes from is said beside a name if more than noise is left and it is another place, or if the name is taken
+/// back.
+fn said_once(report: &ModelReport) {
+    assert!(report.adequate && report.located.is_some(), "{report:#?}");
+    let with = |place: &str, adequate, taken_back| {
+        let mut report = ModelReport { adequate, taken_back, ..report.clone() };
+        let located = report.located.as_mut().unwrap();
+        (located.place, located.alternatives) = (place.into(), Vec::new());
+        report.located_beside_names().is_some()
+    };
+    let [here, elsewhere] = ["equation of v", "output position"];
+    assert_eq!(report.named[0].place, here);
+    assert!(!with(here, true, false) && !with(elsewhere, true, false) && !with(here, false, false));
+    assert!(with(elsewhere, false, false) && with(here, true, true));
 }
 
 /// Its number stands in no file: the extended model has it beside the `use`, and goes on from there.

@@ -163,7 +163,7 @@ fn in_words(report: &ModelReport) -> String {
             suspect.suspect, suspect.probability, suspect.decision
         );
     }
-    if let Some(located) = &report.located {
+    if let Some(located) = report.located_beside_names() {
         let _ = writeln!(text, "  {}", located.in_words());
     }
     text

@@ -15,6 +15,7 @@
 use super::super::fit::Fitting;
 use super::super::judge::GAIN_APART;
 use super::super::record::Measured;
+use super::super::report::ModelReport;
 use super::super::select::{Fitted, SAME};
 use super::features::{Term, group_terms, variables};
 use super::screen::Screen;
@@ -126,6 +127,24 @@ fn period_s(fitting: &Fitting<'_>) -> f64 {
         (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64
     };
     fitting.records.iter().map(period).fold(f64::INFINITY, f64::min)
+}
+
+impl ModelReport {
+    /// Where what the model alone leaves comes from, for who reads what was named beside it: nothing where no more than noise is
+    /// left, or where a name says the same place. What a held-out record takes back says nothing.
+    #[must_use]
+    pub fn located_beside_names(&self) -> Option<&Located> {
+        let located = self.located.as_ref()?;
+        if self.taken_back {
+            return Some(located);
+        }
+        let named = self.named.iter().map(|one| &one.place);
+        let mut places = named.chain(self.discovered.iter().map(|one| &one.place));
+        let is_said = places.any(|place| {
+            *place == located.place || located.alternatives.iter().any(|other| other.place == *place)
+        });
+        (!self.adequate && !is_said).then_some(located)
+    }
 }
 
 impl Located {
