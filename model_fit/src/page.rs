@@ -236,9 +236,7 @@ fn discovered_title(report: &ModelReport) -> &'static str {
 }
 
 fn located(report: &ModelReport) -> String {
-    report
-        .located_beside_names()
-        .map_or_else(String::new, |located| paragraph(&sentence(&located.in_words())))
+    report.located_in_words().map_or_else(String::new, |located| paragraph(&sentence(&located)))
 }
 
 fn left(label: &str, all: &[Left]) -> String {

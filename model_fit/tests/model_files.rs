@@ -139,12 +139,18 @@ fn said_once(report: &ModelReport) {
         let mut report = ModelReport { adequate, taken_back, ..report.clone() };
         let located = report.located.as_mut().unwrap();
         (located.place, located.alternatives) = (place.into(), Vec::new());
-        report.located_beside_names().is_some()
+        report.located_in_words()
     };
     let [here, elsewhere] = ["equation of v", "output position"];
     assert_eq!(report.named[0].place, here);
-    assert!(!with(here, true, false) && !with(elsewhere, true, false) && !with(here, false, false));
-    assert!(with(elsewhere, false, false) && with(here, true, true));
+    for (place, adequate) in [(here, true), (elsewhere, true), (here, false)] {
+        assert_eq!(with(place, adequate, false), None, "{place}");
+    }
+    assert!(
+        with(elsewhere, false, false)
+            .is_some_and(|said| said.contains("; that is without cubic-stiffness: "))
+    );
+    assert!(with(here, true, true).is_some_and(|said| !said.contains("that is without")));
 }
 
 /// Its number stands in no file: the extended model has it beside the `use`, and goes on from there.

@@ -163,8 +163,8 @@ fn in_words(report: &ModelReport) -> String {
             suspect.suspect, suspect.probability, suspect.decision
         );
     }
-    if let Some(located) = report.located_beside_names() {
-        let _ = writeln!(text, "  {}", located.in_words());
+    if let Some(located) = report.located_in_words() {
+        let _ = writeln!(text, "  {located}");
     }
     text
 }

@@ -133,24 +133,30 @@ impl ModelReport {
     /// Where what the model alone leaves comes from, for who reads what was named beside it: nothing where no more than noise is
     /// left, or where a name says the same place. What a held-out record takes back says nothing.
     #[must_use]
-    pub fn located_beside_names(&self) -> Option<&Located> {
+    pub fn located_in_words(&self) -> Option<String> {
         let located = self.located.as_ref()?;
-        if self.taken_back {
-            return Some(located);
+        let named = self.named.iter().map(|one| (&one.suspect, &one.place));
+        let found: Vec<_> = named.chain(self.discovered.iter().map(|one| (&one.name, &one.place))).collect();
+        if self.taken_back || found.is_empty() && !self.adequate {
+            return Some(located.in_words());
         }
-        let named = self.named.iter().map(|one| &one.place);
-        let mut places = named.chain(self.discovered.iter().map(|one| &one.place));
-        let is_said = places.any(|place| {
+        let is_it = |place: &String| {
             *place == located.place || located.alternatives.iter().any(|other| other.place == *place)
-        });
-        (!self.adequate && !is_said).then_some(located)
+        };
+        if self.adequate || found.iter().any(|(_, place)| is_it(place)) {
+            return None;
+        }
+        let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+        let names = names.join(" and ");
+        Some(format!(
+            "{}; that is without {names}: of what is left beside it no place is known",
+            located.in_words()
+        ))
     }
 }
 
 impl Located {
-    /// A line of a report.
-    #[must_use]
-    pub fn in_words(&self) -> String {
+    fn in_words(&self) -> String {
         let of = |variables: &[String]| match variables {
             [] => "a constant".to_owned(),
             all => format!("a function of {}", all.join(" and ")),
