@@ -143,10 +143,10 @@ fn term_curves(curves: &[TermCurve]) -> String {
         let caption = format!("{}{instead} at {}, over {}", curve.suspect, curve.place, curve.variable);
         let without =
             if band.is_some() { "" } else { " The records do not determine its numbers: it has no band." };
+        let TermCurve { variable, .. } = curve;
+        let most = if curve.is_most { "what most of it depends on" } else { "a variable that it depends on" };
         let about = format!(
-            "Along the training records as the model with it has them; {} is what most of it depends on \
-             ({:.0} % of its variance).{without}",
-            curve.variable,
+            "Along the training records as the model with it has them; {variable} is {most} ({:.0} % of its variance).{without}",
             curve.share * 100.0
         );
         let drawing = plot.drawn(

@@ -31,6 +31,8 @@ pub(crate) struct TermCurve {
     pub(crate) variable_unit: String,
     /// The correlation ratio, as the share of the term's variance.
     pub(crate) share: f64,
+    /// Whether no variable has a larger one.
+    pub(crate) is_most: bool,
     /// Those that have rows.
     pub(crate) bins: Vec<Bin>,
 }
@@ -52,19 +54,22 @@ pub(crate) struct Bin {
 /// that cannot be computed by itself.
 pub(crate) fn curves(found: &Found<'_>, rivals: &[Rival<'_>]) -> Vec<TermCurve> {
     let has_law = !found.taken.is_empty();
-    let mut curves = drawn((&found.extended, &found.baseline), &found.extended.suspects, has_law);
+    let mut curves = drawn((&found.extended, &found.baseline), (&found.extended.suspects, None), has_law);
     for rival in rivals {
         let Ok(fit) = &rival.fit else { continue };
         let name = &fit.fitting.model.suspects[rival.instead_of].name;
-        let own = drawn((fit, &found.baseline), &[rival.suspect], true);
+        let of_named = curves.iter().find(|curve| curve.suspect == *name && curve.instead_of.is_none());
+        let over = of_named.map(|curve| curve.variable.as_str());
+        let own = drawn((fit, &found.baseline), (&[rival.suspect], over), true);
         curves.extend(own.into_iter().map(|curve| TermCurve { instead_of: Some(name.clone()), ..curve }));
     }
     curves
 }
 
+/// A curve for each of these suspects, over the given variable where half of what the best one explains depends on it.
 fn drawn(
     (fitted, baseline): (&Fitted<'_>, &Fitted<'_>),
-    suspects: &[usize],
+    (suspects, over): (&[usize], Option<&str>),
     has_law: bool,
 ) -> Vec<TermCurve> {
     if suspects.is_empty() {
@@ -83,13 +88,16 @@ fn drawn(
     let of = |suspect: &usize| {
         let term = Along::of(fitted, *suspect, &errors)?;
         let unit = &term.unit;
-        let binned = variables.iter().filter_map(|(name, variable_unit, x)| {
-            let (share, bins) = binned(x, &term.values)?;
-            Some((share, bins, name, variable_unit, x))
-        });
-        let most = binned.max_by(|one, other| one.0.total_cmp(&other.0));
-        let (share, bins, name, variable_unit, x): (f64, Vec<Vec<usize>>, &&String, &&Unit, &Vec<f64>) =
-            most?;
+        let of_variable = |at: usize| {
+            let (share, bins) = binned(&variables[at].2, &term.values)?;
+            Some((at, share, bins))
+        };
+        let all: Vec<_> = (0..variables.len()).filter_map(of_variable).collect();
+        let most = all.iter().max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let is_given = |at: usize, share: f64| over == Some(variables[at].0.as_str()) && share > 0.5 * most.1;
+        let (at, share, bins) = all.iter().find(|one| is_given(one.0, one.1)).unwrap_or(most);
+        let (name, variable_unit, x) = &variables[*at];
+        let is_most = *at == most.0;
         Some(TermCurve {
             suspect: model.suspects[*suspect].name.clone(),
             instead_of: None,
@@ -97,7 +105,8 @@ fn drawn(
             unit: unit.text.clone(),
             variable: (*name).clone(),
             variable_unit: variable_unit.text.clone(),
-            share,
+            share: *share,
+            is_most,
             bins: bins.iter().map(|rows| term.bin(rows, x, [variable_unit.factor, unit.factor])).collect(),
         })
     };
@@ -267,7 +276,7 @@ parameters.b = { unit = "1/s", value = 0.01, range = [-10, 10] }
         let records = [Measured::read(&model, file.path()).unwrap()];
         let baseline = select::fitted(&model, &records, &[], None).unwrap();
         let fitted = select::fitted(&model, &records, &[suspect], Some(&baseline)).unwrap();
-        let curve = drawn((&fitted, &baseline), &[suspect], has_law).pop().unwrap();
+        let curve = drawn((&fitted, &baseline), (&[suspect], None), has_law).pop().unwrap();
         assert!(
             curve.variable == "x" && curve.variable_unit == "mm" && curve.unit == "mm/s",
             "{}",
