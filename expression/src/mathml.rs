@@ -47,10 +47,31 @@ const GREEK: [(&str, char); 24] = [
     ("Delta", 'Δ'),
 ];
 
+/// Where an expression stands: as an operand it is in brackets where what stands beside it would be read as a part of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operand {
+    /// By itself.
+    None,
+    /// The first term of a sum.
+    FirstTerm,
+    /// Another term of it.
+    Term,
+    /// The first factor of a product.
+    FirstFactor,
+    /// Another factor of it.
+    Factor,
+}
+
 /// An expression, without the element `math` around it.
 #[must_use]
-pub fn expression(nodes: &Nodes, root: Place) -> String {
-    at_least(nodes, root, 0)
+pub fn expression(nodes: &Nodes, root: Place, operand: Operand) -> String {
+    let least = match operand {
+        Operand::None => 0,
+        Operand::FirstTerm => SUM,
+        Operand::Term | Operand::FirstFactor => PRODUCT,
+        Operand::Factor => FRACTION,
+    };
+    at_least(nodes, root, least)
 }
 
 /// A name, with what stands behind its first `_` as index.
@@ -78,7 +99,8 @@ fn row(inner: &str) -> String {
 }
 
 /// In brackets, which grow with what is tall alone.
-fn bracketed(inner: &str) -> String {
+#[must_use]
+pub fn bracketed(inner: &str) -> String {
     let is_tall = ["<mfrac", "<mtable", "<msqrt"].iter().any(|tall| inner.contains(tall));
     let mo = if is_tall { "<mo>" } else { "<mo stretchy=\"false\">" };
     format!("{mo}(</mo>{inner}{mo})</mo>")
@@ -132,7 +154,12 @@ fn binary(nodes: &Nodes, operator: Binary, [left, right]: [Place; 2]) -> (String
         Binary::Subtract => ("−", SUM, [SUM, PRODUCT]),
         Binary::Multiply => ("⋅", PRODUCT, [PRODUCT, FRACTION]),
     };
-    let (left, right) = (at_least(nodes, left, of_left), at_least(nodes, right, of_right));
+    // A sign in front of a product is that of the whole.
+    let (left, holds) = match written(nodes, left) {
+        (signed, NEGATION) if operator == Binary::Multiply => (signed, NEGATION),
+        _ => (at_least(nodes, left, of_left), holds),
+    };
+    let right = at_least(nodes, right, of_right);
     (row(&format!("{left}<mo>{sign}</mo>{right}")), holds)
 }
 
@@ -167,7 +194,7 @@ mod tests {
     fn set(text: &str) -> String {
         let mut nodes = Nodes::default();
         let root = nodes.parse(text, 0).unwrap();
-        let set = expression(&nodes, root).replace(" stretchy=\"false\"", "");
+        let set = expression(&nodes, root, Operand::None).replace(" stretchy=\"false\"", "");
         set.replace("<mrow>", "").replace("</mrow>", "")
     }
 
@@ -192,6 +219,9 @@ mod tests {
             ("a + -b", "a+(−b)"),
             ("-a^2", "−^[a2]"),
             ("(-a)^2", "^[(−a)2]"),
+            ("-a*b*c", "−a⋅b⋅c"),
+            ("a - -b*c", "a−(−b⋅c)"),
+            ("a*(-b*c)", "a⋅(−b⋅c)"),
             ("(a + b)/(c - d)", "[a+bc−d]"),
             ("(a/b)^2", "^[([ab])2]"),
             ("a^b", "^[ab]"),
@@ -199,6 +229,26 @@ mod tests {
             ("2*exp(a)", "2⋅^[ea]"),
         ] {
             assert_eq!(plain(text), wanted, "{text}");
+        }
+    }
+
+    #[test]
+    fn an_operand_has_brackets_where_it_would_fall_apart() {
+        let has_brackets = |text: &str, operand| {
+            let mut nodes = Nodes::default();
+            let root = nodes.parse(text, 0).unwrap();
+            expression(&nodes, root, operand) != expression(&nodes, root, Operand::None)
+        };
+        let all = [Operand::FirstTerm, Operand::Term, Operand::FirstFactor, Operand::Factor];
+        for (text, wanted) in [
+            ("a", [false; 4]),
+            ("a/b", [false; 4]),
+            ("a*b", [false, false, false, true]),
+            ("a - b", [false, true, true, true]),
+            ("-a", [false, true, true, true]),
+            ("if(a < 1, a, b)", [true; 4]),
+        ] {
+            assert_eq!(all.map(|operand| has_brackets(text, operand)), wanted, "{text}");
         }
     }
 

@@ -8,6 +8,7 @@ use crate::rows::Rows;
 use crate::units::Unit;
 use expression::curve::Curve;
 use expression::grammar::{Nodes, Place};
+use expression::mathml::Operand;
 use settings::SettingsError;
 use std::path::{Path, PathBuf};
 
@@ -412,8 +413,8 @@ impl Model {
 
     /// An expression as MathML, without the element `math` around it.
     #[must_use]
-    pub fn mathml(&self, of: &Expression) -> String {
-        expression::mathml::expression(&self.nodes, of.root)
+    pub fn mathml(&self, of: &Expression, operand: Operand) -> String {
+        expression::mathml::expression(&self.nodes, of.root, operand)
     }
 
     /// The unit of a definition, as it follows from what it is made of, in those of the file.
@@ -440,7 +441,8 @@ impl Model {
 
     /// Terms and switched-on suspects at a place in the order in which they act: those that delay an input come first, since no
     /// earlier value is kept of a lag or of a play in front of them.
-    pub(crate) fn changes_of(&self, target: Target, suspects: &[usize]) -> Vec<usize> {
+    #[must_use]
+    pub fn changes_of(&self, target: Target, suspects: &[usize]) -> Vec<usize> {
         let terms = (0..self.suspects.len()).filter(|index| self.suspects[*index].is_term);
         let all = terms.chain(suspects.iter().copied());
         let mut all: Vec<usize> = all.filter(|index| self.suspects[*index].target == target).collect();

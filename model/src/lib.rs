@@ -34,9 +34,10 @@ mod read;
 mod rows;
 mod simulate;
 
+pub use expression::grammar::is_of_name;
 pub use expression::grammar::{DEEPEST, MOST_NODES};
 pub use expression::inputs::{Hold, Inputs};
-pub use expression::mathml::name as mathml_name;
+pub use expression::mathml::{Operand, bracketed as in_brackets, name as mathml_name};
 pub use expression::units::{Dimension, Unit, UnitError};
 pub use failure::Failure;
 pub use file::{

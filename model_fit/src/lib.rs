@@ -31,7 +31,7 @@
 //! | `report` | the report |
 //! | `explain` | equations, units, suspects in words |
 //! | `page` | the page |
-//! | `typeset` | equations as MathML |
+//! | `typeset` | equations of the extended model as MathML |
 //! | `term_curves` | a term over the variable that it depends on most |
 //! | `declared` | what a model file declares beside its equations, by which its versions are told apart |
 //! | `extended` | the model file with what was found |
@@ -242,7 +242,8 @@ pub fn close_with(
     report.declared = declared::declared(&model);
     report.rate(adequacy::residuals(&found.extended)?);
     let curves = term_curves::curves(&found, &rivals);
-    let page = page::page(&model, &report, (&traces, &curves), not_judged.as_deref());
+    let models = (&model, found.extended.fitting.model);
+    let page = page::page(models, &report, (&traces, &curves), not_judged.as_deref());
     let folder = file.parent().unwrap_or(Path::new(""));
     let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
     let extended =

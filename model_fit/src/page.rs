@@ -19,7 +19,7 @@ const DRAWN_ROWS: usize = 1500;
 const STRETCH_ROWS: usize = 400;
 
 pub(crate) fn page(
-    model: &Model,
+    models @ (model, _): (&Model, &Model),
     report: &ModelReport,
     (traces, curves): (&[Traces], &[TermCurve]),
     not_judged: Option<&str>,
@@ -53,7 +53,7 @@ pub(crate) fn page(
         ("suspects", "Suspects, the most likely first", suspects(&report.suspects)),
         ("parameters", "Numbers of the model", numbers(&report.parameters)),
         ("structure", "What these records can tell apart", structure(report)),
-        ("equations", "The model", equations(model, report)),
+        ("equations", "The model", equations(models, report)),
     ];
     let body: String = sections
         .iter()
@@ -360,12 +360,19 @@ fn structure(report: &ModelReport) -> String {
     pagekit::markup::list(&all, "Every number, and every suspect from each other.")
 }
 
-fn equations(model: &Model, report: &ModelReport) -> String {
-    let named: Vec<&str> = report.named.iter().map(|one| one.suspect.as_str()).collect();
+/// Those of the extended model; `extended` has the terms of a search among its suspects.
+fn equations((model, extended): (&Model, &Model), report: &ModelReport) -> String {
+    let named = report.named.iter().map(|one| one.suspect.as_str());
+    let named: Vec<&str> = named.chain(report.discovered.iter().map(|one| one.name.as_str())).collect();
+    let about = match (named.as_slice(), report.taken_back) {
+        ([], _) => String::new(),
+        (all, false) => paragraph(&format!("Marked: {}, beside the model of the file.", all.join(" and "))),
+        (all, true) => paragraph(&format!("Marked, and taken back: {}.", all.join(" and "))),
+    };
     format!(
-        "<div class=\"chart\">\n{}</div>\n<details>\n<summary>As text, with units and numbers</summary>\n<pre>{}</pre>\n\
+        "{about}<div class=\"chart\">\n{}</div>\n<details>\n<summary>As text, with units and numbers</summary>\n<pre>{}</pre>\n\
          </details>\n",
-        typeset::equations(model, &named),
+        typeset::equations(extended, &named),
         escaped(&in_words(model))
     )
 }

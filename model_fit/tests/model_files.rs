@@ -122,6 +122,7 @@ fn a_hidden_term_is_named_and_confirmed_with_its_number() {
         .unwrap_or_else(|error| panic!("the page is well-formed: {error}"));
     assert!(closed.page.contains("cubic-stiffness") && closed.page.contains("dv/dt = "));
     said_once(report);
+    assert!(closed.page.contains("<mo>+</mo><mrow class=\"named\">"), "the term is marked in its equation");
     // A line without a colour in the style sheet is not seen.
     assert!(closed.page.contains("cubic-stiffness at equation of v, over x"), "what the term looks like");
     assert!(closed.page.contains("<mfrac><mrow><mi>d</mi><mi>v</mi></mrow>"), "equations are set");
