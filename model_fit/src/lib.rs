@@ -225,7 +225,7 @@ pub fn close_with(
         }
     };
     report.located = located;
-    let rivals = found.rivals();
+    let rivals = found.rivals(progress);
     let held_out = judged(&model, (&found, &rivals), waiting, progress);
     let (traces, not_judged): (Vec<Traces>, _) = match held_out {
         Ok(None) => (held_out::trained(&found)?, None),

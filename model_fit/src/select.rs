@@ -16,7 +16,7 @@ use super::normal::Normal;
 use super::pairs::{self, Pair};
 use super::record::Measured;
 use super::starts;
-use super::watch::watched;
+use super::watch::{Done, watched};
 use crate::estimator::Convergence;
 use model::{Failure, Model, Program};
 use nalgebra::DVector;
@@ -202,13 +202,14 @@ impl<'a> Found<'a> {
     }
 
     /// Fits each suspect that could not be told from what was taken in its place, beside what else was taken.
-    pub(crate) fn rivals(&self) -> Vec<Rival<'a>> {
-        let in_place = |(suspect, instead_of, is_near): (usize, usize, bool)| {
+    pub(crate) fn rivals(&self, progress: &mut dyn FnMut(&str)) -> Vec<Rival<'a>> {
+        let in_place = |(suspect, instead_of, is_near): (usize, usize, bool), done: &Done| {
             let others = self.extended.suspects.iter().copied();
             let others = others.filter(|other| *other != instead_of && *other != suspect);
             let suspects: Vec<usize> = others.chain([suspect]).collect();
             let (model, records) = (self.extended.fitting.model, self.extended.fitting.records);
             let fit = fitted(model, records, &suspects, Some(&self.extended));
+            done.one_more();
             Rival { suspect, instead_of, is_near, fit }
         };
         let of = |taken: &Taken| {
@@ -218,7 +219,9 @@ impl<'a> Found<'a> {
             as_good.chain(near).collect::<Vec<_>>()
         };
         let all: Vec<_> = self.taken.iter().flat_map(of).collect();
-        all.into_par_iter().map(in_place).collect()
+        watched(progress, ("fits in place of what was named", all.len()), |done| {
+            all.into_par_iter().map(|one| in_place(one, done)).collect()
+        })
     }
 
     fn take_pair(&mut self, pair: Pair<'a>, progress: &mut dyn FnMut(&str)) {
