@@ -11,18 +11,19 @@
 //! ```text
 //!   cost = sum over outputs of  n ln(1 + |e|^2 / rss)        rss, n: what the best fit leaves, in independent samples
 //! ```
-//! A large term is told apart at a cosine at which a small one is not.
+//! A large term is told apart at a cosine at which a small one is not. A suspect that does nothing because a number of it starts at
+//! 0 is held against others by what it does per unit of that number; of several the one that the model's own numbers can do least.
 //!
 //! A parameter without a standard error moves the outputs as others do: the rank of the sensitivities is below their number.
 //!
 //! Source: discrepancy-notes.md, 3; Brun, Reichert, Künsch 2001, Water Resources Research 37(4) (collinearity).
 
-use super::fit::{Fitting, Point, What};
+use super::fit::{Fitting, Point, Unknown, What};
 use super::judge::GAIN_APART;
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
 use super::sensors;
-use model::{Failure, Program, Solver};
+use model::{Failure, Parameter, Program, Solver};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -212,10 +213,17 @@ pub(super) fn seen(
     };
     let of = |suspect: &usize| {
         let change = changed(fitting, (taken, values_si), *suspect, &[], scale).ok()? - &base;
-        let rest = &change - &columns * projected(&columns, &change);
-        let size = if change.norm() > least { change.norm() } else { 0.0 };
-        let share = if size > 0.0 { rest.norm() / size } else { 0.0 };
-        Some(Seen { suspect: *suspect, share, change: size, direction: rest.normalize() })
+        let seen = |change: DVector<f64>| {
+            let (rest, size) = (&change - &columns * projected(&columns, &change), change.norm());
+            let share = if size > 0.0 { rest.norm() / size } else { 0.0 };
+            Seen { suspect: *suspect, share, change: size, direction: rest.normalize() }
+        };
+        if change.norm() > least {
+            return Some(seen(change));
+        }
+        let begun = begun(fitting, (taken, values_si), *suspect, scale).into_iter().map(seen);
+        let most = begun.max_by(|one, other| one.share.total_cmp(&other.share));
+        Some(most.unwrap_or_else(|| seen(change * 0.0)))
     };
     let all = asked.iter().filter_map(of).collect();
     let moved = columns.column_iter().map(|column| column.norm()).collect();
@@ -267,28 +275,66 @@ impl Beside {
     }
 }
 
+/// What a suspect that does nothing at its first values does per unit of each of its numbers that starts at 0; of those alone
+/// that move an output.
+fn begun(
+    fitting: &Fitting<'_>,
+    (taken, values_si): (&[usize], &[f64]),
+    suspect: usize,
+    scale: &[f64],
+) -> Vec<DVector<f64>> {
+    let (extended, values_si) = beside(fitting, (taken, values_si), suspect, &[]);
+    let parameters = &fitting.model.parameters;
+    let at_0 = |index: usize| {
+        let Parameter { suspect: owner, values_si, is_fixed, .. } = &parameters[index];
+        *owner == Some(suspect) && !is_fixed && values_si[0] == 0.0
+    };
+    let numbers: Vec<usize> = (0..parameters.len()).filter(|index| at_0(*index)).collect();
+    if numbers.is_empty() {
+        return Vec::new();
+    }
+    let Ok((columns, _)) = columns(&extended, &values_si, scale) else { return Vec::new() };
+    let of_number = |index: &usize| {
+        let is_it = |what: What| matches!(what, What::Shared(of) | What::OfRecord(of, _) if of == *index);
+        let of_number = extended.unknowns.iter().zip(columns.column_iter());
+        of_number
+            .filter(|(unknown, _)| is_it(unknown.what))
+            .map(|(_, column)| column)
+            .fold(DVector::zeros(columns.nrows()), |sum, column| sum + column)
+    };
+    numbers.iter().map(of_number).filter(|change| change.norm() > 0.0).collect()
+}
+
 /// Scaled outputs with a suspect at these values, or its first; all other numbers as they are.
 pub(super) fn changed(
     fitting: &Fitting<'_>,
-    (taken, values_si): (&[usize], &[f64]),
+    base: (&[usize], &[f64]),
     suspect: usize,
     own: &[(What, f64)],
     scale: &[f64],
 ) -> Result<DVector<f64>, Failure> {
+    let (extended, values_si) = beside(fitting, base, suspect, own);
+    Ok(DVector::from_vec(extended.said(&values_si, scale)?))
+}
+
+/// The fit with one suspect more, and its numbers.
+fn beside<'a>(
+    fitting: &Fitting<'a>,
+    (taken, values_si): (&[usize], &[f64]),
+    suspect: usize,
+    own: &[(What, f64)],
+) -> (Fitting<'a>, Vec<f64>) {
     let mut suspects = taken.to_vec();
     suspects.push(suspect);
     let program = Program::new(fitting.model, &suspects).expect("all suspects together were compiled");
     let extended = Fitting::new(fitting.model, program, fitting.records, &suspects);
     let known = |what| fitting.unknowns.iter().position(|unknown| unknown.what == what);
-    let values: Vec<f64> = extended
-        .unknowns
-        .iter()
-        .map(|unknown| {
-            let own = own.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
-            own.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
-        })
-        .collect();
-    Ok(DVector::from_vec(extended.said(&values, scale)?))
+    let value = |unknown: &Unknown| {
+        let own = own.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
+        own.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
+    };
+    let values_si = extended.unknowns.iter().map(value).collect();
+    (extended, values_si)
 }
 
 #[cfg(test)]

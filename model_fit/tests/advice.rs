@@ -129,3 +129,32 @@ fn no_sensor_is_advised_where_two_suspects_do_the_same_to_every_state() {
     let text = explain(&file, &[record]).unwrap();
     assert!(text.contains("input-gain and flow-gain: the same") && !text.contains("sensor"), "{text}");
 }
+
+#[test]
+fn a_suspect_whose_number_starts_at_0_is_seen_by_what_it_does_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let idle = "[[suspects]]\nname = \"squared\"\nplace = \"upper\"\nadd = \"0*k*u\"\n\
+                parameters.k = { value = 0, range = [-1, 1] }\n";
+    let zero = TANKS.replace("value = 0.1", "value = 0") + idle;
+    let [file, record] = files(folder.path(), &zero);
+    let report = close(&file, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
+    let structure = &report.structure;
+    assert_eq!(structure.without_effect, ["squared"], "{structure:?}");
+    assert_eq!(structure.hidden, ["squared"], "{structure:?}");
+    assert_eq!(structure.twins.len(), 1, "{structure:?}");
+    assert_eq!(structure.twins[0].suspects, ["input-gain", "flow-gain"], "{structure:?}");
+    assert_eq!(structure.advice[0].suspects, ["squared"], "{structure:?}");
+    assert_eq!(structure.advice[1].measure, ["upper"], "{structure:?}");
+    // A gain of the sensor does what both gains do.
+    let gain = zero
+        .replace("value = \"lower\"", "value = \"gain*lower\"")
+        .replace("[states.upper]", "[parameters]\ngain = { value = 1, range = [0.1, 10] }\n[states.upper]");
+    let [file, record] = files(folder.path(), &gain);
+    let text = explain(&file, &[record]).unwrap();
+    for line in
+        ["squared: changes no output", "suspect input-gain: looks like a change of the model's own numbers"]
+    {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    assert!(!text.contains("gain: changes no output"), "{text}");
+}
