@@ -17,16 +17,21 @@ pub struct Cli {
 /// The workflow and its steps.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run the whole workflow: report.json, report.html, the extended rig.toml, and next-NAME.toml where an experiment is
-    /// proposed.
+    /// Run the whole workflow: report.json, report.html, the extended rig or model file, and next-NAME.toml where an experiment
+    /// is proposed for a rig file.
+    #[command(
+        override_usage = "discrepancy close <--model MODEL | --rig RIG> --train TRAIN... [--test TEST...] [OPTIONS]"
+    )]
     Close(CloseArguments),
     /// Check whether records can be used, and estimate their noise.
+    #[command(override_usage = "discrepancy check <--model MODEL | --rig RIG> --train TRAIN... [OPTIONS]")]
     Check(RecordArguments),
     /// Estimate the baseline's parameters from records, with standard errors, and list those that cannot be identified.
     Calibrate(RecordArguments),
     /// Locate which balance disagrees, in which regime, over which variables.
     Locate(RecordArguments),
     /// Name the missing effects: like 'close', without a held-out record.
+    #[command(override_usage = "discrepancy name <--model MODEL | --rig RIG> --train TRAIN... [OPTIONS]")]
     Name(NameArguments),
     /// Write the rig file, or the model file, extended by what a report names.
     Extend(ExtendArguments),
@@ -65,7 +70,7 @@ pub struct RecordArguments {
 /// How records are read.
 #[derive(Args, Clone, Debug)]
 pub struct ReadArguments {
-    /// Mapping file of foreign CSV records.
+    /// Mapping file of foreign CSV records, for a rig file; [record] of a model file says how its records are read.
     #[arg(long)]
     pub(crate) mapping: Option<PathBuf>,
     /// Refuse records with columns that the measurement file does not know (a model file reads its own alone); with
@@ -188,4 +193,22 @@ pub struct NextArguments {
     /// The experiment file.
     #[arg(long)]
     pub out: PathBuf,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Cli;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_usage_names_a_model_file_beside_a_rig_file() {
+        for step in ["close", "check", "name"] {
+            let mut command = Cli::command();
+            let usage = command.find_subcommand_mut(step).unwrap().render_usage().to_string();
+            assert!(
+                usage.contains(&format!("discrepancy {step} <--model MODEL | --rig RIG> --train")),
+                "{usage}"
+            );
+        }
+    }
 }

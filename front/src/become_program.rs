@@ -33,19 +33,19 @@ impl Program {
     pub(crate) fn become_it(&self, front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontError> {
         let mut command = Command::new(front.places.program(self.program)?);
         command.args(self.first);
-        if self.command == "close" && !names_a_rig(&arguments) {
+        if self.command == "close" && !names_a_model(&arguments) {
             command.arg("--rig").arg(front.places.data("rig.toml")?);
         }
         Err(replaced_by(command.args(arguments)))
     }
 }
 
-/// Whether a model stands on the command line, or only help is asked for.
-fn names_a_rig(arguments: &[OsString]) -> bool {
-    let words = arguments.iter().map(|argument| argument.to_string_lossy());
-    words
-        .into_iter()
-        .any(|word| word == "--rig" || word.starts_with("--rig=") || word == "--help" || word == "-h")
+/// Whether a rig file or a model file stands on the command line, or only help is asked for.
+fn names_a_model(arguments: &[OsString]) -> bool {
+    arguments.iter().map(|argument| argument.to_string_lossy()).any(|word| {
+        let option = word.split('=').next().unwrap_or(&word);
+        ["--rig", "--model", "--help", "-h"].contains(&option)
+    })
 }
 
 fn replaced_by(command: &mut Command) -> FrontError {
@@ -83,4 +83,23 @@ fn interpreter() -> PathBuf {
         .map(PathBuf::from)
         .or_else(of_environment)
         .unwrap_or_else(|| OsStr::new("python3").into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::names_a_model;
+    use std::ffi::OsString;
+
+    #[test]
+    fn close_gets_the_shipped_rig_only_where_no_model_is_named() {
+        let is_named = |line: &str| names_a_model(&line.split(' ').map(OsString::from).collect::<Vec<_>>());
+        for line in
+            ["--rig r.toml", "--rig=r.toml", "--train a.csv --model m.toml", "--model=m.toml", "--help", "-h"]
+        {
+            assert!(is_named(line), "{line}");
+        }
+        for line in ["--train rig.csv", "--train a.csv --test model.csv", "--models m.toml"] {
+            assert!(!is_named(line), "{line}");
+        }
+    }
 }

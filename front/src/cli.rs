@@ -22,7 +22,7 @@ pub enum Command {
     Latency(Box<LatencyArguments>),
     /// Hide an effect in the rig, measure, have it found, show the gap shrink, and open the seal.
     FindEffect(FindEffectArguments),
-    /// Find the effect that a model lacks: 'discrepancy close', with the shipped rig file where --rig names no other.
+    /// Find the effect that a model lacks: 'discrepancy close', with the shipped rig file where no --rig or --model is given.
     Close(Passed),
     /// Run any SocketCAN program on an embedded bus: 'bench can'.
     Can(Passed),
