@@ -12,7 +12,7 @@ fn found(hidden: &RigParameters, without: &[&str]) -> SelectionResult {
 }
 
 fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> SelectionResult {
-    let records = [gridded(hidden, &RigParameters::baseline())];
+    let records = [gridded_briefly(hidden, &RigParameters::baseline())];
     let engine = Engine::new(&records, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
     name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())

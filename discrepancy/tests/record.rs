@@ -60,7 +60,7 @@ pub(crate) fn gridded(hidden: &RigParameters, rig: &RigParameters) -> GriddedRec
     on_its_grid(&measurement(hidden, 11, STROKES_RAD_PER_S), rig)
 }
 
-/// The first four seconds of strokes that are twice as fast, which a test of few candidates needs.
+/// The first four seconds of strokes that are twice as fast, which tell as much in a third of the fits' time.
 pub(crate) fn gridded_briefly(hidden: &RigParameters, rig: &RigParameters) -> GriddedRecord {
     let whole = measurement(hidden, 11, 2.0 * STROKES_RAD_PER_S);
     let brief: Vec<&str> = whole.lines().take(4002).collect();
