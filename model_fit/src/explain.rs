@@ -1,9 +1,9 @@
 //! A model file in words: equations, numbers, units, suspects; with records also what these can tell apart.
 
 use super::bounds;
-use super::report::{friction, numbers, place, significant, term};
+use super::report::{friction, notes_of, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
-use super::{ModelError, read, read_all, select};
+use super::{ModelError, look, looked_at, read, select};
 use model::{
     Hold, Input, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start, Suspect, Table,
 };
@@ -20,9 +20,13 @@ pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
     if train.is_empty() {
         return Ok(text);
     }
-    let records = read_all(&model, train)?;
+    let records = looked_at(&model, train)?;
     let baseline = select::fitted(&model, &records, &[], None)?;
     let weak = bounds::remarks(&numbers(&baseline, &baseline, false));
+    let notes: Vec<String> = look::beyond_reach(&baseline).into_iter().chain(notes_of(&records)).collect();
+    if !notes.is_empty() {
+        let _ = write!(text, "\nnotes\n  {}\n", notes.join("\n  "));
+    }
     text += &structure_in_words(&structure(&baseline, &baseline), weak);
     Ok(text)
 }

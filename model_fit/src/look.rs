@@ -9,6 +9,7 @@
 //! | a run of equal values at the end of the range | each column | noted, with the key that says so |
 //! | correlation of model and measurement below -0.7 | outputs | noted |
 //! | another column that fits the model better | inputs and outputs | noted |
+//! | model and measurement of sizes that differ by a factor above 30 | outputs | noted |
 //!
 //! The limits are choices. With the shipped models the foreign records have two notes: runs of the tanks' level at its ceiling,
 //! and holes of up to 0.3 s in those of the cylinder.
@@ -34,6 +35,11 @@ const ASIDE: usize = 2;
 const AGAINST: f64 = -0.7;
 const ALIKE: f64 = 0.85;
 const UNLIKE: f64 = 0.5;
+
+/// Size of a model at the values of its file over that of the record, or the other way round, from which on a unit is doubted.
+const SIZES: f64 = 30.0;
+/// Share of an output's standard deviation from which on a fit that leaves it explains nearly nothing.
+const NEARLY_ALL: f64 = 0.95;
 
 /// Median distance of rows.
 pub(super) fn usual_period_s(time_s: &[f64]) -> f64 {
@@ -194,6 +200,7 @@ fn of_record(model: &Model, record: &Measured) -> Vec<String> {
     for (output, of_model) in model.outputs.iter().enumerate() {
         let own = correlation(&said[output], &record.outputs[output]);
         let name = &of_model.name;
+        notes.extend(sizes(model, output, &said[output], &record.outputs[output]));
         if own < AGAINST {
             notes.push(format!(
                 "before the fit the model moves against {name} (correlation {own:.2}): is a sign wrong, in the record or in the \
@@ -222,6 +229,39 @@ fn of_record(model: &Model, record: &Measured) -> Vec<String> {
         }
     }
     notes
+}
+
+/// A note where a model at the values of its file is of another size than the record.
+fn sizes(model: &Model, output: usize, said: &[f64], measured: &[Option<f64>]) -> Option<String> {
+    let pairs = said.iter().zip(measured).filter_map(|(said, measured)| Some([*said, (*measured)?]));
+    let squares =
+        pairs.fold([0.0, 0.0], |[x, y], [said, measured]| [x + said * said, y + measured * measured]);
+    let ratio = (squares[0] / squares[1]).sqrt();
+    let is_other = ratio > 0.0 && ratio.is_finite() && ratio.max(1.0 / ratio) > SIZES;
+    is_other.then(|| {
+        format!(
+            "before the fit the model gives {} times what the record has of {}: {}?",
+            significant(ratio),
+            model.outputs[output].name,
+            are_right(model, output)
+        )
+    })
+}
+
+/// What to look at where a model does not come near an output.
+fn are_right(model: &Model, output: usize) -> String {
+    let inputs = model.inputs.iter().filter(|input| input.rate_of.is_none());
+    let inputs: Vec<String> =
+        inputs.map(|input| format!("{} in {}", input.column, input.unit.text)).collect();
+    let of_inputs = match inputs.is_empty() {
+        true => String::new(),
+        false => format!(", of the inputs ({})", inputs.join(", ")),
+    };
+    let output = &model.outputs[output];
+    format!(
+        "are units, scales and signs right, of column {} in {}{of_inputs} and of the numbers of the model",
+        output.column, output.unit.text
+    )
 }
 
 /// What the model says at its first values, output by output.
@@ -257,7 +297,7 @@ fn correlation(said: &[f64], measured: &[Option<f64>]) -> f64 {
     if scale > 0.0 { products / scale } else { 0.0 }
 }
 
-/// Outputs of which the fitted model leaves more than their mean would.
+/// Outputs of which the fitted model leaves more than their mean would, or nearly as much.
 pub(super) fn beyond_reach(fitted: &Fitted<'_>) -> Vec<String> {
     let fitting = &fitted.fitting;
     let of_output = |(output, rms_si): (usize, f64)| {
@@ -268,11 +308,15 @@ pub(super) fn beyond_reach(fitted: &Fitted<'_>) -> Vec<String> {
         let signal_si = mean_and_variance(&measured).1.sqrt();
         let unit = &of_model.unit;
         let [rms, signal] = [rms_si, signal_si].map(|value| significant(value / unit.factor));
-        (signal_si > 0.0 && rms_si > signal_si).then(|| {
+        let left = if rms_si > signal_si { "more" } else { "nearly as much" };
+        let than = if rms_si > signal_si { "than" } else { "as" };
+        (signal_si > 0.0 && rms_si > NEARLY_ALL * signal_si).then(|| {
             format!(
-                "the fitted model leaves more of {} ({rms} {} rms) than its mean would ({signal}): are unit, scale, sign and \
-                 column {} right?",
-                of_model.name, unit.text, of_model.column
+                "the fitted model leaves {left} of {} ({rms} {} rms) {than} its mean would ({signal}), and explains nothing of \
+                 it: {}?",
+                of_model.name,
+                unit.text,
+                are_right(fitting.model, output)
             )
         })
     };

@@ -29,9 +29,13 @@ pub(crate) fn page(
     if let Some(why) = not_judged {
         head += &paragraph(&format!("The held-out record was not judged: {why}."));
     }
-    let notes = match report.notes.is_empty() {
+    let (unreached, notes) = report.notes.split_at(report.unreached.min(report.notes.len()));
+    head.extend(
+        unreached.iter().map(|note| paragraph(&format!("{}{}", note[..1].to_uppercase(), &note[1..]))),
+    );
+    let notes = match notes.is_empty() {
         true => String::new(),
-        false => pagekit::markup::list(&report.notes, ""),
+        false => pagekit::markup::list(notes, ""),
     };
     let sections = [
         ("notes", "Notes", notes),

@@ -10,7 +10,8 @@
 use super::filter::LowPass;
 use super::look::{HOLE, is_in_hole, usual_period_s};
 use super::record::{FEWEST_ROWS, Measured, RecordError};
-use model::{Hold, Inputs, Model};
+use super::report::significant;
+use model::{Hold, Input, Inputs, Model};
 
 /// Places for each row that a record may need at most; one with larger holes is taken row by row.
 pub const SPARSEST: usize = 20;
@@ -139,7 +140,7 @@ impl Grid {
         let counts = |row: &usize| condition.as_ref().is_none_or(|values| values[*row] != 0.0);
         let rows: Vec<usize> = (0..sampled_s.len()).step_by(of_model.every).filter(counts).collect();
         if rows.len() < FEWEST_ROWS {
-            return Err(RecordError::FewMeet { file, rows: rows.len() });
+            return Err(RecordError::FewMeet { file, rows: rows.len(), why: few(model, &samples) });
         }
         let of_rows = |values: &[f64]| -> Vec<f64> { rows.iter().map(|row| values[*row]).collect() };
         let folds = of_model.folds.iter().map(|fold| of_rows(&model.at_samples(fold, &samples))).collect();
@@ -186,6 +187,29 @@ impl Measured {
             Some(_) => self.sampled_s.len(),
         }
     }
+}
+
+/// Why few rows meet `[rows]`: what its condition reads, from least to most, or how far the record reaches.
+fn few(model: &Model, Inputs { time_s, samples_si }: &Inputs<'_>) -> String {
+    let length_s = significant(time_s[time_s.len() - 1] - time_s[0]);
+    let whole = format!("{} samples over {length_s} s, one of {} is a row", time_s.len(), model.rows.every);
+    let Some(condition) = &model.rows.condition else {
+        return format!("{whole}: is unit of the time right, and period_s, under [record]?");
+    };
+    let is_of_name = |character: char| character.is_alphanumeric() || character == '_';
+    let words: Vec<&str> = condition.text.split(|character| !is_of_name(character)).collect();
+    let read = model.inputs.iter().zip(*samples_si).filter(|(input, _)| words.contains(&input.name.as_str()));
+    let range = |(input, values): (&Input, &Vec<f64>)| {
+        let of = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or(f64::NAN);
+        let [least, most] = [of(f64::min), of(f64::max)].map(|end| significant(end / input.unit.factor));
+        format!("{} is {least} to {most} {}", input.name, input.unit.text)
+    };
+    let ranges: Vec<String> = read.map(range).collect();
+    format!(
+        "where {}, and {}; {whole}: are the units of these inputs, their columns and that of the time right?",
+        condition.text,
+        ranges.join(", ")
+    )
 }
 
 /// Missing samples by the hold of their input: the last value, or straight between neighbours.

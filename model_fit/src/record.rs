@@ -43,8 +43,8 @@ pub enum RecordError {
         "{file}: parameters.{name}.values of the model has no value of this record; it has {known}: name its file there"
     )]
     Unlisted { file: String, name: String, known: String },
-    #[error("{file}: {rows} rows meet [rows] of the model; {FEWEST_ROWS} are needed")]
-    FewMeet { file: String, rows: usize },
+    #[error("{file}: {rows} rows meet [rows] of the model; {FEWEST_ROWS} are needed: {why}")]
+    FewMeet { file: String, rows: usize, why: String },
 }
 
 /// A record of a model.

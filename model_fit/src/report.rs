@@ -57,6 +57,9 @@ pub struct ModelReport {
     pub suspects: Vec<Judgement>,
     pub structure: Structure,
     pub notes: Vec<String>,
+    /// How many of them, the first, say that the model explains nothing of an output.
+    #[serde(skip)]
+    pub unreached: usize,
     /// States, definitions, outputs and suspects as the file has them.
     pub equations: Vec<String>,
     /// What it declares beside them: records, columns, units, ranges, known numbers.
@@ -213,8 +216,9 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
     let mut suspects: Vec<Judgement> =
         found.first.iter().map(|evaluation| judgement(fitting, evaluation, found)).collect();
     suspects.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.gain.total_cmp(&a.gain)));
-    let mut notes = notes_of(fitting.records);
-    notes.extend(look::beyond_reach(&found.baseline));
+    let mut notes = look::beyond_reach(&found.baseline);
+    let unreached = notes.len();
+    notes.extend(notes_of(fitting.records));
     let failed = found.failed.iter();
     notes.extend(failed.map(|(suspect, why)| {
         format!("suspect {}: cannot be simulated: {why}", model.suspects[*suspect].name)
@@ -252,6 +256,7 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         suspects,
         structure: structure.clone(),
         notes,
+        unreached,
         equations: Vec::new(),
         declared: Vec::new(),
     }

@@ -11,8 +11,8 @@
 //! ```text
 //!   cost = sum over outputs of  n ln(1 + |e|^2 / rss)        rss, n: what the best fit leaves, in independent samples
 //! ```
-//! A large term is told apart at a cosine at which a small one is not. A suspect that does nothing because a number of it starts at
-//! 0 is held against others by what it does per unit of that number; of several the one that the model's own numbers can do least.
+//! A large term is told apart at a cosine at which a small one is not. A suspect that does nothing because a number of it starts
+//! at 0 is taken by what it does per unit of that number; of several by the one that the model's own numbers can do least.
 //!
 //! A parameter without a standard error moves the outputs as others do: the rank of the sensitivities is below their number.
 //!

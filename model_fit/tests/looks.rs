@@ -125,14 +125,73 @@ fn a_sign_and_exchanged_columns_are_noted_before_the_fit() {
 }
 
 #[test]
-fn an_output_in_another_unit_is_noted_after_the_fit() {
+fn a_model_of_another_size_than_the_record_is_noted_with_the_factor() {
+    let of = |from: &str, to: &str| notes(&TANK.replace(from, to), rows().into_iter());
+    let said = of(
+        "[inputs.pump]\ncolumn = \"pump_V\"\nunit = \"V\"",
+        "[inputs.pump]\ncolumn = \"pump_V\"\nunit = \"kV\"",
+    );
+    let factor = said.strip_prefix("before the fit the model gives ").and_then(|rest| rest.split(' ').next());
+    let factor: f64 = factor.and_then(|factor| factor.parse().ok()).unwrap_or_else(|| panic!("{said}"));
+    assert!((500.0..1000.0).contains(&factor), "{said}");
+    assert!(
+        said.contains("of column level_V in V, of the inputs (pump_V in kV) and of the numbers"),
+        "{said}"
+    );
+    let said = of("value = 0.15", "value = 0.001");
+    assert!(said.starts_with("before the fit the model gives 0.00"), "{said}");
+}
+
+#[test]
+fn a_condition_that_few_rows_meet_is_said_with_what_it_reads() {
     let folder = tempfile::tempdir().unwrap();
     let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
-    fs::write(&file, TANK).unwrap();
-    fs::write(&record, written(rows().into_iter().map(|[t, pump, level]| [t, pump, 1e3 * level]))).unwrap();
-    let notes = close(&file, &[record], &[], &mut |_| {}).unwrap().report.notes;
+    fs::write(
+        &record,
+        "t_s,pump_V,level_V\n".to_owned() + &(0..40).map(|k| format!("{k},{k},1\n")).collect::<String>(),
+    )
+    .unwrap();
+    let why = |rows: &str| {
+        fs::write(&file, format!("{rows}\n{TANK}")).unwrap();
+        look(&file, std::slice::from_ref(&record)).unwrap_err().to_string()
+    };
+    let said = why("rows.where = \"pump > 50[V]\"");
     assert!(
-        notes.iter().any(|note| note.contains("than its mean would") && note.contains("level_V right?")),
-        "{notes:?}"
+        said.contains(
+            "0 rows meet [rows] of the model; 8 are needed: where pump > 50[V], and pump is 0 to 39.0 V; "
+        ),
+        "{said}"
     );
+    let said = why("rows.every = 20");
+    assert!(said.contains("40 samples over 39.0 s, one of 20 is a row: is unit of the time right"), "{said}");
+}
+
+#[test]
+fn a_model_that_explains_nothing_of_an_output_is_noted_first_and_on_top_of_the_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
+    let closed = |model: &str, factor: f64| {
+        fs::write(&file, model).unwrap();
+        fs::write(&record, written(rows().into_iter().map(|[t, pump, level]| [t, pump, factor * level])))
+            .unwrap();
+        close(&file, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap()
+    };
+    let other = closed(TANK, 1e3);
+    let [note, page] = [&other.report.notes[0], &other.page];
+    assert!(note.contains("leaves more of seen") && note.contains("than its mean would"), "{note}");
+    assert!(page.find("The fitted model leaves more of seen").unwrap() < page.find("<main>").unwrap());
+    // A constant leaves what the mean leaves.
+    let constant = TANK
+        .replace("derivative = \"gain*pump - drain*level\"", "derivative = \"0*gain*pump - 0*drain*level\"");
+    let constant = constant.replace("start = 0", "start = \"fitted\"\nguess = 5");
+    let note = &closed(&constant, 1.0).report.notes[0];
+    assert!(note.contains("leaves nearly as much of seen") && note.contains("as its mean would"), "{note}");
+    let good = closed(TANK, 1.0).report.notes;
+    assert!(good.iter().all(|note| !note.contains("mean would")), "{good:?}");
+    let text = model_fit::explain(&file, std::slice::from_ref(&record)).unwrap();
+    assert!(!text.contains("\nnotes\n"), "{text}");
+    fs::write(&record, written(rows().into_iter().map(|[t, pump, level]| [t, pump, 1e3 * level]))).unwrap();
+    let text = model_fit::explain(&file, std::slice::from_ref(&record)).unwrap();
+    assert!(text.contains("\nnotes\n  the fitted model leaves more of seen"), "{text}");
+    assert!(text.contains("record.csv: before the fit the model gives 7.50·10⁻⁴ times"), "{text}");
 }
