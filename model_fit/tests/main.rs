@@ -6,6 +6,7 @@ mod balances;
 mod chamber;
 mod closing;
 mod discover;
+mod first_model;
 mod known_values;
 mod library_fits;
 mod looks;
