@@ -26,6 +26,10 @@ const STARTS: usize = 8;
 /// Most names of each kind.
 const MOST_NAMES: usize = 500;
 
+/// Tables and keys of a model file.
+const TOP: &str = "name record solver held_out fit rows tables inputs parameters states memory friction define outputs \
+                   terms suspects";
+
 struct Reader<'a> {
     source: &'a Source<'a>,
     model: Model,
@@ -35,6 +39,7 @@ struct Reader<'a> {
 
 pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsError> {
     let mut root = source.root();
+    root.allow(&TOP.split_whitespace().collect::<Vec<_>>())?;
     let stem = file.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy().into_owned());
     let name = root.text("name")?.map_or(stem, |text| text.text);
     let record = record(&mut root, source)?;
@@ -88,7 +93,6 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
         return Err(root.wrong("[outputs] is missing: what of this model is measured?"));
     }
     reader.resolve_starts()?;
-    root.finish()?;
     Ok(reader.model)
 }
 

@@ -117,7 +117,13 @@ fn an_error_has_line_and_column_and_says_what_is_allowed() {
         ("[inputs.pump]", "[inputs.level]", "states.level.the name is taken"),
         ("[inputs.pump]", "[inputs.sqrt]", "the name has a meaning in expressions"),
         ("unit = \"ms\"", "unit = \"m\"", "no unit of time; allowed is s, ms, us, min, h, or iso8601"),
-        ("[outputs.level_mm]", "[output.level_mm]", "[outputs] is missing"),
+        (
+            "[outputs.level_mm]",
+            "[output.level_mm]",
+            "unknown key output; allowed is name, record, solver, held_out, ",
+        ),
+        ("[outputs.level_mm]", "[output.level_mm]", ", suspects: did you mean outputs?"),
+        ("[parameters]", "[paramters]", "did you mean parameters?"),
     ] {
         assert!(TANK.contains(from), "{from}");
         let found = refused(&TANK.replacen(from, to, 1));

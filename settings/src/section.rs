@@ -323,12 +323,23 @@ impl<'a> Section<'a> {
     /// # Errors
     /// The first of them.
     pub fn finish(&self) -> Result<(), SettingsError> {
-        let unknown = |name: &&Spanned<_>| !self.asked.iter().any(|asked| name.get_ref() == asked);
+        let asked: Vec<&str> = self.asked.iter().map(String::as_str).collect();
+        self.allow(&asked)
+    }
+
+    /// Refuses keys that are none of these, before any is read: what follows from a misspelt table is said less clearly.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn allow(&self, allowed: &[&str]) -> Result<(), SettingsError> {
+        let unknown = |name: &&Spanned<_>| !allowed.iter().any(|allowed| name.get_ref() == allowed);
         let Some(name) = self.table.keys().find(unknown) else { return Ok(()) };
         let path = self.path_of(name.get_ref());
+        let meant = nearest(name.get_ref(), allowed)
+            .map_or(String::new(), |meant| format!(": did you mean {meant}?"));
         Err(self.source.error_at(
             name.span().start,
-            &format!("unknown key {path}; allowed is {}", self.asked.join(", ")),
+            &format!("unknown key {path}; allowed is {}{meant}", allowed.join(", ")),
         ))
     }
 
@@ -382,6 +393,28 @@ impl<'a> Section<'a> {
     }
 }
 
+/// The one of these that is written most alike: at most a third of its letters are others.
+fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
+    let distances = known.iter().map(|known| (edits(name, known), *known));
+    let (edits, known) = distances.min_by_key(|(edits, _)| *edits)?;
+    (3 * edits <= known.chars().count()).then_some(known)
+}
+
+/// Letters that are to be put in, left out or changed to get from one word to another [Levenshtein 1966].
+fn edits(from: &str, to: &str) -> usize {
+    let to: Vec<char> = to.chars().collect();
+    let mut row: Vec<usize> = (0..=to.len()).collect();
+    for (above, letter) in from.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], above + 1);
+        for (place, other) in to.iter().enumerate() {
+            let changed = diagonal + usize::from(letter != *other);
+            diagonal = row[place + 1];
+            row[place + 1] = changed.min(diagonal + 1).min(row[place] + 1);
+        }
+    }
+    row[to.len()]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -401,6 +434,22 @@ mod tests {
         assert_eq!((section.numbers("a"), section.numbers("none")), (Ok(vec![1.0]), Ok(vec![])));
         let message = section.numbers("e").unwrap_err().to_string();
         assert!(message.starts_with("f.toml:6:5: e = [1, inf]; allowed is a finite number"), "{message}");
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_with_the_one_that_is_written_alike() {
+        let source = Source::parse("[paramters]\na = 1", Path::new("f.toml")).expect("TOML");
+        let known = ["parameters", "outputs", "rows"];
+        let message = source.root().allow(&known).unwrap_err().to_string();
+        let expected =
+            "f.toml:1: unknown key paramters; allowed is parameters, outputs, rows: did you mean parameters?";
+        assert_eq!(message, expected);
+        for (name, meant) in
+            [("output", Some("outputs")), ("row", Some("rows")), ("rowing", None), ("x", None)]
+        {
+            assert_eq!(nearest(name, &known), meant, "{name}");
+        }
+        assert_eq!([edits("kitten", "sitting"), edits("", "ab"), edits("ab", "ba")], [3, 2, 2]);
     }
 
     #[test]
