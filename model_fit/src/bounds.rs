@@ -7,6 +7,8 @@ const NEAR: f64 = 1e-4;
 const NEAR_OF_RANGE: f64 = 1e-3;
 /// Error over value from which on a number whose sign is known is hardly determined.
 const WEAK: f64 = 0.5;
+/// Tolerances from what a file expects, from which on a number is remarked.
+const UNEXPECTED: f64 = 3.0;
 /// What is left of a held-out record over what is left of the training records, from which on it is remarked.
 const MUCH_WORSE: f64 = 3.0;
 
@@ -23,7 +25,8 @@ fn name(number: &Number) -> String {
     number.suspect.as_ref().map_or(number.name.clone(), |suspect| format!("{} of {suspect}", number.name))
 }
 
-/// Of numbers that are fitted: which ended at an end of its range, and which are hardly determined.
+/// Of numbers that are fitted: which ended at an end of its range, which are hardly determined, and which are far from what the
+/// file expects.
 pub(super) fn remarks(numbers: &[Number]) -> Vec<String> {
     let remark = |number: &Number| {
         let value = format!("{} {}", significant(number.value), number.unit);
@@ -43,7 +46,24 @@ pub(super) fn remarks(numbers: &[Number]) -> Vec<String> {
             )
         })
     };
-    numbers.iter().filter_map(remark).collect()
+    numbers.iter().filter_map(remark).chain(numbers.iter().filter_map(unexpected)).collect()
+}
+
+/// A number that is many tolerances from its value in the file.
+fn unexpected(number: &Number) -> Option<String> {
+    let [value, tolerance] = number.expected?;
+    let away = (number.value - value).abs() / tolerance;
+    (away > UNEXPECTED).then(|| {
+        format!(
+            "{} is {} {}, {} tolerances from {}: is its unit, its sign or the tolerance wrong, does another number do the \
+             same, or is something else missing?",
+            name(number),
+            significant(number.value),
+            number.unit,
+            significant(away),
+            significant(value)
+        )
+    })
 }
 
 impl ModelReport {

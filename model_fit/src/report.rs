@@ -83,6 +83,9 @@ pub struct Number {
     /// Its range has values of one sign alone.
     #[serde(skip)]
     pub(crate) is_of_one_sign: bool,
+    /// What the file says it is, within how much.
+    #[serde(skip)]
+    pub(crate) expected: Option<[f64; 2]>,
 }
 
 /// What both models leave of an output.
@@ -417,6 +420,7 @@ pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool)
             baseline: covariance::before(baseline, unknown.what).map(|before| before / unit.factor),
             is_at_bound,
             is_of_one_sign: unknown.range_si[0] >= 0.0 || unknown.range_si[1] <= 0.0,
+            expected: unknown.prior_si.map(|prior| prior.map(|value| value / unit.factor)),
         }
     })
     .collect()
@@ -450,6 +454,7 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
             baseline: None,
             is_at_bound: bounds::is_at_bound(*value, parameter.range_si),
             is_of_one_sign: false,
+            expected: None,
         }
     });
     let numbers: Vec<Number> = numbers.collect();

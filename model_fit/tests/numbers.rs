@@ -51,6 +51,19 @@ fn a_number_at_the_end_of_its_range_is_named_and_has_no_error() {
 }
 
 #[test]
+fn a_number_that_is_far_from_what_is_known_of_it_is_said_in_tolerances() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |tolerance: &str| {
+        let known = LINE.replace("value = 1, range = [0, 2]", &format!("value = 1, tolerance = {tolerance}"));
+        closed(folder.path(), &known, &record(0.5, |u| 1.5 * u), None).report.notes
+    };
+    let said = "gain is 1.06 mm/V, 6.32 tolerances from 1.00: is its unit, its sign or the tolerance wrong";
+    let notes = of("0.01");
+    assert!(notes.iter().any(|note| note.starts_with(said)), "{notes:?}");
+    assert!(of("0.3").iter().all(|note| !note.contains("tolerances from")));
+}
+
+#[test]
 fn a_number_whose_error_is_as_large_as_itself_is_said_to_be_hardly_determined() {
     let folder = tempfile::tempdir().unwrap();
     let weak = LINE
