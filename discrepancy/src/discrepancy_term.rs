@@ -17,8 +17,8 @@ use crate::engine::Engine;
 use crate::fit::Products;
 use crate::gridded_record::GriddedRecord;
 use crate::locate::estimate::variables;
-use crate::locate::{self, DIRECTION, POSITION, PRESSURE_DIFFERENCE, VARIABLES};
-use crate::outside::CONSTANT;
+use crate::locate::{self, DIRECTION, MEMORY, POSITION, PRESSURE_DIFFERENCE, VARIABLES};
+use crate::outside::{CONSTANT, TIE_R2_RATIO};
 use crate::parameters::COUNT;
 use crate::refit::{
     EffectEstimate, coordinate_columns, linearise_at, prior_deviations, prior_precisions, rig_of,
@@ -66,6 +66,10 @@ impl Over {
         [Over::Constant].into_iter().chain(single).chain(PRODUCTS.map(Over::Product))
     }
 
+    fn has_memory(self) -> bool {
+        matches!(self, Over::Variable(at) if VARIABLES[at].complexity == MEMORY)
+    }
+
     fn names(self) -> Vec<&'static str> {
         match self {
             Over::Constant => vec![CONSTANT],
@@ -94,9 +98,27 @@ pub struct Beside<'a> {
     pub factors: [f64; COUNT],
 }
 
+/// Groups by evidence, those with memory behind what explains nearly as much without: at least [`TIE_R2_RATIO`] of their
+/// evidence, or what the choice among so many groups costs less.
+fn plain_first(groups: Vec<Group>) -> Vec<Group> {
+    let choice = (groups.len() as f64).ln();
+    let most = |groups: &[Group]| groups.first().map_or(0.0, |group| group.log_evidence);
+    let (memories, plain): (Vec<Group>, Vec<Group>) =
+        groups.into_iter().partition(|group| group.over.has_memory());
+    let exceeds = |group: &Group| {
+        group.log_evidence - choice > most(&plain) && TIE_R2_RATIO * group.log_evidence > most(&plain)
+    };
+    let (first, last): (Vec<Group>, Vec<Group>) = memories.into_iter().partition(exceeds);
+    let mut all = first;
+    let mut rest = plain;
+    rest.extend(last);
+    all.extend(rest);
+    all
+}
+
 /// The term of a model; `None` where none has [`MIN_LOG_EVIDENCE`].
 pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedTerm> {
-    let mut groups = Term::new(engine, beside)?.groups();
+    let mut groups = plain_first(Term::new(engine, beside)?.groups());
     let best = *groups.first().filter(|best| best.log_evidence > MIN_LOG_EVIDENCE)?;
     let constant = groups
         .iter()
@@ -350,5 +372,24 @@ mod tests {
         }
         assert_eq!(hat_at(&knots, 2, knots[2]), 1.0);
         assert_eq!(super::knots(vec![1.0; 50]), [1.0]);
+    }
+    #[test]
+    fn a_memory_comes_first_only_where_it_explains_much_more() {
+        let place = |name: &str| VARIABLES.iter().position(|known| known.name == name).expect("in the table");
+        let group = |name, log_evidence| {
+            let over = Over::Variable(place(name));
+            Group { axis: 0, kinds: BALANCES[0], over, log_evidence, loss_fall: 2.0 * log_evidence }
+        };
+        let first = |memory, plain| {
+            let mut groups =
+                vec![group("last movement of u", memory), group("du/dt", plain), group("x", 1.0)];
+            groups.sort_by(|left, right| right.log_evidence.total_cmp(&left.log_evidence));
+            plain_first(groups)[0].over.names()[0]
+        };
+        assert_eq!(first(1000.0, 800.0), "last movement of u");
+        // Within a tenth, and within the choice among so many groups.
+        assert_eq!(first(1000.0, 950.0), "du/dt");
+        assert_eq!(first(2.0, 1.5), "du/dt");
+        assert_eq!(first(800.0, 1000.0), "du/dt");
     }
 }

@@ -12,10 +12,12 @@
 //!
 //! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
 
+pub(crate) mod memory;
 mod rest;
 mod subsample;
 
 use crate::check::Checked;
+use memory::Memory;
 use model_fit::stats::{mean, mean_and_variance, median};
 use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
 use records::{Channel, Record, Signal};
@@ -55,6 +57,8 @@ pub struct GriddedRecord {
     pub samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
     /// Smoothed state of each axis at the start of each period.
     pub points: Vec<[AxisState; 2]>,
+    /// What each axis remembers at the start of each period.
+    pub(crate) memories: Vec<[Memory; 2]>,
     /// Standard deviation of each reading, its rounding included.
     pub noise: [[f64; CHANNELS]; 2],
     /// Lag-1 autocorrelation of the noise, 0 to 1.
@@ -282,6 +286,7 @@ impl GriddedRecord {
             self.lag1_autocorrelation[i][at] = lag1_autocorrelation(&column(at), &resting, self.noise[i][at]);
         }
         self.jitter_s = self.jitter_s.max(jitter_s(&position, &positions, &resting));
+        self.remember(i);
     }
 }
 

@@ -15,13 +15,13 @@ pub(crate) mod dependence;
 pub(crate) mod formula;
 
 use crate::locate::maps::{map, surface};
-use crate::locate::{TIME, UnknownSeries, VARIABLES};
+use crate::locate::{MEMORY, TIME, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Dependence, LocatedTerm, Outside};
 pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
 
 /// Share of the best R2 that is nearly as good.
-const TIE_R2_RATIO: f64 = 0.9;
+pub(crate) const TIE_R2_RATIO: f64 = 0.9;
 /// Least gain in R2 of a pair.
 const MIN_PAIR_R2_GAIN: f64 = 0.15;
 /// Least R2 of a variable of a pair; below, its bins overfit.
@@ -62,7 +62,9 @@ pub fn outside(
         progress(&format!("outside: {}", series.balance));
         let sample = Sample::of(series);
         let tests: Vec<_> = (0..VARIABLES.len()).map(|variable| sample.test(variable)).collect();
-        let stands_out = tests.iter().map(|test| test.2).fold(0.0, f64::max);
+        // Whether there is a term is judged without memories: more tests would find more by chance.
+        let plain = VARIABLES.iter().zip(&tests).filter(|(variable, _)| variable.complexity < MEMORY);
+        let stands_out = plain.map(|(_, test)| test.2).fold(0.0, f64::max);
         let lifted = series.over_noise().is_some_and(|over| over > MIN_BIRGE_RATIO);
         let is_located = located.is_some_and(|located| located.balance == series.balance);
         if !is_located && !lifted && stands_out < MIN_SHIFT_Z && sample.mean_over_error().abs() < MIN_MEAN_Z {
@@ -152,7 +154,9 @@ impl BalanceTests<'_> {
         let mut best: Option<([usize; 2], f64)> = None;
         for left in 0..VARIABLES.len() {
             for right in left + 1..VARIABLES.len() {
-                let is_half = |at: usize| at != TIME && self.tests[at].0 > MIN_MARGINAL_R2;
+                let is_half = |at: usize| {
+                    at != TIME && VARIABLES[at].complexity < MEMORY && self.tests[at].0 > MIN_MARGINAL_R2
+                };
                 if !is_half(left) || !is_half(right) {
                     continue;
                 }

@@ -34,6 +34,7 @@ impl GriddedRecord {
             inputs: Vec::new(),
             samples: Vec::new(),
             points: Vec::new(),
+            memories: Vec::new(),
             excluded_periods: Vec::new(),
             blocks: Vec::new(),
             ..self.clone()
@@ -46,6 +47,7 @@ impl GriddedRecord {
             part.inputs.extend_from_slice(&self.inputs[places.clone()]);
             part.samples.extend_from_slice(&self.samples[places.clone()]);
             part.points.extend_from_slice(&self.points[places.clone()]);
+            part.memories.extend(self.memories.get(places.clone()).into_iter().flatten());
             part.excluded_periods.extend_from_slice(&self.excluded_periods[places]);
             let began = part.excluded_periods.len() - BLOCK * WINDOW;
             part.excluded_periods[began..began + WINDOW].fill(true);

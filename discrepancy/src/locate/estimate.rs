@@ -23,6 +23,7 @@ use super::noise_colour::ar1_coefficients;
 use super::regime::Regimes;
 use super::simulated::{Nudge, Pass, Readings};
 use super::{UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
+use crate::gridded_record::memory::Memory;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 use crate::unknown_inputs::NORMAL_LITRES_PER_MINUTE;
 use nalgebra::{SMatrix, SVector};
@@ -375,5 +376,26 @@ pub(crate) fn variables(
         _ => slope(0) - slope(1),
     };
     let sign = if v == 0.0 { 0.0 } else { v.signum() };
-    [x, v, v.abs(), sign, a, b, a - b, u, rate, force, (from as f64 + n / 2.0) * PERIOD_S, dp]
+    let time_s = (from as f64 + n / 2.0) * PERIOD_S;
+    let remembered = |of: &dyn Fn(&Memory) -> f64| {
+        let memories = gridded.memories.get(from..from + WINDOW).unwrap_or_default();
+        memories.iter().map(|memory| of(&memory[axis])).sum::<f64>() / n
+    };
+    let [fast, slow] = [0, 1].map(|time: usize| remembered(&|memory| memory.command_changes[time]));
+    let [brief, long] = [0, 1].map(|time: usize| {
+        remembered(&|memory| {
+            let [a, b] = memory.pressure_changes_pa[time];
+            match balance {
+                0 => a,
+                1 => b,
+                _ => a - b,
+            }
+        })
+    });
+    let command_direction = remembered(&|memory| memory.command_direction);
+    let extension_direction = remembered(&|memory| memory.extension_direction);
+    let mean_speed = remembered(&|memory| memory.mean_speed_m_per_s);
+    let plain = [x, v, v.abs(), sign, a, b, a - b, u, rate, force, time_s, dp];
+    let memories = [fast, slow, command_direction, extension_direction, brief, long, mean_speed];
+    std::array::from_fn(|at| if at < plain.len() { plain[at] } else { memories[at - plain.len()] })
 }

@@ -9,7 +9,7 @@
 //! Source: discrepancy-notes.md, Pipeline 8. Short laws before good ones: Udrescu, Tegmark 2020, Science Advances 6(16).
 
 use super::dependence::{Bins, Sample};
-use crate::locate::{DIRECTION, POSITION, SPEED, TIME, VARIABLES, VELOCITY, WindowVariable};
+use crate::locate::{DIRECTION, MEMORY, POSITION, SPEED, TIME, VARIABLES, VELOCITY, WindowVariable};
 use std::f64::consts::TAU;
 
 /// Share of the best gain that a shorter formula must reach.
@@ -69,7 +69,7 @@ fn binned(sample: &Sample) -> f64 {
 
 fn forms() -> Vec<Form> {
     let mut forms = vec![form(1, "", "", true, |_| 0.0)];
-    for at in (0..VARIABLES.len()).filter(|at| *at != TIME) {
+    for at in (0..VARIABLES.len()).filter(|at| *at != TIME && VARIABLES[*at].complexity < MEMORY) {
         let WindowVariable { name, unit, nodes, .. } = VARIABLES[at];
         let text = if name == "p_a-p_b" { "(p_a-p_b)" } else { name };
         forms.push(form(2 + nodes, text, unit, false, move |variables| variables[at]));
