@@ -135,6 +135,12 @@ pub struct ExplainArguments {
 pub struct NewArguments {
     /// Record: a text table with names above its columns.
     pub record: PathBuf,
+    /// Columns that drive the plant, separated by commas; the role of all others is guessed.
+    #[arg(long, value_delimiter = ',', value_name = "COLUMN")]
+    pub inputs: Vec<String>,
+    /// Columns that are measured of it.
+    #[arg(long, value_delimiter = ',', value_name = "COLUMN")]
+    pub outputs: Vec<String>,
     /// The new model file; without it the text is printed.
     #[arg(long)]
     pub out: Option<PathBuf>,

@@ -31,19 +31,40 @@ pub enum NewError {
     Calendar { file: String, line: u64, column: String, cell: String },
     #[error("{file}: beside the time {name} no column changes: nothing is measured")]
     Flat { file: String, name: String },
+    #[error("{file}: {name} is no column with numbers beside the time; there are {known}")]
+    Column { file: String, name: String, known: String },
     #[error(transparent)]
     Read(#[from] records::ReadError),
 }
 
-/// The text of a model file that begins from a record.
+/// Columns whose role is known; that of all others is guessed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Roles<'a> {
+    /// Columns that drive the plant.
+    pub inputs: &'a [String],
+    /// Columns that are measured of it.
+    pub outputs: &'a [String],
+}
+
+/// A model file that begins from a record.
+#[derive(Clone, Debug)]
+pub struct NewModel {
+    /// The file.
+    pub text: String,
+    /// Whether a column drives it.
+    pub has_input: bool,
+}
+
+/// A model file that begins from a record.
 ///
 /// # Errors
-/// A file that is no table over time.
-pub fn new_model(record: &Path) -> Result<String, NewError> {
+/// A file that is no table over time, or lacks a column.
+pub fn new_model(record: &Path, roles: Roles<'_>) -> Result<NewModel, NewError> {
     let bytes = std::fs::read(record).map_err(|why| NewError::Open { file: record.to_owned(), why })?;
     let table = Table::of(record, &String::from_utf8_lossy(&bytes))?;
-    let (time, columns) = guess::columns(record, &table)?;
-    Ok(Text { table: &table, time: &time, columns: &columns }.written(record))
+    let (time, columns) = guess::columns(record, &table, roles)?;
+    let text = Text { table: &table, time: &time, columns: &columns };
+    Ok(NewModel { text: text.written(record), has_input: text.of(Role::Input).next().is_some() })
 }
 
 struct Text<'a> {
@@ -69,6 +90,9 @@ impl Text<'_> {
         self.record(&mut text);
         for column in self.of(Role::LeftOut) {
             let _ = writeln!(text, "\n# Column {} is left out: {}.", column.column, column.why);
+        }
+        if self.of(Role::Input).next().is_none() {
+            text.push_str("\n# No column was taken as an input, so that nothing drives this model: --inputs names them.\n");
         }
         self.inputs(&mut text);
         self.parameters(&mut text);
@@ -102,16 +126,20 @@ impl Text<'_> {
         for input in self.of(Role::Input) {
             let _ = write!(
                 text,
-                "\n[inputs.{}] # guessed: {}. An output instead? Move it to [outputs] with a value\ncolumn = {}\nunit = {}{}\n",
+                "\n[inputs.{}] # {}. An output instead? Move it to [outputs] with a value\ncolumn = {}\nunit = {}{}\n",
                 input.name,
-                input.why,
+                input.reason(),
                 quoted(&input.column),
                 quoted(&input.unit),
                 remark(input)
             );
-            if !input.is_stepwise {
-                text.push_str("hold = \"linear\" # it changes from sample to sample\n");
-            }
+            text.push_str(match (input.is_stepwise, input.is_of_a_drive) {
+                (true, _) => "",
+                (false, true) => "# hold = \"linear\" where it is measured, and goes on between samples\n",
+                (false, false) => {
+                    "hold = \"linear\" # it changes from sample to sample; without it where it is a command\n"
+                }
+            });
         }
     }
 
@@ -163,11 +191,11 @@ impl Text<'_> {
                 "\n[states.{name}] # a lag of first order; write the equation that you believe in\nunit = {0}{2}\n\
                  start = \"{name}_measured\" # the first sample of that output\n\
                  derivative = \"(rest_{name}{gains} - {name})/lag_{name}\"\n\n\
-                 [outputs.{name}_measured] # guessed: {3}\ncolumn = {1}\nunit = {0}\nvalue = \"{name}\"\n",
+                 [outputs.{name}_measured] # {3}\ncolumn = {1}\nunit = {0}\nvalue = \"{name}\"\n",
                 quoted(unit),
                 quoted(column),
                 remark(output),
-                output.why
+                output.reason()
             );
         }
     }
@@ -246,7 +274,7 @@ mod tests {
     fn of(text: &str) -> Result<(String, Model), String> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
-        let written = new_model(file.path()).map_err(|error| error.to_string())?;
+        let written = new_model(file.path(), Roles::default()).map_err(|error| error.to_string())?.text;
         let model = Model::parse(&written, Path::new("new.toml"))
             .unwrap_or_else(|error| panic!("{error}\n{written}"));
         Ok((written, model))
@@ -339,6 +367,44 @@ mod tests {
     }
 
     #[test]
+    fn columns_have_the_roles_that_are_asked_and_a_model_without_an_input_says_so() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let body = rows(|t| format!("{t},{},{},{}\n", (0.3 * t).sin(), t.sqrt(), (0.2 * t).cos()));
+        std::fs::write(file.path(), format!("t_s,x_mm,p_bar_g,u_V\n{body}")).unwrap();
+        let new = |inputs: &[&str], outputs: &[&str]| {
+            let [inputs, outputs] = [inputs, outputs]
+                .map(|names| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+            new_model(file.path(), Roles { inputs: &inputs, outputs: &outputs })
+                .map_err(|why| why.to_string())
+        };
+        let names = |text: &str| {
+            let model =
+                Model::parse(text, Path::new("new.toml")).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let held = |one: &model::Input| (one.column.clone(), one.hold == model::Hold::Linear);
+            let inputs: Vec<_> = model.inputs.iter().map(held).collect();
+            (inputs, model.outputs.iter().map(|one| one.column.clone()).collect::<Vec<_>>())
+        };
+        // A command keeps its value between samples; what is measured goes on.
+        let guessed = new(&[], &[]).unwrap();
+        assert!(guessed.has_input);
+        assert_eq!(
+            names(&guessed.text),
+            (vec![("u_V".into(), false)], vec!["x_mm".into(), "p_bar_g".into()])
+        );
+        let asked = new(&["p_bar_g"], &["u_V"]).unwrap();
+        assert!(asked.has_input && !asked.text.contains("No column was taken"), "{}", asked.text);
+        assert_eq!(names(&asked.text), (vec![("p_bar_g".into(), true)], vec!["x_mm".into(), "u_V".into()]));
+        let none = new(&[], &["u_V"]).unwrap();
+        assert!(!none.has_input && none.text.contains("No column was taken as an input"), "{}", none.text);
+        let refused = new(&["p_bar"], &[]).unwrap_err();
+        assert!(
+            refused
+                .ends_with("p_bar is no column with numbers beside the time; there are x_mm, p_bar_g, u_V"),
+            "{refused}"
+        );
+    }
+
+    #[test]
     fn a_file_that_is_no_record_says_what_is_missing() {
         for (text, message) in [
             ("", "no line with names above rows of numbers"),
@@ -363,7 +429,7 @@ mod tests {
             y += (1.0 - (-0.04_f64).exp()) * (1.0 + 2.5 * u - y);
         }
         std::fs::write(&record, text).unwrap();
-        std::fs::write(&file, new_model(&record).unwrap()).unwrap();
+        std::fs::write(&file, new_model(&record, Roles::default()).unwrap().text).unwrap();
         let closed = crate::close(&file, &[record], &[], &mut |_| {}).unwrap();
         let value = |name: &str| closed.report.parameters.iter().find(|one| one.name == name).unwrap().value;
         assert!((value("lag_y") - 0.5).abs() < 0.01, "{}", value("lag_y"));

@@ -79,7 +79,7 @@ mod verdict;
 mod watch;
 
 pub use adequacy::Residual;
-pub use begin::{NewError, new_model};
+pub use begin::{NewError, NewModel, Roles, new_model};
 pub use discover::{DiscoveredTerm, Located, Place};
 pub use explain::explain;
 pub use extended::{ExtendError, ReportedModel, extended};

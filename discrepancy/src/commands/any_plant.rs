@@ -1,11 +1,11 @@
 //! `close` and `name` of a model file of any plant.
 
 use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress, read_report};
-use crate::cli::ReadArguments;
+use crate::cli::{NewArguments, ReadArguments};
 use crate::folder::{self, Folder};
 use model_fit::{
-    ClosedModel, ModelReport, OfAlternative, ReportedModel, Search, Verdict, close_with, extended, look,
-    new_model, read,
+    ClosedModel, ModelReport, NewModel, OfAlternative, ReportedModel, Roles, Search, Verdict, close_with,
+    extended, look, new_model, read,
 };
 use pagekit::significant;
 use serde::de::DeserializeOwned;
@@ -104,8 +104,14 @@ pub(super) fn report_of<T: DeserializeOwned>(file: &Path, is_of_model: bool) -> 
 }
 
 /// `new`: a first model file, printed or written where nothing stands yet.
-pub(super) fn new_command(record: &Path, out: Option<&Path>) -> Result<Exit, CommandError> {
-    let text = new_model(record)?;
+pub(super) fn new_command(arguments: &NewArguments) -> Result<Exit, CommandError> {
+    let NewArguments { record, inputs, outputs, out } = arguments;
+    let NewModel { text, has_input } = new_model(record, Roles { inputs, outputs })?;
+    if !has_input {
+        progress()(
+            "no column was taken as an input, so that nothing drives this model: --inputs COLUMN names them",
+        );
+    }
     let Some(out) = out else {
         print(&text)?;
         return Ok(Exit::Good);

@@ -1,7 +1,7 @@
 //! What the columns of a table are: the time, inputs, outputs, their names and units.
 
-use super::NewError;
 use super::columns::Table;
+use super::{NewError, Roles};
 use model::Unit;
 use records::{ColumnOptions, read_columns};
 use std::path::Path;
@@ -40,6 +40,9 @@ const TAKEN: [&str; 19] = [
     "cos", "atan", "floor", "delay",
 ];
 
+/// Why a column has the role that the user gave it.
+const ASKED: &str = "named on the command line";
+
 /// The column of the time.
 pub(super) struct Time {
     pub(super) column: String,
@@ -67,6 +70,8 @@ pub(super) struct Column {
     /// Why it has its role.
     pub(super) why: &'static str,
     pub(super) is_stepwise: bool,
+    /// Its name is that of something that drives.
+    pub(super) is_of_a_drive: bool,
     pub(super) mean: f64,
     pub(super) largest: f64,
     /// Time in which it forgets itself to 1/e, s.
@@ -75,7 +80,18 @@ pub(super) struct Column {
     values: Vec<f64>,
 }
 
-pub(super) fn columns(record: &Path, table: &Table) -> Result<(Time, Vec<Column>), NewError> {
+impl Column {
+    /// Why it has its role, as a comment.
+    pub(super) fn reason(&self) -> String {
+        if self.why == ASKED { ASKED.into() } else { format!("guessed: {}", self.why) }
+    }
+}
+
+pub(super) fn columns(
+    record: &Path,
+    table: &Table,
+    roles: Roles<'_>,
+) -> Result<(Time, Vec<Column>), NewError> {
     let file = || record.display().to_string();
     let numbers: Vec<&str> = (0..table.head.len())
         .filter(|index| table.is_number[*index])
@@ -124,6 +140,16 @@ pub(super) fn columns(record: &Path, table: &Table) -> Result<(Time, Vec<Column>
         let samples = samples.map_or(Vec::new(), |number| values[number].clone());
         let column = column(name, samples, time.step_s, &all);
         all.push(column);
+    }
+    let inputs = roles.inputs.iter().map(|name| (name, Role::Input));
+    for (name, role) in inputs.chain(roles.outputs.iter().map(|name| (name, Role::Output))) {
+        let asked = all.iter_mut().find(|column| column.column == *name && !column.values.is_empty());
+        let Some(column) = asked else {
+            let known = all.iter().filter(|column| !column.values.is_empty());
+            let known = known.map(|column| column.column.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(NewError::Column { file: file(), name: name.clone(), known });
+        };
+        (column.role, column.why) = (role, ASKED);
     }
     // Something must be measured.
     if all.iter().all(|column| column.role != Role::Output) {
@@ -195,6 +221,7 @@ fn column(column: &str, values: Vec<f64>, step_s: f64, others: &[Column]) -> Col
         role,
         why,
         is_stepwise,
+        is_of_a_drive: is_named,
         mean,
         largest,
         correlation_s,
