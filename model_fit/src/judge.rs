@@ -211,6 +211,20 @@ pub(crate) fn share_in_words(share: f64) -> String {
     }
 }
 
+/// Effects of these suspects, each once, with its forms where there are several.
+pub(super) fn by_effect(model: &Model, suspects: &[usize]) -> String {
+    let effect = |one: usize| model.suspects[one].effect.as_ref().unwrap_or(&model.suspects[one].name);
+    let mut effects: Vec<&String> = suspects.iter().map(|one| effect(*one)).collect();
+    effects.sort_by_key(|name| suspects.iter().position(|one| effect(*one) == *name));
+    effects.dedup();
+    let in_words = |name: &&String| {
+        let forms = suspects.iter().filter(|one| effect(**one) == *name);
+        let forms: Vec<&str> = forms.map(|one| model.suspects[*one].name.as_str()).collect();
+        if forms.len() < 2 { (*name).clone() } else { format!("{name} ({})", forms.join(" or ")) }
+    };
+    effects.iter().map(in_words).collect::<Vec<_>>().join(" or ")
+}
+
 /// Whether two suspects are forms of one effect.
 pub(super) fn is_one_effect(model: &Model, one: usize, other: usize) -> bool {
     let [effect, of_other] = [one, other].map(|suspect| model.suspects[suspect].effect.as_ref());
@@ -233,7 +247,9 @@ pub(super) fn apart(model: &Model, best: &Evaluation, other: &Evaluation) -> boo
 
 #[cfg(test)]
 mod tests {
-    use super::share_in_words;
+    use super::{by_effect, share_in_words};
+    use model::Model;
+    use std::path::Path;
 
     #[test]
     fn a_share_that_is_far_below_nothing_is_said_as_a_ratio() {
@@ -246,5 +262,22 @@ mod tests {
             "worse, more than 10000 times the power",
         ];
         assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn forms_of_one_effect_are_one_alternative_with_their_names() {
+        let suspect = |name: &str, effect: &str| {
+            format!("[[suspects]]\nname = \"{name}\"\n{effect}place = \"y\"\nadd = \"1\"\n")
+        };
+        let seal = "effect = \"pressed-seal\"\n";
+        let all = [
+            suspect("lip", seal),
+            suspect("offset", ""),
+            suspect("root", seal),
+            suspect("single", "effect = \"e\"\n"),
+        ];
+        let text = format!("[outputs.y]\nvalue = \"1\"\n{}", all.concat());
+        let model = Model::parse(&text, Path::new("m.toml")).unwrap();
+        assert_eq!(by_effect(&model, &[0, 1, 2, 3]), "pressed-seal (lip or root) or offset or e");
     }
 }

@@ -6,7 +6,7 @@ use super::covariance;
 use super::discover::{DiscoveredTerm, Located};
 use super::fit::Fitting;
 use super::held_out::{Alternative, Judged, Traces};
-use super::judge::{Evaluation, is_one_effect};
+use super::judge::{Evaluation, by_effect, is_one_effect};
 use super::look;
 use super::record::Measured;
 use super::select::{Fitted, Found, Taken};
@@ -150,14 +150,12 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
     };
     let names: Vec<&str> = found.taken.iter().map(|taken| effect(taken.evaluation.suspect)).collect();
     // Forms of one effect that cannot be told apart are one finding.
-    let others: Vec<&str> = found
+    let pairs = found
         .taken
         .iter()
-        .flat_map(|taken| {
-            taken.alternatives.iter().map(|other| [effect(*other), effect(taken.evaluation.suspect)])
-        })
-        .filter_map(|[other, taken]| (other != taken).then_some(other))
-        .collect();
+        .flat_map(|taken| taken.alternatives.iter().map(|other| (*other, taken.evaluation.suspect)));
+    let others: Vec<usize> =
+        pairs.filter(|(other, of)| effect(*other) != effect(*of)).map(|(one, _)| one).collect();
     let is_near_another = found
         .taken
         .iter()
@@ -197,7 +195,8 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
             )
         }
         Verdict::Ambiguous if !others.is_empty() => {
-            format!("{} is missing, or {}: the records cannot tell", names.join(" and "), others.join(" or "))
+            let others = by_effect(model, &others);
+            format!("{} is missing, or {others}: the records cannot tell", names.join(" and "))
         }
         _ => format!("{} {} missing", names.join(" and "), if names.len() == 1 { "is" } else { "are" }),
     };

@@ -165,8 +165,8 @@ fn in_words(report: &ModelReport) -> String {
     for suspect in &report.suspects {
         let _ = writeln!(
             text,
-            "  suspect {}: probability {:.3}, {}",
-            suspect.suspect, suspect.probability, suspect.decision
+            "  suspect {}: {} (beside the model alone its probability is {:.3})",
+            suspect.suspect, suspect.decision, suspect.probability
         );
     }
     if let Some(located) = report.located_in_words() {
