@@ -40,7 +40,7 @@
 //! | `verdict` | what is concluded |
 //!
 //! Held-out records are read and checked before a fit starts, and no value of theirs enters one: they wait until the terms are
-//! chosen and fitted. Keys and figures: `docs/model-files.md`.
+//! chosen and fitted. Keys: `docs/model-files.md`; figures: `docs/model-records.md`.
 
 pub mod equal_runs;
 pub mod estimator;
