@@ -1,6 +1,6 @@
 //! Binned means of unknown inputs over their strongest variables, with bands; over two variables as a surface.
 
-use super::{UnknownPoint, UnknownSeries, VARIABLES};
+use super::{MEMORY, UnknownPoint, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Surface};
 
 /// Bins of a map.
@@ -14,12 +14,13 @@ const LEAST: usize = 5;
 /// Smallest over_noise of a drawn balance.
 const DRAWN: f64 = 1.1;
 
-/// Maps of all significant balances over their strongest variables.
+/// Maps of all significant balances over the strongest variables that can be read off the record: one of memory may follow by chance.
 pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
     let mut maps = Vec::new();
     for series in series.iter().filter(|series| series.over_noise().is_some_and(|over| over > DRAWN)) {
+        let present = (0..VARIABLES.len()).filter(|variable| VARIABLES[*variable].complexity < MEMORY);
         let mut ranked: Vec<(usize, f64)> =
-            (0..VARIABLES.len()).map(|variable| (variable, between(series, variable))).collect();
+            present.map(|variable| (variable, between(series, variable))).collect();
         ranked.sort_by(|left, right| right.1.total_cmp(&left.1));
         maps.extend(ranked.iter().take(MAPS).map(|(variable, _)| map(series, *variable)));
     }
