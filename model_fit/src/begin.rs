@@ -49,7 +49,7 @@ pub struct Roles<'a> {
 /// A model file that begins from a record.
 #[derive(Clone, Debug)]
 pub struct NewModel {
-    /// The file.
+    /// TOML with comments, as `close` reads it.
     pub text: String,
     /// Whether a column drives it.
     pub has_input: bool,
