@@ -9,6 +9,7 @@ use system_tests::binaries::Program;
 use system_tests::launch::{Pace, run_both};
 use system_tests::process::Running;
 use system_tests::scene::{SHORT, Scene};
+use system_tests::turn;
 use system_tests::xcp;
 
 /// System calls that make, change or remove something in a file system.
@@ -90,6 +91,7 @@ fn listens(process: &Running) -> Vec<String> {
 fn rig_and_controllers_listen_nowhere_and_the_gateway_on_loopback_alone() {
     let scene = Scene::new(SHORT);
     let config = xcp::config(&scene);
+    let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 60").start();
     let controller =
         scene.controller(Pace::Real).with(&format!("--repeat --xcp {}", config.display())).start();

@@ -11,6 +11,7 @@ use system_tests::launch::Pace;
 use system_tests::process::{Running, wait_until};
 use system_tests::records::{Table, bus_log, count, json};
 use system_tests::scene::{SHORT, Scene};
+use system_tests::turn;
 
 /// The experiment of the other tests, with more in its `[rig]`.
 fn with_people(rig: &str) -> Scene {
@@ -257,6 +258,7 @@ fn people_allocate_nothing_in_the_1_ms_path() {
          [[rig.event]]\nat_s = 1.4\ndo = \"weights\"\nadded_mass_kg = 5\n",
         STOP_AND_RELEASE.replace("0.4", "1.2").replace("0.95", "1.6")
     ));
+    let _machine = turn::take();
     let launch = scene.emulator(Pace::Real).build(Build::CountingAllocations);
     let mut emulator = launch.with("--console --seconds 60").start();
     scene.wait_for_rows("emulator", 1800);

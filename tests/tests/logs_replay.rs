@@ -12,6 +12,7 @@ use system_tests::peer::{Packet, Peer};
 use system_tests::process::Running;
 use system_tests::records::{count, json};
 use system_tests::scene::{SHORT, Scene};
+use system_tests::turn;
 
 /// Silence after which nothing more comes.
 const SILENCE: Duration = Duration::from_millis(500);
@@ -86,6 +87,7 @@ fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
         commands(3)
     );
     let log = scene.write("mixed.log", &mixed);
+    let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 60").start();
     scene.wait_for_rows("emulator", 50);
     let refused = replay(&scene, &log, "").wait().expect_code(2);

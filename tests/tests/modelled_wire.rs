@@ -10,6 +10,7 @@ use system_tests::launch::Pace;
 use system_tests::process::Ended;
 use system_tests::records::{bus_log, count, json};
 use system_tests::scene::{LINKED, SHORT, Scene};
+use system_tests::turn;
 
 const CYCLE_NS: u64 = 1_000_000;
 
@@ -81,6 +82,7 @@ fn expect_below_the_bounds(wire: &Value) -> Vec<String> {
 #[test]
 fn every_frame_of_a_real_run_is_through_within_its_worst_case() {
     let scene = Scene::new(LINKED);
+    let _machine = turn::take();
     let (summary, _) = run(&scene, Pace::Real, "bitrate=1000000", "");
     let wire = wire_time(&summary);
     let widened = expect_below_the_bounds(wire);

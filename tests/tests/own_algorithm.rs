@@ -8,6 +8,7 @@ use system_tests::own;
 use system_tests::process::Ended;
 use system_tests::records::{Table, json};
 use system_tests::scene::{SHORT, Scene};
+use system_tests::turn;
 
 /// A scene whose drive is controlled by the scene's own_algorithm.so.
 fn scene() -> Scene {
@@ -90,6 +91,7 @@ fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
     let scene = scene();
     let slow = "count > 150 && (usleep(2000), 0)";
     own::failing(&scene, slow, &["-D_DEFAULT_SOURCE", "-include", "unistd.h"]);
+    let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
     let _ = ended.expect_said(&["drive: controller-fault", "missed its time"]);
@@ -103,6 +105,7 @@ fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
 fn a_library_that_never_returns_ends_the_controller_with_what_was_recorded() {
     let scene = scene();
     own::failing(&scene, "count > 200 && (pause(), 0)", &["-D_DEFAULT_SOURCE", "-include", "unistd.h"]);
+    let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
     let _ = ended.expect_said(&["has not returned for 2 s"]);
