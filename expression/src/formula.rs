@@ -19,7 +19,7 @@ pub const MOST_REGISTERS: usize = 96;
 /// What a formula is over.
 #[derive(Clone, Copy, Debug)]
 pub struct Variable<'a> {
-    /// Its name in the expression.
+    /// Its name in the expression; empty where a parameter has taken it.
     pub name: &'a str,
     /// Its dimension.
     pub dimension: Dimension,
@@ -142,7 +142,8 @@ impl Names<'_> {
     }
 
     fn unknown(&self, name: &str, at: usize) -> Wrong {
-        let known: Vec<&str> = self.variables.iter().chain(self.parameters).map(|one| one.name).collect();
+        let names = self.variables.iter().chain(self.parameters).map(|one| one.name);
+        let known: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
         Wrong::new(at, format!("'{name}' is unknown here; known are pi, {}", known.join(", ")))
     }
 }

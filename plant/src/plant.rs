@@ -83,6 +83,7 @@ impl Plant {
             let now = seen(&self.truth(&Inputs::default()));
             let effects = self.effects.as_mut().expect("there were some before");
             effects.memory.move_seen(before, now);
+            effects.memory.sensor_force_n = now.map(|[_, force_n, ..]| force_n);
         }
         Ok(())
     }

@@ -112,7 +112,7 @@ fn a_period_with_all_effects_allocates_nothing() {
 
 /// A rig with a term of every target, over all variables.
 fn declared() -> RigParameters {
-    let over = "(x/1[m] + sin(v/1[m/s]) + u + tanh(s) + max(p_a, p_b)/1[MPa] + t/1[s])";
+    let over = "(x/1[m] + sin(v/1[m/s]) + u + tanh(s) + max(p_a, p_b)/1[MPa] + t/1[s] + F/1[kN])";
     let terms = Axis::ALL.into_iter().flat_map(|axis| Target::ALL.map(|target| (axis, target)));
     let terms: String = terms
         .map(|(axis, target)| {

@@ -4,7 +4,7 @@ use crate::tabulated::{inputs, run};
 use plant::effects::declared::Target;
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::parameters::suspects;
-use plant::{Axis, Plant, RigParameters, Setup};
+use plant::{Axis, Inputs, Plant, RigParameters, Setup};
 
 /// A rig with terms: place, expression and numbers of each.
 fn with(terms: &[(&str, &str, &str)]) -> RigParameters {
@@ -92,6 +92,62 @@ fn a_force_is_a_table_of_the_same_law_and_a_flow_one_of_the_same_mass() {
         &with(&[("load.flow-b", "q*s", &format!("parameters.q = {{ unit = \"kg/s\", value = {flow:?} }}"))]),
         &tabulated(table(Balance::FlowB, Variable::Spool, [-1.0, 1.0], [-6.0, 6.0])),
     );
+}
+
+/// F is the carriage's inertia on the drive, and the hand on the load: both are known without a term.
+#[test]
+fn a_force_over_the_force_sensor_is_the_mass_or_the_hand_that_it_shows() {
+    // m a = S + k m_c a: as a mass of m - k m_c, 5 kg and half of 3.5 kg.
+    let heavier = RigParameters::baseline().with("mass.drive_kg", &[6.75]).expect("good");
+    let [term, heavier] = [&with(&[("drive.force", "-0.5*F", "")]), &heavier].map(run);
+    let [one, two, bare] = [&term, &heavier, &run(&RigParameters::baseline())]
+        .map(|plant| plant.truth(&inputs(0)).axes[0].position_m);
+    // F is 0.1 ms old.
+    assert!((one - two).abs() < 2e-5, "{one} {two}");
+    assert!((one - bare).abs() > 2e-4, "{one} {bare}");
+
+    let pushed = |rig: &RigParameters, hand_force_load_n: f64| {
+        let mut plant = Plant::new(rig, &Setup::default()).expect("good");
+        let inputs = |period| Inputs { hand_force_load_n, ..inputs(period) };
+        (0..1000).for_each(|period| plant.step(&inputs(period)));
+        plant.truth(&inputs(1000)).axes[1]
+    };
+    let [one, two] =
+        [pushed(&with(&[("load.force", "0.25*F", "")]), -80.0), pushed(&RigParameters::baseline(), -60.0)];
+    assert_eq!((one.sensor_force_n, one.effect_force_n), (-80.0, -20.0));
+    assert!((one.position_m - two.position_m).abs() < 2e-5, "{} {}", one.position_m, two.position_m);
+}
+
+#[test]
+fn a_flow_and_what_is_kept_may_follow_the_force_sensor() {
+    let low =
+        "memory.w = { unit = \"N\", range = [-500, 500], start = \"F\", update = \"w + (F - w)*dt/50[ms]\" }";
+    let rig = with(&[
+        ("load.pressure-a-reading", "1[Pa/N]*w", low),
+        ("load.flow-a", "1e-6[kg/(s N)]*F", ""),
+        ("load.force", "-1*w", low),
+    ]);
+    let mut plant = Plant::new(&rig, &Setup::default()).expect("good");
+    let hand = Inputs { hand_force_load_n: -30.0, ..Inputs::default() };
+    (0..1000).for_each(|_| plant.step(&hand));
+    let truth = plant.truth(&hand);
+    // Twenty time constants: the rest is below a rounding of the sum.
+    assert!((plant.shown(&truth)[1][2] - truth.axes[1].pressure_a_pa + 30.0).abs() < 1e-4);
+    assert!((truth.axes[1].effect_force_n - 30.0).abs() < 1e-6, "{}", truth.axes[1].effect_force_n);
+    let flow = plant.term_names().iter().position(|name| name == "load_leakage_declared_a_m3_per_s");
+    let flow = plant.terms(&hand).values()[flow.expect("a term")];
+    // -3e-5 kg/s of 1.204 kg/m^3, whole as long as the chamber is at exhaust pressure.
+    assert!((flow + 3e-5 / (101_325.0 / (287.0 * 293.15))).abs() < 1e-6, "{flow}");
+}
+
+/// As files did before F was known in forces.
+#[test]
+fn a_number_of_a_force_may_be_called_as_the_force_sensor() {
+    let own = |name: &str| {
+        let number = format!("parameters.{name} = {{ unit = \"N\", value = 7 }}");
+        with(&[("drive.force", &format!("-{name}*tanh(v/1[mm/s])"), &number)])
+    };
+    alike(&own("F"), &own("G"));
 }
 
 #[test]
@@ -234,10 +290,9 @@ fn whatever_is_wrong_is_named_with_line_column_and_what_is_allowed() {
             number,
             3,
             13,
-            "'w' is unknown here; known are pi, x, v, p_a, p_b, u, s, t, c",
+            "'w' is unknown here; known are pi, x, v, p_a, p_b, u, s, t, F, c",
         ),
         ("drive.force", "-c*x", number, 3, 8, "drive.force is in N, and this is in N s"),
-        ("drive.force", "F*0.1", "", 3, 8, "'F' is unknown here"),
         ("drive.force", "c*v/v*1[m/s]", number, 3, 11, "divides by a value that may be 0 (-1000 to 1000)"),
         (
             "drive.force",

@@ -84,6 +84,12 @@ impl Effects {
         for (axis, channels) in effects.memory.channels.iter_mut().enumerate() {
             channels[1].iter_mut().for_each(|history| history.fill(forces.sensor_n(of, axis)));
         }
+        effects.see_forces(of, &Lanes::load(state), Pair::both(0.0), state.linked);
+        for axis in (0..2).filter(|axis| effects.on[*axis].declared.follows_sensor()) {
+            let seen = seen_at(of, &Lanes::load(state), axis);
+            let values = effects.declared_in_step(axis, &seen).values();
+            effects.memory.declared[axis] = effects.on[axis].declared.begin(&values);
+        }
         effects
     }
 
@@ -166,8 +172,21 @@ impl Effects {
                 .map_or(0.0, |effect| ALONG_X[axis] * effect.term(position_m)),
             end_cushion: on.end_cushion.map_or(0.0, |effect| effect.stop_force(extension_m, self.stroke_m)),
             tabulated: on.tabulated.force(seen),
-            declared: on.declared.force(&self.declared_at(axis, seen, 0.0)),
+            declared: on.declared.force(&self.declared_in_step(axis, seen)),
             added: on.added(OpenBalance::Force(seen)),
+        }
+    }
+
+    /// What declared terms of a force, of a flow and of what is kept are over.
+    pub(crate) fn declared_in_step<'a>(&'a self, axis: usize, seen: &'a Seen) -> DeclaredAt<'a> {
+        self.declared_at(axis, seen, self.memory.sensor_force_n[axis])
+    }
+
+    /// Keeps what the force sensors should show, where a declared term is over it in a step.
+    fn see_forces(&mut self, of: &Integrator, lanes: &Lanes, hand: Pair, linked: bool) {
+        if self.on.iter().any(|on| on.declared.follows_sensor()) {
+            let forces = Forces::at(of, Some(self), lanes, hand, linked);
+            self.memory.sensor_force_n = [0, 1].map(|axis| forces.sensor_n(of, axis));
         }
     }
 
@@ -464,6 +483,7 @@ impl Laws for Effects {
         let span_s = self.substep_s;
         self.memory.moving = *carried;
         self.memory.substeps += 1;
+        self.see_forces(of, lanes, held.hand, held.linked);
         for axis in 0..2 {
             let lane = |pair: Pair| pair.to_array()[axis];
             // Bristles never come to rest to the bit.
@@ -478,7 +498,7 @@ impl Laws for Effects {
                 self.keep_readings(of, axis, lanes);
             }
             if self.on[axis].declared.remembers() {
-                let values = self.declared_at(axis, &seen_at(of, lanes, axis), 0.0).values();
+                let values = self.declared_in_step(axis, &seen_at(of, lanes, axis)).values();
                 self.on[axis].declared.renew(&values, span_s, &mut self.memory.declared[axis]);
             }
         }

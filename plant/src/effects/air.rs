@@ -54,7 +54,7 @@ impl Effects {
             piston_leakage: if chamber == 0 { -across } else { across },
             rod_leakage: out(chamber),
             tabulated: on.tabulated.flow(chamber, seen),
-            declared: on.declared.flow(chamber, &self.declared_at(axis, seen, 0.0)),
+            declared: on.declared.flow(chamber, &self.declared_in_step(axis, seen)),
             added: on.added(OpenBalance::Leakage { chamber, seen }),
         })
     }

@@ -1,9 +1,9 @@
 //! declared: a term that a file declares as an expression, for what the catalogue lacks.
 //!
 //! ```text
-//! force   = f(x, v, p_a, p_b, u, s, t)             along the axis' own extension, N
-//! flow    = f(x, v, p_a, p_b, u, s, t) g(p) / rho   into a chamber; f in kg/s
-//! reading = truth + f(x, v, p_a, p_b, u, s, t, F)   of a sensor, m, N or Pa
+//! force   = f(x, v, p_a, p_b, u, s, t, F)             along the axis' own extension, N
+//! flow    = f(x, v, p_a, p_b, u, s, t, F) g(p) / rho   into a chamber; f in kg/s
+//! reading = truth + f(x, v, p_a, p_b, u, s, t, F)      of a sensor, m, N or Pa
 //! g(p)    = p / p_exhaust for f < 0, 2 - p / p_supply for f > 0, within 0 to 1
 //! ```
 //!
@@ -11,6 +11,11 @@
 //! t time since the plant began, s; F what its force sensor should show, N; rho density at normal conditions, kg/m^3. Extension
 //! and pressures are those at the midpoint of a step; v, u, s and t those at its beginning, since the force itself decides on the
 //! speed after. Terms of one target add up.
+//!
+//! F in a force or a flow is that of the end of the substep before: the sensor of the drive shows the carriage's acceleration,
+//! which the force itself decides on, so that F of the same instant would be an algebraic loop. Resolved step by step, the loop
+//! converges where a force changes by less than (moved mass)/(carriage and weights) N for each N of F; beyond it swings between
+//! the bounds of a force. The load's sensor shows contact and hand alone: no loop.
 //!
 //! A term may keep values from step to step ([`super::remembered`]), and is then over them too.
 //!
@@ -42,7 +47,7 @@ pub const MOST_PARAMETERS: usize = 6;
 pub const MOST_REMEMBERED: usize = 2;
 /// Terms of a file at most.
 pub const MOST_TERMS: usize = 32;
-/// What expressions are over: name, unit, least and largest value. The last one stands in readings alone.
+/// What expressions are over: name, unit, least and largest value.
 pub const VARIABLES: [(&str, &str, [f64; 2]); 8] = [
     ("x", "m", [0.0, 10.0]),
     ("v", "m/s", [-1e3, 1e3]),
@@ -53,6 +58,8 @@ pub const VARIABLES: [(&str, &str, [f64; 2]); 8] = [
     ("t", "s", [0.0, 1e7]),
     ("F", "N", [-1e6, 1e6]),
 ];
+/// Place of F among them.
+pub(crate) const SENSOR_FORCE: usize = VARIABLES.len() - 1;
 /// Specific gas constant of air, J/(kg K).
 const GAS_J_PER_KG_K: f64 = 287.0;
 
@@ -133,19 +140,14 @@ impl Target {
             _ => PlaceKind::Channel,
         }
     }
+}
 
-    const fn is_reading(self) -> bool {
-        !matches!(self, Target::Force | Target::FlowA | Target::FlowB)
-    }
-
-    /// What the expression may be over.
-    pub(crate) fn variables(self) -> Vec<Variable<'static>> {
-        let count = VARIABLES.len() - usize::from(!self.is_reading());
-        VARIABLES[..count]
-            .iter()
-            .map(|(name, unit, range)| Variable { name, dimension: dimension(unit), range: *range })
-            .collect()
-    }
+/// [`VARIABLES`] for an expression.
+pub(crate) fn variables() -> Vec<Variable<'static>> {
+    VARIABLES
+        .iter()
+        .map(|(name, unit, range)| Variable { name, dimension: dimension(unit), range: *range })
+        .collect()
 }
 
 /// The dimension of a unit of this module.
@@ -279,7 +281,7 @@ impl Declared {
 
     /// Its value, in SI, at these values of [`VARIABLES`] and of what it keeps.
     pub(crate) fn value_keeping(&self, at: &[f64; VARIABLES.len()], kept: &[f64]) -> f64 {
-        value(&self.formula, self.target, at, kept)
+        value(&self.formula, at, kept)
     }
 
     /// The same with other values of its numbers, in the units of the file.
@@ -357,7 +359,7 @@ pub(crate) struct DeclaredAt<'a> {
     pub(crate) seen: &'a Seen,
     pub(crate) command: f64,
     pub(crate) time_s: f64,
-    /// What the force sensor should show, N; read by readings alone.
+    /// What the force sensor should show, N; in a step that of the end of the substep before.
     pub(crate) sensor_force_n: f64,
     /// What the axis' terms keep, SI, in the order of [`DeclaredTerms::begin`].
     pub(crate) kept: &'a [f64],
@@ -371,13 +373,12 @@ impl DeclaredAt<'_> {
     }
 }
 
-/// The value of an expression of a term with this target.
-fn value(formula: &Formula, target: Target, at: &[f64; VARIABLES.len()], kept: &[f64]) -> f64 {
-    let before = VARIABLES.len() - usize::from(!target.is_reading());
+/// The value of an expression of a term.
+fn value(formula: &Formula, at: &[f64; VARIABLES.len()], kept: &[f64]) -> f64 {
     let mut all = [0.0; VARIABLES.len() + MOST_REMEMBERED];
-    all[..before].copy_from_slice(&at[..before]);
-    all[before..][..kept.len()].copy_from_slice(kept);
-    formula.value(&all[..before + kept.len()])
+    all[..VARIABLES.len()].copy_from_slice(at);
+    all[VARIABLES.len()..][..kept.len()].copy_from_slice(kept);
+    formula.value(&all[..VARIABLES.len() + kept.len()])
 }
 
 /// A term at work.
@@ -394,6 +395,8 @@ struct Acting {
 pub(crate) struct DeclaredTerms {
     terms: Vec<Acting>,
     laws: Vec<Kept>,
+    /// Whether a force, a flow or what is kept is over the force sensor.
+    follows_sensor: bool,
     kg_per_m3: f64,
     exhaust_pa: f64,
     supply_pa: f64,
@@ -403,15 +406,19 @@ impl DeclaredTerms {
     /// Those of an axis that a rig has.
     pub(crate) fn of(rig: &RigParameters, axis: Axis) -> Self {
         let (mut terms, mut laws) = (Vec::new(), Vec::new());
+        let mut follows_sensor = false;
         for term in rig.terms().iter().filter(|term| term.axis == axis) {
             let first = laws.len();
             laws.extend(term.memory.iter().map(Remembered::kept));
             let (target, formula) = (term.target, term.formula.clone());
+            let in_step = target.kind() != PlaceKind::Channel && formula.reads(SENSOR_FORCE);
+            follows_sensor |= in_step || term.memory.iter().any(Remembered::reads_sensor_force);
             terms.push(Acting { target, formula, kept: first..laws.len() });
         }
         DeclaredTerms {
             terms,
             laws,
+            follows_sensor,
             kg_per_m3: rig.gas().normal_pressure_pa / (GAS_J_PER_KG_K * rig.gas().temperature_k),
             exhaust_pa: rig.supply().exhaust_pressure_pa,
             supply_pa: rig.supply().pressure_pa,
@@ -436,6 +443,11 @@ impl DeclaredTerms {
     /// Whether any keeps a value.
     pub(crate) fn remembers(&self) -> bool {
         !self.laws.is_empty()
+    }
+
+    /// Whether a force, a flow or what is kept is over the force sensor.
+    pub(crate) fn follows_sensor(&self) -> bool {
+        self.follows_sensor
     }
 
     /// What they keep where the plant begins, at these [`VARIABLES`].
@@ -471,7 +483,7 @@ impl DeclaredTerms {
     fn sum(&self, target: Target, at: &DeclaredAt<'_>) -> f64 {
         let mut sum = 0.0;
         for term in self.terms.iter().filter(|term| term.target == target) {
-            sum += value(&term.formula, target, &at.values(), &at.kept[term.kept.clone()]);
+            sum += value(&term.formula, &at.values(), &at.kept[term.kept.clone()]);
         }
         sum
     }

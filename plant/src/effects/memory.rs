@@ -146,6 +146,8 @@ pub(crate) struct Memory {
     pub(super) channels: [[Option<History>; 4]; 2],
     /// What declared terms keep, SI.
     pub(super) declared: [Vec<f64>; 2],
+    /// What the force sensors should show at the end of the last substep, N; renewed where a declared term is over it in a step.
+    pub(crate) sensor_force_n: [f64; 2],
 }
 
 impl Memory {
@@ -197,6 +199,7 @@ impl Memory {
             lines,
             channels,
             declared,
+            sensor_force_n: [0.0; 2],
         }
     }
 

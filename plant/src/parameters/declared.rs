@@ -4,7 +4,7 @@
 //! [[terms]]
 //! name = "eddy-brake"
 //! place = "drive.force"          # drive or load; force, flow-a, flow-b, position-reading, force-reading, pressure-a-reading, …
-//! add = "-(c0 + c1*x)*v"         # over x, v, p_a, p_b, u, s, t, in a reading also F
+//! add = "-(c0 + c1*x)*v"         # over x, v, p_a, p_b, u, s, t, F
 //! parameters.c0 = { unit = "N s/m", value = 40, range = [0, 200] }
 //! parameters.c1 = { unit = "N s/m^2", value = 120, range = [0, 500] }
 //! ```
@@ -22,10 +22,12 @@
 use super::laws::{Laws, used};
 use super::reader::ParameterError;
 use crate::effects::declared::{
-    Declared, MOST_PARAMETERS, MOST_REMEMBERED, MOST_TERMS, Number, Target, VARIABLES, dimension,
+    Declared, MOST_PARAMETERS, MOST_REMEMBERED, MOST_TERMS, Number, SENSOR_FORCE, Target, VARIABLES,
+    dimension, variables,
 };
-use crate::effects::remembered::{BEFORE, Remembered, STEP};
+use crate::effects::remembered::{Remembered, STEP};
 use crate::effects::sheet;
+use crate::effects::sheet::PlaceKind;
 use crate::state::Axis;
 use expression::formula::{Formula, Variable};
 use expression::grammar::is_of_name;
@@ -192,7 +194,14 @@ impl Reader<'_> {
         section.finish()?;
 
         let ways: Vec<Variable<'_>> = kept.iter().map(KeptText::variable).collect();
-        let variables = [target.variables(), ways.clone()].concat();
+        let mut before = variables();
+        if target.kind() != PlaceKind::Channel
+            && numbers.iter().any(|own| own.name == before[SENSOR_FORCE].name)
+        {
+            // The number stands for itself.
+            before[SENSOR_FORCE].name = "";
+        }
+        let variables = [before.clone(), ways.clone()].concat();
         let taken = variables.iter().map(|one| one.name).chain((!kept.is_empty()).then_some(STEP.0));
         if let Some(number) = numbers.iter().find(|own| taken.clone().any(|name| name == own.name)) {
             return Err(section.wrong(&format!("parameters.{}: a variable has this name", number.name)));
@@ -217,11 +226,9 @@ impl Reader<'_> {
                 None => self.source.wrong_from(wrong.at, &wrong.why),
             }
         })?;
-        let before = Target::Force.variables();
         let (name_of_step, unit_of_step, range) = STEP;
         let step = Variable { name: name_of_step, dimension: dimension(unit_of_step), range };
         let while_kept = [before.clone(), ways.clone(), vec![step]].concat();
-        debug_assert!(before.len() == BEFORE);
         let memory = kept
             .iter()
             .map(|one| {
