@@ -9,6 +9,7 @@
 //!
 //! Source: Moore, Kearfott, Cloud, Introduction to Interval Analysis, SIAM 2009, chapter 2.
 
+use crate::curve::Table;
 use crate::grammar::{Binary, Kind, Nodes, Place, Wrong};
 
 /// Largest bound that counts as finite.
@@ -17,34 +18,41 @@ pub const MOST: f64 = 1e100;
 /// Smallest and largest value.
 pub type Range = [f64; 2];
 
-/// Bounds of a node; `of` gives the range of a name. Names and numbers of arguments were checked.
+/// Bounds of a node; `of` gives the range of a name, and a table comes before a function. Names and numbers of arguments were
+/// checked.
 ///
 /// # Errors
 /// [`Wrong`] at the node that is not proven finite.
-pub fn bounds(nodes: &Nodes, place: Place, of: &dyn Fn(&str) -> Range) -> Result<Range, Wrong> {
+pub fn bounds(
+    nodes: &Nodes,
+    place: Place,
+    of: &dyn Fn(&str) -> Range,
+    tables: &[Table],
+) -> Result<Range, Wrong> {
     let node = nodes.get(place);
+    let bounds = |place: Place| bounds(nodes, place, of, tables);
     let range = match &node.kind {
         Kind::Number(value, _) => [*value; 2],
         Kind::Name(name) => of(name),
         Kind::Negation(inner) => {
-            let [least, most] = bounds(nodes, *inner, of)?;
+            let [least, most] = bounds(*inner)?;
             [-most, -least]
         }
         Kind::Binary(Binary::Power, base, exponent) => {
-            let inner = bounds(nodes, *base, of)?;
-            let powers = bounds(nodes, *exponent, of)?;
+            let inner = bounds(*base)?;
+            let powers = bounds(*exponent)?;
             power(inner, powers).map_err(|why| Wrong::new(node.at, why))?
         }
         Kind::Binary(operator, left, right) => {
-            let [a, b] = [bounds(nodes, *left, of)?, bounds(nodes, *right, of)?];
+            let [a, b] = [bounds(*left)?, bounds(*right)?];
             binary(*operator, a, b).map_err(|why| Wrong::new(node.at, why))?
         }
         Kind::Call(name, arguments) => {
-            let ranges = arguments
-                .iter()
-                .map(|argument| bounds(nodes, *argument, of))
-                .collect::<Result<Vec<_>, _>>()?;
-            call(name, &ranges).map_err(|why| Wrong::new(node.at, why))?
+            let ranges = arguments.iter().map(|argument| bounds(*argument)).collect::<Result<Vec<_>, _>>()?;
+            match tables.iter().find(|table| table.name == *name) {
+                Some(table) => table.curve.bounds(ranges[0]),
+                None => call(name, &ranges).map_err(|why| Wrong::new(node.at, why))?,
+            }
         }
     };
     // Written so that a NaN is refused.
@@ -137,14 +145,14 @@ fn hull(values: &[f64]) -> Range {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formula::{Formula, Variable};
+    use crate::formula::{Formula, Known, Variable};
     use crate::units::Dimension;
     use proptest::prelude::*;
 
     fn range(text: &str, of: Range) -> Result<Range, Wrong> {
         let mut nodes = Nodes::default();
         let root = nodes.parse(text, 0).expect("an expression");
-        bounds(&nodes, root, &|_| of)
+        bounds(&nodes, root, &|_| of, &[])
     }
 
     #[test]
@@ -194,7 +202,8 @@ mod tests {
             ][which];
             let one = |name, range| Variable { name, dimension: Dimension::NONE, range };
             let over = [one("x", [-2.0, 2.0]), one("y", [0.1, 3.0])];
-            let formula = Formula::compile((text, 0), &over, &[], (Dimension::NONE, "it")).unwrap();
+            let known = Known { variables: &over, parameters: &[], tables: &[] };
+            let formula = Formula::compile((text, 0), known, (Dimension::NONE, "it")).unwrap();
             let ([least, most], value) = (formula.bounds(), formula.value(&[x, y]));
             prop_assert!(least - 1e-9 <= value && value <= most + 1e-9, "{text}: {value} in {least} to {most}");
         }

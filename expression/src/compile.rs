@@ -3,6 +3,12 @@
 use crate::grammar::{Binary, Kind, Node, Place, Wrong};
 use crate::tape::{Builder, Code, Register};
 
+/// Names that mean something in every expression.
+pub const RESERVED: [&str; 19] = [
+    "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
+    "cos", "atan", "floor", "delay",
+];
+
 /// A function and the least number of its arguments; `min` and `max` take more.
 #[must_use]
 pub fn function(name: &str) -> Option<(Code, usize)> {

@@ -8,9 +8,10 @@
 
 use crate::bounds::{Range, bounds};
 use crate::compile::Compile;
+use crate::curve::Table;
 use crate::dimensions::{Dimensions, Measure};
 use crate::grammar::{Kind, Node, Nodes, Place, Wrong};
-use crate::tape::{Builder, Leaves, Register, Tape};
+use crate::tape::{Builder, Code, Leaves, Register, Tape};
 use crate::units::Dimension;
 
 /// Registers of a formula at most: names, numbers and operations.
@@ -27,6 +28,17 @@ pub struct Variable<'a> {
     pub range: Range,
 }
 
+/// What the names of an expression stand for.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// What it is over.
+    pub variables: &'a [Variable<'a>],
+    /// Its numbers.
+    pub parameters: &'a [Variable<'a>],
+    /// Curves that it may read.
+    pub tables: &'a [Table],
+}
+
 /// A compiled expression with the values of its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formula {
@@ -37,6 +49,8 @@ pub struct Formula {
     registers: [f64; MOST_REGISTERS],
     parameters: usize,
     bounds: Range,
+    /// Names of the tables that it reads.
+    tables: Vec<String>,
 }
 
 impl Formula {
@@ -46,23 +60,26 @@ impl Formula {
     /// [`Wrong`] with the byte of the file: no expression, an unknown name, another dimension, too long, or not proven finite.
     pub fn compile(
         (text, at): (&str, usize),
-        variables: &[Variable<'_>],
-        parameters: &[Variable<'_>],
+        known: Known<'_>,
         (wanted, what): (Dimension, &str),
     ) -> Result<Self, Wrong> {
         let mut nodes = Nodes::default();
         let root = nodes.parse(text, at)?;
+        let tables: Vec<Table> =
+            known.tables.iter().filter(|table| calls(&nodes, root, &table.name)).cloned().collect();
+        let (has_tables, known) = (!known.tables.is_empty(), Known { tables: &tables, ..known });
+        let Known { variables, parameters, .. } = known;
         let leaves = Leaves { inputs: variables.len(), parameters: parameters.len(), ..Leaves::default() };
-        let mut names = Names { nodes, variables, parameters, builder: Builder::new(leaves) };
+        let mut names = Names { nodes, known, has_tables, builder: Builder::new(leaves) };
         names.expression(root, (), wanted, (at, what))?;
         let of = |name: &str| match names.place(name) {
             Some(place) => names.variable(place).range,
             None => [std::f64::consts::PI; 2],
         };
-        let bounds = bounds(&names.nodes, root, &of)?;
+        let bounds = bounds(&names.nodes, root, &of, &tables)?;
         let is_read: Vec<bool> = variables.iter().map(|variable| names.reads(root, variable.name)).collect();
         let result = Compile::node(&mut names, root, ())?;
-        let tape = names.builder.tape(&[result], Vec::new());
+        let tape = names.builder.tape(&[result], tables.iter().map(|table| table.curve.clone()).collect());
         if tape.registers() > MOST_REGISTERS {
             let why = format!("more than {MOST_REGISTERS} names, numbers and operations in one expression");
             return Err(Wrong::new(at, why));
@@ -74,7 +91,14 @@ impl Formula {
             .zip(is_read)
             .map(|(variable, is_read)| is_read.then_some(variable.range))
             .collect();
-        Ok(Self { tape, ranges, registers, parameters: parameters.len(), bounds })
+        Ok(Self {
+            tape,
+            ranges,
+            registers,
+            parameters: parameters.len(),
+            bounds,
+            tables: tables.into_iter().map(|table| table.name).collect(),
+        })
     }
 
     /// Sets the values of its parameters, in SI.
@@ -106,6 +130,12 @@ impl Formula {
         self.bounds
     }
 
+    /// Whether it reads the table of this name.
+    #[must_use]
+    pub fn reads_table(&self, name: &str) -> bool {
+        self.tables.iter().any(|table| table == name)
+    }
+
     /// Whether the variable of this place stands in it.
     #[must_use]
     pub fn reads(&self, variable: usize) -> bool {
@@ -113,21 +143,39 @@ impl Formula {
     }
 }
 
+/// Whether a function or table is called in a tree.
+fn calls(nodes: &Nodes, place: Place, wanted: &str) -> bool {
+    let calls = |place: &Place| calls(nodes, *place, wanted);
+    match &nodes.get(place).kind {
+        Kind::Number(..) | Kind::Name(_) => false,
+        Kind::Negation(inner) => calls(inner),
+        Kind::Binary(_, left, right) => calls(left) || calls(right),
+        Kind::Call(name, arguments) => name == wanted || arguments.iter().any(calls),
+    }
+}
+
 struct Names<'a> {
     nodes: Nodes,
-    variables: &'a [Variable<'a>],
-    parameters: &'a [Variable<'a>],
+    /// With the tables that it reads alone.
+    known: Known<'a>,
+    has_tables: bool,
     builder: Builder,
 }
 
 impl Names<'_> {
     /// The place of a name among variables and parameters.
     fn place(&self, name: &str) -> Option<usize> {
-        self.variables.iter().chain(self.parameters).position(|one| one.name == name)
+        self.known.variables.iter().chain(self.known.parameters).position(|one| one.name == name)
     }
 
     fn variable(&self, place: usize) -> &Variable<'_> {
-        self.variables.get(place).unwrap_or_else(|| &self.parameters[place - self.variables.len()])
+        let Known { variables, parameters, .. } = self.known;
+        variables.get(place).unwrap_or_else(|| &parameters[place - variables.len()])
+    }
+
+    /// The place of a table of this name.
+    fn table(&self, name: &str) -> Option<usize> {
+        self.known.tables.iter().position(|table| table.name == name)
     }
 
     /// Whether a name stands in a tree.
@@ -142,7 +190,7 @@ impl Names<'_> {
     }
 
     fn unknown(&self, name: &str, at: usize) -> Wrong {
-        let names = self.variables.iter().chain(self.parameters).map(|one| one.name);
+        let names = self.known.variables.iter().chain(self.known.parameters).map(|one| one.name);
         let known: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
         Wrong::new(at, format!("'{name}' is unknown here; known are pi, {}", known.join(", ")))
     }
@@ -163,16 +211,24 @@ impl Dimensions for Names<'_> {
         }
     }
 
-    fn arguments(&self, _name: &str) -> Option<usize> {
-        None
+    fn arguments(&self, name: &str) -> Option<usize> {
+        self.table(name).map(|_| 1)
     }
 
     fn functions(&self) -> &'static str {
-        ""
+        if self.has_tables { ", and the tables" } else { "" }
     }
 
-    fn called(&mut self, name: &str, _measures: &[Measure], at: usize) -> Result<Measure, Wrong> {
-        Err(self.unknown(name, at))
+    fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure, Wrong> {
+        let table = self.table(name).ok_or_else(|| self.unknown(name, at))?;
+        let Table { from, to, .. } = &self.known.tables[table];
+        match measures[0] {
+            Some(given) if given != from.dimension => {
+                let [wanted, given] = [from.dimension, given].map(|one| self.in_units(one));
+                Err(Wrong::new(at, format!("{name} is over {wanted}, and this is in {given}")))
+            }
+            _ => Ok(Some(to.dimension)),
+        }
     }
 }
 
@@ -190,20 +246,22 @@ impl Compile for Names<'_> {
     fn named(&mut self, name: &str, _at: usize, (): ()) -> Result<Register, Wrong> {
         let leaves = self.builder.leaves();
         Ok(match self.place(name) {
-            Some(place) if place < self.variables.len() => leaves.input(place),
-            Some(place) => leaves.parameter(place - self.variables.len()),
+            Some(place) if place < self.known.variables.len() => leaves.input(place),
+            Some(place) => leaves.parameter(place - self.known.variables.len()),
             None => self.builder.constant(std::f64::consts::PI),
         })
     }
 
     fn called(
         &mut self,
-        _name: &str,
-        _arguments: &[Place],
+        name: &str,
+        arguments: &[Place],
         _at: usize,
         (): (),
     ) -> Result<Option<Register>, Wrong> {
-        Ok(None)
+        let Some(table) = self.table(name) else { return Ok(None) };
+        let operand = Compile::node(self, arguments[0], ())?;
+        Ok(Some(self.builder.push(Code::Table(table as u16), &[operand])))
     }
 }
 
@@ -222,7 +280,14 @@ mod tests {
             Variable { name: "v", dimension: dimension("m/s"), range: [-1e3, 1e3] },
         ];
         let parameters = [Variable { name: "c", dimension: dimension("N s/m"), range: [0.0, 200.0] }];
-        Formula::compile((text, 100), &variables, &parameters, (dimension("N"), "force"))
+        let lift = Table::new(
+            "lift".to_owned(),
+            (vec![0.0, 500.0, 2000.0], Unit::parse("mm").unwrap()),
+            (vec![0.0, 3.0, -1.0], Unit::parse("kN").unwrap()),
+        );
+        let tables = [lift.unwrap()];
+        let known = Known { variables: &variables, parameters: &parameters, tables: &tables };
+        Formula::compile((text, 100), known, (dimension("N"), "force"))
     }
 
     #[test]
@@ -245,6 +310,22 @@ mod tests {
         assert!(brake.value(&[0.0, f64::NAN]).is_nan());
         // What it does not read does not matter.
         assert_eq!(brake.value(&[f64::NAN, 2.0]), 2.0);
+    }
+
+    #[test]
+    fn a_table_is_straight_between_its_points_and_bounded_where_it_is_read() {
+        let lift = compiled("lift(x)").unwrap();
+        assert_eq!(
+            [0.25, 0.5, 1.0, 9.0].map(|x| lift.value(&[x, 0.0]).round()),
+            [1500.0, 3000.0, 1667.0, 1667.0]
+        );
+        // x is 0 to 1 m, and the table goes on to 2 m.
+        assert_eq!(lift.bounds(), [0.0, 3000.0]);
+        assert!(compiled("1[N^2]/lift(x)").unwrap_err().why.contains("may be 0 (0 to 3000)"));
+        assert!(compiled("1[N^2]/lift(max(x, 0.1[m]))").is_ok());
+        assert!(compiled("lift(c)").unwrap_err().why.contains("lift is over m, and this is in N s/m"));
+        assert!(compiled("lift(x, x)").unwrap_err().why.contains("it takes 1"));
+        assert!(compiled("lifts(x)").unwrap_err().why.contains("not, and the tables"));
     }
 
     #[test]

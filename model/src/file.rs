@@ -6,7 +6,7 @@ use crate::inputs::{Hold, Inputs};
 use crate::read;
 use crate::rows::Rows;
 use crate::units::Unit;
-use expression::curve::Curve;
+pub use expression::curve::Table;
 use expression::grammar::{Nodes, Place};
 use expression::mathml::Operand;
 use settings::SettingsError;
@@ -336,19 +336,6 @@ pub struct Suspect {
     pub twins: Vec<String>,
     /// Carried to be rejected: one that does better than every suspect ends the search.
     pub is_decoy: bool,
-}
-
-/// A curve of the file, which expressions read by its name.
-#[derive(Clone, Debug)]
-pub struct Table {
-    /// Its name in expressions.
-    pub name: String,
-    /// Its points, in SI.
-    pub curve: Curve,
-    /// Unit in which what it is read at is written.
-    pub from: Unit,
-    /// Unit in which its values are written.
-    pub to: Unit,
 }
 
 impl Model {

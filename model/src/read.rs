@@ -9,16 +9,11 @@ use crate::file::{
 };
 use crate::rows::Rows;
 use crate::units::{Dimension, Unit};
-use expression::curve::Curve;
+use expression::compile::RESERVED;
 use expression::grammar::{Nodes, is_of_name};
 use settings::{Section, SettingsError, Source, Text};
 use std::path::Path;
 
-/// Names that expressions have from the start.
-pub(crate) const RESERVED: [&str; 19] = [
-    "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
-    "cos", "atan", "floor", "delay",
-];
 /// Unit of a column that holds times of a calendar.
 const CALENDAR: &str = "iso8601";
 /// Points from which fits start unless the file says how many.
@@ -260,23 +255,11 @@ impl Reader<'_> {
             self.is_new(&name, None, &section)?;
             let from = unit_of(&mut section, self.source, "x_unit")?;
             let to = unit_of(&mut section, self.source, "y_unit")?;
-            let scaled =
-                |values: Vec<f64>, unit: &Unit| values.iter().map(|value| value * unit.factor).collect();
-            let x: Vec<f64> = scaled(section.numbers("x")?, &from);
-            let y: Vec<f64> = scaled(section.numbers("y")?, &to);
-            if x.len() < 2 || x.len() > 10_000 {
-                return Err(section.wrong_at("x", "x: a table has 2 to 10000 points"));
-            }
-            if x.windows(2).any(|pair| pair[0] >= pair[1]) {
-                return Err(section.wrong_at("x", "x: each point must be larger than the one before"));
-            }
-            if y.len() != x.len() {
-                return Err(
-                    section.wrong_at("y", &format!("y: {} values for {} points of x", y.len(), x.len()))
-                );
-            }
+            let (x, y) = (section.numbers("x")?, section.numbers("y")?);
+            let table = Table::new(name, (x, from), (y, to));
+            let table = table.map_err(|(key, why)| section.wrong_at(key, &why))?;
             section.finish()?;
-            self.model.tables.push(Table { name, curve: Curve::new(x, y), from, to });
+            self.model.tables.push(table);
         }
         Ok(())
     }

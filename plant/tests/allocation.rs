@@ -112,7 +112,7 @@ fn a_period_with_all_effects_allocates_nothing() {
 
 /// A rig with a term of every target, over all variables.
 fn declared() -> RigParameters {
-    let over = "(x/1[m] + sin(v/1[m/s]) + u + tanh(s) + max(p_a, p_b)/1[MPa] + t/1[s] + F/1[kN])";
+    let over = "(x/1[m] + sin(v/1[m/s]) + u + tanh(s) + max(p_a, p_b)/1[MPa] + t/1[s] + F/1[kN] + bump(u))";
     let terms = Axis::ALL.into_iter().flat_map(|axis| Target::ALL.map(|target| (axis, target)));
     let terms: String = terms
         .map(|(axis, target)| {
@@ -124,7 +124,8 @@ fn declared() -> RigParameters {
             )
         })
         .collect();
-    let text = format!("{}{terms}", RigParameters::BASELINE_TOML);
+    let table = "[tables.bump]\nx = [-1, 0, 1]\ny = [0, 2, 1]\n";
+    let text = format!("{}{terms}{table}", RigParameters::BASELINE_TOML);
     RigParameters::from_toml(&text, "rig.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 

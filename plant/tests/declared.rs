@@ -94,6 +94,55 @@ fn a_force_is_a_table_of_the_same_law_and_a_flow_one_of_the_same_mass() {
     );
 }
 
+#[test]
+fn a_table_of_the_term_or_of_the_file_is_the_same_curve_in_a_table_of_the_rig() {
+    let own = "tables.lift = { x_unit = \"mm\", y_unit = \"N\", x = [0, 100, 500], y = [0, 20, -7.5] }";
+    let rig = with(&[("load.force", "2*lift(x)", own)]);
+    let at = vec![0.0, 0.1, 0.5];
+    let (axis, balance, variable) = (Axis::Load, Balance::Force, Variable::Extension);
+    let tabulated = Tabulated { axis, balance, variable, at, value: vec![0.0, 40.0, -15.0] };
+    alike(&rig, &RigParameters::baseline().with_tabulated(&[tabulated]).expect("good"));
+
+    // Under the file's tables; a term's own comes first, and one that nothing reads is not the term's.
+    let of_file = "[tables.lift]\nx_unit = \"mm\"\ny_unit = \"kN\"\nx = [0, 100, 500]\ny = [0, 0.02, -0.0075]\n\
+                   [tables.other]\nx = [0, 1]\ny = [0.1, 1e-7]\n";
+    let both = text(&[("load.force", "lift(x)", ""), ("drive.force", "lift(x)", own)]);
+    let both = RigParameters::from_toml(&format!("{both}{of_file}"), "rig.toml")
+        .unwrap_or_else(|error| panic!("{error}"));
+    alike(&both, &with(&[("load.force", "lift(x)", own), ("drive.force", "lift(x)", own)]));
+    let again: String = both.terms().iter().map(|term| term.toml("terms")).collect();
+    assert!(!again.contains("other") && again.contains("y_unit = \"kN\""), "{again}");
+    let again = RigParameters::from_toml(&format!("{}{again}", RigParameters::BASELINE_TOML), "rig.toml");
+    assert_eq!(again.expect("written as it is read"), both);
+    let suspect = "[[suspects]]\nname = \"lift\"\nplace = \"load.force\"\nadd = \"c*lift(x)\"\n\
+                   parameters.c = { range = [0, 3] }\n";
+    let suspect =
+        suspects(&format!("{suspect}{of_file}"), "s.toml").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(suspects(&suspect[0].toml("suspects"), "s.toml").expect("written as it is read"), suspect);
+}
+
+#[test]
+fn a_table_that_is_none_is_refused_at_its_key() {
+    for (add, table, message) in [
+        ("f(x)*1[N]", "x = [0, 1], y = [0, 1]", "f is over 1, and this is in m"),
+        ("f(s)", "x = [0, 1], y = [0, 1]", "drive.force is in N, and this is in 1"),
+        ("1[N]/f(s)", "x = [0, 1], y = [0, 1]", "divides by a value that may be 0 (0 to 1)"),
+        ("1[N]*f(s)", "x = [0, 0], y = [0, 1]", "x: each point must be larger"),
+        ("1[N]*f(s)", "x = [0, 1], y = [0, 1, 2]", "y: 3 values for 2 points of x"),
+        ("1[N]*f(s)", "x = [0, 1], y = [0, 1], z = 3", "z"),
+        ("1[N]*g(s)", "x = [0, 1], y = [0, 1]", "'g' is no function; known are abs, "),
+    ] {
+        let table = format!("tables.f = {{ {table} }}");
+        let error =
+            RigParameters::from_toml(&text(&[("drive.force", add, &table)]), "rig.toml").expect_err(add);
+        let error = error.to_string();
+        assert!(error.starts_with("rig.toml:") && error.contains(message), "{add}\n{error}");
+    }
+    let taken = text(&[("drive.force", "0", "tables.sin = { x = [0, 1], y = [0, 1] }")]);
+    let error = RigParameters::from_toml(&taken, "rig.toml").unwrap_err().to_string();
+    assert!(error.contains("sin: the name has a meaning in expressions"), "{error}");
+}
+
 /// F is the carriage's inertia on the drive, and the hand on the load: both are known without a term.
 #[test]
 fn a_force_over_the_force_sensor_is_the_mass_or_the_hand_that_it_shows() {

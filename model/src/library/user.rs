@@ -4,7 +4,7 @@
 //! number, a state, a memory or a friction of its own, so that none means something of the model that uses it by chance.
 
 use super::{Entry, Library, PLACE, library, names};
-use crate::read::RESERVED;
+use expression::compile::RESERVED;
 use settings::{SettingsError, Source};
 use std::borrow::Cow;
 use std::path::Path;

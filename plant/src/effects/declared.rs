@@ -26,6 +26,8 @@
 //! It is no effect of the catalogue: `[[terms]]` of a rig file holds it, and `[[suspects]]` of a file beside one holds terms that
 //! may be missing.
 //!
+//! A term may read curves of its file, straight between their points and level beyond them ([`expression::curve`]).
+//!
 //! Properties: the value of its expression; two terms are their sum; nothing is allocated.
 //!
 //! Source: the file that declares it.
@@ -36,9 +38,9 @@ use super::tabulated::{MOST_FLOW_NL_PER_MIN, MOST_FORCE_N, Seen, neither_empties
 use crate::parameters::table::Unit;
 use crate::parameters::{ParameterError, RigParameters};
 use crate::state::Axis;
+use expression::curve::Table;
 use expression::formula::{Formula, Variable};
 use expression::units::Dimension;
-use std::fmt::Write as _;
 use std::ops::Range;
 
 /// Parameters of a term at most.
@@ -206,6 +208,8 @@ pub struct Declared {
     pub(crate) add: String,
     pub(crate) numbers: Vec<Number>,
     pub(crate) memory: Vec<Remembered>,
+    /// Curves that its expressions read.
+    pub(crate) tables: Vec<Table>,
     pub(crate) twins: Vec<String>,
     pub(crate) formula: Formula,
 }
@@ -315,41 +319,6 @@ impl Declared {
 
     fn values_si(&self) -> Vec<f64> {
         self.numbers.iter().map(|number| number.value * number.unit.factor).collect()
-    }
-
-    /// What a file says to have this term, numbers to the bit; `table` is `terms` or `suspects`.
-    #[must_use]
-    pub fn toml(&self, table: &str) -> String {
-        let text = |text: &str| toml::Value::from(text).to_string();
-        let mut out = format!(
-            "[[{table}]]\nname = {}\nplace = {}\nadd = {}\n",
-            text(&self.name),
-            text(&self.place()),
-            text(&self.add)
-        );
-        for number in &self.numbers {
-            let [least, most] = number.range;
-            let prior = number.prior.map_or(String::new(), |prior| format!(", prior = {prior:?}"));
-            let _ = writeln!(
-                out,
-                "parameters.{} = {{ unit = {}, value = {:?}, range = [{least:?}, {most:?}]{prior} }}",
-                number.name,
-                text(number.unit()),
-                number.value
-            );
-        }
-        for Remembered { name, unit, range: [least, most], start, update, .. } in &self.memory {
-            let (unit, start, update) = (text(&unit.text), text(start), text(update));
-            let _ = writeln!(
-                out,
-                "memory.{name} = {{ unit = {unit}, range = [{least:?}, {most:?}], start = {start}, update = {update} }}"
-            );
-        }
-        if !self.twins.is_empty() {
-            let twins: Vec<String> = self.twins.iter().map(|twin| text(twin)).collect();
-            let _ = writeln!(out, "twins = [{}]", twins.join(", "));
-        }
-        out
     }
 }
 

@@ -16,6 +16,13 @@
 //! memory.w = { unit = "m", range = [0, 1], start = "x", update = "min(max(w, x - g), x + g)" }    # over dt and w too
 //! ```
 //!
+//! Curves that a term reads stand under its `tables`, or under `[tables]` of the file for all of its terms:
+//!
+//! ```text
+//! add = "-c*drag(x)*v"
+//! tables.drag = { x_unit = "mm", x = [0, 100, 500], y = [0.2, 1, 1.4] }
+//! ```
+//!
 //! A term needs the value of each number, and its range is that value alone where the file gives none. A suspect needs ranges,
 //! and its values are those at which it adds nothing, 0 where the file gives none.
 
@@ -29,10 +36,13 @@ use crate::effects::remembered::{Remembered, STEP};
 use crate::effects::sheet;
 use crate::effects::sheet::PlaceKind;
 use crate::state::Axis;
-use expression::formula::{Formula, Variable};
+use expression::compile::RESERVED;
+use expression::curve::Table;
+use expression::formula::{Formula, Known, Variable};
 use expression::grammar::is_of_name;
 use expression::units::Unit;
 use settings::{Section, SettingsError, Source, Text};
+use std::fmt::Write as _;
 use std::path::Path;
 
 /// Values of the variables at which a suspect that is off must add nothing, in their order: rest and motion of a rig.
@@ -77,11 +87,12 @@ fn read_with(
     let source = Source::parse(text, Path::new(file))?.with_columns();
     let mut root = source.root();
     let mut all: Vec<Declared> = Vec::new();
+    let of_file = tables(&mut root, &source)?;
     for section in root.sections(key)? {
         if all.len() == MOST_TERMS {
             return Err(section.wrong(&format!("more than {MOST_TERMS} of a kind in one file")).into());
         }
-        let mut reader = Reader { source: &source, is_suspect: key == "suspects", laws };
+        let mut reader = Reader { source: &source, is_suspect: key == "suspects", laws, of_file: &of_file };
         let at = section.at("name");
         let term = reader.term(section)?;
         if let Some(other) = all.iter().find(|other| other.is_same(&term)) {
@@ -124,6 +135,28 @@ impl KeptText {
     }
 }
 
+/// The curves under `tables` of a section.
+fn tables(section: &mut Section<'_>, source: &Source<'_>) -> Result<Vec<Table>, SettingsError> {
+    let Some(mut all) = section.section("tables")? else { return Ok(Vec::new()) };
+    let mut found = Vec::new();
+    for name in all.keys() {
+        is_name(&all, &name)?;
+        if RESERVED.contains(&name.as_str()) {
+            let why = format!("{name}: the name has a meaning in expressions: choose another");
+            return Err(all.wrong_at(&name, &why));
+        }
+        let Some(mut one) = all.section(&name)? else { continue };
+        let from = unit_at(&mut one, source, "x_unit")?;
+        let to = unit_at(&mut one, source, "y_unit")?;
+        let (x, y) = (one.numbers("x")?, one.numbers("y")?);
+        let table = Table::new(name, (x, from), (y, to));
+        found.push(table.map_err(|(key, why)| one.wrong_at(key, &why))?);
+        one.finish()?;
+    }
+    all.finish()?;
+    Ok(found)
+}
+
 /// Refuses a key that no expression could read.
 fn is_name(section: &Section<'_>, name: &str) -> Result<(), SettingsError> {
     let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
@@ -135,7 +168,12 @@ fn is_name(section: &Section<'_>, name: &str) -> Result<(), SettingsError> {
 
 /// The unit of a section, 1 when it is absent.
 pub(super) fn unit_of(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit, SettingsError> {
-    match section.text("unit")? {
+    unit_at(section, source, "unit")
+}
+
+/// The same under another key.
+fn unit_at(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit, SettingsError> {
+    match section.text(key)? {
         None => Ok(Unit::one()),
         Some(text) => {
             Unit::parse(&text.text).map_err(|wrong| source.wrong_from(text.at + wrong.at, &wrong.why))
@@ -148,6 +186,8 @@ struct Reader<'a> {
     is_suspect: bool,
     /// Libraries whose laws the file may use.
     laws: Option<Laws<'a>>,
+    /// Curves of the file, for all of its terms.
+    of_file: &'a [Table],
 }
 
 impl Reader<'_> {
@@ -190,6 +230,14 @@ impl Reader<'_> {
             return Err(section.wrong(&format!("more than {MOST_PARAMETERS} names under parameters")));
         }
         let kept = self.named(&mut section, "memory", MOST_REMEMBERED, Self::kept)?;
+        let mut curves = tables(&mut section, self.source)?;
+        let others: Vec<Table> = self
+            .of_file
+            .iter()
+            .filter(|one| curves.iter().all(|own| own.name != one.name))
+            .cloned()
+            .collect();
+        curves.extend(others);
         let twins = section.texts("twins")?;
         section.finish()?;
 
@@ -219,7 +267,8 @@ impl Reader<'_> {
             })
             .collect();
         let wanted = (dimension(target.unit()), place.text.as_str());
-        let formula = Formula::compile((&add, at), &variables, &parameters, wanted).map_err(|wrong| {
+        let known = Known { variables: &variables, parameters: &parameters, tables: &curves };
+        let formula = Formula::compile((&add, at), known, wanted).map_err(|wrong| {
             match library {
                 // The expression is the library's, so that the file has no place of its parts.
                 Some(used) => self.source.wrong_from(used, &format!("{}, in {add}", wrong.why)),
@@ -233,19 +282,20 @@ impl Reader<'_> {
             .iter()
             .map(|one| {
                 let compiled = |text: &Text, variables: &[Variable<'_>]| {
-                    Formula::compile(
-                        (&text.text, text.at),
-                        variables,
-                        &parameters,
-                        (one.unit.dimension, &one.name),
-                    )
-                    .map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))
+                    let wanted = (one.unit.dimension, one.name.as_str());
+                    Formula::compile((&text.text, text.at), Known { variables, ..known }, wanted)
+                        .map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))
                 };
                 let formulas = (compiled(&one.start, &before)?, compiled(&one.update, &while_kept)?);
                 Ok(one.with(formulas))
             })
             .collect::<Result<Vec<_>, SettingsError>>()?;
-        let mut term = Declared { name, axis, target, add, numbers, memory, twins, formula };
+        let reads = |table: &Table| {
+            let kept = memory.iter().flat_map(|one| [&one.start_formula, &one.update_formula]);
+            [&formula].into_iter().chain(kept).any(|formula| formula.reads_table(&table.name))
+        };
+        let read: Vec<Table> = curves.iter().filter(|table| reads(table)).cloned().collect();
+        let mut term = Declared { name, axis, target, add, numbers, memory, tables: read, twins, formula };
         term.set_formulas();
         if self.is_suspect {
             self.adds_nothing(&term, at)?;
@@ -350,5 +400,49 @@ impl Reader<'_> {
         };
         section.finish()?;
         Ok(Number { name, unit, value, range, prior })
+    }
+}
+
+impl Declared {
+    /// What a file says to have this term, numbers to the bit; `table` is `terms` or `suspects`.
+    #[must_use]
+    pub fn toml(&self, table: &str) -> String {
+        let text = |text: &str| toml::Value::from(text).to_string();
+        let mut out = format!(
+            "[[{table}]]\nname = {}\nplace = {}\nadd = {}\n",
+            text(&self.name),
+            text(&self.place()),
+            text(&self.add)
+        );
+        for number in &self.numbers {
+            let [least, most] = number.range;
+            let prior = number.prior.map_or(String::new(), |prior| format!(", prior = {prior:?}"));
+            let _ = writeln!(
+                out,
+                "parameters.{} = {{ unit = {}, value = {:?}, range = [{least:?}, {most:?}]{prior} }}",
+                number.name,
+                text(number.unit()),
+                number.value
+            );
+        }
+        for Remembered { name, unit, range: [least, most], start, update, .. } in &self.memory {
+            let (unit, start, update) = (text(&unit.text), text(start), text(update));
+            let _ = writeln!(
+                out,
+                "memory.{name} = {{ unit = {unit}, range = [{least:?}, {most:?}], start = {start}, update = {update} }}"
+            );
+        }
+        for Table { name, from, to, written: [x, y], .. } in &self.tables {
+            let (x_unit, y_unit) = (text(&from.text), text(&to.text));
+            let _ = writeln!(
+                out,
+                "tables.{name} = {{ x_unit = {x_unit}, y_unit = {y_unit}, x = {x:?}, y = {y:?} }}"
+            );
+        }
+        if !self.twins.is_empty() {
+            let twins: Vec<String> = self.twins.iter().map(|twin| text(twin)).collect();
+            let _ = writeln!(out, "twins = [{}]", twins.join(", "));
+        }
+        out
     }
 }

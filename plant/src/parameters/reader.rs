@@ -146,9 +146,9 @@ impl Entries {
     pub(super) fn with_effects_of(&self, text: &str, file: &str) -> Result<Self, ParameterError> {
         let in_file = Place { text, file };
         let root = in_file.parse()?;
-        let is_known = |name: &str| ["effects", "terms"].contains(&name);
+        let is_known = |name: &str| ["effects", "tables", "terms"].contains(&name);
         if let Some((name, value)) = root.get_ref().iter().find(|(name, _)| !is_known(name.get_ref())) {
-            return Err(in_file.unknown(name, name.get_ref(), value, "effects, terms"));
+            return Err(in_file.unknown(name, name.get_ref(), value, "effects, tables, terms"));
         }
         let mut changed = self.clone();
         for effect in switched::read(root.get_ref(), &in_file)? {
@@ -238,7 +238,7 @@ impl Place<'_> {
     }
 
     fn refuse_unknown(&self, root: &DeTable<'_>) -> Result<(), ParameterError> {
-        let is_key = |name: &str| !["effects", "tabulated", "terms"].contains(&name);
+        let is_key = |name: &str| !["effects", "tables", "tabulated", "terms"].contains(&name);
         for (name, value) in root.iter().filter(|(name, _)| is_key(name.get_ref())) {
             let known: Vec<&str> =
                 KEYS.iter().filter(|key| key.table == name.get_ref()).map(|key| key.name).collect();
