@@ -115,6 +115,18 @@ impl Unit {
     /// # Errors
     /// [`UnitError`] with the place of what is none.
     pub fn parse(text: &str) -> Result<Self, UnitError> {
+        Self::read(text).map_err(|wrong| {
+            let right = with_powers(text);
+            match right != text && Self::read(&right).is_ok() {
+                true => {
+                    UnitError { why: format!("a power of a unit is written with ^: write {right}"), ..wrong }
+                }
+                false => wrong,
+            }
+        })
+    }
+
+    fn read(text: &str) -> Result<Self, UnitError> {
         let mut reader = Reader { text, at: 0 };
         let (dimension, factor) = reader.product(0)?;
         reader.skip_blanks();
@@ -126,6 +138,26 @@ impl Unit {
         }
         Ok(Self { text: text.trim().into(), dimension, factor })
     }
+}
+
+/// A unit as people write it, `N/mm2`, `m**2`, `m³`, with `^` before its exponents.
+#[must_use]
+pub fn with_powers(text: &str) -> String {
+    let mut right = String::with_capacity(text.len() + 2);
+    let text = text.replace("**", "^");
+    let mut characters = text.chars().peekable();
+    while let Some(character) = characters.next() {
+        match character {
+            '²' => right.push_str("^2"),
+            '³' => right.push_str("^3"),
+            _ => right.push(character),
+        }
+        let is_power = characters.peek().is_some_and(|next| next.is_ascii_digit() || *next == '-');
+        if character.is_alphabetic() && is_power {
+            right.push('^');
+        }
+    }
+    right
 }
 
 /// Deepest brackets of a unit.
@@ -333,6 +365,16 @@ mod tests {
             [("N sx", 2), ("", 0), ("m^x", 0), ("m)", 1), ("(m", 2), ("degC", 0), ("m^0.01", 0), ("m^1e9", 3)]
         {
             assert_eq!(Unit::parse(text).map_err(|error| error.at), Err(at), "{text}");
+        }
+        for (text, right) in [
+            ("mm2", "mm^2"),
+            ("N/mm2", "N/mm^2"),
+            ("kg m-3", "kg m^-3"),
+            ("cm³/s", "cm^3/s"),
+            ("m/s**2", "m/s^2"),
+        ] {
+            let why = Unit::parse(text).unwrap_err().why;
+            assert!(why.ends_with(&format!("write {right}")) && unit(right).factor > 0.0, "{text}: {why}");
         }
         let deep = format!("{}m", "(".repeat(10_000));
         assert!(Unit::parse(&deep).is_err_and(|error| error.why.contains("brackets")));

@@ -34,11 +34,12 @@ mod read;
 mod rows;
 mod simulate;
 
+pub use expression::compile::RESERVED;
 pub use expression::grammar::is_of_name;
 pub use expression::grammar::{DEEPEST, MOST_NODES};
 pub use expression::inputs::{Hold, Inputs};
 pub use expression::mathml::{Operand, bracketed as in_brackets, name as mathml_name};
-pub use expression::units::{Dimension, Unit, UnitError};
+pub use expression::units::{Dimension, Unit, UnitError, with_powers};
 pub use failure::Failure;
 pub use file::{
     Change, Definition, Expression, Friction, Input, Memory, Model, Output, Parameter, Part, RecordLayout,

@@ -2,7 +2,7 @@
 
 use super::columns::Table;
 use super::{NewError, Roles};
-use model::Unit;
+use model::{RESERVED, Unit, with_powers};
 use records::{ColumnOptions, read_columns};
 use std::path::Path;
 
@@ -34,11 +34,6 @@ const INPUT_WORDS: [&str; 23] = [
 ];
 /// Share of the samples that are as the one before in a column of steps.
 const STEPWISE: f64 = 0.5;
-/// Names that a model file gives a meaning, and those of parameters that are written.
-const TAKEN: [&str; 19] = [
-    "t", "pi", "and", "or", "not", "if", "abs", "sign", "min", "max", "sqrt", "exp", "log", "tanh", "sin",
-    "cos", "atan", "floor", "delay",
-];
 
 /// Why a column has the role that the user gave it.
 const ASKED: &str = "named on the command line";
@@ -193,7 +188,7 @@ fn column(column: &str, values: Vec<f64>, step_s: f64, others: &[Column]) -> Col
     if name.is_empty() || name.starts_with(|first: char| first.is_numeric()) {
         name = format!("column_{name}").trim_end_matches('_').to_owned();
     }
-    while TAKEN.contains(&name.as_str()) || others.iter().any(|other| other.name == name) {
+    while RESERVED.contains(&name.as_str()) || others.iter().any(|other| other.name == name) {
         name.push('_');
     }
     let count = values.len().max(1) as f64;
@@ -268,9 +263,10 @@ fn named(column: &str) -> (String, String, Option<&'static str>) {
         }
         known(unit).then(|| (name.trim().to_owned(), unit.to_owned(), None))
     };
+    let unit_between = |unit: &str| if known(unit) { unit.to_owned() } else { with_powers(unit) };
     for (open, close) in [('[', ']'), ('(', ')')] {
         let inner = column.strip_suffix(close).and_then(|rest| rest.rsplit_once(open));
-        if let Some(found) = inner.and_then(|(name, unit)| found(name, unit.trim())) {
+        if let Some(found) = inner.and_then(|(name, unit)| found(name, &unit_between(unit.trim()))) {
             return found;
         }
     }
@@ -313,6 +309,9 @@ mod tests {
             ("oven [degC]", "oven", "K"),
             ("level", "level", "1"),
             ("2", "2", "1"),
+            ("stress [N/mm2]", "stress", "N/mm^2"),
+            ("flow (cm³/s)", "flow", "cm^3/s"),
+            ("u_V2", "u_V2", "1"),
         ] {
             let (found, written, _) = named(column);
             assert_eq!((found.as_str(), written.as_str()), (name, unit), "{column}");
