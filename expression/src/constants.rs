@@ -7,6 +7,7 @@ use crate::compile::{code_of, function};
 use crate::grammar::{Binary, Kind, Nodes, Wrong};
 use crate::inputs::Inputs;
 use crate::operation::{Around, Code};
+use crate::past::NONE;
 
 /// Of each node its value if it is a constant.
 ///
@@ -55,7 +56,7 @@ fn call(name: &str, arguments: &[f64]) -> Option<f64> {
 }
 
 fn computed(code: Code, operands: [f64; 3]) -> f64 {
-    code.value(operands, &Around { time_s: 0.0, inputs: &Inputs::none(), curves: &[] })
+    code.value(operands, &Around { time_s: 0.0, inputs: &Inputs::none(), past: &NONE, curves: &[] })
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@
 //! | `tape` | operations in their order, computed with or without derivatives |
 //! | `curve` | tables |
 //! | `inputs` | inputs over time between their samples |
+//! | `past` | earlier values of what is integrated |
 //! | `mathml` | a tree as a formula that browsers set |
 //! | `formula` | one expression over named variables |
 //!
@@ -32,5 +33,6 @@ pub mod grammar;
 pub mod inputs;
 pub mod mathml;
 mod operation;
+pub mod past;
 pub mod tape;
 pub mod units;

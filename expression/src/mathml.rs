@@ -178,6 +178,13 @@ fn call(nodes: &Nodes, function: &str, arguments: &[Place]) -> (String, u8) {
             let lines = line(yes, &condition) + &line(no, "<mtext>otherwise</mtext>");
             (row(&format!("<mo>{{</mo><mtable>{lines}</mtable>")), CASES)
         }
+        ("delay", [late, by]) => {
+            let earlier = row(&format!("<mi>t</mi><mo>−</mo>{}", at_least(nodes, *by, PRODUCT)));
+            match &nodes.get(*late).kind {
+                Kind::Name(text) => (row(&(name(text) + &bracketed(&earlier))), ATOM),
+                _ => (format!("<msub>{}{earlier}</msub>", row(&bracketed(&of(late)))), ATOM),
+            }
+        }
         _ => {
             let least = if arguments.len() > 1 { OR } else { 0 };
             let inner: Vec<String> = arguments.iter().map(|one| at_least(nodes, *one, least)).collect();
@@ -260,6 +267,12 @@ mod tests {
         assert_eq!(set("abs(x)"), "<mo>|</mo><mi>x</mi><mo>|</mo>");
         assert_eq!(set("exp(x)"), "<msup><mi>e</mi><mi>x</mi></msup>");
         assert_eq!(set("tanh(x)"), "<mi>tanh</mi><mo>(</mo><mi>x</mi><mo>)</mo>");
+        assert_eq!(set("delay(x, tau)"), "<mi>x</mi><mo>(</mo><mi>t</mi><mo>−</mo><mi>τ</mi><mo>)</mo>");
+        assert_eq!(
+            set("delay(2*x, a + b)"),
+            "<msub><mo>(</mo><mn>2</mn><mo>⋅</mo><mi>x</mi><mo>)</mo><mi>t</mi><mo>−</mo><mo>(</mo><mi>a</mi><mo>+</mo><mi>b</mi>\
+             <mo>)</mo></msub>"
+        );
         assert_eq!(set("0.3[bar]"), "<mn>0.3</mn><mspace width=\"0.2em\"/><mtext>bar</mtext>");
         let cases = set("if(x < 1, a, b)");
         assert!(

@@ -6,6 +6,7 @@
 
 use crate::curve::Curve;
 use crate::inputs::Inputs;
+use crate::past::Past;
 
 /// What an operation does with its operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -40,12 +41,15 @@ pub enum Code {
     Table(u16),
     /// The input of this number, the first operand earlier.
     Delayed(u16),
+    /// The state, memory or direction in this register, the first operand earlier.
+    Past(u32),
 }
 
 /// What operations read beside their operands.
 pub(crate) struct Around<'a> {
     pub(crate) time_s: f64,
     pub(crate) inputs: &'a Inputs<'a>,
+    pub(crate) past: &'a Past,
     pub(crate) curves: &'a [Curve],
 }
 
@@ -139,6 +143,7 @@ impl Code {
             }
             Code::Table(number) => around.curves[usize::from(number)].at(a).0,
             Code::Delayed(input) => around.inputs.between(usize::from(input), around.time_s - a).0,
+            Code::Past(leaf) => around.past.value(leaf, around.time_s - a)[0],
         }
     }
 
@@ -176,6 +181,7 @@ impl Code {
             Code::Delayed(input) => {
                 [-around.inputs.between(usize::from(input), around.time_s - a).1, 0.0, 0.0]
             }
+            Code::Past(leaf) => [-around.past.value(leaf, around.time_s - a)[1], 0.0, 0.0],
             Code::Sign
             | Code::Floor
             | Code::Less

@@ -16,6 +16,7 @@ use crate::curve::Curve;
 use crate::inputs::Inputs;
 use crate::operation::Around;
 pub use crate::operation::Code;
+use crate::past::{NONE, Past};
 use std::collections::HashMap;
 
 /// A register.
@@ -158,6 +159,18 @@ impl Builder {
         of(&degrees, register)
     }
 
+    /// Whether a register depends on parameters and constants alone.
+    #[must_use]
+    pub fn is_of_numbers(&self, register: Register) -> bool {
+        match (register as usize).checked_sub(self.leaves.count() + CONSTANTS) {
+            Some(operation) => self.fixed()[operation],
+            None => {
+                let parameters = self.leaves.parameter(0)..self.leaves.memory(0);
+                parameters.contains(&register) || register as usize >= self.leaves.count()
+            }
+        }
+    }
+
     /// Of each operation whether it depends on parameters and constants alone.
     fn fixed(&self) -> Vec<bool> {
         let first = self.leaves.count() + CONSTANTS;
@@ -168,7 +181,7 @@ impl Builder {
                 Some(before) => fixed[before],
                 None => parameters.contains(operand) || *operand as usize >= self.leaves.count(),
             };
-            let reads_time = matches!(operation.code, Code::Delayed(_));
+            let reads_time = matches!(operation.code, Code::Delayed(_) | Code::Past(_));
             let count = operation.code.operands();
             fixed.push(!reads_time && operation.operands[..count].iter().all(is_fixed));
         }
@@ -221,7 +234,8 @@ impl Registers {
             let count = operation.code.operands();
             let mut operands = operation.operands.map(|operand| active[operand as usize]);
             operands[count..].fill(false);
-            let is_active = !operation.code.is_flat() && operands.contains(&true);
+            let is_past = directions > 0 && matches!(operation.code, Code::Past(_));
+            let is_active = is_past || !operation.code.is_flat() && operands.contains(&true);
             active.push(is_active);
             reached.push(is_active.then_some(operands));
         }
@@ -266,18 +280,32 @@ impl Tape {
 
     /// Computes what depends on parameters alone, after these were set and before [`Tape::evaluate`].
     pub fn prepare(&self, registers: &mut Registers) {
-        self.compute_some(registers, 0..self.fixed, &Inputs::none());
+        self.compute_some(registers, 0..self.fixed, (&Inputs::none(), &NONE));
     }
 
     /// Computes all other registers from the leaves that were set.
-    pub fn evaluate(&self, registers: &mut Registers, inputs: &Inputs<'_>) {
-        self.compute_some(registers, self.fixed..self.operations.len(), inputs);
+    pub fn evaluate(&self, registers: &mut Registers, inputs: &Inputs<'_>, past: &Past) {
+        self.compute_some(registers, self.fixed..self.operations.len(), (inputs, past));
+    }
+
+    /// The leaves of which it reads earlier values, each with the register of by how much they are earlier, which
+    /// [`Tape::prepare`] computes.
+    pub fn pasts(&self) -> impl Iterator<Item = (Register, Register)> + '_ {
+        self.operations.iter().filter_map(|operation| match operation.code {
+            Code::Past(leaf) => Some((leaf, operation.operands[0])),
+            _ => None,
+        })
     }
 
     #[inline]
-    fn compute_some(&self, registers: &mut Registers, which: core::ops::Range<usize>, inputs: &Inputs<'_>) {
+    fn compute_some(
+        &self,
+        registers: &mut Registers,
+        which: core::ops::Range<usize>,
+        (inputs, past): (&Inputs<'_>, &Past),
+    ) {
         let first = self.leaves.count() + self.constants.len() + which.start;
-        let around = Around { time_s: registers.values[0], inputs, curves: &self.curves };
+        let around = Around { time_s: registers.values[0], inputs, past, curves: &self.curves };
         for (place, operation) in self.operations[which.clone()].iter().enumerate() {
             let operands = operation.operands.map(|operand| operand as usize);
             let [a, b, c] = operands.map(|operand| registers.values[operand]);
@@ -286,6 +314,10 @@ impl Tape {
             if let Some(reached) = registers.reached[which.start + place] {
                 let partial = operation.code.partials([a, b, c], value, reached, &around);
                 carry(registers, first + place, operands, reached, partial);
+                if let Code::Past(leaf) = operation.code {
+                    let slopes = registers.slope_mut((first + place) as Register);
+                    past.add_slopes(leaf, around.time_s - a, slopes);
+                }
             }
         }
     }
@@ -312,7 +344,8 @@ impl Tape {
     #[must_use]
     pub fn compute(&self, registers: &mut [f64]) -> f64 {
         let first = self.leaves.count() + self.constants.len();
-        let around = Around { time_s: registers[0], inputs: &Inputs::none(), curves: &self.curves };
+        let around =
+            Around { time_s: registers[0], inputs: &Inputs::none(), past: &NONE, curves: &self.curves };
         for (place, operation) in self.operations.iter().enumerate() {
             let operands = operation.operands.map(|operand| registers[operand as usize]);
             registers[first + place] = operation.code.value(operands, &around);
@@ -371,7 +404,7 @@ mod tests {
         registers.slope_mut(leaves.parameter(0))[0] = 1.0;
         registers.slope_mut(leaves.parameter(1))[1] = 1.0;
         tape.prepare(&mut registers);
-        tape.evaluate(&mut registers, &Inputs::none());
+        tape.evaluate(&mut registers, &Inputs::none(), &NONE);
         let slope = registers.slope(tape.result(0));
         (registers.value(tape.result(0)), [slope[0], slope[1]])
     }

@@ -10,6 +10,7 @@ use crate::names::{DEEPEST_CHAIN, Symbol, chain, name_of, resolve};
 use crate::tape::{Builder, Code, Leaves, Register, Registers, Tape};
 use expression::compile::Compile;
 use expression::grammar::{Kind, Node, Place, Wrong};
+use expression::past::NONE;
 use std::collections::HashMap;
 
 /// The tapes of a model with some suspects.
@@ -124,23 +125,10 @@ pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs
         for (index, samples) in inputs.samples_si.iter().enumerate() {
             registers.set(leaves.input(index), samples[row]);
         }
-        tape.evaluate(&mut registers, inputs);
+        tape.evaluate(&mut registers, inputs, &NONE);
         registers.value(tape.result(0))
     };
     inputs.time_s.iter().enumerate().map(value).collect()
-}
-
-/// The input that an expression names as what is delayed, or as it is without the suspect at it, and its name.
-fn delayed_input(model: &Model, place: Place, suspect: Option<usize>) -> Option<(Symbol, String)> {
-    let node = model.nodes.get(place);
-    let Kind::Name(name) = &node.kind else { return None };
-    let symbol = resolve(model, name, suspect, node.at).ok()?;
-    let is_input = match symbol {
-        Symbol::Input(_) => true,
-        Symbol::Before(suspect) => matches!(model.suspects[suspect].target, Target::Input(_)),
-        _ => false,
-    };
-    is_input.then(|| (symbol, name_of(model, symbol).to_owned()))
 }
 
 /// Whether a suspect at an input is one that delays it.
@@ -152,9 +140,11 @@ pub(crate) fn delays_its_place(model: &Model, suspect: usize) -> bool {
             Kind::Negation(place) => inner(place),
             Kind::Binary(_, left, right) => inner(left) || inner(right),
             Kind::Call(name, arguments) => {
-                let delayed = || delayed_input(model, arguments[0], Some(suspect));
-                name == "delay" && delayed().is_some_and(|(symbol, _)| symbol == Symbol::Before(suspect))
-                    || arguments.iter().any(inner)
+                let is_place = |argument: &Place| match &model.nodes.get(*argument).kind {
+                    Kind::Name(name) => resolve(model, name, Some(suspect), 0) == Ok(Symbol::Before(suspect)),
+                    _ => false,
+                };
+                name == "delay" && is_place(&arguments[0]) || arguments.iter().any(inner)
             }
         }
     }
@@ -176,16 +166,17 @@ struct Compiler<'a> {
     known: HashMap<Symbol, Register>,
     /// Symbols that are being computed: one that comes again depends on itself.
     open: Vec<Symbol>,
-    /// The friction of whose speed the rate is computed, and the force that it has there.
+    /// The friction of whose speed the rate is computed, and the force that it has there; and at which earlier instant.
     held: Option<(usize, Register)>,
+    held_by: Option<Register>,
     earlier: Earlier,
 }
 
-/// An earlier instant, at which a delayed input is computed with what changes it.
+/// An earlier instant, at which what is delayed is computed with all that it is made of.
 #[derive(Default)]
 struct Earlier {
-    /// By how much it is earlier, and what messages call what is delayed.
-    by: Option<(Register, String)>,
+    /// By how much it is earlier, and where the file says so.
+    by: Option<(Register, usize)>,
     /// What is known there, for each delay.
     known: HashMap<(Register, Symbol), Register>,
     /// How many were computed: delays of delays multiply.
@@ -199,7 +190,18 @@ impl<'a> Compiler<'a> {
     fn new(model: &'a Model, suspects: &'a [usize]) -> Self {
         let builder = Builder::new(leaves(model));
         let earlier = Earlier::default();
-        Self { model, suspects, builder, known: HashMap::new(), open: Vec::new(), held: None, earlier }
+        let (known, open) = (HashMap::new(), Vec::new());
+        Self { model, suspects, builder, known, open, held: None, held_by: None, earlier }
+    }
+
+    /// A state, a memory or the direction of a friction, at the instant that is computed.
+    fn kept(&mut self, leaf: Register, name: &str) -> Result<Register, Wrong> {
+        let Some((by, at)) = self.earlier.by else { return Ok(leaf) };
+        if !self.builder.is_of_numbers(by) {
+            let why = format!("delay: the time by which {name} is late reads parameters and numbers alone");
+            return Err(Wrong::new(at, why));
+        }
+        Ok(self.builder.push(Code::Past(leaf), &[by]))
     }
 
     fn rate(&mut self, state: usize) -> Result<Register, Wrong> {
@@ -215,6 +217,7 @@ impl<'a> Compiler<'a> {
             // Exactly at rest, where the sum of forces would leave a rounding error.
             Some(friction) if self.held.is_none() => {
                 let direction = direction_of(self.builder.leaves(), model, friction);
+                let direction = self.kept(direction, &model.frictions[friction].name)?;
                 let zero = self.builder.constant(0.0);
                 Ok(self.builder.push(Code::Select, &[direction, rate, zero]))
             }
@@ -225,11 +228,13 @@ impl<'a> Compiler<'a> {
     /// The rate of a friction's speed where this is its force.
     fn held(&mut self, held: (usize, Register)) -> Result<Register, Wrong> {
         let known = core::mem::take(&mut self.known);
+        let known_earlier = core::mem::take(&mut self.earlier.known);
         let open = core::mem::take(&mut self.open);
         self.held = Some(held);
+        self.held_by = self.earlier.by.map(|(by, _)| by);
         let rate = self.rate(self.model.frictions[held.0].velocity);
         self.held = None;
-        (self.known, self.open) = (known, open);
+        (self.known, self.earlier.known, self.open) = (known, known_earlier, open);
         rate
     }
 
@@ -257,7 +262,13 @@ impl<'a> Compiler<'a> {
     fn force(&mut self, friction: usize, at: usize) -> Result<Register, Wrong> {
         let model = self.model;
         let element = &model.frictions[friction];
+        let by = self.earlier.by.map(|(by, _)| by);
         match self.held {
+            Some((held, _)) if by != self.held_by => {
+                let state = &model.states[model.frictions[held].velocity].name;
+                let why = format!("the equation of {state} reads an earlier {}", element.name);
+                return Err(Wrong::new(at, why));
+            }
             Some((held, force)) if held == friction => return Ok(force),
             Some((held, _)) => {
                 let state = &model.states[model.frictions[held].velocity].name;
@@ -267,6 +278,7 @@ impl<'a> Compiler<'a> {
             None => {}
         }
         let direction = direction_of(self.builder.leaves(), model, friction);
+        let direction = self.kept(direction, &element.name)?;
         let [holding, _] = self.holding(friction)?;
         let sliding = self.node(element.sliding.root, Scope { suspect: element.suspect, before: None })?;
         let sliding = self.builder.push(Code::Multiply, &[direction, sliding]);
@@ -278,12 +290,15 @@ impl<'a> Compiler<'a> {
         let model = self.model;
         let (root, suspect) = match target {
             Target::Input(index) => {
-                return Ok(match &self.earlier.by {
+                return Ok(match self.earlier.by {
                     None => self.builder.leaves().input(index),
-                    Some((by, _)) => self.builder.push(Code::Delayed(index as u16), &[*by]),
+                    Some((by, _)) => self.builder.push(Code::Delayed(index as u16), &[by]),
                 });
             }
-            Target::State(index) => return Ok(self.builder.leaves().state(index)),
+            Target::State(index) => {
+                let leaf = self.builder.leaves().state(index);
+                return self.kept(leaf, &model.states[index].name);
+            }
             Target::Definition(index) => {
                 let definition = &model.definitions[index];
                 (definition.value.root, definition.suspect)
@@ -329,16 +344,6 @@ impl<'a> Compiler<'a> {
         if let Some(register) = known {
             return Ok(*register);
         }
-        if let (Some((_, delayed)), Symbol::State(_) | Symbol::Memory(_) | Symbol::Friction(_)) =
-            (&self.earlier.by, symbol)
-        {
-            let name = name_of(self.model, symbol);
-            let why = format!(
-                "{delayed} is delayed, and what changes it reads {name}, of which no earlier value is kept: \
-                 name the delayed input under [define], and change it there"
-            );
-            return Err(Wrong::new(at, why));
-        }
         if let Some(first) = self.open.iter().position(|open| *open == symbol) {
             let circle: Vec<&str> =
                 self.open[first..].iter().map(|open| name_of(self.model, *open)).collect();
@@ -358,9 +363,9 @@ impl<'a> Compiler<'a> {
             },
             Symbol::Pi => self.builder.constant(core::f64::consts::PI),
             Symbol::Input(index) => self.whole(Target::Input(index), None)?,
-            Symbol::State(index) => leaves.state(index),
+            Symbol::State(index) => self.kept(leaves.state(index), name_of(self.model, symbol))?,
             Symbol::Parameter(index) => leaves.parameter(index),
-            Symbol::Memory(index) => leaves.memory(index),
+            Symbol::Memory(index) => self.kept(leaves.memory(index), name_of(self.model, symbol))?,
             Symbol::Friction(index) => self.force(index, at)?,
             Symbol::Definition(index) => self.whole(Target::Definition(index), None)?,
             Symbol::Output(index) => self.whole(Target::Output(index), None)?,
@@ -398,20 +403,24 @@ impl<'a> Compiler<'a> {
         Ok(self.builder.push(Code::Max, &[register, zero]))
     }
 
-    /// An input some time earlier, with the terms and suspects that change it.
-    fn delayed(&mut self, [input, by]: [Place; 2], at: usize, scope: Scope) -> Result<Register, Wrong> {
-        let Some((symbol, name)) = delayed_input(self.model, input, scope.suspect) else {
-            return Err(Wrong::new(at, "delay: the first argument is the name of an input"));
-        };
+    /// An expression some time earlier, with the terms and suspects that change what it reads.
+    fn delayed(&mut self, [delayed, by]: [Place; 2], at: usize, scope: Scope) -> Result<Register, Wrong> {
+        let late_at = self.model.nodes.get(by).at;
         self.earlier.count += 1;
         if self.earlier.count > MOST_DELAYS {
             return Err(Wrong::new(at, format!("more than {MOST_DELAYS} delays, those of delays included")));
         }
         let by = self.duration(by, scope)?;
         let outer = self.earlier.by.take();
-        let by = outer.as_ref().map_or(by, |(outer, _)| self.builder.push(Code::Add, &[*outer, by]));
-        self.earlier.by = Some((by, name));
-        let register = self.symbol(symbol, at);
+        self.earlier.by = Some(match outer {
+            None => (by, late_at),
+            Some((outer, outer_at)) => {
+                let is_outer = !self.builder.is_of_numbers(outer);
+                let both = self.builder.push(Code::Add, &[outer, by]);
+                (both, if is_outer { outer_at } else { late_at })
+            }
+        });
+        let register = self.node(delayed, Scope { before: None, ..scope });
         self.earlier.by = outer;
         register
     }

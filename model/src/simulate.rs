@@ -10,7 +10,7 @@
 //! x alone. Memories are renewed at each sample and after each step; what their change within a step does to x is added by
 //! Simpson's rule, and is part of the adaptive method's error (`memories`). A step ends where dry friction stops or breaks away
 //! (`frictions`). What else jumps is found by step control: steps become shorter, until one of a millionth of the samples'
-//! distance goes over the jump.
+//! distance goes over the jump. Earlier values of what is integrated are kept as long as delays reach back (`delays`).
 //!
 //! The scheme is written out here: the kept libraries were tried and allocate in each step (ode_solvers 0.6 clones its state some
 //! six times a step and stores it; diffsol 0.12 brings faer and 90 crates), and both would restart at each sample. ode_solvers is
@@ -19,6 +19,7 @@
 //! Sources: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.4, II.5, table 5.2 [HNW 1993];
 //! Bock 1983, internal numerical differentiation.
 
+mod delays;
 mod frictions;
 mod memories;
 mod steps;
@@ -28,6 +29,8 @@ use crate::failure::Failure;
 use crate::file::{Model, Solver};
 use crate::inputs::{Hold, Inputs};
 use crate::tape::{Leaves, Register, Registers, Tape};
+use delays::Kept;
+use expression::past::Past;
 use settings::SettingsError;
 
 /// Stages of Dormand-Prince.
@@ -152,6 +155,15 @@ pub struct Simulator<'a> {
     memory_in_two: Vec<f64>,
     largest_memory: Vec<f64>,
     middle: Vec<f64>,
+    /// What has earlier values, and these.
+    kept: Vec<(Register, Kept)>,
+    past: Past,
+    memory_at_head: Vec<f64>,
+    memory_within: [Vec<f64>; 3],
+    /// Delays that rates and memories read; the least of them, and the longest of all.
+    delays_s: Vec<f64>,
+    least_delay_s: f64,
+    longest_delay_s: f64,
     step_s: f64,
     /// Steps of the record, refused ones too, and how many it may take.
     steps: usize,
@@ -182,6 +194,8 @@ impl<'a> Simulator<'a> {
         };
         let width = 1 + directions.len();
         let room = vec![0.0; program.tapes.states.len() * width];
+        let memory = vec![0.0; program.tapes.memories.len() * width];
+        let kept = program.kept();
         Self {
             program,
             directions: directions.to_vec(),
@@ -198,11 +212,18 @@ impl<'a> Simulator<'a> {
             tried: room.clone(),
             stages: core::array::from_fn(|_| room.clone()),
             largest: vec![0.0; program.tapes.states.len()],
-            memory: vec![0.0; program.tapes.memories.len() * width],
-            memory_before: vec![0.0; program.tapes.memories.len() * width],
-            memory_in_two: vec![0.0; program.tapes.memories.len() * width],
+            memory_before: memory.clone(),
+            memory_in_two: memory.clone(),
+            memory_at_head: memory.clone(),
+            memory_within: core::array::from_fn(|_| memory.clone()),
+            memory,
             largest_memory: vec![0.0; program.tapes.memories.len()],
             middle: room.clone(),
+            past: Past::of(kept.iter().map(|(leaf, _)| *leaf).collect(), directions.len()),
+            kept,
+            delays_s: Vec::with_capacity(program.delays()),
+            least_delay_s: 0.0,
+            longest_delay_s: 0.0,
             step_s: 0.0,
             steps: 0,
             most_steps: usize::MAX,
@@ -254,7 +275,9 @@ impl<'a> Simulator<'a> {
         tapes.guards.prepare(&mut self.plain_guards);
         self.begin(starts, memories);
         self.begin_memories(inputs)?;
+        self.begin_delays(inputs);
         self.settle(inputs)?;
+        self.keep_directions();
         for row in 0..inputs.time_s.len() {
             if row > 0 {
                 self.advance(inputs, row - 1)?;
@@ -299,7 +322,7 @@ impl<'a> Simulator<'a> {
     ) -> Result<(), Failure> {
         let program = self.program;
         put(program, &mut self.outputs, inputs, (row, inputs.time_s[row]), &self.x);
-        program.tapes.outputs.evaluate(&mut self.outputs, inputs);
+        program.tapes.outputs.evaluate(&mut self.outputs, inputs, &self.past);
         for (output, (name, place)) in program.names.outputs.iter().enumerate() {
             let register = program.tapes.outputs.result(output);
             let value = self.outputs.value(register);

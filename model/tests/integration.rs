@@ -245,11 +245,7 @@ fn a_lag_and_a_dead_time_at_one_input_are_both_there() {
 }
 
 #[test]
-fn a_delay_of_what_a_state_changes_is_refused_with_its_place() {
-    let text = "[inputs.u]\n[states.x]\nstart = 0\nderivative = \"(delay(u, 1[s]) - x)/1[s]\"\n\
-                [outputs.y]\nvalue = \"x\"\n[[terms]]\nname = \"back\"\nplace = \"u\"\nadd = \"-x\"\n";
-    let found = refused(text);
-    assert!(found.starts_with("model.toml:10:9: u is delayed, and what changes it reads x"), "{found}");
+fn too_many_delays_of_delays_are_refused() {
     // Delays of delays multiply.
     let mut text = String::from("[outputs.y]\nvalue = \"u0\"\n");
     for index in 0..30 {

@@ -1,5 +1,6 @@
 //! The integration tests of `model`, one executable; its allocator counts.
 
+mod delays;
 mod files;
 mod friction;
 mod integration;

@@ -21,7 +21,6 @@
 use super::steps::cubic;
 use super::{STAGES, Simulator, put};
 use crate::failure::Failure;
-use crate::file::Solver;
 use crate::inputs::Inputs;
 
 /// Results of the guards' tape for each friction.
@@ -64,7 +63,7 @@ impl Simulator<'_> {
     fn guard(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), friction: usize) -> [f64; GUARDS] {
         let guards = &self.program.tapes.guards;
         put(self.program, &mut self.plain_guards, inputs, instant, &self.within);
-        guards.evaluate(&mut self.plain_guards, inputs);
+        guards.evaluate(&mut self.plain_guards, inputs, &self.past);
         core::array::from_fn(|place| self.plain_guards.value(guards.result(GUARDS * friction + place)))
     }
 
@@ -204,10 +203,7 @@ impl Simulator<'_> {
         let mut length_s = share * step_s;
         let mut rate = 0.0;
         for correction in 0..=CORRECTIONS {
-            match self.program.solver {
-                Solver::Fixed { .. } => self.classical(inputs, (row, time_s), length_s),
-                Solver::Adaptive { .. } => self.dormand_prince(inputs, (row, time_s), length_s),
-            }
+            self.attempt(inputs, (row, time_s), length_s);
             let found = self.condition_and_rate(inputs, (row, time_s), [length_s, step_s], friction);
             rate = found[1];
             let late_s = found[0] / rate;
@@ -218,6 +214,7 @@ impl Simulator<'_> {
             length_s -= late_s;
         }
         let _ = self.remember(inputs, (row, time_s), length_s);
+        self.keep(length_s);
         core::mem::swap(&mut self.x, &mut self.tried);
         let instant = (row, time_s + length_s);
         let width = self.width();
@@ -226,7 +223,7 @@ impl Simulator<'_> {
         let direction = self.direction[friction];
         if direction == 0.0 {
             put(self.program, &mut self.guards, inputs, instant, &self.x);
-            self.program.tapes.guards.evaluate(&mut self.guards, inputs);
+            self.program.tapes.guards.evaluate(&mut self.guards, inputs, &self.past);
             let guards = &self.program.tapes.guards;
             let [holding, breakaway] = [0, 1].map(|result| guards.result(GUARDS * friction + result));
             let sign = self.guards.value(holding).signum();

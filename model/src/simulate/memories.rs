@@ -13,6 +13,7 @@ use super::steps::cubic;
 use super::{STAGES, Simulator, put};
 use crate::failure::Failure;
 use crate::inputs::Inputs;
+use expression::past::NONE;
 
 /// Stages of a step that are no longer needed when its memories are looked at: rates in its middle with the memories of its head
 /// and with those there, and rates at its end with those there.
@@ -31,7 +32,7 @@ impl Simulator<'_> {
             return Ok(());
         };
         tape.prepare(registers);
-        tape.evaluate(registers, inputs);
+        tape.evaluate(registers, inputs, &NONE);
         for (place, memory) in self.memory.chunks_mut(width).enumerate() {
             let start = tape.result(place);
             memory[0] = registers.value(start);
@@ -67,7 +68,7 @@ impl Simulator<'_> {
             At::End => &self.tried,
         };
         put(program, &mut self.updates, inputs, instant, x);
-        program.tapes.updates.evaluate(&mut self.updates, inputs);
+        program.tapes.updates.evaluate(&mut self.updates, inputs, &self.past);
         for place in 0..program.tapes.memories.len() {
             let register = program.tapes.updates.result(place);
             let kept = &mut self.memory[place * width..(place + 1) * width];
@@ -104,10 +105,11 @@ impl Simulator<'_> {
         self.renew_at(inputs, end, At::End);
         self.memory_in_two.copy_from_slice(&self.memory);
         self.forget();
-        for share in [0.25, 0.5, 0.75] {
+        for (part, share) in [0.25, 0.5, 0.75].into_iter().enumerate() {
             self.between(step_s, share);
             let instant = (row, time_s + share * step_s);
             self.renew_at(inputs, instant, At::Middle);
+            self.memory_within[part].copy_from_slice(&self.memory);
             if share == 0.5 {
                 self.stage_at(inputs, instant, MIDDLE, At::Middle);
             }
@@ -115,7 +117,7 @@ impl Simulator<'_> {
         self.renew_at(inputs, end, At::End);
         self.stage_at(inputs, end, END, At::End);
         let width = self.width();
-        let mut worst: f64 = 0.0;
+        let mut worst = self.error_of_memories();
         for (place, largest) in self.largest_memory.iter().enumerate() {
             let [before, in_two, now] =
                 [&self.memory_before, &self.memory_in_two, &self.memory].map(|memory| memory[place * width]);

@@ -26,7 +26,9 @@ const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
 /// The shortest step over the distance of two samples. It is taken whatever its error, which is that of a jump within it, or of a
 /// state that leaves 0 by a power of time: its error over its change does not fall with the step.
-const SHORTEST: f64 = 1e-6;
+pub(super) const SHORTEST: f64 = 1e-6;
+/// Of a time less a delay, over both.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Most such steps with an error between two samples. Two go over a jump, and some twenty lead a chain of six states away from 0;
 /// equations that jump to and fro at a level need a million.
 const MOST_SHORTEST: usize = 200;
@@ -52,6 +54,24 @@ impl Simulator<'_> {
             // An input that jumps at the sample.
             self.renew(inputs, (row, from_s));
         }
+        let mut from_s = from_s;
+        loop {
+            let ends_s = self.next_return(inputs, row, [from_s, to_s]);
+            self.advance_to(inputs, row, [from_s, ends_s])?;
+            if ends_s >= to_s {
+                return Ok(());
+            }
+            from_s = ends_s;
+        }
+    }
+
+    /// Within the distance of two samples.
+    fn advance_to(
+        &mut self,
+        inputs: &Inputs<'_>,
+        row: usize,
+        [from_s, to_s]: [f64; 2],
+    ) -> Result<(), Failure> {
         match self.program.solver {
             Solver::Fixed { step_s } => {
                 // A step that is longer by a rounding error is no step more.
@@ -68,7 +88,9 @@ impl Simulator<'_> {
                 }
                 Ok(())
             }
-            Solver::Adaptive { relative_tolerance } => self.adapt(inputs, row, relative_tolerance),
+            Solver::Adaptive { relative_tolerance } => {
+                self.adapt(inputs, row, [from_s, to_s], relative_tolerance)
+            }
         }
     }
 
@@ -97,8 +119,9 @@ impl Simulator<'_> {
         let (mut time_s, mut step_s) = (from_s, length_s);
         for _ in 0..MOST_STEPS {
             self.first_stage(inputs, row, time_s)?;
-            self.classical(inputs, (row, time_s), step_s);
+            self.attempt(inputs, (row, time_s), step_s);
             let Some(event) = self.event(inputs, (row, time_s), step_s) else {
+                self.keep(step_s);
                 core::mem::swap(&mut self.x, &mut self.tried);
                 return self.taken(inputs, row, ends_s);
             };
@@ -124,7 +147,7 @@ impl Simulator<'_> {
         for (index, (tried, x)) in self.tried.iter_mut().zip(&self.x).enumerate() {
             *tried = x + step_s / 6.0 * (first[index] + 2.0 * (second[index] + third[index]) + fourth[index]);
         }
-        if !self.direction.is_empty() {
+        if !self.direction.is_empty() || !self.past.is_empty() {
             self.stage(inputs, row, time_s + step_s, STAGES - 1, true);
         }
     }
@@ -145,10 +168,15 @@ impl Simulator<'_> {
         }
     }
 
-    fn adapt(&mut self, inputs: &Inputs<'_>, row: usize, tolerance: f64) -> Result<(), Failure> {
-        let (from_s, to_s) = (inputs.time_s[row], inputs.time_s[row + 1]);
+    fn adapt(
+        &mut self,
+        inputs: &Inputs<'_>,
+        row: usize,
+        [from_s, to_s]: [f64; 2],
+        tolerance: f64,
+    ) -> Result<(), Failure> {
         let mut time_s = from_s;
-        let shortest_s = SHORTEST * (to_s - from_s);
+        let shortest_s = SHORTEST * (inputs.time_s[row + 1] - inputs.time_s[row]);
         let mut shortest = 0;
         self.release(inputs, (row, time_s));
         self.first_stage(inputs, row, time_s)?;
@@ -159,8 +187,9 @@ impl Simulator<'_> {
             // The last step ends on the sample, and no sliver is left behind it.
             let is_last = wished_s >= 0.999 * left_s || left_s <= shortest_s;
             let step_s = if is_last { left_s } else { wished_s.min(0.5 * left_s).max(shortest_s) };
-            self.dormand_prince(inputs, (row, time_s), step_s);
-            let error = self.error(step_s).max(self.remember(inputs, (row, time_s), step_s)) / tolerance;
+            let unread = if self.attempt(inputs, (row, time_s), step_s) { 0.0 } else { f64::INFINITY };
+            let error = self.error(step_s).max(self.remember(inputs, (row, time_s), step_s));
+            let error = error.max(unread) / tolerance;
             let factor = if error > 0.0 { SAFETY * libm::pow(error, -0.2) } else { GROW };
             let factor = if factor.is_nan() { SHRINK } else { factor.clamp(SHRINK, GROW) };
             let is_good = error <= 1.0 || error.is_finite() && step_s <= shortest_s;
@@ -182,6 +211,7 @@ impl Simulator<'_> {
             if is_good {
                 self.step_s = if is_last { self.step_s.max(step_s * factor) } else { step_s * factor };
                 time_s = if is_last { to_s } else { time_s + step_s };
+                self.keep(step_s);
                 core::mem::swap(&mut self.x, &mut self.tried);
                 self.taken(inputs, row, time_s)?;
                 if is_last {
@@ -240,7 +270,9 @@ impl Simulator<'_> {
             At::End => &self.tried,
         };
         put(program, &mut self.rates, inputs, instant, x);
-        program.tapes.rates.evaluate(&mut self.rates, inputs);
+        let rounding_s = (ROUNDING * (instant.1.abs() + self.longest_delay_s)).max(f64::MIN_POSITIVE);
+        self.past.lean(if at == At::Head { rounding_s } else { -rounding_s });
+        program.tapes.rates.evaluate(&mut self.rates, inputs, &self.past);
         let width = self.width();
         for place in 0..program.tapes.states.len() {
             let register = program.tapes.rates.result(place);
@@ -262,6 +294,7 @@ impl Simulator<'_> {
         }
         if !self.memory.is_empty() {
             self.renew(inputs, (row, time_s));
+            self.keep_memories();
             self.release(inputs, (row, time_s));
         }
         Ok(())
