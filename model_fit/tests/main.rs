@@ -5,6 +5,7 @@ mod advice;
 mod balances;
 mod chamber;
 mod closing;
+mod delayed;
 mod discover;
 mod first_model;
 mod known_values;
