@@ -3,8 +3,8 @@
 //! ```text
 //!   v(s) = a + s (b + (1 - s) (c + s (d + (1 - s) e)))        s: share of the step, 0 to 1
 //! ```
-//! Level at the start before the first step. The step that is being tried may be read before it is accepted. Derivatives by what is
-//! fitted are kept as the values are.
+//! Level at the start before the first step. The step that is being tried may be read before it is accepted. Derivatives by what
+//! is fitted are kept as the values are.
 //!
 //! Source: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.6 (dense output), II.17 (delays).
 

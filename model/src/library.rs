@@ -365,7 +365,7 @@ mod tests {
             );
         }
         // What an input at its place would delay is the input itself.
-        let is_input = entry.expression.contains("delay(");
+        let is_input = entry.expression.contains("delay(u,");
         let place = if is_input { "in_u" } else { "there" };
         let with = library.variables_of(entry).into_iter().filter(|variable| variable.default.is_none());
         let with: String = with.map(|variable| format!("with.{0} = \"in_{0}\"\n", variable.name)).collect();

@@ -38,8 +38,8 @@ fn times(count: u32, period_s: f64) -> Vec<f64> {
     (0..count).map(|row| f64::from(row) * period_s).collect()
 }
 
-/// Delays over many samples, within a step, and none, where x falls as exp(-rate t). Tolerance 1e-8 for each step, or Runge-Kutta with
-/// steps of 1/100 s; of a step that reads itself the polynomial between its ends is good to 1e-7 of its derivatives.
+/// Delays over many samples, within a step, and none, where x falls as exp(-rate t). Tolerance 1e-8 for each step, or
+/// Runge-Kutta with steps of 1/100 s; of a step that reads itself the polynomial between its ends is good to 1e-7 of its derivatives.
 #[test]
 fn a_delay_equation_has_the_solution_of_the_method_of_steps() {
     let time_s = times(60, 0.1);
@@ -81,8 +81,8 @@ fn late(hold: &str) -> (String, Vec<f64>, [Vec<f64>; 1]) {
     (format!("[solver]\nrelative_tolerance = 1e-9\n{}", LATE.replace("HOLD", hold)), time_s, [force])
 }
 
-/// With play, sticking and a delay that is no multiple of the samples. The derivative of a play jumps where it begins to move, within
-/// a step; of these, some ten in the record, the differences see the instant: 2 % of the least of the derivatives.
+/// With play, sticking and a delay that is no multiple of the samples. The derivative of a play jumps where it begins to move,
+/// within a step; of these, some ten in the record, the differences see the instant: 2 % of the least of the derivatives.
 #[test]
 fn derivatives_through_delays_play_and_friction_are_those_of_differences() {
     for hold in ["linear", "zero"] {
@@ -206,4 +206,33 @@ fn a_run_with_delays_allocates_nothing_once_there_is_room() {
         assert_eq!(calls, 2, "{solver}");
         assert_eq!(counting(&mut run), (Ok(()), 0), "{solver}");
     }
+}
+
+/// A reading that is late, of a state and behind a lag, whichever stands first in the file. 0.4 s are 8 samples; all is 0
+/// before.
+#[test]
+fn a_sensor_reads_a_state_late() {
+    let dead = "[[terms]]\nname = \"dead\"\nuse = \"sensor/dead-time\"\nplace = \"y\"\nparameters.late = { value = 400 }\n";
+    let lag =
+        "[[terms]]\nname = \"lag\"\nuse = \"sensor/lag\"\nplace = \"y\"\nparameters.lag = { value = 0.3 }\n";
+    let (time_s, samples) = (times(60, 0.05), [times(60, 1.0)]);
+    let inputs = Inputs { time_s: &time_s, samples_si: &samples };
+    let read_as = |terms: &[&str]| {
+        let model = read(&format!(
+            "[inputs.u]\nunit = \"V\"\nhold = \"linear\"\n[states.x]\nunit = \"V\"\nstart = 0\nderivative = \"(u - x)/0.5[s]\"\n\
+             [outputs.y]\nunit = \"V\"\nvalue = \"x\"\n{}",
+            terms.concat()
+        ));
+        simulated(&Program::new(&model, &[]).unwrap(), &[], &inputs, &first_values(&model)).unwrap()
+    };
+    for (prompt, late) in [(&[][..], &[&[dead][..]][..]), (&[lag], &[&[dead, lag], &[lag, dead]])] {
+        let prompt = read_as(prompt);
+        for late in late.iter().map(|terms| read_as(terms)) {
+            for row in 0..time_s.len() {
+                let (was, is) = (if row < 8 { 0.0 } else { prompt[row - 8].0 }, late[row].0);
+                assert!((was - is).abs() < 1e-4, "row {row}: {is} for {was}");
+            }
+        }
+    }
+    assert!(read_as(&[])[59].0 > 40.0);
 }

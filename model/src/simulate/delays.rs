@@ -42,7 +42,7 @@ const CONVERGED_SHARE: f64 = 0.01;
 const RETURNS: u32 = 4;
 /// Steps for which the ring has room: of the adaptive method for a sample, and at most before it has to grow.
 const STEPS_OF_A_SAMPLE: f64 = 4.0;
-const MOST_ROOM: f64 = 65_536.0;
+const MOST_ROOM: f64 = 4096.0;
 
 /// What has earlier values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
