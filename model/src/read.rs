@@ -198,15 +198,32 @@ fn range(section: &mut Section<'_>, unit: &Unit) -> Result<[f64; 2], SettingsErr
     }
 }
 
+/// How a table under a key is written.
+fn example(key: &str, name: &str) -> Option<String> {
+    let keys = match key {
+        "inputs" => "unit = \"V\"",
+        "parameters" => "unit = \"kg\", value = 2",
+        "states" => "unit = \"m\", start = 0, derivative = \"v\"",
+        "outputs" => "unit = \"m\", value = \"x\"",
+        "tables" => "x = [0, 1], y = [0, 2]",
+        "memory" => "unit = \"m\", start = 0, update = \"max(w, x)\"",
+        "friction" => "unit = \"N\", velocity = \"v\", sliding = \"coulomb\"",
+        _ => return None,
+    };
+    Some(format!("{key}.{name} = {{ {keys} }}"))
+}
+
 /// The tables under a key, by their names.
 pub(crate) fn named<'a>(
     section: &mut Section<'a>,
     key: &str,
 ) -> Result<Vec<(String, Section<'a>)>, SettingsError> {
-    let Some(mut all) = section.section(key)? else { return Ok(Vec::new()) };
+    let Some(mut all) = section.section_as(key, example(key, "NAME").as_deref())? else {
+        return Ok(Vec::new());
+    };
     let mut found = Vec::new();
     for name in all.keys() {
-        let inner = all.section(&name)?.expect("it is one of the keys");
+        let inner = all.section_as(&name, example(key, &name).as_deref())?.expect("it is one of the keys");
         found.push((name, inner));
     }
     Ok(found)

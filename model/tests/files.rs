@@ -221,6 +221,19 @@ fn hostile_files_are_refused_with_line_and_column() {
         (with_output("", &terms), "more than 10000 numbers, names and operators in this file"),
         (with_output("", &brackets), "nested deeper than 64"),
         (
+            with_output("[parameters]\nk = 3", "k"),
+            "model.toml:2:5: parameters.k = 3 must be a table: write parameters.k = { unit = \"kg\", value = 2 }",
+        ),
+        (
+            "[outputs]\ny = \"x\"".to_owned(),
+            "model.toml:2:5: outputs.y = \"x\" must be a table: write outputs.y = { unit = \"m\", value = \"x\" }",
+        ),
+        (
+            "[[outputs]]\nname = \"y\"".to_owned(),
+            "outputs must be a table and no list: write outputs.NAME = { unit = \"m\", value = \"x\" }",
+        ),
+        (with_output("record = 3", "1"), "record = 3 must be a table: write [record] with its keys below"),
+        (
             with_output("[tables.f]\nx = [1]\ny = [2]", "f(1)"),
             "model.toml:2:5: tables.f.x: a table has 2 to 10000 points",
         ),

@@ -279,8 +279,16 @@ impl<'a> Section<'a> {
     /// # Errors
     /// No table.
     pub fn section(&mut self, key: &str) -> Result<Option<Self>, SettingsError> {
+        self.section_as(key, None)
+    }
+
+    /// The same; `example` is how it is written, for the message where something else stands there.
+    ///
+    /// # Errors
+    /// No table.
+    pub fn section_as(&mut self, key: &str, example: Option<&str>) -> Result<Option<Self>, SettingsError> {
         let Some(value) = self.value(key) else { return Ok(None) };
-        self.inner(self.path_of(key), value).map(Some)
+        self.inner(self.path_of(key), value, example).map(Some)
     }
 
     /// The tables of the list under `key`, each called by its place from 1 on; none when it is absent.
@@ -295,7 +303,7 @@ impl<'a> Section<'a> {
             );
         };
         let path = |place: usize| format!("{}[{place}]", self.path_of(key));
-        list.iter().enumerate().map(|(index, item)| self.inner(path(index + 1), item)).collect()
+        list.iter().enumerate().map(|(index, item)| self.inner(path(index + 1), item, None)).collect()
     }
 
     /// The table under `key` as it stands, unread; empty when it is absent.
@@ -385,9 +393,22 @@ impl<'a> Section<'a> {
         self.table.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
     }
 
-    fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>) -> Result<Self, SettingsError> {
+    fn inner(
+        &self,
+        path: String,
+        value: &'a Spanned<DeValue<'a>>,
+        example: Option<&str>,
+    ) -> Result<Self, SettingsError> {
         let Some(table) = value.get_ref().as_table() else {
-            return Err(self.source.error_at(value.span().start, &format!("{path} must be a table")));
+            let example = example.map_or_else(|| format!("[{path}] with its keys below"), str::to_owned);
+            let message = match value.get_ref() {
+                DeValue::Array(_) => format!("{path} must be a table and no list: write {example}"),
+                _ => {
+                    let written = written(self.source.text, value.span());
+                    format!("{path} = {written} must be a table: write {example}")
+                }
+            };
+            return Err(self.source.error_at(value.span().start, &message));
         };
         Ok(Self { source: self.source, path, table, at: value.span().start, asked: Vec::new() })
     }
