@@ -302,6 +302,18 @@ mod tests {
     }
 
     #[test]
+    fn a_row_of_units_under_the_head_is_read() {
+        let body =
+            rows(|t| format!("{},{},{}\n", 10.0 * t, f64::from(u8::from(t > 20.0)), 20.0 * (0.3 * t).sin()));
+        let (text, model) = of(&format!("# bench\nclock,valve,stress\n[ms],[V],[N/mm2]\n{body}")).unwrap();
+        assert_eq!((model.record.time_column.as_str(), model.record.time_unit_s), ("clock", 1e-3), "{text}");
+        let units = (model.inputs[0].unit.text.as_str(), model.outputs[0].unit.text.as_str());
+        assert_eq!((units, model.record.skip_lines), (("V", "N/mm^2"), 0), "{text}");
+        let (text, model) = of(&format!("a title\nclock,valve,oven\nms,-,degC\n{body}")).unwrap();
+        assert_eq!((model.outputs[0].unit.text.as_str(), model.record.skip_lines), ("K", 1), "{text}");
+    }
+
+    #[test]
     fn tables_of_other_countries_and_loggers_are_read() {
         let body = rows(|t| {
             format!(

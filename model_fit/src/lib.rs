@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `begin` | a first model file from the columns of a record |
 //! | `record` | a record as the model reads it |
+//! | `unit_row` | a row of units under its head |
 //! | `processing` | even grid, smoothed inputs, rates, rows |
 //! | `look` | what a record looks like: holes, spikes, saturation, sign, columns |
 //! | `filter` | zero-phase low passes |
@@ -75,6 +76,7 @@ mod starts;
 mod structure;
 mod term_curves;
 mod typeset;
+mod unit_row;
 mod verdict;
 mod watch;
 
@@ -194,6 +196,10 @@ pub fn close_with(
 ) -> Result<ClosedModel, ModelError> {
     let model = read(file)?;
     let records = looked_at(&model, train)?;
+    // Before the fit, which may take minutes.
+    for record in &records {
+        record.notes.iter().for_each(|note| progress(&format!("{}: {note}", record.name)));
+    }
     let waiting = read_all(&model, tests)?;
     held_out::check(&model, &waiting)?;
     let found = select::search(&model, &records, progress)?;

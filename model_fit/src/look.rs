@@ -41,10 +41,32 @@ const SIZES: f64 = 30.0;
 /// Share of an output's standard deviation from which on a fit that leaves it explains nearly nothing.
 const NEARLY_ALL: f64 = 0.95;
 
+/// A period is far from the rows' distance from this factor on: a wrong unit is off by sixty or a thousand, a wrong digit by ten.
+const FAR_PERIOD: f64 = 5.0;
+
 /// Median distance of rows.
 pub(super) fn usual_period_s(time_s: &[f64]) -> f64 {
     let mut distances: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     median(&mut distances).unwrap_or(0.0)
+}
+
+/// A note where the period of the file is far from the distance of the rows: it asks for that, or the time has another unit.
+pub(super) fn period(period_s: f64, time_s: &[f64]) -> Option<String> {
+    let usual_s = usual_period_s(time_s);
+    let ratio = period_s / usual_s;
+    let what = if ratio > 1.0 {
+        "rows between are passed over"
+    } else {
+        "samples between the rows are straight lines"
+    };
+    (ratio.is_finite() && ratio > 0.0 && ratio.max(1.0 / ratio) > FAR_PERIOD).then(|| {
+        format!(
+            "period_s under [record] is {period_s} s, {} times the usual distance of the rows, {} s: {what}; is the time in \
+             another unit?",
+            significant(ratio),
+            significant(usual_s)
+        )
+    })
 }
 
 /// Rows that are missing in a record that is even otherwise.

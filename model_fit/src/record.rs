@@ -3,6 +3,7 @@
 use super::filter::LowPass;
 use super::look::{self, Column, StuckFrom};
 use super::processing::{Grid, Names};
+use super::unit_row::{self, OtherUnit};
 use model::{Input, Model};
 use records::{ColumnOptions, Columns, ReadError, read_columns};
 use std::path::{Path, PathBuf};
@@ -37,6 +38,8 @@ pub enum RecordError {
     Uneven { file: String, line: u64, time_s: f64 },
     #[error("{file}:{line}: {time_s} s: {rows} rows cannot reach as far at a period of {period_s} s")]
     Far { file: String, line: u64, time_s: f64, rows: usize, period_s: f64 },
+    #[error(transparent)]
+    OtherUnit(Box<OtherUnit>),
     #[error("{file}: low_pass_hz of input {name} is {edge_hz}; allowed is below half of {sampling_hz} Hz")]
     Edge { file: String, name: String, edge_hz: f64, sampling_hz: f64 },
     #[error(
@@ -93,7 +96,7 @@ impl Measured {
     }
 
     fn of(model: &Model, columns: Columns) -> Result<Self, RecordError> {
-        let Columns { file, time_s, lines, mut values, warnings } = columns;
+        let Columns { file, time_s, lines, mut values, units, warnings } = columns;
         all_listed(model, &file)?;
         let file = file.display().to_string();
         if time_s.len() < FEWEST_ROWS {
@@ -103,6 +106,10 @@ impl Measured {
             return Err(RecordError::Time { file, line: lines[row], time_s: time_s[row] });
         }
         let mut notes: Vec<String> = warnings.into_iter().map(|warning| warning.text).collect();
+        if let Some(units) = units {
+            notes.extend(unit_row::compared(model, &file, &units)?);
+        }
+        notes.extend(model.record.period_s.and_then(|period_s| look::period(period_s, &time_s)));
         let measured: Vec<&Input> = model.inputs.iter().filter(|input| input.rate_of.is_none()).collect();
         for (input, values) in measured.iter().zip(&values) {
             let missing = values.iter().filter(|value| value.is_none()).count();
@@ -198,6 +205,29 @@ mod tests {
         }
         assert_eq!(measured.outputs[0][..3], [Some(1e-3), None, Some(2e-3)]);
         assert!(measured.notes[0].contains("2 samples of u are missing"), "{:?}", measured.notes);
+    }
+
+    #[test]
+    fn a_period_that_is_not_that_of_the_rows_is_noted() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let rows: String = (0..200).map(|row| format!("{},{},1\n", f64::from(row) * 0.01, row % 7)).collect();
+        std::fs::write(file.path(), format!("t,u,y\n{rows}")).unwrap();
+        let notes = |period: &str| {
+            let model = format!(
+                "[record]\ntime = \"t\"\nperiod_s = {period}\n[inputs.u]\n[outputs.y]\nvalue = \"u\"\n"
+            );
+            let read = Measured::read(&Model::parse(&model, Path::new("m.toml")).unwrap(), file.path());
+            read.unwrap().notes.into_iter().filter(|note| note.contains("period_s")).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            notes("0.1"),
+            [
+                "period_s under [record] is 0.1 s, 10.00 times the usual distance of the rows, 0.0100 s: rows between are passed \
+                 over; is the time in another unit?"
+            ]
+        );
+        assert!(notes("0.001")[0].contains("samples between the rows are straight lines"));
+        assert_eq!((notes("0.01").len(), notes("0.02").len()), (0, 0));
     }
 
     #[test]

@@ -43,7 +43,19 @@ pub struct Columns {
     pub lines: Vec<u64>,
     /// Those that were wanted, in their order, as they are written.
     pub values: Vec<Vec<Option<f64>>>,
+    pub units: Option<UnitRow>,
     pub warnings: Vec<Warning>,
+}
+
+/// A row of units under the head.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnitRow {
+    /// Its line, from 1.
+    pub line: u64,
+    /// What it says of the time.
+    pub time: String,
+    /// What it says of the wanted columns, in their order; without brackets around it.
+    pub columns: Vec<String>,
 }
 
 /// Reads the wanted columns of a table.
@@ -62,11 +74,13 @@ pub fn read_columns(file: &Path, options: &ColumnOptions<'_>) -> Result<Columns,
     };
     let comment = Some(options.comment.to_owned()).filter(|comment| !comment.is_empty());
     let layout = Layout { separator, comment, skip_lines: options.skip_lines, head: true };
-    let table = Table::read(file, &layout)?;
+    let mut table = Table::read(file, &layout)?;
     let time = table.required(options.time)?;
     let places =
         options.columns.iter().map(|column| table.required(column)).collect::<Result<Vec<_>, _>>()?;
+    let units = unit_row(&mut table, (time, &places), options)?;
     let mut columns = Columns {
+        units,
         file: file.into(),
         time_s: Vec::with_capacity(table.rows.len()),
         lines: Vec::with_capacity(table.rows.len()),
@@ -96,6 +110,36 @@ pub fn read_columns(file: &Path, options: &ColumnOptions<'_>) -> Result<Columns,
         columns.warnings.push(Warning { line: table.cut, text });
     }
     Ok(columns)
+}
+
+/// Takes the first row out where it holds texts alone: no row of a record, whose time is a number or a time of a calendar.
+fn unit_row(
+    table: &mut Table,
+    (time, places): (usize, &[usize]),
+    options: &ColumnOptions<'_>,
+) -> Result<Option<UnitRow>, ReadError> {
+    let Some((line, row)) = table.rows.first() else { return Ok(None) };
+    let is_value = |cell: &str| {
+        let number = if options.is_decimal_comma { cell.replacen(',', ".", 1) } else { cell.to_owned() };
+        number.parse::<f64>().is_ok() || CalendarTime::parse(cell).is_some()
+    };
+    if row.iter().any(is_value) || row.iter().all(str::is_empty) {
+        return Ok(None);
+    }
+    let of = |place: usize| {
+        let cell = row.get(place).unwrap_or_default().trim();
+        let inner = [('[', ']'), ('(', ')')]
+            .into_iter()
+            .find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
+        inner.unwrap_or(cell).trim().to_owned()
+    };
+    let found =
+        UnitRow { line: *line, time: of(time), columns: places.iter().map(|place| of(*place)).collect() };
+    table.rows.remove(0);
+    if table.rows.is_empty() {
+        return Err(ReadError::Empty { file: table.file.clone() });
+    }
+    Ok(Some(found))
 }
 
 #[cfg(test)]
@@ -156,6 +200,19 @@ mod tests {
             let expected = "allowed is a time such as 2026-11-27T14:05:03.250, in all rows with a zone";
             assert!(message.contains("any.csv:3: at = '") && message.contains(expected), "{message}");
         }
+    }
+
+    #[test]
+    fn a_row_of_texts_under_the_head_holds_units() {
+        let columns = read("Zeit;u;y\nms;[mm];-\n0;1,5;2\n10;3;4\n", &["y", "u"]).unwrap();
+        let units = UnitRow { line: 2, time: "ms".into(), columns: vec!["-".into(), "mm".into()] };
+        assert_eq!((columns.units, columns.lines.as_slice()), (Some(units), &[3, 4][..]));
+        assert_eq!(read("Zeit;u\n0;1\n", &["u"]).unwrap().units, None);
+        // A number in it, or a place below, makes it a row that is wrong.
+        for text in ["Zeit;u\nms;1\n0;1\n", "Zeit;u\n0;1\nms;mm\n"] {
+            assert!(read(text, &["u"]).unwrap_err().to_string().contains("allowed is a finite number"));
+        }
+        assert!(read("Zeit;u\nms;mm\n", &["u"]).unwrap_err().to_string().contains("has no rows"));
     }
 
     #[test]

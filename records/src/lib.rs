@@ -27,7 +27,7 @@ mod table;
 
 pub use calendar::CalendarTime;
 pub use channel::{Channel, Quantity, Signal};
-pub use columns::{ColumnOptions, Columns, read_columns};
+pub use columns::{ColumnOptions, Columns, UnitRow, read_columns};
 pub use error::ReadError;
 pub use mapping::Mapping;
 pub use table::cells;

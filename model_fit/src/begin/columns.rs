@@ -1,6 +1,7 @@
 //! How a table is laid out, as far as it can be seen: separator, decimal sign, head, cells without a value.
 
 use super::NewError;
+use model::{Unit, with_powers};
 use records::CalendarTime;
 use std::path::Path;
 
@@ -17,6 +18,8 @@ pub(super) struct Table {
     /// Cells that hold no value.
     pub(super) absent: Vec<String>,
     pub(super) head: Vec<String>,
+    /// Units of the columns, where a row under the head has them.
+    pub(super) units: Option<Vec<String>>,
     /// Whether each column holds numbers.
     pub(super) is_number: Vec<bool>,
     /// Whether each column holds times of a calendar.
@@ -24,6 +27,15 @@ pub(super) struct Table {
 }
 
 impl Table {
+    /// The unit of a column in the row under the head.
+    pub(super) fn unit(&self, column: usize) -> Option<&str> {
+        self.units
+            .as_ref()
+            .and_then(|units| units.get(column))
+            .map(String::as_str)
+            .filter(|unit| !is_missing(unit))
+    }
+
     pub(super) fn of(record: &Path, text: &str) -> Result<Self, NewError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let lines: Vec<(usize, &str)> = text
@@ -57,7 +69,12 @@ impl Table {
             .filter(|cell| number(cell, false).is_none() && number(cell, true).is_some());
         let is_decimal_comma = separator != "," && commas.count() > 0;
         let first = decimal(is_decimal_comma).ok_or_else(no_head)?;
-        let head: Vec<String> = cells[first - 1].clone();
+        let under = first - 1;
+        let has_units =
+            under > 0 && is_unit_row(&cells[under]) && is_names(&cells[under - 1], cells[under].len());
+        let units = has_units.then(|| cells[under].iter().map(|cell| bare(cell).to_owned()).collect());
+        let head_at = under - usize::from(has_units);
+        let head: Vec<String> = cells[head_at].clone();
         let mut absent: Vec<String> = Vec::new();
         for cell in cells[first..].iter().flatten().filter(|cell| !cell.is_empty() && is_missing(cell)) {
             if !absent.contains(cell) {
@@ -86,7 +103,7 @@ impl Table {
                 });
             }
         }
-        let skip_lines = lines[first - 1].0 as u64;
+        let skip_lines = lines[head_at].0 as u64;
         // Comments above the head are passed over as it is.
         let is_comment = |line: &str| line.trim().is_empty() || line.trim_start().starts_with('#');
         let is_clean = text.lines().take(skip_lines as usize).all(is_comment);
@@ -97,10 +114,28 @@ impl Table {
             skip_lines,
             absent,
             head,
+            units,
             is_number,
             is_calendar,
         })
     }
+}
+
+/// A cell without brackets around it.
+fn bare(cell: &str) -> &str {
+    cell.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')'])
+}
+
+/// Whether each cell is a unit, or none, and one of them is.
+fn is_unit_row(row: &[String]) -> bool {
+    let is_unit = |cell: &&str| Unit::parse(&with_powers(cell)).is_ok() || ["degC", "°C"].contains(cell);
+    let cells: Vec<&str> = row.iter().map(|cell| bare(cell)).collect();
+    cells.iter().any(is_unit) && cells.iter().all(|cell| is_missing(cell) || is_unit(cell))
+}
+
+/// Whether so many names stand in a row.
+fn is_names(row: &[String], count: usize) -> bool {
+    row.len() == count && row.iter().all(|cell| cell.chars().any(char::is_alphabetic))
 }
 
 fn separator(line: &str) -> &'static str {

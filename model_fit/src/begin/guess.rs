@@ -126,14 +126,15 @@ pub(super) fn columns(
             let Some(place) = named.or(growing.first().copied()) else {
                 return Err(NewError::Time { file: file() });
             };
-            time(numbers[place], &values[place])
+            let at = table.head.iter().position(|name| name == numbers[place]).unwrap_or(0);
+            time((numbers[place], table.unit(at)), &values[place])
         }
     };
     let mut all: Vec<Column> = Vec::new();
     for (index, name) in table.head.iter().enumerate().filter(|(_, name)| **name != time.column) {
         let samples = numbers.iter().position(|number| number == name).filter(|_| table.is_number[index]);
         let samples = samples.map_or(Vec::new(), |number| values[number].clone());
-        let column = column(name, samples, time.step_s, &all);
+        let column = column((name, table.unit(index)), samples, time.step_s, &all);
         all.push(column);
     }
     let inputs = roles.inputs.iter().map(|name| (name, Role::Input));
@@ -166,11 +167,11 @@ fn filled(values: Vec<Option<f64>>) -> Vec<f64> {
 
 /// A column with times of a calendar.
 fn of_calendar(column: &str, time_s: &[f64]) -> Time {
-    Time { column: column.into(), unit: "iso8601".into(), ..time("", time_s) }
+    Time { column: column.into(), unit: "iso8601".into(), ..time(("", None), time_s) }
 }
 
-fn time(column: &str, values: &[f64]) -> Time {
-    let (_, unit, _) = named(column);
+fn time((column, unit): (&str, Option<&str>), values: &[f64]) -> Time {
+    let (_, unit, _) = named_with(column, unit);
     let is_time = Unit::parse(&unit).is_ok_and(|unit| unit.dimension == model::Dimension::TIME);
     let unit = if is_time { unit } else { "s".to_owned() };
     let factor = Unit::parse(&unit).map_or(1.0, |unit| unit.factor);
@@ -180,8 +181,8 @@ fn time(column: &str, values: &[f64]) -> Time {
     Time { column: column.into(), unit, step_s: steps[steps.len() / 2] * factor, length_s: length * factor }
 }
 
-fn column(column: &str, values: Vec<f64>, step_s: f64, others: &[Column]) -> Column {
-    let (base, unit, remark) = named(column);
+fn column((column, unit): (&str, Option<&str>), values: Vec<f64>, step_s: f64, others: &[Column]) -> Column {
+    let (base, unit, remark) = named_with(column, unit);
     let mut name: String =
         base.chars().map(|character| if character.is_alphanumeric() { character } else { '_' }).collect();
     name = name.trim_matches('_').chars().take(40).collect();
@@ -251,6 +252,17 @@ pub(super) fn slope(input: &Column, output: &Column) -> f64 {
 }
 
 /// Name and unit of a column: `force [N]`, `force (N)`, `force_N`, `p_bar_g`, `speed_m_per_s`.
+fn named_with(column: &str, unit: Option<&str>) -> (String, String, Option<&'static str>) {
+    let (name, of_name, remark) = named(column);
+    let Some(unit) = unit else { return (name, of_name, remark) };
+    // As if it stood in the name.
+    match named(&format!("{column} [{unit}]")) {
+        (base, unit, remark) if base == column.trim() => (name, unit, remark),
+        _ => (name, of_name, remark),
+    }
+}
+
+/// The name of a column, its unit and what is to be said of that.
 fn named(column: &str) -> (String, String, Option<&'static str>) {
     let known = |text: &str| Unit::parse(text).is_ok_and(|unit| !unit.text.is_empty());
     let celsius = |name: &str, unit: &str| {
