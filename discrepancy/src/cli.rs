@@ -39,6 +39,9 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Print a model file's equations, numbers, units and suspects; with records, which of them these can tell apart.
     Explain(ExplainArguments),
+    /// Simulate a model file over a record with the values of the file, without fit and suspects: what it says beside what was
+    /// measured.
+    Simulate(SimulateArguments),
     /// Write a first model file from the columns of a record: units from their names, inputs and outputs guessed.
     New(NewArguments),
     /// List the ready suspects that model files use: laws, what they are bound to, numbers with unit and range.
@@ -128,6 +131,19 @@ pub struct ExplainArguments {
     /// Records that the model is fitted to.
     #[arg(long, num_args = 1..)]
     pub train: Vec<PathBuf>,
+}
+
+/// What is simulated.
+#[derive(Args, Clone, Debug)]
+pub struct SimulateArguments {
+    /// Model file.
+    pub model: PathBuf,
+    /// Record whose inputs drive it.
+    #[arg(long)]
+    pub record: PathBuf,
+    /// New table: the columns of the record that the model reads, and NAME_model for each output.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
 }
 
 /// What a model file begins from.

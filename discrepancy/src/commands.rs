@@ -69,6 +69,7 @@ pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
         Command::Extend(arguments) => extend_command(arguments),
         Command::Verify(arguments) => verify_command(arguments),
         Command::Explain(arguments) => explain_command(arguments),
+        Command::Simulate(arguments) => any_plant::simulate_command(arguments),
         Command::New(arguments) => any_plant::new_command(arguments),
         Command::Suspects(arguments) => libraries::suspects_command(arguments.name.as_deref()),
         Command::Next(arguments) => next_command(arguments),

@@ -14,6 +14,7 @@
 //! | `filter` | zero-phase low passes |
 //! | `fit` | output-error fit by the one Gauss-Newton |
 //! | `bounds` | numbers at the end of their range, or hardly determined |
+//! | `simulate` | the model with the values of its file beside a record |
 //! | `samples` | measured samples, what the model says of them, derivatives |
 //! | `normal` | normal equations, steps, standard errors |
 //! | `covariance` | standard errors beside coloured residuals and a law that is only near |
@@ -72,6 +73,7 @@ mod report;
 mod samples;
 mod select;
 mod sensors;
+mod simulate;
 mod starts;
 mod structure;
 mod term_curves;
@@ -89,6 +91,7 @@ pub use held_out::{JudgeError, WORSE};
 pub use processing::SPARSEST;
 pub use record::RecordError;
 pub use report::{Left, ModelReport, OfAlternative};
+pub use simulate::{Simulated, SimulatedOutput, simulate};
 pub use verdict::Verdict;
 
 use held_out::Traces;

@@ -1,7 +1,7 @@
 //! What is said of a record before a model file is fitted to it.
 
 use crate::closing::close;
-use model_fit::look;
+use model_fit::{look, simulate};
 use std::fs;
 
 /// A tank that drains, a pump that fills it.
@@ -53,6 +53,41 @@ fn notes(model: &str, rows: impl Iterator<Item = [f64; 3]>) -> String {
     fs::write(&file, model).unwrap();
     fs::write(&record, written(rows)).unwrap();
     look(&file, &[record]).unwrap_or_else(|error| panic!("{error}"))[0].notes.join("\n")
+}
+
+#[test]
+fn a_model_is_simulated_with_the_values_of_its_file_and_nothing_is_fitted() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
+    // In millivolts, with a row of units, and a suspect that does not act.
+    let rows = rows().into_iter().map(|[t, pump, level]| [t, pump, level * 1e3]);
+    fs::write(&record, written(rows).replace("level_V\n", "level_V\ns,V,mV\n")).unwrap();
+    let suspect = "[[suspects]]\nname = \"brim\"\nplace = \"level\"\nadd = \"-k*level\"\n\
+                   parameters.k = { unit = \"1/s\", value = 1 }\n";
+    let text = TANK.replace("unit = \"V\"\nvalue = \"level\"", "unit = \"mV\"\nvalue = \"level\"") + suspect;
+    let of = |gain: &str| {
+        fs::write(&file, text.replace("value = 0.15", gain)).unwrap();
+        simulate(&file, &record).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let right = of("value = 0.2");
+    // Noise of 35 mV / sqrt(12), and a level of some volts.
+    let one = &right.outputs[0];
+    assert_eq!((one.output.as_str(), one.unit.as_str()), ("seen", "mV"));
+    assert!(one.left > 9.0 && one.left < 11.0 && one.signal > 1000.0, "{one:?}");
+    let wrong = of("value = 0.15");
+    assert!(wrong.outputs[0].left > 1000.0, "its own value, not that of a fit: {:?}", wrong.outputs);
+    let lines: Vec<&str> = right.table.lines().collect();
+    assert_eq!((lines[0], lines.len()), ("t_s,pump_V,level_V,seen_model", 401));
+    let cells: Vec<f64> = lines[400].split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert_eq!(cells[0], 199.5);
+    assert!((cells[2] - cells[3]).abs() < 40.0 && cells[3] > 500.0, "{cells:?}");
+    let started = text.replace("start = 0", "start = \"fitted\"\nguess = 0");
+    fs::write(&file, started).unwrap();
+    let notes = simulate(&file, &record).unwrap().notes;
+    assert!(
+        notes.iter().any(|note| note.starts_with("the start of level is fitted by a close")),
+        "{notes:?}"
+    );
 }
 
 #[test]

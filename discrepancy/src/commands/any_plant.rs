@@ -1,11 +1,11 @@
 //! `close` and `name` of a model file of any plant.
 
 use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress, read_report};
-use crate::cli::{NewArguments, ReadArguments};
+use crate::cli::{NewArguments, ReadArguments, SimulateArguments};
 use crate::folder::{self, Folder};
 use model_fit::{
     ClosedModel, ModelReport, NewModel, OfAlternative, ReportedModel, Roles, Search, Verdict, close_with,
-    extended, look, new_model, read,
+    extended, look, new_model, read, simulate,
 };
 use pagekit::significant;
 use serde::de::DeserializeOwned;
@@ -103,6 +103,37 @@ pub(super) fn report_of<T: DeserializeOwned>(file: &Path, is_of_model: bool) -> 
     serde_json::from_value(report).map_err(|why| CommandError::Report { file: file.to_owned(), why })
 }
 
+/// `simulate`: a model file beside a record, with the values of the file.
+pub(super) fn simulate_command(arguments: &SimulateArguments) -> Result<Exit, CommandError> {
+    let SimulateArguments { model, record, out } = arguments;
+    out.as_deref().map_or(Ok(()), is_new)?;
+    let simulated = simulate(model, record)?;
+    let mut text = String::new();
+    for one in &simulated.outputs {
+        let [left, signal] = [one.left, one.signal].map(significant::short);
+        let _ = writeln!(
+            text,
+            "{}: leaves {left} {unit} rms, its mean {signal} {unit}",
+            one.output,
+            unit = one.unit
+        );
+    }
+    simulated.notes.iter().for_each(|note| text.push_str(&format!("  {note}\n")));
+    print(&text)?;
+    if let Some(out) = out {
+        folder::write(out, &simulated.table)?;
+    }
+    Ok(Exit::Good)
+}
+
+/// Refuses to write over a file.
+fn is_new(out: &Path) -> Result<(), CommandError> {
+    if !out.exists() {
+        return Ok(());
+    }
+    Err(CommandError::BadData(format!("--out {}: there is a file already: name another", out.display())))
+}
+
 /// `new`: a first model file, printed or written where nothing stands yet.
 pub(super) fn new_command(arguments: &NewArguments) -> Result<Exit, CommandError> {
     let NewArguments { record, inputs, outputs, out } = arguments;
@@ -116,12 +147,7 @@ pub(super) fn new_command(arguments: &NewArguments) -> Result<Exit, CommandError
         print(&text)?;
         return Ok(Exit::Good);
     };
-    if out.exists() {
-        return Err(CommandError::BadData(format!(
-            "--out {}: there is a file already: name another",
-            out.display()
-        )));
-    }
+    is_new(out)?;
     folder::write(out, &text)?;
     Ok(Exit::Good)
 }
