@@ -1,5 +1,6 @@
 //! `airbench-hil` as tests in Python use it: its own tests, and the suite of `docs/examples/pytest` on two workers.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
@@ -73,21 +74,27 @@ fn reports_campaigns_robot_and_the_wheel_for_python_do_what_they_say() {
 
 #[test]
 fn the_rig_for_python_does_in_real_time_what_it_says() {
+    // Who has the turn waits for nobody's tests in lockstep.
+    let lock = tempfile::NamedTempFile::new().expect("a lock of its own");
     let _machine = turn::take();
     let mut tests = pytest();
-    tests.args(["-m", "airbench_realtime"]).arg(folder());
+    tests.args(["-m", "airbench_realtime"]).arg(folder()).env("AIRBENCH_PYTEST_LOCK", lock.path());
     expect_all_passed(Running::start("pytest", &mut tests).wait(), 7);
 }
 
 #[test]
 fn the_example_suite_holds_our_controller_and_the_firmware_against_their_requirements() {
-    let _machine = turn::take();
     let folder = tempfile::tempdir().expect("a temporary folder");
     firmware::build(&folder.path().join("firmware"), &[]);
     let mut suite = on_two_workers();
+    // Most of it is in lockstep: it takes its turn for each test in real time, not for the minutes of all.
+    let plugins = workspace().join("tests/python");
     suite
+        .args(["-p", "machine_turn"])
         .current_dir(workspace().join("docs/examples/pytest"))
-        .env("PYTHONPATH", light_path())
+        .env("PYTHONPATH", [light_path(), plugins.into_os_string()].join(OsStr::new(":")))
+        .env("AIRBENCH_TURN_LOCK", turn::path())
+        .env("AIRBENCH_PYTEST_LOCK", folder.path().join("pytest.lock"))
         .env("AIRBENCH_FIRMWARE", folder.path().join("firmware"));
     for (option, place) in [("runs", "runs"), ("traceability", "traceability")] {
         suite.arg(format!("--airbench-{option}={}", folder.path().join(place).display()));
