@@ -131,6 +131,9 @@ pub struct ExplainArguments {
     /// Records that the model is fitted to.
     #[arg(long, num_args = 1..)]
     pub train: Vec<PathBuf>,
+    /// A page of it beside the text: equations set, inputs, states, outputs, numbers with their units, suspects.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
 }
 
 /// What is simulated.

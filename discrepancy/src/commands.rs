@@ -11,8 +11,7 @@ mod text;
 use crate::calibrate::calibrate;
 use crate::calibrate::finer::finer;
 use crate::cli::{
-    Cli, Command, ExplainArguments, ExtendArguments, NameArguments, NextArguments, RecordArguments,
-    VerifyArguments,
+    Cli, Command, ExtendArguments, NameArguments, NextArguments, RecordArguments, VerifyArguments,
 };
 use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
@@ -68,7 +67,7 @@ pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
         Command::Locate(arguments) => locate_command(arguments),
         Command::Extend(arguments) => extend_command(arguments),
         Command::Verify(arguments) => verify_command(arguments),
-        Command::Explain(arguments) => explain_command(arguments),
+        Command::Explain(arguments) => any_plant::explain_command(arguments),
         Command::Simulate(arguments) => any_plant::simulate_command(arguments),
         Command::New(arguments) => any_plant::new_command(arguments),
         Command::Suspects(arguments) => libraries::suspects_command(arguments.name.as_deref()),
@@ -368,11 +367,6 @@ struct VerifiedFile<'a> {
     #[serde(rename = "gap")]
     misfit: &'a BTreeMap<String, Misfit>,
     verification: &'a Verification,
-}
-
-fn explain_command(arguments: &ExplainArguments) -> Result<Exit, CommandError> {
-    print(&model_fit::explain(&arguments.model, &arguments.train)?)?;
-    Ok(Exit::Good)
 }
 
 fn next_command(arguments: &NextArguments) -> Result<Exit, CommandError> {

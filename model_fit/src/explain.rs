@@ -1,6 +1,7 @@
 //! A model file in words: equations, numbers, units, suspects; with records also what these can tell apart.
 
 use super::bounds;
+use super::explain_page::page;
 use super::report::{friction, notes_of, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
 use super::{ModelError, look, looked_at, read, select};
@@ -10,15 +11,32 @@ use model::{
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+/// A model file explained.
+pub struct Explained {
+    /// As text.
+    pub text: String,
+    /// As a page, its equations set.
+    pub page: String,
+}
+
 /// Explains a model file. With training records the model is fitted to them, and what they can tell apart is added.
 ///
 /// # Errors
 /// [`ModelError`] for a model or a record that cannot be used.
 pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
+    explained(file, train).map(|explained| explained.text)
+}
+
+/// The same, and the page of it.
+///
+/// # Errors
+/// Those of [`explain`].
+pub fn explained(file: &Path, train: &[PathBuf]) -> Result<Explained, ModelError> {
     let model = read(file)?;
     let mut text = in_words(&model);
     if train.is_empty() {
-        return Ok(text);
+        let page = page(&model, &[], &text);
+        return Ok(Explained { text, page });
     }
     let records = looked_at(&model, train)?;
     let baseline = select::fitted(&model, &records, &[], None)?;
@@ -27,8 +45,10 @@ pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
     if !notes.is_empty() {
         let _ = write!(text, "\nnotes\n  {}\n", notes.join("\n  "));
     }
-    text += &structure_in_words(&structure(&baseline, &baseline), weak);
-    Ok(text)
+    let told = structure_in_words(&structure(&baseline, &baseline), weak);
+    let _ = write!(text, "\nwhat these records can tell apart\n  {}\n", told.join("\n  "));
+    let page = page(&model, &told, &text);
+    Ok(Explained { text, page })
 }
 
 pub(crate) fn in_words(model: &Model) -> String {
@@ -263,15 +283,20 @@ pub(super) fn rows(rows: &Rows) -> Vec<String> {
 }
 
 fn parameter(parameter: &Parameter) -> String {
+    format!("{} = {}", parameter.name, value_of(parameter))
+}
+
+/// What is known of a number: value and unit, and whether it is fitted.
+pub(super) fn value_of(parameter: &Parameter) -> String {
     let factor = parameter.unit.factor;
     let value = |value: &f64| significant(value / factor);
     if !parameter.of_records_si.is_empty() {
         let unit = &parameter.unit.text;
         let of = parameter.of_records_si.iter();
         let of = of.map(|(record, si)| format!("{} {unit} of {record}", value(si))).collect::<Vec<_>>();
-        return format!("{} = {}, known", parameter.name, of.join(", "));
+        return format!("{}, known", of.join(", "));
     }
-    let mut text = format!("{} = {} {}", parameter.name, value(&parameter.values_si[0]), parameter.unit.text);
+    let mut text = format!("{} {}", value(&parameter.values_si[0]), parameter.unit.text);
     if let [_, further @ ..] = parameter.values_si.as_slice()
         && !further.is_empty()
     {
@@ -298,7 +323,7 @@ fn parameter(parameter: &Parameter) -> String {
     text
 }
 
-fn structure_in_words(structure: &Structure, weak: Vec<String>) -> String {
+fn structure_in_words(structure: &Structure, weak: Vec<String>) -> Vec<String> {
     let idle = structure.without_effect.iter().map(|name| format!("{name}: changes no output"));
     let is_moved = |name: &&String| !structure.without_effect.contains(name);
     let undetermined = structure.undetermined.iter().filter(is_moved);
@@ -316,5 +341,5 @@ fn structure_in_words(structure: &Structure, weak: Vec<String>) -> String {
     if lines.is_empty() {
         lines.push("every number, and every suspect from each other".into());
     }
-    format!("\nwhat these records can tell apart\n  {}\n", lines.join("\n  "))
+    lines
 }

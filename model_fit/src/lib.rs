@@ -31,7 +31,7 @@
 //! | `adequacy` | whether what is left is noise |
 //! | `watch` | progress of work that takes long |
 //! | `report` | the report |
-//! | `explain` | equations, units, suspects in words |
+//! | `explain`, `explain_page` | equations, units, suspects in words; on a page |
 //! | `page` | the page |
 //! | `typeset` | equations of the extended model as MathML |
 //! | `term_curves` | a term over the variable that it depends on most |
@@ -57,6 +57,7 @@ mod cuts;
 mod declared;
 mod discover;
 mod explain;
+mod explain_page;
 mod extended;
 mod filter;
 mod fit;
@@ -85,7 +86,7 @@ mod watch;
 pub use adequacy::Residual;
 pub use begin::{NewError, NewModel, Roles, new_model};
 pub use discover::{DiscoveredTerm, Located, Place};
-pub use explain::explain;
+pub use explain::{Explained, explain, explained};
 pub use extended::{ExtendError, ReportedModel, extended};
 pub use held_out::{JudgeError, WORSE};
 pub use processing::SPARSEST;

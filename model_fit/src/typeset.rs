@@ -33,6 +33,27 @@ pub(crate) fn equations(model: &Model, named: &[&str]) -> String {
     inputs + &equations
 }
 
+/// What a suspect does to its place, and the equations of its own states and definitions.
+pub(crate) fn of_suspect(model: &Model, index: usize) -> String {
+    let page = Typeset { model, named: Vec::new() };
+    let target = model.suspects[index].target;
+    let change = if matches!(target, Target::Input(_)) || page.reads_its_place(index) {
+        page.by_itself(target, index)
+    } else {
+        let (left, left_text) = page.left(target);
+        let rest = || "<mo>…</mo>".to_owned();
+        let side = Side { whole: rest(), term: rest(), factor: rest(), text: "…".to_owned() };
+        let side = page.changed(side, index);
+        block(&left, "=", &side.whole, &format!("{left_text} = {}", side.text))
+    };
+    let states = model.states.iter().enumerate().filter(|(_, one)| one.suspect == Some(index));
+    let states = states.map(|(place, one)| page.equation(None, Target::State(place), &one.derivative));
+    let definitions = model.definitions.iter().enumerate().filter(|(_, one)| one.suspect == Some(index));
+    let definitions =
+        definitions.map(|(place, one)| page.equation(None, Target::Definition(place), &one.value));
+    change + &states.chain(definitions).collect::<String>()
+}
+
 struct Typeset<'a> {
     model: &'a Model,
     named: Vec<usize>,
@@ -53,11 +74,7 @@ impl Typeset<'_> {
 
     /// The equation of a place with what changes it, and behind it what stands by itself.
     fn equation(&self, owner: Option<usize>, target: Target, value: &Expression) -> String {
-        let name = self.model.target_name(target);
-        let (left, left_text) = match target {
-            Target::State(_) => (rate(name), format!("d{name}/dt")),
-            _ => (mathml_name(name), name.to_owned()),
-        };
+        let (left, left_text) = self.left(target);
         let mut side = Side {
             whole: self.marked(owner, self.set(value, Operand::None)),
             term: self.marked(owner, self.set(value, Operand::FirstTerm)),
@@ -68,6 +85,15 @@ impl Typeset<'_> {
             side = self.changed(side, index);
         }
         block(&left, "=", &side.whole, &format!("{left_text} = {}", side.text)) + &self.alone(target)
+    }
+
+    /// The left side of the equation of a place, and the same in plain text.
+    fn left(&self, target: Target) -> (String, String) {
+        let name = self.model.target_name(target);
+        match target {
+            Target::State(_) => (rate(name), format!("d{name}/dt")),
+            _ => (mathml_name(name), name.to_owned()),
+        }
     }
 
     /// What changes a place, in the order in which it acts.
@@ -101,15 +127,18 @@ impl Typeset<'_> {
 
     /// What stands by itself of the changes of a place.
     fn alone(&self, target: Target) -> String {
-        let name = self.model.target_name(target);
         let is_alone = |index: &usize| matches!(target, Target::Input(_)) || self.reads_its_place(*index);
-        let of = |index: usize| {
-            let before = || mathml_name(name);
-            let side = Side { whole: before(), term: before(), factor: before(), text: name.to_owned() };
-            let side = self.changed(side, index);
-            block(&before(), "←", &side.whole, &format!("{name} ← {}", side.text))
-        };
-        self.changes(target).into_iter().filter(is_alone).map(of).collect()
+        let all = self.changes(target).into_iter().filter(is_alone);
+        all.map(|index| self.by_itself(target, index)).collect()
+    }
+
+    /// A change of a place, from what is there without it.
+    fn by_itself(&self, target: Target, index: usize) -> String {
+        let name = self.model.target_name(target);
+        let before = || mathml_name(name);
+        let side = Side { whole: before(), term: before(), factor: before(), text: name.to_owned() };
+        let side = self.changed(side, index);
+        block(&before(), "←", &side.whole, &format!("{name} ← {}", side.text))
     }
 
     /// Whether an expression has the name of the place that it changes, which is there the value without it.

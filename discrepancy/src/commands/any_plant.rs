@@ -1,11 +1,11 @@
-//! `close` and `name` of a model file of any plant.
+//! `close`, `name` and `explain` of a model file of any plant.
 
-use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress, read_report};
-use crate::cli::{NewArguments, ReadArguments, SimulateArguments};
+use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress, read_report, spare};
+use crate::cli::{ExplainArguments, NewArguments, ReadArguments, SimulateArguments};
 use crate::folder::{self, Folder};
 use model_fit::{
-    ClosedModel, ModelReport, NewModel, OfAlternative, ReportedModel, Roles, Search, Verdict, close_with,
-    extended, look, new_model, read, simulate,
+    ClosedModel, Explained, ModelReport, NewModel, OfAlternative, ReportedModel, Roles, Search, Verdict,
+    close_with, explained, extended, look, new_model, read, simulate,
 };
 use pagekit::significant;
 use serde::de::DeserializeOwned;
@@ -132,6 +132,20 @@ fn is_new(out: &Path) -> Result<(), CommandError> {
         return Ok(());
     }
     Err(CommandError::BadData(format!("--out {}: there is a file already: name another", out.display())))
+}
+
+/// `explain`: a model file in words, and on a page.
+pub(super) fn explain_command(arguments: &ExplainArguments) -> Result<Exit, CommandError> {
+    let ExplainArguments { model, train, html } = arguments;
+    if let Some(html) = html {
+        spare(html, &[model].into_iter().chain(train).collect::<Vec<_>>())?;
+    }
+    let Explained { text, page } = explained(model, train)?;
+    if let Some(html) = html {
+        folder::write(html, &page)?;
+    }
+    print(&text)?;
+    Ok(Exit::Good)
 }
 
 /// `new`: a first model file, printed or written where nothing stands yet.
