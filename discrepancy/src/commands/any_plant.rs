@@ -138,7 +138,9 @@ fn is_new(out: &Path) -> Result<(), CommandError> {
 pub(super) fn explain_command(arguments: &ExplainArguments) -> Result<Exit, CommandError> {
     let ExplainArguments { model, train, html } = arguments;
     if let Some(html) = html {
-        spare(html, &[model].into_iter().chain(train).collect::<Vec<_>>())?;
+        let read = [model].into_iter().chain(train).collect::<Vec<_>>();
+        let refused = || format!("--html {}: it is read here: name another", html.display());
+        spare(html, &read).map_err(|_| CommandError::BadData(refused()))?;
     }
     let Explained { text, page } = explained(model, train)?;
     if let Some(html) = html {
