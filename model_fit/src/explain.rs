@@ -153,7 +153,7 @@ pub(super) fn kind(suspect: &Suspect) -> Vec<String> {
 }
 
 fn table(table: &Table) -> String {
-    let Table { name, curve, from, to, written: _ } = table;
+    let Table { name, curve, from, to, .. } = table;
     let point = |point: Option<[f64; 2]>| {
         let [x, y] = point.expect("a table has two points at least");
         format!(

@@ -26,9 +26,9 @@ pub struct SimulatedOutput {
     pub output: String,
     pub unit: String,
     /// Root mean square of measured less modelled.
-    pub left: f64,
+    pub rms: f64,
     /// The same of measured less its mean.
-    pub signal: f64,
+    pub signal_rms: f64,
 }
 
 /// Simulates a model file over a record.
@@ -52,8 +52,8 @@ pub fn simulate(file: &Path, record: &Path) -> Result<Simulated, ModelError> {
         SimulatedOutput {
             output: output.name.clone(),
             unit: output.unit.text.clone(),
-            left: (squares / left.len() as f64).sqrt() / output.unit.factor,
-            signal: mean_and_variance(&measured).1.sqrt() / output.unit.factor,
+            rms: (squares / left.len() as f64).sqrt() / output.unit.factor,
+            signal_rms: mean_and_variance(&measured).1.sqrt() / output.unit.factor,
         }
     });
     let outputs = outputs.collect();

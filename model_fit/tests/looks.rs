@@ -73,9 +73,9 @@ fn a_model_is_simulated_with_the_values_of_its_file_and_nothing_is_fitted() {
     // Noise of 35 mV / sqrt(12), and a level of some volts.
     let one = &right.outputs[0];
     assert_eq!((one.output.as_str(), one.unit.as_str()), ("seen", "mV"));
-    assert!(one.left > 9.0 && one.left < 11.0 && one.signal > 1000.0, "{one:?}");
+    assert!(one.rms > 9.0 && one.rms < 11.0 && one.signal_rms > 1000.0, "{one:?}");
     let wrong = of("value = 0.15");
-    assert!(wrong.outputs[0].left > 1000.0, "its own value, not that of a fit: {:?}", wrong.outputs);
+    assert!(wrong.outputs[0].rms > 1000.0, "its own value, not that of a fit: {:?}", wrong.outputs);
     let lines: Vec<&str> = right.table.lines().collect();
     assert_eq!((lines[0], lines.len()), ("t_s,pump_V,level_V,seen_model", 401));
     let cells: Vec<f64> = lines[400].split(',').map(|cell| cell.parse().unwrap()).collect();

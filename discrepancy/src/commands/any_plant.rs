@@ -110,7 +110,7 @@ pub(super) fn simulate_command(arguments: &SimulateArguments) -> Result<Exit, Co
     let simulated = simulate(model, record)?;
     let mut text = String::new();
     for one in &simulated.outputs {
-        let [left, signal] = [one.left, one.signal].map(significant::short);
+        let [left, signal] = [one.rms, one.signal_rms].map(significant::short);
         let _ = writeln!(
             text,
             "{}: leaves {left} {unit} rms, its mean {signal} {unit}",

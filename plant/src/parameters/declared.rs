@@ -432,8 +432,9 @@ impl Declared {
                 "memory.{name} = {{ unit = {unit}, range = [{least:?}, {most:?}], start = {start}, update = {update} }}"
             );
         }
-        for Table { name, from, to, written: [x, y], .. } in &self.tables {
-            let (x_unit, y_unit) = (text(&from.text), text(&to.text));
+        for table in &self.tables {
+            let (name, [x, y]) = (&table.name, table.written());
+            let (x_unit, y_unit) = (text(&table.from.text), text(&table.to.text));
             let _ = writeln!(
                 out,
                 "tables.{name} = {{ x_unit = {x_unit}, y_unit = {y_unit}, x = {x:?}, y = {y:?} }}"
