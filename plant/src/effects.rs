@@ -21,6 +21,7 @@ mod over_stroke;
 mod readings;
 pub mod remembered;
 mod replaced;
+mod sensor_force;
 pub mod sheet;
 mod sums;
 pub mod tabulated;

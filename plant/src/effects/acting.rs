@@ -7,7 +7,6 @@
 //! Laws: the file of each effect. Scheme: the head of `integrator.rs`.
 
 use super::air::HeatAt;
-use super::declared::DeclaredAt;
 use super::flows::PortsAt;
 use super::friction::direction_of;
 use super::memory::{Memory, Moving, seen_at};
@@ -84,12 +83,7 @@ impl Effects {
         for (axis, channels) in effects.memory.channels.iter_mut().enumerate() {
             channels[1].iter_mut().for_each(|history| history.fill(forces.sensor_n(of, axis)));
         }
-        effects.see_forces(of, &Lanes::load(state), Pair::both(0.0), state.linked);
-        for axis in (0..2).filter(|axis| effects.on[*axis].declared.follows_sensor()) {
-            let seen = seen_at(of, &Lanes::load(state), axis);
-            let values = effects.declared_in_step(axis, &seen).values();
-            effects.memory.declared[axis] = effects.on[axis].declared.begin(&values);
-        }
+        effects.begin_forces(of, &Lanes::load(state), state.linked);
         effects
     }
 
@@ -175,31 +169,6 @@ impl Effects {
             declared: on.declared.force(&self.declared_in_step(axis, seen)),
             added: on.added(OpenBalance::Force(seen)),
         }
-    }
-
-    /// What declared terms of a force, of a flow and of what is kept are over.
-    pub(crate) fn declared_in_step<'a>(&'a self, axis: usize, seen: &'a Seen) -> DeclaredAt<'a> {
-        self.declared_at(axis, seen, self.memory.sensor_force_n[axis])
-    }
-
-    /// Keeps what the force sensors should show, where a declared term is over it in a step.
-    fn see_forces(&mut self, of: &Integrator, lanes: &Lanes, hand: Pair, linked: bool) {
-        if self.on.iter().any(|on| on.declared.follows_sensor()) {
-            let forces = Forces::at(of, Some(self), lanes, hand, linked);
-            self.memory.sensor_force_n = [0, 1].map(|axis| forces.sensor_n(of, axis));
-        }
-    }
-
-    /// What declared terms are over.
-    pub(crate) fn declared_at<'a>(
-        &'a self,
-        axis: usize,
-        seen: &'a Seen,
-        sensor_force_n: f64,
-    ) -> DeclaredAt<'a> {
-        let command = self.memory.commands[axis].newest();
-        let time_s = self.memory.substeps as f64 * self.substep_s;
-        DeclaredAt { seen, command, time_s, sensor_force_n, kept: &self.memory.declared[axis] }
     }
 }
 
