@@ -113,7 +113,7 @@ pub(super) fn simulate_command(arguments: &SimulateArguments) -> Result<Exit, Co
         let [left, signal] = [one.rms, one.signal_rms].map(significant::short);
         let _ = writeln!(
             text,
-            "{}: leaves {left} {unit} rms, its mean {signal} {unit}",
+            "{}: leaves {left} {unit} rms; its mean alone would leave {signal} {unit}",
             one.output,
             unit = one.unit
         );
