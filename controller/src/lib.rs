@@ -40,7 +40,7 @@ pub fn main() -> ExitCode {
         Command::ProbeLibrary(library) => Ok(command::probe_library(&library.file)),
     };
     let exit = result.unwrap_or_else(|error| {
-        realtime::say!("controller: {error}");
+        protocol::say!("controller: {error}");
         error.exit()
     });
     exit.into()

@@ -119,7 +119,7 @@ impl Writer {
             reloader.iter_mut().for_each(Reloader::look);
             clerk.iter_mut().for_each(Clerk::look);
             for item in news.try_iter() {
-                realtime::say!("controller: {}", sentence(item));
+                protocol::say!("controller: {}", sentence(item));
                 if let (News::State { state: MainChainState::Fault, cycle, .. }, Some(timing)) =
                     (item, &mut timing)
                 {
@@ -142,7 +142,7 @@ impl Writer {
                 note(&mut failure, timing.as_mut().map_or(Ok(()), TimingQueues::write_out));
             }
             if let Some(failure) = &failure {
-                realtime::say!("controller: cannot write {failure}; free space or choose another --out");
+                protocol::say!("controller: cannot write {failure}; free space or choose another --out");
                 failed();
             }
             if finished || failure.is_some() {

@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
             .and_then(|()| rehearsed.axes.iter().flatten().try_for_each(|record| axes.write(record)))
             .map_err(RunError::output)?;
         for item in rehearsal.take_news() {
-            realtime::say!("controller: {}", sentence(item));
+            protocol::say!("controller: {}", sentence(item));
             news.push(item);
         }
         interrupted = interrupt.came();
@@ -86,7 +86,7 @@ fn end_when_stuck() {
         while !watch.look() {
             std::thread::sleep(Duration::from_millis(100));
         }
-        realtime::say!("controller: {STUCK}");
+        protocol::say!("controller: {STUCK}");
         std::process::exit(Exit::BoundBroken as i32);
     });
 }
@@ -125,7 +125,7 @@ fn save(
     };
     let cycles = ended.rehearsal.cycles();
     let simulated_s = cycles as f64 * 1e-3;
-    realtime::say!(
+    protocol::say!(
         "controller: {ended_because}; {simulated_s} s rehearsed in {:.2} s, {:.0} times real time",
         ended.took_s,
         simulated_s / ended.took_s

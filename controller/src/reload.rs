@@ -53,7 +53,7 @@ impl Reloader {
             }
             file.changed = changed;
             if let Err(problem) = file.take_over(&self.rig, &self.changes) {
-                realtime::say!("controller: {problem}; the numbers in use stay");
+                protocol::say!("controller: {problem}; the numbers in use stay");
             }
         }
     }
@@ -99,7 +99,7 @@ impl ProgramFile {
             let (name, value) = (&self.variables[place].name, new.values[place]);
             let change = Change { axis: self.axis, place, value };
             changes.try_send(change).map_err(|_| "too many changes at a time".to_owned())?;
-            realtime::say!("controller: {}.{name} is {value} now", self.axis.name());
+            protocol::say!("controller: {}.{name} is {value} now", self.axis.name());
             self.values[place] = value;
         }
         self.text = source.text;

@@ -186,13 +186,13 @@ impl Signals {
 
 /// Ends the process whose loop is stuck in an algorithm, for good: its thread cannot be asked to.
 fn end_stuck(out: &Path, axes: &[Axis]) {
-    realtime::say!("controller: {STUCK}");
+    protocol::say!("controller: {STUCK}");
     let exit = Exit::BoundBroken;
     let report = serde_json::json!({
         "schema_version": SCHEMA_VERSION, "ended_well": false, "ended_because": STUCK,
     });
     if let Err(error) = write_json(&out.join(format!("{}.json", report::name(axes))), &report) {
-        realtime::say!("controller: cannot write {error}");
+        protocol::say!("controller: cannot write {error}");
     }
     std::process::exit(exit as i32);
 }
@@ -270,7 +270,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
         return Grants::default();
     }
     let grants = realtime::acquire(&Request::for_a_loop(arguments.fifo_priority, arguments.cpu));
-    grants.refusals().iter().for_each(|refusal| realtime::say!("controller: warning: {refusal}"));
+    grants.refusals().iter().for_each(|refusal| protocol::say!("controller: warning: {refusal}"));
     grants
 }
 
@@ -304,7 +304,7 @@ fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit,
     let Ended { started, finished, written } = ended;
     let Finished { outcome, grants, bus, axes, .. } = finished;
     let sum = |of: fn(&AxisReport) -> u64| axes.values().map(of).sum::<u64>();
-    realtime::say!(
+    protocol::say!(
         "controller: {ended_because}; {} cycles answered, {} sensor frames lost",
         finished.answered,
         sum(|axis| axis.sensors_lost.unwrap_or_default())

@@ -74,7 +74,7 @@ pub fn open(limits: Limits) -> (Console, Receiver<Command>) {
 impl Console {
     /// Obeys what is typed at standard input, and says there what there is to say.
     pub fn listen(self) {
-        let answer = |text: &str| text.lines().for_each(|line| realtime::say!("emulator: console: {line}"));
+        let answer = |text: &str| text.lines().for_each(|line| protocol::say!("emulator: console: {line}"));
         // It ends with its input, with the loop, or with the process: nobody can wait for a thread that reads a terminal.
         std::thread::spawn(move || {
             answer("open; 'help' lists the commands");

@@ -19,7 +19,7 @@ pub(crate) fn finish(
     written: WriterReport,
 ) -> Result<Exit, RunError> {
     let (exit, reason) = verdict(&outcome.paced.end);
-    realtime::say!("emulator: {reason}");
+    protocol::say!("emulator: {reason}");
     let path = arguments.out.join("summary.json");
     let summary = summarise(outcome, written, started.epoch_offset_ns, reason, exit == Exit::Good);
     tell(&summary, &arguments.out);
@@ -33,19 +33,19 @@ fn tell(summary: &Summary<Event>, folder: &Path) {
     let (cycles, skipped) = (summary.cycles.unwrap_or_default(), summary.skipped.unwrap_or_default());
     let Summary { frames_malformed, stale_commands, .. } = summary;
     let frames_lost = summary.frames_lost.unwrap_or_default();
-    realtime::say!("emulator: {cycles} cycles, {skipped} of them skipped in {overruns} overruns");
-    realtime::say!(
+    protocol::say!("emulator: {cycles} cycles, {skipped} of them skipped in {overruns} overruns");
+    protocol::say!(
         "emulator: {frames_sent} frames sent, {frames_received} received, {frames_lost} lost by their counters, \
          {frames_malformed} malformed, {stale_commands} stale commands"
     );
     if let Some(dropped) = summary.records_dropped.filter(|dropped| *dropped > 0) {
-        realtime::say!("emulator: {dropped} records did not reach the files: the disk was too slow");
+        protocol::say!("emulator: {dropped} records did not reach the files: the disk was too slow");
     }
     if summary.wakeup_ns.count > 0 {
-        realtime::say!("emulator: wake-up {}", summary.wakeup_ns);
-        realtime::say!("emulator: round trip {}", summary.round_trip_ns);
+        protocol::say!("emulator: wake-up {}", summary.wakeup_ns);
+        protocol::say!("emulator: round trip {}", summary.round_trip_ns);
     }
-    realtime::say!("emulator: files in {}", folder.display());
+    protocol::say!("emulator: files in {}", folder.display());
 }
 
 fn summarise(

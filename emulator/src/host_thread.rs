@@ -34,7 +34,7 @@ impl HostThread {
         match self.thread.join() {
             Ok(Ok(report)) => Some(report),
             Ok(Err(error)) => {
-                realtime::say!("emulator: the bus host failed: {error}");
+                protocol::say!("emulator: the bus host failed: {error}");
                 None
             }
             Err(panic) => std::panic::resume_unwind(panic),

@@ -23,7 +23,7 @@ pub fn main() -> ExitCode {
         Command::BusLoad(arguments) => bus_load::print(&arguments),
     };
     let exit = result.unwrap_or_else(|error| {
-        realtime::say!("emulator: {error}");
+        protocol::say!("emulator: {error}");
         error.exit()
     });
     exit.into()
@@ -38,7 +38,7 @@ fn host_bus(arguments: &BusArguments) -> Result<Exit, RunError> {
         Host::bind(path, *wire, None)?,
         Some(DEFAULT_FIFO_PRIORITY + 1),
     );
-    realtime::say!("emulator: hosting {}; Ctrl-C ends it", arguments.bus);
+    protocol::say!("emulator: hosting {}; Ctrl-C ends it", arguments.bus);
     let began = Instant::now();
     let time_up = || arguments.seconds.is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds);
     while !interrupt.came() && !time_up() {

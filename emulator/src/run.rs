@@ -247,7 +247,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
         return Grants::default();
     }
     let grants = realtime::acquire(&Request::for_a_loop(arguments.fifo_priority, arguments.cpu));
-    grants.refusals().iter().for_each(|refusal| realtime::say!("emulator: warning: {refusal}"));
+    grants.refusals().iter().for_each(|refusal| protocol::say!("emulator: warning: {refusal}"));
     grants
 }
 
@@ -283,7 +283,7 @@ fn open_bus(arguments: &RunArguments, clock: StampClock) -> Result<OpenedBus, Ru
         }
         // A barrier has one rig, which is its host: a second emulator would take the first one's place.
         Err(BusError::HostExists { .. }) if !lockstep => {
-            realtime::say!("emulator: {} has a host already; joining it", arguments.bus);
+            protocol::say!("emulator: {} has a host already; joining it", arguments.bus);
             Ok(OpenedBus { bus: bus::open(&arguments.bus, clock)?, host: None, orders: None })
         }
         Err(error) => Err(error.into()),
@@ -409,7 +409,7 @@ fn tell_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
             let skipped = shared.skipped.load(Ordering::Relaxed);
             let received = shared.controller_received.load(Ordering::Relaxed);
             let waiting = if received { "" } else { ", no valve command heard yet" };
-            realtime::say!("emulator: {seconds:.0} s simulated, {skipped} cycles skipped{waiting}");
+            protocol::say!("emulator: {seconds:.0} s simulated, {skipped} cycles skipped{waiting}");
         }
     }
 }

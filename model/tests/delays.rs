@@ -39,7 +39,8 @@ fn times(count: u32, period_s: f64) -> Vec<f64> {
 }
 
 /// Delays over many samples, within a step, and none, where x falls as exp(-rate t). Tolerance 1e-8 for each step, or
-/// Runge-Kutta with steps of 1/100 s; of a step that reads itself the polynomial between its ends is good to 1e-7 of its derivatives.
+/// Runge-Kutta with steps of 1/100 s; of a step that reads itself the polynomial between its ends is good to 1e-7 of its
+/// derivatives.
 #[test]
 fn a_delay_equation_has_the_solution_of_the_method_of_steps() {
     let time_s = times(60, 0.1);

@@ -12,6 +12,7 @@ pub mod frames;
 pub mod live_cycles;
 pub mod periods;
 pub mod response_time;
+pub mod say;
 pub mod socket_file;
 pub mod sources;
 pub mod wire_time;

@@ -26,7 +26,6 @@
 //! | [`wall_clock`] | whether somebody set the time of day |
 //! | [`privileges`] | what the thread asks of the system, what it got, what was refused and how to get it |
 //! | [`machine`] | facts of the machine: kernel, processors, interrupts, memory, limits, build |
-//! | [`mod@say`] | lines to standard error that other programs do not mix with theirs |
 //! | [`signals`] | Ctrl-C, SIGTERM, SIGUSR1 and SIGCONT as values |
 //! | [`allocations`] | an allocator that counts, for the proof that a cycle allocates nothing |
 //!
@@ -58,7 +57,6 @@ pub mod interval_log;
 pub mod machine;
 pub mod periodic;
 pub mod privileges;
-pub mod say;
 pub mod signals;
 pub mod stages;
 mod virtual_clock;

@@ -84,16 +84,16 @@ impl Clerk {
                     let name =
                         self.book(axis).and_then(|book| book.variables.get(place)).map(|found| &found.name);
                     let name = name.map_or("?", String::as_str);
-                    realtime::say!(
+                    protocol::say!(
                         "controller: cycle {cycle}: {}.{name} is {value} now, by XCP",
                         axis.name()
                     );
                 }
                 Note::Unlocked { axis, cycle } => {
-                    realtime::say!("controller: cycle {cycle}: XCP of the {} axis is unlocked", axis.name());
+                    protocol::say!("controller: cycle {cycle}: XCP of the {} axis is unlocked", axis.name());
                 }
                 Note::WrongKey { axis, cycle } => {
-                    realtime::say!(
+                    protocol::say!(
                         "controller: cycle {cycle}: a wrong key to XCP of the {} axis",
                         axis.name()
                     );
@@ -101,12 +101,12 @@ impl Clerk {
                 Note::Store { axis, values } => self.store(axis, values),
                 Note::Load { axis } => match self.load(axis) {
                     Ok(count) => {
-                        realtime::say!(
+                        protocol::say!(
                             "controller: {count} parameters of the {} axis loaded, by XCP",
                             axis.name()
                         )
                     }
-                    Err(problem) => realtime::say!("controller: {problem}; the numbers in use stay"),
+                    Err(problem) => protocol::say!("controller: {problem}; the numbers in use stay"),
                 },
             }
         }
@@ -129,13 +129,13 @@ impl Clerk {
         let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path));
         match &written {
             Ok(()) => {
-                realtime::say!(
+                protocol::say!(
                     "controller: parameters of the {} axis stored in {}",
                     axis.name(),
                     path.display()
                 )
             }
-            Err(error) => realtime::say!("controller: cannot write {}: {error}", path.display()),
+            Err(error) => protocol::say!("controller: cannot write {}: {error}", path.display()),
         }
         // A port that has gone needs nothing back.
         let _ = book.returned.send(Returned { values, stored: written.is_ok() });

@@ -242,9 +242,9 @@ impl Writer {
             self.untold.skipped += cycles;
         }
         if *reported < most_told {
-            realtime::say!("emulator: {event}");
+            protocol::say!("emulator: {event}");
         } else if *reported == most_told {
-            realtime::say!("emulator: {event}; further ones of this kind stand in summary.json only");
+            protocol::say!("emulator: {event}; further ones of this kind stand in summary.json only");
         }
         Ok(())
     }
@@ -262,7 +262,7 @@ impl Writer {
         let message = format!(
             "cannot write to {folder}: {error}; free space or choose another --out, what was written stays"
         );
-        realtime::say!("emulator: {message}");
+        protocol::say!("emulator: {message}");
         self.report.failure = Some(message);
         // One file failed; what waits for the others may still find room.
         for file in

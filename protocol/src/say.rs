@@ -3,8 +3,8 @@
 use std::fmt::Arguments;
 use std::io::Write;
 
-/// Writes a line to standard error by one system call. `eprintln!` makes one for each piece of the text, so that what emulator and
-/// controller say at once is mixed within a line. A terminal that is gone is no reason to end.
+/// Writes a line to standard error by one system call. `eprintln!` makes one for each piece of the text, so that what emulator
+/// and controller say at once is mixed within a line. A terminal that is gone is no reason to end.
 pub fn line(text: Arguments<'_>) {
     let _ = write_line(&mut std::io::stderr(), text);
 }
