@@ -299,10 +299,7 @@ pub(crate) fn fitted_from<'a>(
             sum.iter_mut().zip(block).for_each(|(sum, normal)| *sum += normal.squares);
             sum
         });
-    let residuals = series(&fitting, &point)?;
-    let effective = (0..model.outputs.len())
-        .map(|output| independent(&residuals[output], fitting.count(output)))
-        .collect();
+    let effective = effective(&fitting, &point)?;
     let steps = steps(&normals, &normal, &fitting, &point);
     Ok(Fitted {
         suspects: suspects.to_vec(),
@@ -317,6 +314,14 @@ pub(crate) fn fitted_from<'a>(
         normal,
         effective,
     })
+}
+
+/// What the residual of each output is worth in independent samples.
+pub(super) fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> {
+    let residuals = series(fitting, point)?;
+    let of_output =
+        |(output, residual): (usize, &Vec<Vec<f64>>)| independent(residual, fitting.count(output));
+    Ok(residuals.iter().enumerate().map(of_output).collect())
 }
 
 /// What is left of each output, record by record, where something was measured.

@@ -123,21 +123,39 @@ impl Screen {
 
     /// Share of what is left, beyond what the model's own numbers explain, that some terms explain together.
     pub(super) fn share(&self, terms: &[usize]) -> f64 {
-        let rest = |change: DMatrix<f64>| {
-            let taken = inverse(&self.own.tr_mul(&self.own)) * self.own.tr_mul(&change);
-            change - &self.own * taken
-        };
-        let plain = self.terms.select_columns(terms);
-        let mut own = rest(plain.clone());
-        for (mut left, whole) in own.column_iter_mut().zip(plain.column_iter()) {
+        let (own, left) = (self.rest(self.terms.select_columns(terms)), self.left_rest());
+        let along = own.tr_mul(&left);
+        let explained = (along.transpose() * inverse(&own.tr_mul(&own)) * &along)[(0, 0)];
+        (explained / left.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+    }
+
+    /// Those of some terms that do not look like the model's own numbers, and the coefficients by which they explain most together.
+    pub(super) fn together(&self, terms: &[usize]) -> (Vec<usize>, Vec<f64>) {
+        let own = self.rest(self.terms.select_columns(terms));
+        let coefficients_si = inverse(&own.tr_mul(&own)) * own.tr_mul(&self.left_rest());
+        let all = terms.iter().zip(own.column_iter()).zip(coefficients_si.iter());
+        let apart = all.filter(|((_, change), _)| change.norm_squared() > 0.0);
+        apart.map(|((term, _), coefficient_si)| (*term, *coefficient_si)).unzip()
+    }
+
+    /// What terms do beyond the model's own numbers; 0 where that is nearly nothing.
+    fn rest(&self, terms: DMatrix<f64>) -> DMatrix<f64> {
+        let mut rest = self.beyond(terms.clone());
+        for (mut left, whole) in rest.column_iter_mut().zip(terms.column_iter()) {
             if left.norm_squared() <= HIDDEN * whole.norm_squared() {
                 left.fill(0.0);
             }
         }
-        let left = rest(DMatrix::from_column_slice(self.left.len(), 1, self.left.as_slice()));
-        let along = own.tr_mul(&left);
-        let explained = (along.transpose() * inverse(&own.tr_mul(&own)) * &along)[(0, 0)];
-        (explained / left.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+        rest
+    }
+
+    fn left_rest(&self) -> DMatrix<f64> {
+        self.beyond(DMatrix::from_column_slice(self.left.len(), 1, self.left.as_slice()))
+    }
+
+    fn beyond(&self, change: DMatrix<f64>) -> DMatrix<f64> {
+        let taken = inverse(&self.own.tr_mul(&self.own)) * self.own.tr_mul(&change);
+        change - &self.own * taken
     }
 
     /// Share of halves of the blocks in which the best term is this one or one that does nearly the same.
