@@ -27,7 +27,7 @@ fn record(rig: &RigParameters, seed: u64) -> String {
     text
 }
 
-/// Pressure in the chamber, Pa, at each of 68 samples of 1 ms, with the piston at rest, from a pressure and with a constant command.
+/// Pressure in the chamber, Pa, at each of 68 samples of 1 ms, from a pressure, with the piston at rest and a constant command.
 fn pressure(start_pa: f64, valve: f64) -> Vec<f64> {
     let mut text =
         String::from("time_s,drive_valve,drive_position_m,drive_pressure_a_Pa,drive_pressure_b_Pa\n");
@@ -42,8 +42,8 @@ fn pressure(start_pa: f64, valve: f64) -> Vec<f64> {
 #[test]
 fn a_shut_valve_passes_nothing_and_an_open_one_fills_from_the_supply() {
     assert!(pressure(3e5, 0.0).iter().all(|pressure_pa| *pressure_pa == 3e5));
-    // 25.9 / 2 K_V p_up with K_V 0.36 m^3/h at half opening and 7 bar, into 0.1 m of 1963.5 mm^2 and 20 cm^3: below half of it all
-    // the time. After 62 ms the slower lag, 8 ms, leaves 5e-4 of it.
+    // 25.9 / 2 K_V p_up with K_V 0.36 m^3/h at half opening and 7 bar, into 0.1 m of 1963.5 mm^2 and 20 cm^3: below half of it
+    // all the time. After 62 ms the slower lag, 8 ms, leaves 5e-4 of it.
     let by_hand_pa_per_s = 101_325.0 * 12.95 * 0.36 * 7.0 / 3600.0 / (0.1 * 1963.5e-6 + 20e-6);
     let filled_pa = pressure(101_325.0, 0.5);
     let slope_pa_per_s = (filled_pa[65] - filled_pa[62]) / 3e-3;

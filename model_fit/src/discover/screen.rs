@@ -129,7 +129,8 @@ impl Screen {
         (explained / left.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     }
 
-    /// Those of some terms that do not look like the model's own numbers, and the coefficients by which they explain most together.
+    /// Those of some terms that do not look like the model's own numbers, and the coefficients by which they explain most
+    /// together.
     pub(super) fn together(&self, terms: &[usize]) -> (Vec<usize>, Vec<f64>) {
         let own = self.rest(self.terms.select_columns(terms));
         let coefficients_si = inverse(&own.tr_mul(&own)) * own.tr_mul(&self.left_rest());
