@@ -1,6 +1,6 @@
 //! Delays of what is integrated.
 
-use crate::{counting, first_values, read, refused, simulated};
+use crate::{counting, differences, first_values, read, refused, simulated};
 use model::{Direction, Inputs, Program, Simulator};
 
 const METHODS: [&str; 2] =
@@ -101,22 +101,11 @@ fn derivatives_through_delays_play_and_friction_are_those_of_differences() {
         let values = first_values(&model);
         let computed = simulated(&program, &directions, &inputs, &values).unwrap();
         for (place, direction) in directions.iter().enumerate() {
-            let moved = |sign: f64| {
-                let mut values = values.clone();
-                let value = match direction {
-                    Direction::Parameter(index) => &mut values[0][*index],
-                    Direction::Start(index) => &mut values[1][*index],
-                };
-                let step = 1e-4 * *value;
-                *value += sign * step;
-                (simulated(&program, &[], &inputs, &values).unwrap(), step)
-            };
-            let ((ahead, step), (behind, _)) = (moved(1.0), moved(-1.0));
+            let differences = differences(&program, *direction, &inputs, (&values, 1e-4));
             let position = || (0..time_s.len()).map(|row| 5 * row);
             let largest = position().map(|at| computed[at].1[place].abs()).fold(0.0, f64::max);
             for at in position() {
-                let difference = (ahead[at].0 - behind[at].0) / (2.0 * step);
-                let away = (computed[at].1[place] - difference).abs() / largest;
+                let away = (computed[at].1[place] - differences[at]).abs() / largest;
                 assert!(away < 0.03, "{hold} {direction:?} row {}: {away}", at / 5);
             }
         }

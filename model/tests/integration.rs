@@ -1,6 +1,6 @@
 //! What is integrated, against closed forms, against an integrator by others, derivatives against differences.
 
-use crate::{counting, first_values, read, refused, simulated};
+use crate::{counting, differences, first_values, read, refused, simulated};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator};
 use nalgebra::DVector;
 use ode_solvers::dop_shared::OutputType;
@@ -128,21 +128,10 @@ fn derivatives_of_the_outputs_are_those_of_differences() {
     let values = first_values(&model);
     let computed = simulated(&program, &directions, &inputs, &values).unwrap();
     for (place, direction) in directions.iter().enumerate() {
-        let moved = |sign: f64| {
-            let mut values = values.clone();
-            let value = match direction {
-                Direction::Parameter(index) => &mut values[0][*index],
-                Direction::Start(index) => &mut values[1][*index],
-            };
-            let step = 1e-5 * *value;
-            *value += sign * step;
-            (simulated(&program, &[], &inputs, &values).unwrap(), step)
-        };
-        let ((ahead, step), (behind, _)) = (moved(1.0), moved(-1.0));
+        let differences = differences(&program, *direction, &inputs, (&values, 1e-5));
         let largest = computed.iter().map(|(_, slope)| slope[place].abs()).fold(0.0, f64::max);
         for (row, (_, slope)) in computed.iter().enumerate() {
-            let difference = (ahead[row].0 - behind[row].0) / (2.0 * step);
-            assert!((slope[place] - difference).abs() < 1e-4 * largest, "{direction:?} row {row}");
+            assert!((slope[place] - differences[row]).abs() < 1e-4 * largest, "{direction:?} row {row}");
         }
     }
 }

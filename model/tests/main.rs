@@ -48,6 +48,27 @@ pub(crate) fn first_values(model: &Model) -> [Vec<f64>; 3] {
     ]
 }
 
+/// Derivatives of all outputs in a direction, row by row: central differences over a share of the value.
+pub(crate) fn differences(
+    program: &Program,
+    direction: Direction,
+    inputs: &Inputs<'_>,
+    (values, share): (&[Vec<f64>; 3], f64),
+) -> Vec<f64> {
+    let (set, index) = match direction {
+        Direction::Parameter(index) => (0, index),
+        Direction::Start(index) => (1, index),
+    };
+    let step = share * values[set][index];
+    let moved = |by: f64| {
+        let mut values = values.clone();
+        values[set][index] += by;
+        simulated(program, &[], inputs, &values).unwrap()
+    };
+    let (ahead, behind) = (moved(step), moved(-step));
+    ahead.iter().zip(&behind).map(|(ahead, behind)| (ahead.0 - behind.0) / (2.0 * step)).collect()
+}
+
 /// Values and derivatives of all outputs, row by row.
 pub(crate) fn simulated(
     program: &Program,

@@ -21,7 +21,7 @@ mod features;
 mod place;
 mod screen;
 
-use super::fit::{Fitting, OPTIONS, What};
+use super::fit::{Fitting, OPTIONS, Unknown, What};
 use super::judge::{Evaluation, GAIN_APART, judge};
 use super::record::Measured;
 use super::select::{Fitted, Found, MOST_TERMS, SAME, fitted, fitted_from};
@@ -130,6 +130,18 @@ pub(super) fn search<'a>(
     Ok(Discovery { found, terms: taken, note })
 }
 
+/// Where the fit of a model with more terms begins: at what the smaller one gave, and at the coefficients that straight lines
+/// promise, by their parameters.
+fn start(fitting: &Fitting<'_>, before: &Fitted<'_>, promised_si: impl Fn(usize) -> Option<f64>) -> Vec<f64> {
+    let known = |what: What| before.fitting.unknowns.iter().position(|unknown| unknown.what == what);
+    let value = |unknown: &Unknown| match (unknown.what, known(unknown.what)) {
+        (_, Some(place)) => before.point.values_si[place],
+        (What::Shared(index), None) => promised_si(index).unwrap_or(unknown.start_si),
+        _ => unknown.start_si,
+    };
+    fitting.unknowns.iter().map(value).collect()
+}
+
 /// The best of the terms fitted in the simulator, and others that are as good.
 fn round<'a>(
     grown: &'a Grown,
@@ -143,15 +155,8 @@ fn round<'a>(
         let suspect = first + term;
         let suspects: Vec<usize> = before.suspects.iter().copied().chain([suspect]).collect();
         let coefficient = coefficient(model, Some(suspect));
-        let start = |fitting: &Fitting<'a>| -> Vec<Vec<f64>> {
-            let known = |what: What| before.fitting.unknowns.iter().position(|unknown| unknown.what == what);
-            let value = |unknown: &super::fit::Unknown| match (unknown.what, known(unknown.what)) {
-                (_, Some(place)) => before.point.values_si[place],
-                (What::Shared(index), None) if Some(index) == coefficient => screen.coefficient_si(*term),
-                _ => unknown.start_si,
-            };
-            vec![fitting.unknowns.iter().map(value).collect()]
-        };
+        let promised = |index: usize| (Some(index) == coefficient).then(|| screen.coefficient_si(*term));
+        let start = |fitting: &Fitting<'a>| vec![start(fitting, before, promised)];
         fitted_from(model, before.fitting.records, &suspects, (start, OPTIONS.steps))
             .ok()
             .map(|fit| (suspect, fit))

@@ -55,6 +55,16 @@ fn closed(folder: &Path, search: Search, hidden: fn(f64, f64, f64) -> f64) -> Cl
     close_with(&model, (&train, &test), search, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// What is left without it hangs together over the whole record; straight lines alone call it a constant.
+#[test]
+fn a_strong_spring_on_one_side_is_placed_with_its_variable() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = closed(folder.path(), Search::Never, |x, _, _| 60.0 * x.max(0.0)).report;
+    let located = report.located.expect("most of what is left");
+    assert_eq!((located.place.as_str(), located.variables.join(",")), ("equation of v", "x".to_owned()));
+    assert!(located.share > 0.9, "{located:?}");
+}
+
 #[test]
 fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -15,14 +15,14 @@
 //!
 //! Source: the unknown-input view of model error, e.g. Gillijns, De Moor 2007, Automatica 43(1).
 
-use super::super::fit::{Fitting, Unknown, What};
+use super::super::fit::Fitting;
 use super::super::judge::GAIN_APART;
 use super::super::record::Measured;
 use super::super::report::ModelReport;
 use super::super::select::{Fitted, SAME, effective};
-use super::ROWS;
 use super::features::{Term, group_terms, variables};
 use super::screen::{Screen, coefficient};
+use super::{ROWS, start};
 use model::{Model, Program};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -133,19 +133,7 @@ fn refit(
     };
     let fitting = Fitting::new(grown, Program::new(grown, &suspects).ok()?, before.records, &suspects);
     // All of the promise, or nothing: a strong term may be far from straight.
-    let start = |share: f64| {
-        let value = |unknown: &Unknown| {
-            let known = before.unknowns.iter().position(|known| known.what == unknown.what);
-            match (unknown.what, known) {
-                (_, Some(place)) => baseline.point.values_si[place],
-                (What::Shared(index), None) => {
-                    of(index).map_or(unknown.start_si, |promised| share * promised)
-                }
-                _ => unknown.start_si,
-            }
-        };
-        fitting.unknowns.iter().map(value).collect()
-    };
+    let start = |share: f64| start(&fitting, baseline, |index| of(index).map(|promised| share * promised));
     let (point, _) = fitting.near(&baseline.point).fit_from(vec![start(1.0), start(0.0)], STEPS).ok()?;
     let scaled = |squares: &[f64]| -> f64 {
         let outputs = squares.iter().zip(&baseline.point.squares).enumerate();
