@@ -47,6 +47,7 @@ mod logs_replay;
 mod logs_trace;
 mod loss;
 mod malformed;
+mod model_commands;
 mod modelled_wire;
 mod noise;
 mod own_algorithm;
