@@ -1,6 +1,7 @@
 //! Rules for Rust and for what the rooms may know of each other.
 
 use super::{Problem, Rule};
+use std::str::SplitWhitespace;
 
 fn is_rust(path: &str) -> bool {
     path.ends_with(".rs")
@@ -23,125 +24,28 @@ pub(super) const PURPOSE: Rule = Rule {
     good: &[("a.rs", "//! Prints.\n"), ("a.toml", "")],
 };
 
-/// Rooms that not everybody may know.
-const ROOMS: [&str; 27] = [
-    "settings",
-    "protocol",
-    "realtime",
-    "runlog",
-    "plant",
-    "nominal",
-    "rig-node",
-    "emulator",
-    "algorithms",
-    "plugin",
-    "axis-control",
-    "xcp",
-    "rehearsal",
-    "controller",
-    "pagekit",
-    "figures",
-    "latency",
-    "live",
-    "socketcan-guest",
-    "bench",
-    "records",
-    "expression",
-    "model",
-    "model-fit",
-    "discrepancy",
-    "campaign",
-    "system-tests",
-];
-/// Which of them each room may depend on, tests included.
-const KNOWS: &[(&str, &[&str])] = &[
-    ("settings", &[]),
-    ("expression", &[]),
-    ("model", &["settings", "expression"]),
-    ("protocol", &[]),
-    ("realtime", &[]),
-    ("runlog", &["protocol", "realtime"]),
-    ("plant", &["settings", "expression"]),
-    ("nominal", &["plant"]),
-    ("fmu", &["plant"]),
-    ("rig_node", &["protocol", "plant"]),
-    ("emulator", &["settings", "protocol", "realtime", "runlog", "plant", "rig-node"]),
-    ("algorithms", &["settings", "realtime", "nominal"]),
-    ("plugin", &["settings", "protocol", "nominal", "algorithms"]),
-    ("axis", &["settings", "protocol", "realtime", "runlog", "nominal", "algorithms", "plugin"]),
-    ("xcp", &["settings", "protocol", "runlog", "nominal", "algorithms", "axis-control"]),
-    ("rehearsal", &["protocol", "runlog", "plant", "rig-node", "axis-control"]),
-    (
-        "controller",
-        &[
-            "settings",
-            "protocol",
-            "realtime",
-            "runlog",
-            "nominal",
-            "algorithms",
-            "plugin",
-            "axis-control",
-            "xcp",
-            "rehearsal",
-        ],
-    ),
-    ("pagekit", &[]),
-    ("figures", &["runlog", "pagekit"]),
-    ("latency", &["protocol", "realtime", "runlog", "pagekit", "figures"]),
-    ("live", &["protocol", "realtime", "runlog", "pagekit", "latency"]),
-    ("front", &["protocol", "runlog"]),
-    ("socketcan_guest", &["protocol"]),
-    ("records", &["protocol", "runlog", "plant"]),
-    ("model_fit", &["settings", "records", "model", "plant", "pagekit"]),
-    (
-        "discrepancy",
-        &[
-            "records",
-            "expression",
-            "model",
-            "model-fit",
-            "protocol",
-            "realtime",
-            "runlog",
-            "plant",
-            "axis-control",
-            "rehearsal",
-            "pagekit",
-        ],
-    ),
-    (
-        "campaign",
-        &[
-            "settings",
-            "protocol",
-            "realtime",
-            "runlog",
-            "plant",
-            "axis-control",
-            "rehearsal",
-            "pagekit",
-            "figures",
-        ],
-    ),
-];
+/// What the crate of each folder may depend on, after the packages that not everybody may know.
+const EDGES: &str = include_str!("crate_edges.txt");
 /// What a room may depend on in its tests alone: a controller needs a plant there.
 const IN_TESTS: &[(&str, &str)] =
     &[("algorithms", "plant"), ("axis", "plant"), ("controller", "plant"), ("model", "realtime")];
 
+/// What [`EDGES`] lists behind a name, line by line.
+fn listed(name: &str) -> impl Iterator<Item = SplitWhitespace<'static>> {
+    EDGES.lines().filter_map(move |line| Some(line.strip_prefix(name)?.strip_prefix(':')?.split_whitespace()))
+}
+
 /// House-style: who knows whom.
 pub(super) const CRATE_EDGES: Rule = Rule {
     name: "crate-edges",
-    applies: |path| KNOWS.iter().any(|(room, _)| path == format!("{room}/Cargo.toml")),
+    applies: |path| path.strip_suffix("/Cargo.toml").is_some_and(|room| listed(room).next().is_some()),
     check: |file| {
-        let (room, known) = KNOWS
-            .iter()
-            .find(|(room, _)| file.path == format!("{room}/Cargo.toml"))
-            .expect("the rule applies");
+        let room = file.path.trim_end_matches("/Cargo.toml");
+        let known: Vec<&str> = listed(room).flatten().collect();
         let forbidden = |in_tests: bool| -> Vec<&str> {
             let may_know =
-                |other: &&str| known.contains(other) || in_tests && IN_TESTS.contains(&(*room, *other));
-            ROOMS.into_iter().filter(|other| !may_know(other)).collect()
+                |other: &&str| known.contains(other) || in_tests && IN_TESTS.contains(&(room, *other));
+            listed("packages").flatten().filter(|other| !may_know(other)).collect()
         };
         let (mut in_dependencies, mut in_tests) = (false, false);
         file.each_line(|line| {
@@ -275,133 +179,8 @@ const UNITS: &[&str] = &[
 ];
 /// Statistics that may follow the unit.
 const STATISTICS: &[&str] = &["min", "max", "mean", "rms", "p50", "p90", "p99", "p999", "p9999"];
-/// Names of quantities without a unit, or whose unit stands beside them.
-const DIMENSIONLESS: &[&str] = &[
-    "opening",               // of a valve, -1 to 1
-    "loop_factor",           // on what a valve passes
-    "valve",                 // the same, of both axes
-    "spool",                 // position of a valve's spool, -1 to 1
-    "velocity_feed_forward", // share
-    "prior_std",             // of a factor
-    "amplitude_variation",   // between windows, over the amplitude
-    "loss",                  // probability
-    "loss_per_dof",          // of a fit
-    "behind",                // difference of losses
-    "converged",             // the same
-    "fractions",             // of a step
-    "parameters_moved",      // a count in part
-    "stability",             // share of halves of a record
-    "smallest_amplitude",    // over the smallest that is named
-    "size",                  // of a drawing, in its own units
-    "values",                // of parameters, each with its own unit
-    "searched_share",        // of records
-    "error_rate",            // the same
-    "median",                // of ratios
-    "interval",              // of their median
-    "confidence",            // probability
-    "factor",                // of a DBC signal, whose unit is a field beside it
-    "offset",                // the same
-    "range",                 // of a variable, whose unit is a field beside it
-    "friction_factor",       // on the friction of an axis
-    "limit",                 // of an opening
-    "dropout",               // probability
-    "gain",                  // of a faulty sensor
-    "spike",                 // of a faulty sensor, in its own unit
-    "step",                  // the same
-    "act",                   // openings that a test commands
-    "min",                   // the same, and of a key of the parameter table
-    "max",                   // the same
-    "value",                 // of a reading, whose unit its sensor has
-    "least",                 // of a parameter, whose unit is a field beside it
-    "most",                  // the same
-    "default",               // the same
-    "drawn",                 // of a key of an effect, whose unit is a field beside it
-    "neutral",               // the same
-    "numbers",               // of an effect, in the units of its keys
-    "wrong_parameters",      // names and factors
-    "noise",                 // share of the specified
-    "without_noise",         // readings, in the units of their sensors
-    "windows",               // in units of noise
-    "variables",             // of a program: names with their units, and values
-    "before_value",          // of a set-point, position or force
-    "after_value",           // the same
-    "share",                 // a rate, and the bound below
-    "at_most",               // a rate
-    "cosine",                // of two signatures
-    "strength",              // of a signature, over what an ideal observer needs
-    "noise_factor",          // on the noise of the sensors
-    "weaker_factor",         // on amplitudes
-    "valve_point_factors",   // on K_V
-    "dead_volume_ratio",     // true over nominal
-    "temperature_ratio",     // the same
-    "fading_ratio",          // share of a friction
-    "slow_noise_ratio",      // share of a variance
-    "over_limit",            // amplitudes over their limits
-    "limit_value",           // of an effect, whose unit is a field beside it
-    "error_value",           // of a fitted number, whose unit is a field beside it
-    "closed_ratio",          // share of a gap
-    "claimed_closed_ratio",  // the same
-    "claimed_joint_ratio",   // the same
-    "floor_value",           // of a gap, as before_value and after_value
-    "r2_ratio",              // share of a variance
-    "p_value_ratio",         // significance
-    "chi2_after_ratio",      // chi2 per degree of freedom
-    "chi2_null_ratio",       // range of the same
-    "off_ratio",             // error over truth
-    "error_ratio",           // standard error over truth
-    "quantiles",             // of a spread, whose field has the unit
-    "samples",               // readings, in the units of their sensors
-    "lag1_autocorrelation",  // of a noise
-    "shape",                 // of a regressor
-    "coefficients",          // of whitened columns
-    "squares",               // in squared standard deviations
-    "square",                // the same
-    "weights",               // of windows
-    "shares",                // of an excess
-    "threshold",             // of a log-likelihood
-    "nothing",               // the same
-    "limits",                // in coordinates of an effect's keys
-    "tolerance",             // of a factor
-    "coordinates",           // of an effect's keys, 1 the strongest that occurs
-    "factors",               // on numbers of a rig file
-    "errors",                // of coordinates and factors
-    "inflation",             // of a variance
-    "columns",               // in standard deviations
-    "probes",                // coordinates
-    "standard_error",        // of a quantity, whose unit is a field beside it
-    "before",                // the same, and of a figure of two models
-    "after",                 // the same
-    "floor",                 // the same
-    "closed",                // share of a gap
-    "share_explained",       // share of an excess
-    "score",                 // over a threshold
-    "amplitude",             // whose unit is a field beside it
-    "r2",                    // share of a variance
-    "p_value",               // probability
-    "at",                    // of a curve, whose units are fields beside it
-    "band",                  // the same
-    "chi2_before",           // per degree of freedom
-    "chi2_after",            // the same
-    "chi2_null",             // the same
-    "over_noise",            // in units of noise
-    "rms",                   // whose unit is a field beside it
-    "rms_before",            // the same
-    "rms_after",             // the same
-    "signal_rms",            // the same
-    "model_error_rms",       // the same
-    "baseline",              // the same
-    "ratio",                 // of two of them
-    "probability",           // 0 to 1
-    "probability_interval",  // 0 to 1
-    "penalty",               // twice a log likelihood
-    "clustered_t",           // in standard errors
-    "quantum",               // of a channel, in its unit
-    "unusable",              // share of samples
-    "divergence",            // in squared standard deviations
-    "ripple_decibel",        // of a filter
-    "scale",                 // of a column, whose unit is a field beside it
-    "edge",                  // of a filter, over a Nyquist frequency
-];
+/// Names of quantities without a unit, or whose unit stands beside them, each with what it is.
+const DIMENSIONLESS: &str = include_str!("dimensionless.txt");
 
 /// A public number says its unit in its name.
 pub(super) const UNITS_IN_NAMES: Rule = Rule {
@@ -413,7 +192,7 @@ pub(super) const UNITS_IN_NAMES: Rule = Rule {
             let (name, kind) = line.trim_start().strip_prefix("pub ")?.split_once(": ")?;
             let field = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
             let float = kind.split(|c: char| !c.is_alphanumeric()).any(|word| word == "f64");
-            if !field || !float || DIMENSIONLESS.contains(&name) || has_unit(name) {
+            if !field || !float || is_dimensionless(name) || has_unit(name) {
                 return None;
             }
             Some(format!("end '{name}' with its unit, as supply_pressure_pa does, or add it to DIMENSIONLESS of this rule"))
@@ -434,6 +213,10 @@ pub(super) const UNITS_IN_NAMES: Rule = Rule {
         ("a/tests/b.rs", "    pub pressure: f64,\n"),
     ],
 };
+
+fn is_dimensionless(name: &str) -> bool {
+    DIMENSIONLESS.lines().any(|line| line.split(' ').next() == Some(name))
+}
 
 fn has_unit(name: &str) -> bool {
     let name = STATISTICS.iter().find_map(|suffix| name.strip_suffix(&format!("_{suffix}"))).unwrap_or(name);
