@@ -9,16 +9,16 @@
 //!
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
 //! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
-//! joins and stays when windows agree on its amplitude ([`consistency`]), small ones too. What a model without a name, or a poor
+//! joins and stays when windows agree on its amplitude ([`heterogeneity`]), small ones too. What a model without a name, or a poor
 //! one, leaves is outside the catalogue.
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
-mod consistency;
 mod decision;
 mod elimination;
 mod explanations;
 mod gauss_newton;
+mod heterogeneity;
 mod needed_parameters;
 mod null_distribution;
 mod pitch;
@@ -31,14 +31,14 @@ use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
-use consistency::{amplitude_variation, eliminate_inconsistent, prefer_consistent, prefer_large};
 pub use decision::NotExplained;
 use decision::{Decision, Searched, decide};
 pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, same};
 use elimination::{alternatives, eliminate_backward, swap};
-pub use explanations::{Evidence, Explanation, ExplanationKind};
+pub use explanations::{Explanation, ExplanationKind, Features};
 use explanations::{Fits, explanations};
-use gauss_newton::{backtrack, fit_selected};
+use gauss_newton::{fit_selected, shrink_parameters};
+use heterogeneity::{amplitude_variation, eliminate_heterogeneous, prefer_homogeneous, prefer_large};
 use model_fit::estimator::RELINEARISED;
 use needed_parameters::with_needed;
 pub(crate) use needed_parameters::{is_off, off};
@@ -143,7 +143,7 @@ pub fn name(
     let mut fitted = Vec::new();
     // For each accepted effect the fits of its round, best first.
     let mut rounds: Vec<Vec<Refit>> = Vec::new();
-    let mut any_consistent = false;
+    let mut any_homogeneous = false;
     for number in 0..MAX_ROUNDS {
         let here = restarted.as_ref().unwrap_or(engine);
         let screening =
@@ -155,9 +155,9 @@ pub fn name(
         let Some(mut round) = selected else { break };
         fitted.extend(round.fits.iter().cloned());
         let inexact = round.fits.first().is_some_and(|best| lacks_fit(here, best.loss));
-        let consistent = if inexact {
+        let homogeneous = if inexact {
             progress("comparing explanations");
-            prefer_consistent(here, &at_model, &model, &mut round.fits)
+            prefer_homogeneous(here, &at_model, &model, &mut round.fits)
         } else {
             prefer_large(here, &model, &mut round.fits);
             false
@@ -167,11 +167,11 @@ pub fn name(
         let Some(best) = round.fits.first_mut() else { break };
         // The null distribution is drawn from the residual of the best model, since explained signal is not noise. No threshold
         // applies here: an effect that turns out unnecessary is eliminated at the end.
-        if !consistent && (number >= MAX_EFFECTS || !gains_enough(here, &model, best)) {
+        if !homogeneous && (number >= MAX_EFFECTS || !gains_enough(here, &model, best)) {
             break;
         }
-        any_consistent |= consistent;
-        best.factors = backtrack(there, best);
+        any_homogeneous |= homogeneous;
+        best.factors = shrink_parameters(there, best);
         threshold = NullDistribution::new(there, &columns, &linearise(there, best), best).threshold();
         model = best.clone();
         rounds.push(round.fits);
@@ -183,7 +183,7 @@ pub fn name(
     let here = restarted.as_ref().unwrap_or(engine);
     let all_rounds = rounds.clone();
     if lacks_fit(here, model.loss) {
-        eliminate_inconsistent(here, &calibrated, &mut model, &mut rounds);
+        eliminate_heterogeneous(here, &calibrated, &mut model, &mut rounds);
     } else {
         eliminate_backward(here, &calibrated, &columns, &mut model, &mut rounds);
     }
@@ -194,7 +194,7 @@ pub fn name(
     progress("weighing explanations");
     let fits = Fits { parameters: &calibrated.fit, model: &model, fitted: &fitted };
     let explanations = explanations(here, &linearisation, &columns, &fits);
-    let searched = Searched { model, rounds, all_rounds, lacks_fit, any_consistent };
+    let searched = Searched { model, rounds, all_rounds, lacks_fit, any_homogeneous };
     let decision = decide(here, &calibrated, &explanations, searched);
     let Decision { model, rounds, shares, is_named, explained, not_explained } = decision;
     let reported = if not_explained.is_some() {

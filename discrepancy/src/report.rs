@@ -7,7 +7,7 @@ mod declared;
 mod next;
 mod objection;
 
-use crate::name::{Evidence, ExplanationKind};
+use crate::name::{ExplanationKind, Features};
 pub use declared::DeclaredSuspect;
 pub use model_fit::Verdict;
 use model_fit::estimator::Convergence;
@@ -183,7 +183,7 @@ pub struct Explanation {
     /// Those of all explanations sum to one.
     pub probability: f64,
     /// What the records say about it; null for none of these.
-    pub evidence: Option<Evidence>,
+    pub evidence: Option<Features>,
 }
 
 #[derive(Clone, Debug, Serialize)]

@@ -56,7 +56,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     assert_eq!(found.not_explained, None);
     let kinds: Vec<ExplanationKind> = found.explanations.iter().map(|explanation| explanation.kind).collect();
     assert_eq!(kinds, [ExplanationKind::Nothing, ExplanationKind::Parameters, ExplanationKind::NoneOfThese]);
-    let nothing = found.explanations[0].evidence.expect("of the rig file");
+    let nothing = found.explanations[0].features.expect("of the rig file");
     assert!(nothing.loss_per_dof.abs() < 0.08 && nothing.parameters_moved == 0.0, "{nothing:?}");
     for (at, (factor, error)) in factors(&found).into_iter().enumerate() {
         assert!((factor - 1.0).abs() < 5.0 * error + 0.003, "parameter {at}: {factor} +- {error}");
@@ -94,10 +94,10 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
     let explanation = &found.explanations[2];
     assert_eq!(explanation.sets[0][0].candidate.name(), "rod-leakage drive.b");
-    let evidence = explanation.evidence.expect("of the leak");
-    assert!(evidence.behind == 0.0 && evidence.amplitude_variation < Some(0.1), "{evidence:?}");
+    let features = explanation.features.expect("of the leak");
+    assert!(features.behind == 0.0 && features.amplitude_variation < Some(0.1), "{features:?}");
     for other in &found.explanations[..2] {
-        assert!(other.evidence.expect("of another explanation").behind > 100.0, "{other:?}");
+        assert!(other.features.expect("of another explanation").behind > 100.0, "{other:?}");
     }
 }
 
@@ -185,8 +185,8 @@ fn what_is_missing_on_the_other_axis_hides_no_effect() {
     assert_eq!(found.not_explained, None);
     assert_eq!(names(&found)[0], "valve-dead-zone drive");
     let explanation = found.explanations.iter().find(|one| one.kind == ExplanationKind::Effects);
-    let evidence = explanation.and_then(|one| one.evidence).expect("of the dead zone");
-    assert!(found.lacks_fit && evidence.loss_per_dof < 0.1 && evidence.share > 0.9, "{evidence:?}");
+    let features = explanation.and_then(|one| one.features).expect("of the dead zone");
+    assert!(found.lacks_fit && features.loss_per_dof < 0.1 && features.share > 0.9, "{features:?}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ const DECIDES: f64 = 0.5;
 /// Variation of an amplitude between windows above which its effect is not named, however probable: of sets said at one half and
 /// more on seeds 15 and 3769683697404522, development seeds, right ones had 0.00 to 0.57, leaks that took over what was left of a
 /// background 1.1 to 1.6.
-const MOST_VARIATION: f64 = 0.75;
+const MAX_CV_WHEN_PROBABLE: f64 = 0.75;
 /// Share of the loss after calibration that an explanation may leave on its axes: impostors for what was left out left 0.54 and
 /// more on seed 13, a development seed, and on the frozen record without `inclination`; all but two right names left 0 to 0.45.
 const MOST_LOSS_LEFT: f64 = 0.5;
@@ -57,7 +57,7 @@ pub(super) struct Searched {
     pub(super) all_rounds: Vec<Vec<Refit>>,
     pub(super) lacks_fit: bool,
     /// Whether windows agree on an amplitude of the model, which therefore may need many parameters.
-    pub(super) any_consistent: bool,
+    pub(super) any_homogeneous: bool,
 }
 
 pub(super) struct Decision {
@@ -77,12 +77,12 @@ pub(super) fn decide(
     explanations: &[Explanation],
     searched: Searched,
 ) -> Decision {
-    let Searched { mut model, mut rounds, all_rounds, lacks_fit, any_consistent } = searched;
+    let Searched { mut model, mut rounds, all_rounds, lacks_fit, any_homogeneous } = searched;
     let likely = explanations.iter().find(|one| one.probability >= DECIDES);
     let falls_short = |one: &Explanation| {
-        one.evidence.is_some_and(|evidence| {
-            evidence.amplitude_variation.is_some_and(|variation| variation > MOST_VARIATION)
-                || lacks_fit && evidence.share < 1.0 - MOST_LOSS_LEFT
+        one.features.is_some_and(|features| {
+            features.amplitude_variation.is_some_and(|variation| variation > MAX_CV_WHEN_PROBABLE)
+                || lacks_fit && features.share < 1.0 - MOST_LOSS_LEFT
         })
     };
     let sets = likely.filter(|one| one.kind == ExplanationKind::Effects);
@@ -119,7 +119,10 @@ pub(super) fn decide(
     let parameters_off = off(engine, &explained).into_iter().filter(|off| *off).count();
     let not_explained = if too_little {
         Some(NotExplained::TooLittle)
-    } else if !is_likely && !any_consistent && !model.placed.is_empty() && parameters_off > MAX_PARAMETERS_OFF
+    } else if !is_likely
+        && !any_homogeneous
+        && !model.placed.is_empty()
+        && parameters_off > MAX_PARAMETERS_OFF
     {
         Some(NotExplained::TooManyParametersOff)
     } else {

@@ -1,17 +1,17 @@
-//! The explanations of the records, each with its evidence: nothing, parameters alone, sets of effects, none of these.
+//! The explanations of the records, each with its features: nothing, parameters alone, sets of effects, none of these.
 //!
 //! ```text
 //!   model of the selection, then all fits by loss ──► a set of effects each ──► alike sets together ──► the first few
-//!   evidence of each: what it leaves, how far it is behind, parameters moved, agreement of the windows, amplitude, share
+//!   features of each: what it leaves, how far it is behind, parameters moved, agreement of the windows, amplitude, share
 //! ```
 //!
 //! A set has the effects that are large enough to be named; fits that differ in smaller ones beside them are the same
-//! explanation, and its evidence is that of the best of them. Sets are alike when they differ in one effect, and the responses
+//! explanation, and its features are those of the best of them. Sets are alike when they differ in one effect, and the responses
 //! to the two have a cosine above [`ALIKE_COSINE`], parameters projected out. Losses are J of `refit`: minus twice the
 //! log-likelihood of the windows, priors and penalties included.
 
 use super::probabilities::probabilities;
-use super::{amplitude_ratio, axes_of, consistency::amplitude_variation, is_large, loss_on, same};
+use super::{amplitude_ratio, axes_of, heterogeneity::amplitude_variation, is_large, loss_on, same};
 use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -38,7 +38,7 @@ pub enum ExplanationKind {
 
 /// What the records say about an explanation.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
-pub struct Evidence {
+pub struct Features {
     /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included; on the axes
     /// that its effects act on, where both are recorded and the rods are not linked.
     pub loss_per_dof: f64,
@@ -56,13 +56,13 @@ pub struct Evidence {
     pub share: f64,
 }
 
-/// An explanation and its evidence; none of these has none.
+/// An explanation and its features; none of these has none.
 #[derive(Clone, Debug)]
 pub struct Explanation {
     pub kind: ExplanationKind,
     /// Sets of effects that these records cannot tell apart, the best first.
     pub sets: Vec<Vec<EffectEstimate>>,
-    pub evidence: Option<Evidence>,
+    pub features: Option<Features>,
     /// Of the best set of effects, small ones beside them included.
     pub(super) fit: Option<Refit>,
     /// All sum to one.
@@ -92,7 +92,7 @@ pub(super) fn explanations(
     let classes = classes(fits, |left, right| alike.are(left, right));
     let losses = classes.iter().map(|class| class[0].loss).chain([nothing, fits.parameters.loss]);
     let best = losses.fold(f64::INFINITY, f64::min);
-    let evidence = |loss: f64, factors: &[f64; COUNT]| Evidence {
+    let features = |loss: f64, factors: &[f64; COUNT]| Features {
         loss_per_dof: loss / dof,
         behind: loss - best,
         parameters_moved: parameters_moved(factors),
@@ -102,12 +102,12 @@ pub(super) fn explanations(
         share: (1.0 - loss / fits.parameters.loss.max(1e-9)).clamp(0.0, 1.0),
     };
     let without_effects =
-        |kind, evidence| Explanation { kind, sets: Vec::new(), evidence, fit: None, probability: 0.0 };
+        |kind, features| Explanation { kind, sets: Vec::new(), features, fit: None, probability: 0.0 };
     let mut all = vec![
-        without_effects(ExplanationKind::Nothing, Some(evidence(nothing, &[1.0; COUNT]))),
+        without_effects(ExplanationKind::Nothing, Some(features(nothing, &[1.0; COUNT]))),
         without_effects(
             ExplanationKind::Parameters,
-            Some(evidence(fits.parameters.loss, &fits.parameters.factors)),
+            Some(features(fits.parameters.loss, &fits.parameters.factors)),
         ),
     ];
     all.extend(classes.iter().map(|class| {
@@ -119,18 +119,18 @@ pub(super) fn explanations(
         let named = large(best);
         let axes = axes_of(&named);
         let [left, before] = [best, fits.parameters].map(|fit| loss_on(engine, axes, fit));
-        let evidence = Evidence {
+        let features = Features {
             loss_per_dof: left / engine.loss_on(axes, &best.squares).1,
             share: (1.0 - left / before.max(1e-9)).clamp(0.0, 1.0),
             amplitude_variation: variations,
             smallest_amplitude: Some(named.iter().map(amplitude_ratio).fold(f64::INFINITY, f64::min)),
             small_beside: best.placed.len() - named.len(),
-            ..evidence(best.loss, &best.factors)
+            ..features(best.loss, &best.factors)
         };
         Explanation {
             kind: ExplanationKind::Effects,
             sets: class.iter().map(|fit| large(fit)).collect(),
-            evidence: Some(evidence),
+            features: Some(features),
             fit: Some(best.clone()),
             probability: 0.0,
         }

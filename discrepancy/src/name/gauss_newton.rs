@@ -30,7 +30,7 @@ const SHRINK_FACTORS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
 /// Scales all deviations of the parameters from the rig file by the fraction with the smallest simulated loss. While an effect is
 /// missing, the linearised step may lead far off.
-pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
+pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = SHRINK_FACTORS.map(|shrink| model.factors.map(|factor| 1.0 + shrink * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {
         iterate(engine, model.placed.clone(), *factors).map_or(f64::INFINITY, |iterate| iterate.loss)

@@ -1,4 +1,4 @@
-//! Probabilities of the explanations: a conditional logit of their evidence (McFadden 1974).
+//! Probabilities of the explanations: a conditional logit of their features (McFadden 1974).
 //!
 //! Of a record, explanation j has the probability exp(w'x_j) / sum_k exp(w'x_k). `discrepancy/study/explanations.py` fits w to
 //! draws of the study whose truth is known; its function `regressors` gives the same x. What they say holds where nothing,
@@ -12,7 +12,7 @@ static WEIGHTS: LazyLock<Weights> = LazyLock::new(|| {
     serde_json::from_str(include_str!("../../study/weights.json")).expect("weights of a fit")
 });
 
-/// Scales on which evidence counts: the loss by which alternatives are told apart, what the best model of an exact record leaves,
+/// Scales on which features count: the loss by which alternatives are told apart, what the best model of an exact record leaves,
 /// a variation that chance does not give.
 const BEHIND_SCALE: f64 = 9.0;
 const EXCESS_SCALE: f64 = 0.08;
@@ -40,7 +40,7 @@ struct Weights {
     parameters_alone: f64,
     variation: f64,
     amplitude: f64,
-    /// Probability of none of these whatever the evidence says.
+    /// Probability of none of these whatever the features say.
     lapse: f64,
 }
 
@@ -55,39 +55,39 @@ pub(super) fn probabilities(explanations: &[Explanation]) -> Vec<f64> {
     let most = utilities.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let shares: Vec<f64> = utilities.iter().map(|utility| (utility - most).exp()).collect();
     let sum: f64 = shares.iter().sum();
-    let lapse = |one: &Explanation| if one.evidence.is_none() { WEIGHTS.lapse } else { 0.0 };
+    let lapse = |one: &Explanation| if one.features.is_none() { WEIGHTS.lapse } else { 0.0 };
     let weighed = shares.into_iter().zip(explanations);
     weighed.map(|(share, one)| (1.0 - WEIGHTS.lapse) * share / sum + lapse(one)).collect()
 }
 
 fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
-    let Some(evidence) = &explanation.evidence else { return weights.none_of_these };
+    let Some(features) = &explanation.features else { return weights.none_of_these };
     let of_kind = match explanation.kind {
         ExplanationKind::Parameters => {
-            let moved = evidence.parameters_moved.max(SMALLEST_MOVED) / MOVED_SCALE;
+            let moved = features.parameters_moved.max(SMALLEST_MOVED) / MOVED_SCALE;
             weights.parameters + weights.parameters_alone * moved.ln()
         }
         ExplanationKind::Effects => weights.effects,
         ExplanationKind::Nothing | ExplanationKind::NoneOfThese => 0.0,
     };
-    let smallest = evidence.smallest_amplitude.unwrap_or(1.0);
+    let smallest = features.smallest_amplitude.unwrap_or(1.0);
     let of_effects =
         if explanation.kind == ExplanationKind::Effects { weights.excess_of_effects } else { 0.0 };
     of_kind
-        + weights.behind * (evidence.behind / BEHIND_SCALE).ln_1p()
-        + (weights.excess + of_effects) * (evidence.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
-        + weights.moved * evidence.parameters_moved
-        + weights.variation * (evidence.amplitude_variation.unwrap_or(0.0) / VARIATION_SCALE).ln_1p()
+        + weights.behind * (features.behind / BEHIND_SCALE).ln_1p()
+        + (weights.excess + of_effects) * (features.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
+        + weights.moved * features.parameters_moved
+        + weights.variation * (features.amplitude_variation.unwrap_or(0.0) / VARIATION_SCALE).ln_1p()
         + weights.amplitude * smallest.clamp(1.0, LARGEST_RATIO).ln()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::explanations::Evidence;
+    use super::super::explanations::Features;
     use super::*;
 
     fn explanation(kind: ExplanationKind, loss_per_dof: f64, behind: f64) -> Explanation {
-        let evidence = Evidence {
+        let features = Features {
             loss_per_dof,
             behind,
             parameters_moved: 0.0,
@@ -96,8 +96,8 @@ mod tests {
             small_beside: 0,
             share: 0.0,
         };
-        let evidence = (kind != ExplanationKind::NoneOfThese).then_some(evidence);
-        Explanation { kind, sets: Vec::new(), evidence, fit: None, probability: 0.0 }
+        let features = (kind != ExplanationKind::NoneOfThese).then_some(features);
+        Explanation { kind, sets: Vec::new(), features, fit: None, probability: 0.0 }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::markup::{number, paragraph, table, words as text_cell};
 use super::words;
-use crate::name::{Evidence, ExplanationKind};
+use crate::name::{ExplanationKind, Features};
 use crate::report::{EffectPlace, Explanation, Report, listed};
 use pagekit::plot::{Bar, figure, share_bars};
 
@@ -92,7 +92,7 @@ fn shortened(name: &str) -> String {
 }
 
 /// Mean power of what is left, over that of noise: the geometric mean of the windows.
-fn noise_ratio(evidence: &Evidence) -> f64 {
+fn noise_ratio(evidence: &Features) -> f64 {
     evidence.loss_per_dof.exp()
 }
 

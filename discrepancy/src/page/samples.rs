@@ -1,7 +1,7 @@
 //! Made-up reports, one for each verdict, as like real ones as made-up ones can be.
 
 use super::{Pictures, Trace};
-use crate::name::{Evidence, ExplanationKind};
+use crate::name::{ExplanationKind, Features};
 use crate::report::*;
 use plant::effects::SHEETS;
 use std::collections::BTreeMap;
@@ -225,7 +225,7 @@ fn check(file: &str) -> RecordCheck {
 
 fn explanations() -> Vec<Explanation> {
     let effect = |name: &str| EffectPlace { effect: name.to_owned(), place: at("drive", None) };
-    let evidence = |loss_per_dof, behind, amplitude_variation| Evidence {
+    let evidence = |loss_per_dof, behind, amplitude_variation| Features {
         loss_per_dof,
         behind,
         parameters_moved: 0.4,

@@ -181,7 +181,7 @@ pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> 
         kind: explanation.kind,
         probability: explanation.probability,
         sets: explanation.sets.iter().map(|set| set.iter().map(effect).collect()).collect(),
-        evidence: explanation.evidence,
+        evidence: explanation.features,
     });
     all.collect()
 }

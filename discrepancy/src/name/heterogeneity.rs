@@ -24,17 +24,17 @@ use rayon::prelude::*;
 
 /// CV_B above which an effect is no explanation of what a record shows: right names had 0.01 to 0.24 on seed 13, a development
 /// seed, impostors 0.1 to 2.
-const MAX_VARIATION: f64 = 0.3;
+const MAX_CV_IN_SEARCH: f64 = 0.3;
 /// Number of fits of a round that are compared.
 const COMPARED: usize = 4;
-/// Share of the best gain that a consistent fit must reach to come before it.
+/// Share of the best gain that a homogeneous fit must reach to come before it.
 const MIN_GAIN_SHARE: f64 = 0.4;
-/// Share of the loss before it that a consistent effect must remove.
+/// Share of the loss before it that a homogeneous effect must remove.
 const MIN_LOSS_SHARE: f64 = 0.1;
 
-/// Leaves the fits that are consistent and remove enough, the one with the least loss first; whether there is one. All stay where
+/// Leaves the fits that are homogeneous and remove enough, the one with the least loss first; whether there is one. All stay where
 /// there is none.
-pub(super) fn prefer_consistent(
+pub(super) fn prefer_homogeneous(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
     before: &Refit,
@@ -46,19 +46,19 @@ pub(super) fn prefer_consistent(
         let share = MIN_LOSS_SHARE * loss_where_last_acts(engine, before, fit);
         share.max(MIN_LOSS_REDUCTION).max(MIN_GAIN_SHARE * most)
     };
-    let is_consistent = |fit: &Refit| {
+    let is_homogeneous = |fit: &Refit| {
         let variation = amplitude_variation(engine, linearisation, fit);
-        variation.and_then(|all| all.last().copied()).is_some_and(|variation| variation < MAX_VARIATION)
+        variation.and_then(|all| all.last().copied()).is_some_and(|variation| variation < MAX_CV_IN_SEARCH)
     };
-    let consistent: Vec<Refit> = fits
+    let homogeneous: Vec<Refit> = fits
         .par_iter()
         .take(COMPARED)
-        .filter(|fit| gain(fit) > needed(fit) && is_consistent(fit))
+        .filter(|fit| gain(fit) > needed(fit) && is_homogeneous(fit))
         .cloned()
         .collect();
-    let found = !consistent.is_empty();
+    let found = !homogeneous.is_empty();
     if found {
-        *fits = consistent;
+        *fits = homogeneous;
     }
     found
 }
@@ -73,7 +73,7 @@ pub(super) fn prefer_large(engine: &Engine<'_>, before: &Refit, fits: &mut Vec<R
 }
 
 /// Eliminates effects on whose amplitude the windows do not agree, the worst first.
-pub(super) fn eliminate_inconsistent(
+pub(super) fn eliminate_heterogeneous(
     engine: &Engine<'_>,
     calibrated: &Calibrated,
     model: &mut Refit,
@@ -83,7 +83,7 @@ pub(super) fn eliminate_inconsistent(
         let linearisation = linearise(engine, model);
         let Some(variation) = amplitude_variation(engine, &linearisation, model) else { break };
         let worst = variation.iter().copied().enumerate().max_by(|left, right| left.1.total_cmp(&right.1));
-        let Some((at, _)) = worst.filter(|(_, variation)| *variation > MAX_VARIATION) else { break };
+        let Some((at, _)) = worst.filter(|(_, variation)| *variation > MAX_CV_IN_SEARCH) else { break };
         let mut placed = model.placed.clone();
         placed.remove(at);
         rounds.remove(at.min(rounds.len() - 1));
