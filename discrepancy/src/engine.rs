@@ -24,7 +24,7 @@ use std::sync::Mutex;
 /// Change of a factor in finite differences.
 pub(crate) const FACTOR_CHANGE: f64 = 0.01;
 
-/// Bounds of the noise level correction: an effect in every window must not pass for noise.
+/// Bounds of the noise level correction: an effect in every window must not pass for noise, so that the upper one is close to 1.
 const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.6, 1.05];
 
 /// Size of the cache of sensitivities, which saves a fifth of the time of naming.

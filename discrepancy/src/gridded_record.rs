@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Rows go to their nearest millisecond. A period without a row has no samples and keeps the command before. A window with a
-//! longer run of missing commands is not simulated ([`GriddedRecord::excluded_periods`]).
+//! run of more than [`HELD_LONGEST`] periods without a command, or a period without a smoothed state, is not simulated
+//! ([`GriddedRecord::excluded_periods`]).
 //!
 //! Windows start at the points; their remaining errors are estimated with each window. At rest the speed is exactly zero
 //! (`gridded_record/rest.rs`).

@@ -9,8 +9,8 @@
 //!
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
 //! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
-//! joins and stays when windows agree on its amplitude ([`heterogeneity`]), small ones too. What a model without a name, or a poor
-//! one, leaves is outside the catalogue.
+//! joins and stays when its amplitude is homogeneous over windows ([`heterogeneity`]), small ones too. Probabilities of all sets
+//! that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
@@ -58,8 +58,9 @@ const STEPS: usize = 5;
 const LACK_OF_FIT_PER_DOF: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
 const LACK_OF_FIT_PER_DOF_LINKED: f64 = 0.3;
-/// Screened gain below which no candidate is fitted. Of forty independent null gains (chi2 of one degree of freedom) the largest
-/// has the median 5.7 and the 99th percentile 13.4.
+/// Screened gain below which no candidate is fitted; also the least gain of an effect that joins, of a homogeneous one, and that
+/// of a detection limit. An empirical value, about twice what chance gives: of forty independent null gains (chi2 of one degree
+/// of freedom) the largest has the median 5.7 and the 99th percentile 13.4.
 pub(crate) const MIN_LOSS_REDUCTION: f64 = 25.0;
 /// Penalty for each fitted parameter of an effect.
 pub(crate) const EFFECT_PARAMETER_PENALTY: f64 = 8.0;
@@ -107,7 +108,8 @@ pub struct SelectionResult {
     pub(crate) null_loss: f64,
     /// Detection limit of each candidate as a coordinate of its amplitude; `None` where the record does not excite it.
     pub limits: Vec<Option<f64>>,
-    /// Whether the model leaves more than the records' noise.
+    /// Whether the model of the search, before the probabilities may have replaced it, leaves more than noise on the searched
+    /// part of the records.
     pub lacks_fit: bool,
     /// Coefficient of variation of the amplitude of each effect of the reported model between windows; empty where the model
     /// leaves no more than noise.
@@ -171,6 +173,7 @@ pub fn name(
             break;
         }
         any_homogeneous |= homogeneous;
+        // Its loss, squares and errors stay those of the factors before; the next fits start from these.
         best.factors = shrink_parameters(there, best);
         threshold = NullDistribution::new(there, &columns, &linearise(there, best), best).threshold();
         model = best.clone();

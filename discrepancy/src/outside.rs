@@ -21,7 +21,7 @@ pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
 
 /// Share of the best R2 that is nearly as good.
-pub(crate) const TIE_R2_RATIO: f64 = 0.9;
+const TIE_R2_RATIO: f64 = 0.9;
 /// Least gain in R2 of a pair.
 const MIN_PAIR_R2_GAIN: f64 = 0.15;
 /// Least R2 of a variable of a pair; below, its bins overfit.

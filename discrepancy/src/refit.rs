@@ -42,7 +42,8 @@ pub struct EffectEstimate {
 pub struct Refit {
     pub placed: Vec<EffectEstimate>,
     pub factors: [f64; COUNT],
-    /// The loss, priors and a penalty for each number of an effect and each parameter that is off included.
+    /// The loss with priors and, of fits that are compared, a penalty for each number of an effect and each parameter that is
+    /// off; a reported model (`name::gauss_newton::fit_selected`) has no penalties in it.
     pub loss: f64,
     /// Squared residuals of each window.
     pub(crate) squares: Vec<f64>,

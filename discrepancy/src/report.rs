@@ -350,7 +350,8 @@ pub struct Verification {
     pub(crate) whiteness: BTreeMap<String, BeforeAfter>,
     /// Unphysical events of the free run, in words.
     pub(crate) physical: Vec<String>,
-    /// Whether the extended model is better by more than three clustered standard errors and no signal worse by more than 2 %.
+    /// Whether the extended model is better by more than three standard errors over independent windows and no signal worse by
+    /// more than 2 %.
     pub confirmed: bool,
     /// Whether a signal's rms rises by more than 2 %.
     pub worse: bool,

@@ -42,7 +42,8 @@ use power::{Power, kept, levels, pooled};
 use records::Channel;
 use std::collections::BTreeMap;
 
-/// Bounds of the noise level correction, as a factor on the power.
+/// Bounds of the noise level correction, as a factor on the mean square. The upper one exceeds that of the search (`engine.rs`),
+/// where the level comes from the rig file's model: here the better of two models gives it. No study set either.
 pub(crate) const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.75, 1.15];
 /// Significance of an improvement, in standard errors.
 const BETTER_ERRORS: f64 = 3.0;

@@ -6,11 +6,11 @@
 //! ```
 //!
 //! Spool, lagged flows and the memories of effects continue from window to window. Mechanical states and pressures restart from
-//! the record's points, whose errors M_k projects out to first order. A direction of the start state that changes the window by
-//! less than one standard deviation is not projected out: at rest the speed is zero.
+//! the record's points, whose errors M_k projects out to first order. A direction is projected out if one prior standard
+//! deviation of the start state changes the whitened window by a norm above 1; at rest the speed is zero.
 //!
 //! The force jumps where a piston stops, breaks away or reverses, and microseconds decide on which side of a sample. A force
-//! reading that differs from its neighbours by more than noise is replaced by their median, in residuals and sensitivities alike
+//! residual, or difference of two simulations, that deviates from its neighbours' median by more than noise is replaced by it
 //! [rig-model.md, Accuracy].
 //!
 //! Source: discrepancy-notes.md, 1 (the share of right names is the same from 100 ms to 2 s; longer windows show smaller slow

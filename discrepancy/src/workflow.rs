@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   records ─► check ─► grid ─► name (with calibration) ─► locate ─► extend ─┬─► report, page, rig.toml
-//!                 └─ cannot be used: bad-data     alike ──► next             └─► verify: opens the held-out record, alone
+//!                 └─ cannot be used: bad-data     alike ──► next             └─► held_out: opens that record; verify judges
 //! ```
 //!
 //! All but [`Report::misfit`] and [`Report::verification`] is computed before the held-out record is opened.

@@ -1,4 +1,5 @@
-//! Gauss-Newton for every nonlinear fit of the workflow: one loop, one rule of globalisation, one set of options, one outcome.
+//! Gauss-Newton of the nonlinear fits of rigs and model files: one loop and one outcome; each kind of fit states its options.
+//! Start states of windows have a loop of their own (`windows/starts.rs` of `discrepancy`).
 //!
 //! ```text
 //!   linearise at the iterate ──► full step, then shorter ones, until the simulated loss falls ──► next iterate
@@ -7,10 +8,10 @@
 //!                converged if the linearised model promises less than the tolerance, else stalled
 //! ```
 //!
-//! Backtracking on the simulated loss: a step counts only if the loss of the simulator falls, not that of the linearised model.
-//! Callers know how to linearise and which fits are linear within a step (of the rig, `refit` takes the baseline parameters as
-//! linear, `name` and `tabulate` simulate them). Through stick-slip the loss has steps, so that neither the slope nor a
-//! sufficient decrease is asked for.
+//! Backtracking on the simulated loss (fits of model files damp a step in place of shortening it, see `fit`): a step counts only
+//! if the loss of the simulator falls, not that of the linearised model. Callers know how to linearise and which fits are linear
+//! within a step (of the rig, `refit` takes the baseline parameters as linear, `name` and `tabulate` simulate them). Through
+//! stick-slip the loss has steps, so that neither the slope nor a sufficient decrease is asked for.
 //!
 //! Source: Björck, Numerical Methods for Least Squares Problems, SIAM 1996, chapter 9 (damped Gauss-Newton, variable projection).
 

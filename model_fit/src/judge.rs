@@ -30,7 +30,8 @@ pub(super) const SHARE_FLOOR: f64 = 0.1;
 const SHARE_LARGE: f64 = 0.5;
 const T_SMALL: f64 = 5.0;
 /// Clustered standard errors that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
-/// Grandvalet 2004, JMLR 5]; for ten folds 2 is about 4 % one-sided.
+/// Grandvalet 2004, JMLR 5]; for the five bands 2 is 5.8 % one-sided (Student t with 4
+/// degrees of freedom).
 const T_BANDS: f64 = 2.0;
 /// Clustered standard errors of a difference between two suspects that tells them apart.
 const T_APART: f64 = 3.0;
@@ -51,7 +52,7 @@ pub(crate) struct Evaluation {
     pub(crate) passes: bool,
     /// The gate that decided, in words.
     pub(crate) gate: String,
-    /// Posterior probability among the suspects of its round and none of them, all as likely before.
+    /// Posterior probability among the suspects of its round and none of them, which is as likely before as all of them together.
     pub(crate) probability: f64,
     /// Numbers of the suspect, by parameter.
     pub(crate) values_si: Vec<(usize, f64)>,
@@ -192,7 +193,8 @@ impl Evaluation {
     }
 }
 
-/// Probabilities of a round: each suspect and none of them, as likely before; gains in units of the best one's samples.
+/// Probabilities of a round: each suspect, all as likely before, and none of them, as likely before as all together, since a
+/// penalty has 2 ln(suspects tried); gains in units of the best one's samples.
 pub(super) fn weigh(round: &mut [Evaluation]) {
     let best = round.iter().map(Evaluation::worth).fold(0.0, f64::max);
     let weight = |worth: f64| (0.5 * (worth - best)).exp();

@@ -1,11 +1,16 @@
 //! What is named: the set of effects that is more probable than not; where none is, what the search selected, by its own rules.
 //!
 //! ```text
-//!   probability of one half and more
-//!   a set of effects, of the same size in all windows     named, with "more is missing" where it leaves more than noise
-//!   none of these                                         outside the catalogue
-//!   nothing has it                                        the model of the search is named, unless it explains too little
+//!   probability of one half and more                 the model of the search leaves more than noise      noise alone
+//!   a set of effects within the bars                 that set, with "more is missing"                    that set
+//!   a set of effects beyond a bar, none of these     outside the catalogue                               the model of the search
+//!   nothing, parameters, or no explanation           the model of the search, unless it explains         the model of the search
+//!                                                    too little: then outside the catalogue
 //! ```
+//!
+//! The bars: the amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; and, where the model of the search leaves
+//! more than noise, the set leaves [`MOST_LOSS_LEFT`] of the loss at most. The model of the search has no name either where more
+//! than [`MAX_PARAMETERS_OFF`] parameters are off beside it, unless an effect of it joined as a homogeneous one.
 
 use super::elimination::{close_alternatives, shares};
 use super::explanations::{Explanation, ExplanationKind};
@@ -17,9 +22,10 @@ use crate::refit::Refit;
 
 /// Probability from which on an explanation decides: it is right more often than all others together.
 const DECIDES: f64 = 0.5;
-/// Variation of an amplitude between windows above which its effect is not named, however probable: of sets said at one half and
-/// more on seeds 15 and 3769683697404522, development seeds, right ones had 0.00 to 0.57, leaks that took over what was left of a
-/// background 1.1 to 1.6.
+/// Coefficient of variation of an amplitude between windows above which its effect is not named, however probable. The limit of
+/// the search is stricter, since no probability speaks for the effect there. Of sets said at one half and more on seeds 15 and
+/// 3769683697404522, development seeds, right ones had 0.00 to 0.57, leaks that took over what was left of a background 1.1 to
+/// 1.6.
 const MAX_CV_WHEN_PROBABLE: f64 = 0.75;
 /// Share of the loss after calibration that an explanation may leave on its axes: impostors for what was left out left 0.54 and
 /// more on seed 13, a development seed, and on the frozen record without `inclination`; all but two right names left 0 to 0.45.
@@ -55,8 +61,9 @@ pub(super) struct Searched {
     pub(super) rounds: Vec<Vec<Refit>>,
     /// The same before effects were eliminated.
     pub(super) all_rounds: Vec<Vec<Refit>>,
+    /// Of this model, on the searched part of the records.
     pub(super) lacks_fit: bool,
-    /// Whether windows agree on an amplitude of the model, which therefore may need many parameters.
+    /// Whether an effect joined because its amplitude is homogeneous over windows: the model may need many parameters then.
     pub(super) any_homogeneous: bool,
 }
 

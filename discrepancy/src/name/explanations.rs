@@ -1,4 +1,5 @@
-//! The explanations of the records, each with its features: nothing, parameters alone, sets of effects, none of these.
+//! The explanations of the records, each with the figures that its probability rests on: nothing, parameters alone, sets of
+//! effects, none of these.
 //!
 //! ```text
 //!   model of the selection, then all fits by loss ──► a set of effects each ──► alike sets together ──► the first few
@@ -36,7 +37,7 @@ pub enum ExplanationKind {
     NoneOfThese,
 }
 
-/// What the records say about an explanation.
+/// What the records say about an explanation; `evidence` in the report.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Features {
     /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included; on the axes

@@ -28,7 +28,7 @@ const NONLINEAR_EXCESS: f64 = 6.0;
 /// Grid of fractions by which the deviations of the parameters are scaled.
 const SHRINK_FACTORS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
-/// Scales all deviations of the parameters from the rig file by the fraction with the smallest simulated loss. While an effect is
+/// Factors with all deviations from the rig file scaled by the fraction with the smallest simulated loss. While an effect is
 /// missing, the linearised step may lead far off.
 pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = SHRINK_FACTORS.map(|shrink| model.factors.map(|factor| 1.0 + shrink * (factor - 1.0)));
@@ -72,7 +72,7 @@ impl Iterate for Simulated {
 }
 
 /// Fits a model in the simulator with the parameters that are not `needed` at the rig file's values; `None` where no rig can have
-/// it.
+/// it. Its loss has the priors and no penalties.
 pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
     let mut factors = model.factors;
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {

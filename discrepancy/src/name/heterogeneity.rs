@@ -1,4 +1,4 @@
-//! Whether the windows of the records agree on the amplitude of an effect.
+//! Heterogeneity of an effect's amplitude between the windows of the records.
 //!
 //! ```text
 //!   d_k, i_k   change of the amplitude that window k asks for beside the fitted model, and its information
@@ -7,6 +7,9 @@
 //!
 //! A law that is nearly right has one amplitude whatever the rig does. Another one absorbs more of what is missing in some
 //! windows than in others, and its amplitude differs between them by as much as its size.
+//!
+//! The information i_k has the weight f_k / |e_k|^2 of its window: 1 / i_k is the variance by what the model leaves, not by the
+//! noise of the sensors, so that a bad fit looks more homogeneous than it is.
 //!
 //! Source: DerSimonian, Laird 1986, Control. Clin. Trials 7(3): random effects. Takkouche et al. 1999, Am. J. Epidemiol. 150(2):
 //! between-study coefficient of variation.
@@ -22,8 +25,8 @@ use crate::refit::{
 };
 use rayon::prelude::*;
 
-/// CV_B above which an effect is no explanation of what a record shows: right names had 0.01 to 0.24 on seed 13, a development
-/// seed, impostors 0.1 to 2.
+/// CV_B above which an effect neither comes first in a round nor stays in a model that lacks fit: right names had 0.01 to 0.24 on
+/// seed 13, a development seed, impostors 0.1 to 2.
 const MAX_CV_IN_SEARCH: f64 = 0.3;
 /// Number of fits of a round that are compared.
 const COMPARED: usize = 4;
@@ -32,8 +35,8 @@ const MIN_GAIN_SHARE: f64 = 0.4;
 /// Share of the loss before it that a homogeneous effect must remove.
 const MIN_LOSS_SHARE: f64 = 0.1;
 
-/// Leaves the fits that are homogeneous and remove enough, the one with the least loss first; whether there is one. All stay where
-/// there is none.
+/// Leaves the fits, of the best [`COMPARED`], that are homogeneous and remove enough, the one with the least loss first; whether
+/// there is one. All stay where there is none.
 pub(super) fn prefer_homogeneous(
     engine: &Engine<'_>,
     linearisation: &Linearisation,

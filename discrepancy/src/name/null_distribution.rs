@@ -1,6 +1,9 @@
 //! Sign-flip null distribution of the gain: the elimination threshold and the detection limits.
 //!
-//! Source: discrepancy-notes.md, 4 (thresholds from this very record) and pipeline 1.
+//! Effects that act to one side in a few windows pass it too often (discrepancy-notes.md, Second reading, 4).
+//!
+//! Source: discrepancy-notes.md, 4 (thresholds from this very record) and pipeline 1. Hemerik, Goeman, Finos 2020, J. R. Stat.
+//! Soc. B 82(3): score sign flipping. Westfall, Young 1993, Resampling-Based Multiple Testing: maximum over candidates.
 
 use crate::engine::Engine;
 use crate::parameters::COUNT;

@@ -1,8 +1,10 @@
 //! Probabilities of the explanations: a conditional logit of their features (McFadden 1974).
 //!
-//! Of a record, explanation j has the probability exp(w'x_j) / sum_k exp(w'x_k). `discrepancy/study/explanations.py` fits w to
-//! draws of the study whose truth is known; its function `regressors` gives the same x. What they say holds where nothing,
-//! parameters and effects are as frequent as in those draws.
+//! Of a record, explanation j has the probability (1 - lapse) exp(w'x_j) / sum_k exp(w'x_k), that of none of these the lapse
+//! more. The regressors x are transforms of the features (logarithms, a clamp) and indicators of the kind and of the search's own
+//! set; none of these has a constant utility. `discrepancy/study/explanations.py` fits w to draws of the study whose truth is
+//! known; its function `regressors` gives the same x. What they say holds where nothing, parameters and effects are as frequent
+//! as in those draws.
 
 use super::explanations::{Explanation, ExplanationKind};
 use serde::Deserialize;
@@ -12,7 +14,7 @@ static WEIGHTS: LazyLock<Weights> = LazyLock::new(|| {
     serde_json::from_str(include_str!("../../study/weights.json")).expect("weights of a fit")
 });
 
-/// Scales on which features count: the loss by which alternatives are told apart, what the best model of an exact record leaves,
+/// Scales of the features: the loss by which alternatives are told apart, what the best model of an exact record leaves,
 /// a variation that chance does not give.
 const BEHIND_SCALE: f64 = 9.0;
 const EXCESS_SCALE: f64 = 0.08;
@@ -23,7 +25,7 @@ const LARGEST_RATIO: f64 = 10.0;
 const SMALLEST_MOVED: f64 = 1e-3;
 const MOVED_SCALE: f64 = 0.1;
 
-/// Log odds for each unit of a regressor.
+/// Utility for each unit of a regressor.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Weights {

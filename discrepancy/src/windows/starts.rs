@@ -279,7 +279,7 @@ pub(crate) fn set_state(plant: &mut Plant, record: &GriddedRecord, period: usize
     plant.set_time(record.since_start(period) as u64);
 }
 
-/// Orthonormal basis of some columns, without directions below one standard deviation.
+/// Orthonormal basis of some columns, without directions whose norm is 1 or less: they do not show in the whitened window.
 pub(super) fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut column in columns {

@@ -39,6 +39,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     Report {
         named,
         small,
+        // Of the search's model, which the probabilities may have replaced.
         adequate: Some(!found.lacks_fit && found.not_explained.is_none()),
         fit: Some(found.reported.convergence),
         nearest,
