@@ -71,7 +71,7 @@ impl Over {
         [Over::Constant].into_iter().chain(single).chain(PRODUCTS.map(Over::Product))
     }
 
-    fn has_memory(self) -> bool {
+    fn is_history(self) -> bool {
         matches!(self, Over::Variable(at) if VARIABLES[at].complexity == MEMORY)
     }
 
@@ -108,13 +108,13 @@ pub struct Beside<'a> {
 fn plain_first(groups: Vec<Group>) -> Vec<Group> {
     let choice = (groups.len() as f64).ln();
     let most = |groups: &[Group]| groups.first().map_or(0.0, |group| group.log_evidence);
-    let (memories, plain): (Vec<Group>, Vec<Group>) =
-        groups.into_iter().partition(|group| group.over.has_memory());
+    let (history, plain): (Vec<Group>, Vec<Group>) =
+        groups.into_iter().partition(|group| group.over.is_history());
     let exceeds = |group: &Group| {
         group.log_evidence - choice > most(&plain)
             && MIN_LOG_EVIDENCE_RATIO * group.log_evidence > most(&plain)
     };
-    let (first, last): (Vec<Group>, Vec<Group>) = memories.into_iter().partition(exceeds);
+    let (first, last): (Vec<Group>, Vec<Group>) = history.into_iter().partition(exceeds);
     let mut all = first;
     let mut rest = plain;
     rest.extend(last);

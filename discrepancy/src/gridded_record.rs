@@ -34,10 +34,10 @@ const POSITION_HALF_WIDTH: usize = 10;
 /// The same of a pressure.
 const PRESSURE_REACH: usize = 5;
 /// Differences in a block of the autocorrelation estimate, and the fewest blocks at rest.
-const MEMORY_BLOCK: usize = 25;
+const AUTOCORRELATION_BLOCK: usize = 25;
 const FEWEST_AT_REST: usize = 10;
 /// Autocorrelation and jitter below which they count as zero.
-const LEAST_MEMORY: f64 = 0.15;
+const LEAST_AUTOCORRELATION: f64 = 0.15;
 const LEAST_JITTER_S: f64 = 2e-5;
 /// Samples in a block of the jitter estimate, and the lowest speed of a block.
 const JITTER_BLOCK: usize = 20;
@@ -294,9 +294,9 @@ impl GriddedRecord {
 /// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1
 /// - share).
 fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
-    let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / MEMORY_BLOCK)
+    let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / AUTOCORRELATION_BLOCK)
         .filter_map(|block| {
-            let places = block * MEMORY_BLOCK..(block + 1) * MEMORY_BLOCK;
+            let places = block * AUTOCORRELATION_BLOCK..(block + 1) * AUTOCORRELATION_BLOCK;
             let differences: Option<Vec<f64>> = places
                 .map(|at| if resting[at] { Some(values[at + 1]? - values[at]?) } else { None })
                 .collect();
@@ -309,7 +309,7 @@ fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) ->
     }
     let spread = median(&mut variances).map_or(0.0, f64::sqrt);
     let share = 1.0 - spread * spread / (2.0 * noise * noise);
-    if share < LEAST_MEMORY { 0.0 } else { share.min(0.95) }
+    if share < LEAST_AUTOCORRELATION { 0.0 } else { share.min(0.95) }
 }
 
 /// Sampling jitter: the part of the scatter of positions around their parabolas that grows with the speed.

@@ -324,10 +324,10 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     }
 }
 
-/// Detection limits: the amplitude whose expected linear gain reaches [`THRESHOLD_FACTOR_SINGLE`] null thresholds and the gain
-/// worth a fit, at least the floor. The linear gain exceeds that in half of the records; the procedure finds fewer, since the
-/// objective charges [`EFFECT_PARAMETER_PENALTY`] for each parameter of the effect. The smallest limit of several probes is
-/// optimistic for nonlinear effects.
+/// Detection limits, in Currie's terms (1968) decision limits: the amplitude whose expected linear gain reaches
+/// [`THRESHOLD_FACTOR_SINGLE`] null thresholds and the gain worth a fit, at least the floor. The linear gain exceeds that in half
+/// of the records; the procedure finds fewer, since the objective charges [`EFFECT_PARAMETER_PENALTY`] for each parameter of the
+/// effect. The smallest limit of several probes is optimistic for nonlinear effects.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
     let limits =
         null.limits(columns.candidates.len(), (THRESHOLD_FACTOR_SINGLE * threshold).max(MIN_LOSS_REDUCTION));

@@ -62,7 +62,7 @@ pub fn outside(
         progress(&format!("outside: {}", series.balance));
         let sample = Sample::of(series);
         let tests: Vec<_> = (0..VARIABLES.len()).map(|variable| sample.test(variable)).collect();
-        // Whether there is a term is judged without memories: more tests would find more by chance.
+        // Whether there is a term is judged without history variables: more tests would find more by chance.
         let plain = VARIABLES.iter().zip(&tests).filter(|(variable, _)| variable.complexity < MEMORY);
         let stands_out = plain.map(|(_, test)| test.2).fold(0.0, f64::max);
         let lifted = series.over_noise().is_some_and(|over| over > MIN_BIRGE_RATIO);

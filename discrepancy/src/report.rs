@@ -37,7 +37,8 @@ pub struct Report {
     /// Parameters that the model moved by an insignificant amount; the extended rig file has them.
     #[serde(rename = "carried")]
     pub(crate) insignificant: Vec<Quantity>,
-    /// Whether the reported model leaves no more on the training records than their noise; null where none was judged.
+    /// Whether the model of the search leaves no more than noise on the searched part of the training records, and the verdict is
+    /// not outside the catalogue; null where none was judged.
     pub adequate: Option<bool>,
     /// How the fit of the reported model ended; null where none was fitted.
     pub(crate) fit: Option<Convergence>,

@@ -5,8 +5,8 @@
 //!   M_k = 1 - Q_k Q_k'                                   Q_k: what a change of x, v, p_a, p_b at the window's start explains
 //! ```
 //!
-//! Spool, lagged flows and the memories of effects continue from window to window. Mechanical states and pressures restart from
-//! the record's points, whose errors M_k projects out to first order. A direction is projected out if one prior standard
+//! Spool, lagged flows and the internal states of effects continue from window to window. Mechanical states and pressures restart
+//! from the record's points, whose errors M_k projects out to first order. A direction is projected out if one prior standard
 //! deviation of the start state changes the whitened window by a norm above 1; at rest the speed is zero.
 //!
 //! The force jumps where a piston stops, breaks away or reverses, and microseconds decide on which side of a sample. A force
@@ -67,8 +67,8 @@ impl<'a> Windows<'a> {
 
     /// The same with estimated start states.
     ///
-    /// The projection is of first order only, and memories of effects continue from window to window. Where the points are far
-    /// off, as behind a lagging sensor, both need a better start state.
+    /// The projection is of first order only, and internal states of effects continue from window to window. Where the points are
+    /// far off, as behind a lagging sensor, both need a better start state.
     pub(crate) fn with_estimated_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         Self::with_recorded_starts(record, rig).estimate_starts(START_PASSES)
     }
@@ -76,7 +76,7 @@ impl<'a> Windows<'a> {
     fn with_recorded_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         let measured = (0..2).filter(|axis| record.measured[*axis]);
         let outputs: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
-        // The first window fills lags and memories and is not judged [rig-model.md: a record is judged after 0.1 s].
+        // The first window fills lags and internal states and is not judged [rig-model.md: a record is judged after 0.1 s].
         let starts: Vec<usize> = (1..record.len() / WINDOW)
             .map(|window| window * WINDOW)
             .filter(|start| !record.excluded_periods[*start..start + WINDOW].contains(&true))
@@ -185,7 +185,7 @@ impl<'a> Windows<'a> {
         let inverse: Vec<SensorInverse> = plants.iter().map(|plant| SensorInverse::of(plant.rig())).collect();
         let mut batch = Batch::new(plants);
         let mut next = 0;
-        // Unjudged windows are simulated as well, since memories continue.
+        // Unjudged windows are simulated as well, since internal states continue.
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             for (at, inverse) in inverse.iter().enumerate() {
                 let points = inverse.points(self.record, start, &self.points[start / WINDOW]);

@@ -3,7 +3,7 @@
 //! ```text
 //!   blocks of 200 ──► the quietest, by the drift of their thirds ──► V_k = mean (y_t+k - 2 y_t + y_t-k)^2 / 6
 //!
-//!   V_k = white + coloured (6 - 8 r^k + 2 r^2k) / 6 + motion k^4          r = exp(-1 / memory)
+//!   V_k = white + coloured (6 - 8 r^k + 2 r^2k) / 6 + motion k^4          r = exp(-1 / correlation time)
 //! ```
 //!
 //! White noise has the same V at every lag k, autocorrelated noise a V that grows to a plateau, and a smooth motion one that
@@ -150,13 +150,13 @@ mod tests {
     use rand_core::{Rng, SeedableRng};
     use rand_pcg::Pcg64;
 
-    /// Noise of 1 with a memory in samples, over a motion.
-    fn series(seed: u64, memory: f64, motion: impl Fn(f64) -> f64) -> Vec<Option<f64>> {
+    /// Noise of 1 with a correlation time in samples, over a motion.
+    fn series(seed: u64, correlation_time: f64, motion: impl Fn(f64) -> f64) -> Vec<Option<f64>> {
         let mut stream = Pcg64::seed_from_u64(seed);
         // Twelve uniform numbers of variance 1/12 make a normal one, near enough.
         let mut normal =
             || (0..12).map(|_| (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
-        let kept = if memory > 0.0 { (-1.0 / memory).exp() } else { 0.0 };
+        let kept = if correlation_time > 0.0 { (-1.0 / correlation_time).exp() } else { 0.0 };
         let mut last = normal();
         (0..20_000)
             .map(|at| {
@@ -169,21 +169,22 @@ mod tests {
     #[test]
     fn white_and_coloured_noise_at_rest_are_found_within_a_tenth() {
         for seed in 0..6 {
-            for memory in [0.0, 5.0] {
-                let found = of(&series(seed, memory, |_| 7.0)).unwrap();
+            for correlation_time in [0.0, 5.0] {
+                let found = of(&series(seed, correlation_time, |_| 7.0)).unwrap();
                 // 200 blocks of at least 20 independent samples: 1 % of a standard error.
-                assert!((found - 1.0).abs() < 0.05, "{memory}: {found}");
+                assert!((found - 1.0).abs() < 0.05, "{correlation_time}: {found}");
             }
         }
     }
 
     #[test]
     fn motion_does_not_count_as_noise() {
-        for memory in [0.0, 5.0] {
-            let moving = of(&series(1, memory, |at| 2000.0 * (at / 300.0).sin())).unwrap();
-            assert!((moving - 1.0).abs() < 0.25, "never at rest, {memory}: {moving}");
-            let resting = of(&series(1, memory, |at| 2000.0 * (at.min(18_000.0) / 300.0).sin())).unwrap();
-            assert!((resting - 1.0).abs() < 0.1, "at rest for a tenth, {memory}: {resting}");
+        for correlation_time in [0.0, 5.0] {
+            let moving = of(&series(1, correlation_time, |at| 2000.0 * (at / 300.0).sin())).unwrap();
+            assert!((moving - 1.0).abs() < 0.25, "never at rest, {correlation_time}: {moving}");
+            let resting =
+                of(&series(1, correlation_time, |at| 2000.0 * (at.min(18_000.0) / 300.0).sin())).unwrap();
+            assert!((resting - 1.0).abs() < 0.1, "at rest for a tenth, {correlation_time}: {resting}");
         }
     }
 

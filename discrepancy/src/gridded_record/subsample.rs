@@ -4,7 +4,7 @@
 //!   |......|lead|judged judged judged judged judged|............|lead|judged ...
 //! ```
 //!
-//! The first window of a block only fills lags and memories and counts as a gap ([`GriddedRecord::excluded_periods`]).
+//! The first window of a block only fills lags and internal states and counts as a gap ([`GriddedRecord::excluded_periods`]).
 
 use super::GriddedRecord;
 use crate::windows::WINDOW;

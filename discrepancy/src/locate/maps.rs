@@ -14,7 +14,7 @@ const LEAST: usize = 5;
 /// Smallest over_noise of a drawn balance.
 const DRAWN: f64 = 1.1;
 
-/// Maps of all significant balances over their strongest variables that are no memories, which may follow by chance.
+/// Maps of all significant balances over their strongest variables that are no history variables, which may follow by chance.
 pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
     let mut maps = Vec::new();
     for series in series.iter().filter(|series| series.over_noise().is_some_and(|over| over > DRAWN)) {

@@ -1,8 +1,8 @@
 //! Simulates a window with perturbed start state and unknown inputs.
 //!
-//! Windows start at the record's points; spool, lagged flows and memories of effects continue. When linked, the measured contact
-//! force is an input of both axes, since positions do not determine it at 2 N per micrometre. It acts as a hand force, so that
-//! the force sensors read it as on the rig [rig-model.md, Masses and linkage]. The axes are then independent, and one run
+//! Windows start at the record's points; spool, lagged flows and internal states of effects continue. When linked, the measured
+//! contact force is an input of both axes, since positions do not determine it at 2 N per micrometre. It acts as a hand force, so
+//! that the force sensors read it as on the rig [rig-model.md, Masses and linkage]. The axes are then independent, and one run
 //! perturbs both.
 //!
 //! An unknown force acts as a hand force, without its reading by the sensor. An unknown flow is added to the stored air at the

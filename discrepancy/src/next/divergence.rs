@@ -12,9 +12,9 @@
 //! a share e of the signature. T counts that share as noise: it equals D for a weak signature, and for a strong one T >= 25 means
 //! a cosine below 0.95. The amplitude is refitted although the first record bounds it, so that T is conservative.
 //!
-//! Windows start at the true x, v, p_a, p_b of the run; spool, lagged flow and memories of effects continue in each plant. The
-//! first window is left out, since memories fill in it. Force readings next to a stop, a break-away or a contact are excluded:
-//! microseconds there are hundreds of newtons in a sample.
+//! Windows start at the true x, v, p_a, p_b of the run; spool, lagged flow and internal states of effects continue in each plant.
+//! The first window is left out, since internal states fill in it. Force readings next to a stop, a break-away or a contact are
+//! excluded: microseconds there are hundreds of newtons in a sample.
 //!
 //! Source: discrepancy-notes.md, 1 and pipeline 9; Hunter and Reiner 1965, Technometrics 7(3): designs for discriminating
 //! between two rival models.

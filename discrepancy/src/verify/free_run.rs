@@ -6,7 +6,7 @@ use crate::windows::{first_state, set_state};
 use plant::{Axis, PERIOD_S, Plant, RigParameters};
 use std::collections::BTreeMap;
 
-/// Periods that are not judged: memories and lags fill [rig-model.md, Accuracy].
+/// Periods that are not judged: internal states and lags fill [rig-model.md, Accuracy].
 const FILLING: usize = 100;
 /// Pressure that air from the supply does not exceed by much in a chamber, over the supply's.
 const HIGHEST: f64 = 1.1;

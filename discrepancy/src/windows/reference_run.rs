@@ -17,7 +17,7 @@ use plant::{Axis, Plant, RigParameters, State};
 #[derive(Clone, Debug, Default)]
 pub struct ReferenceRun {
     simulated: Vec<f64>,
-    /// Start state of each judged window; empty for rigs with effects, whose memories are no part of it.
+    /// Start state of each judged window; empty for rigs with effects, whose internal states are no part of it.
     states: Vec<State>,
     ranges_of_windows: Vec<VariableRanges>,
 }
