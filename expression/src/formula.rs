@@ -65,8 +65,10 @@ impl Formula {
     ) -> Result<Self, Wrong> {
         let mut nodes = Nodes::default();
         let root = nodes.parse(text, at)?;
-        let tables: Vec<Table> =
-            known.tables.iter().filter(|table| calls(&nodes, root, &table.name)).cloned().collect();
+        let is_called = |table: &&Table| {
+            nodes.tree(root).any(|node| matches!(&node.kind, Kind::Call(name, _) if *name == table.name))
+        };
+        let tables: Vec<Table> = known.tables.iter().filter(is_called).cloned().collect();
         let (has_tables, known) = (!known.tables.is_empty(), Known { tables: &tables, ..known });
         let Known { variables, parameters, .. } = known;
         let leaves = Leaves { inputs: variables.len(), parameters: parameters.len(), ..Leaves::default() };
@@ -77,7 +79,11 @@ impl Formula {
             None => [std::f64::consts::PI; 2],
         };
         let bounds = bounds(&names.nodes, root, &of, &tables)?;
-        let is_read: Vec<bool> = variables.iter().map(|variable| names.reads(root, variable.name)).collect();
+        let is_read = |variable: &Variable<'_>| {
+            let is_it = |node: &Node| matches!(&node.kind, Kind::Name(name) if name == variable.name);
+            names.nodes.tree(root).any(is_it).then_some(variable.range)
+        };
+        let ranges = variables.iter().map(is_read).collect();
         let result = Compile::node(&mut names, root, ())?;
         let tape = names.builder.tape(&[result], tables.iter().map(|table| table.curve.clone()).collect());
         if tape.registers() > MOST_REGISTERS {
@@ -86,11 +92,6 @@ impl Formula {
         }
         let mut registers = [0.0; MOST_REGISTERS];
         tape.begin(&mut registers);
-        let ranges = variables
-            .iter()
-            .zip(is_read)
-            .map(|(variable, is_read)| is_read.then_some(variable.range))
-            .collect();
         Ok(Self {
             tape,
             ranges,
@@ -143,17 +144,6 @@ impl Formula {
     }
 }
 
-/// Whether a function or table is called in a tree.
-fn calls(nodes: &Nodes, place: Place, wanted: &str) -> bool {
-    let calls = |place: &Place| calls(nodes, *place, wanted);
-    match &nodes.get(place).kind {
-        Kind::Number(..) | Kind::Name(_) => false,
-        Kind::Negation(inner) => calls(inner),
-        Kind::Binary(_, left, right) => calls(left) || calls(right),
-        Kind::Call(name, arguments) => name == wanted || arguments.iter().any(calls),
-    }
-}
-
 struct Names<'a> {
     nodes: Nodes,
     /// With the tables that it reads alone.
@@ -176,17 +166,6 @@ impl Names<'_> {
     /// The place of a table of this name.
     fn table(&self, name: &str) -> Option<usize> {
         self.known.tables.iter().position(|table| table.name == name)
-    }
-
-    /// Whether a name stands in a tree.
-    fn reads(&self, place: Place, wanted: &str) -> bool {
-        match &self.nodes.get(place).kind {
-            Kind::Number(..) => false,
-            Kind::Name(name) => name == wanted,
-            Kind::Negation(inner) => self.reads(*inner, wanted),
-            Kind::Binary(_, left, right) => self.reads(*left, wanted) || self.reads(*right, wanted),
-            Kind::Call(_, arguments) => arguments.iter().any(|argument| self.reads(*argument, wanted)),
-        }
     }
 
     fn unknown(&self, name: &str, at: usize) -> Wrong {

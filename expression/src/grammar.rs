@@ -37,6 +37,17 @@ pub enum Kind {
     Call(String, Vec<Place>),
 }
 
+impl Kind {
+    fn operands(&self) -> Vec<Place> {
+        match self {
+            Kind::Number(..) | Kind::Name(_) => Vec::new(),
+            Kind::Negation(inner) => vec![*inner],
+            Kind::Binary(_, left, right) => vec![*left, *right],
+            Kind::Call(_, arguments) => arguments.clone(),
+        }
+    }
+}
+
 /// Operators between two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Binary {
@@ -94,14 +105,18 @@ impl Nodes {
         &self.0
     }
 
+    /// A node and all that it is made of, from left to right.
+    pub fn tree(&self, root: Place) -> impl Iterator<Item = &Node> {
+        let mut left = vec![root];
+        std::iter::from_fn(move || {
+            let node = self.get(left.pop()?);
+            left.extend(node.kind.operands().into_iter().rev());
+            Some(node)
+        })
+    }
+
     fn push(&mut self, kind: Kind, at: usize) -> Result<Place, Wrong> {
-        let below: &[Place] = match &kind {
-            Kind::Number(..) | Kind::Name(_) => &[],
-            Kind::Negation(inner) => &[*inner],
-            Kind::Binary(_, left, right) => &[*left, *right],
-            Kind::Call(_, arguments) => arguments,
-        };
-        let depth = 1 + below.iter().map(|place| self.get(*place).depth).max().unwrap_or(0);
+        let depth = 1 + kind.operands().iter().map(|place| self.get(*place).depth).max().unwrap_or(0);
         if depth > DEEPEST {
             return Err(Wrong::new(at, too_deep()));
         }

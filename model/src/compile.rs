@@ -4,7 +4,7 @@
 //!   equation of its file ──► + the suspects that are switched on, in their order ──► tape of rates, outputs, memories
 //! ```
 
-use crate::file::{Change, Expression, Model, Parameter, State, Target};
+use crate::file::{Change, Expression, Memory, Model, Parameter, State, Suspect, Target};
 use crate::inputs::Inputs;
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, name_of, resolve};
 use crate::tape::{Builder, Code, Leaves, Register, Registers, Tape};
@@ -44,6 +44,17 @@ pub(crate) fn direction_of(leaves: Leaves, model: &Model, friction: usize) -> Re
     leaves.memory(model.memories.len() + friction)
 }
 
+/// A tape whose results are registers of a compiler of its own.
+fn tape<'a>(
+    model: &'a Model,
+    suspects: &'a [usize],
+    results: impl FnOnce(&mut Compiler<'a>) -> Result<Vec<Register>, Wrong>,
+) -> Result<Tape, Wrong> {
+    let mut compiler = Compiler::new(model, suspects);
+    let results = results(&mut compiler)?;
+    Ok(compiler.builder.tape(&results, model.tables.iter().map(|table| table.curve.clone()).collect()))
+}
+
 /// The tapes with these suspects.
 pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
     let is_there = |owner: Option<usize>| model.is_there(owner, suspects);
@@ -53,38 +64,27 @@ pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
         (0..model.memories.len()).filter(|index| is_there(model.memories[*index].suspect)).collect();
     let frictions: Vec<usize> =
         (0..model.frictions.len()).filter(|index| is_there(model.frictions[*index].suspect)).collect();
-    let curves = || model.tables.iter().map(|table| table.curve.clone()).collect();
-    let mut compiler = Compiler::new(model, suspects);
-    let rates = states.iter().map(|state| compiler.rate(*state)).collect::<Result<Vec<_>, _>>()?;
-    let rates = compiler.builder.tape(&rates, curves());
-    let mut compiler = Compiler::new(model, suspects);
-    let outputs = (0..model.outputs.len()).map(|output| compiler.symbol(Symbol::Output(output), 0));
-    let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
-    let outputs = compiler.builder.tape(&outputs, curves());
-    let mut compiler = Compiler::new(model, suspects);
-    let updates = memories.iter().map(|index| {
-        let memory = &model.memories[*index];
-        compiler.node(memory.update.root, Scope { suspect: memory.suspect, before: None })
-    });
-    let updates = updates.collect::<Result<Vec<_>, _>>()?;
-    let updates = compiler.builder.tape(&updates, curves());
-    let mut compiler = Compiler::new(model, suspects);
-    let starts = memories.iter().map(|index| {
-        let memory = &model.memories[*index];
-        let scope = Scope { suspect: memory.suspect, before: None };
-        let constant = memory.start_si;
-        match &memory.start {
-            Some(start) => compiler.node(start.root, scope),
-            None => Ok(compiler.builder.constant(constant)),
-        }
-    });
-    let starts = starts.collect::<Result<Vec<_>, _>>()?;
-    let is_computed = memories.iter().any(|index| model.memories[*index].start.is_some());
-    let starts = is_computed.then(|| compiler.builder.tape(&starts, curves()));
-    let mut compiler = Compiler::new(model, suspects);
-    let guards = frictions.iter().map(|friction| compiler.guards(*friction));
-    let guards = guards.collect::<Result<Vec<_>, _>>()?.concat();
-    let guards = compiler.builder.tape(&guards, curves());
+    let scope = |suspect| Scope { suspect, before: None };
+    let rates = tape(model, suspects, |compiler| states.iter().map(|state| compiler.rate(*state)).collect())?;
+    let outputs = tape(model, suspects, |compiler| {
+        (0..model.outputs.len()).map(|output| compiler.symbol(Symbol::Output(output), 0)).collect()
+    })?;
+    let of_memories = || memories.iter().map(|index| &model.memories[*index]);
+    let updates = tape(model, suspects, |compiler| {
+        of_memories().map(|memory| compiler.node(memory.update.root, scope(memory.suspect))).collect()
+    })?;
+    let starts = tape(model, suspects, |compiler| {
+        let start = |memory: &Memory| match &memory.start {
+            Some(start) => compiler.node(start.root, scope(memory.suspect)),
+            None => Ok(compiler.builder.constant(memory.start_si)),
+        };
+        of_memories().map(start).collect()
+    })?;
+    let starts = of_memories().any(|memory| memory.start.is_some()).then_some(starts);
+    let guards = tape(model, suspects, |compiler| {
+        let guards = frictions.iter().map(|friction| compiler.guards(*friction));
+        Ok(guards.collect::<Result<Vec<_>, _>>()?.concat())
+    })?;
     Ok(Tapes { rates, outputs, updates, starts, guards, states, memories, frictions })
 }
 
@@ -109,11 +109,9 @@ pub(crate) fn frictions_hold(model: &Model, suspects: &[usize]) -> Result<(), Wr
 
 /// Values of an expression of inputs and fixed numbers at each sample.
 pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs<'_>) -> Vec<f64> {
-    let mut compiler = Compiler::new(model, &[]);
-    let result = compiler.node(expression.root, Scope { suspect: None, before: None });
-    let result = result.expect("it was checked when the file was read");
-    let curves = model.tables.iter().map(|table| table.curve.clone()).collect();
-    let tape = compiler.builder.tape(&[result], curves);
+    let scope = Scope { suspect: None, before: None };
+    let tape = tape(model, &[], |compiler| Ok(vec![compiler.node(expression.root, scope)?]))
+        .expect("it was checked when the file was read");
     let leaves = tape.leaves;
     let mut registers = Registers::new(&tape, 0, |_| false);
     for (index, parameter) in model.parameters.iter().enumerate() {
@@ -133,23 +131,16 @@ pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs
 
 /// Whether a suspect at an input is one that delays it.
 pub(crate) fn delays_its_place(model: &Model, suspect: usize) -> bool {
-    fn is_in(model: &Model, place: Place, suspect: usize) -> bool {
-        let inner = |place: &Place| is_in(model, *place, suspect);
-        match &model.nodes.get(place).kind {
-            Kind::Number(..) | Kind::Name(_) => false,
-            Kind::Negation(place) => inner(place),
-            Kind::Binary(_, left, right) => inner(left) || inner(right),
-            Kind::Call(name, arguments) => {
-                let is_place = |argument: &Place| match &model.nodes.get(*argument).kind {
-                    Kind::Name(name) => resolve(model, name, Some(suspect), 0) == Ok(Symbol::Before(suspect)),
-                    _ => false,
-                };
-                name == "delay" && is_place(&arguments[0]) || arguments.iter().any(inner)
-            }
-        }
-    }
-    matches!(model.suspects[suspect].target, Target::Input(_))
-        && is_in(model, model.suspects[suspect].expression.root, suspect)
+    let is_place = |argument: Place| match &model.nodes.get(argument).kind {
+        Kind::Name(name) => resolve(model, name, Some(suspect), 0) == Ok(Symbol::Before(suspect)),
+        _ => false,
+    };
+    let delays = |node: &Node| match &node.kind {
+        Kind::Call(name, arguments) => name == "delay" && is_place(arguments[0]),
+        _ => false,
+    };
+    let Suspect { target, expression, .. } = &model.suspects[suspect];
+    matches!(target, Target::Input(_)) && model.nodes.tree(expression.root).any(delays)
 }
 
 /// Where an expression stands: the suspect whose own names it may use, and the value that its place has without it.

@@ -51,17 +51,27 @@ pub(crate) fn name_of(model: &Model, symbol: Symbol) -> &str {
     }
 }
 
-fn own(model: &Model, name: &str, suspect: Option<usize>) -> Option<Symbol> {
-    let is_it = |(other, of): (&String, Option<usize>)| other == name && of.is_some() && of == suspect;
-    let parameter = model.parameters.iter().position(|one| is_it((&one.name, one.suspect)));
-    let state = || model.states.iter().position(|one| is_it((&one.name, one.suspect)));
-    let memory = || model.memories.iter().position(|one| is_it((&one.name, one.suspect)));
-    let friction = || model.frictions.iter().position(|one| is_it((&one.name, one.suspect)));
-    parameter
-        .map(Symbol::Parameter)
-        .or_else(|| state().map(Symbol::State))
-        .or_else(|| memory().map(Symbol::Memory))
-        .or_else(|| friction().map(Symbol::Friction))
+/// What a file gives names to, with the suspect that it belongs to, in the order in which a name is looked up.
+pub(crate) fn named_parts(model: &Model) -> impl Iterator<Item = (Symbol, &String, Option<usize>)> {
+    let inputs = model.inputs.iter().map(|one| (&one.name, None));
+    let states = model.states.iter().map(|one| (&one.name, one.suspect));
+    let parameters = model.parameters.iter().map(|one| (&one.name, one.suspect));
+    let memories = model.memories.iter().map(|one| (&one.name, one.suspect));
+    let frictions = model.frictions.iter().map(|one| (&one.name, one.suspect));
+    let definitions = model.definitions.iter().map(|one| (&one.name, one.suspect));
+    numbered(Symbol::Input, inputs)
+        .chain(numbered(Symbol::State, states))
+        .chain(numbered(Symbol::Parameter, parameters))
+        .chain(numbered(Symbol::Memory, memories))
+        .chain(numbered(Symbol::Friction, frictions))
+        .chain(numbered(Symbol::Definition, definitions))
+}
+
+fn numbered<'a>(
+    symbol: fn(usize) -> Symbol,
+    names: impl Iterator<Item = (&'a String, Option<usize>)>,
+) -> impl Iterator<Item = (Symbol, &'a String, Option<usize>)> {
+    names.enumerate().map(move |(index, (name, suspect))| (symbol(index), name, suspect))
 }
 
 pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usize) -> Result<Symbol, Wrong> {
@@ -71,7 +81,9 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
         _ => {}
     }
     if let Some(name) = name.strip_prefix(OWN) {
-        return own(model, name, suspect).ok_or_else(|| Wrong::new(at, format!("'{name}' is unknown")));
+        let mut own = named_parts(model).filter(|(_, _, of)| of.is_some() && *of == suspect);
+        let found = own.find(|(_, other, _)| *other == name).map(|(symbol, ..)| symbol);
+        return found.ok_or_else(|| Wrong::new(at, format!("'{name}' is unknown")));
     }
     let owner = suspect.and_then(|index| model.suspects.get(index));
     // The file's own names alone may stand in what a suspect of a library is bound to.
@@ -84,35 +96,10 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
     {
         return Ok(Symbol::Before(suspect));
     }
-    let find = |mut names: Box<dyn Iterator<Item = (&String, Option<usize>)> + '_>| {
-        names.position(|(other, of)| other == name && seen(of))
-    };
-    let parameters = find(Box::new(model.parameters.iter().map(|one| (&one.name, one.suspect))));
-    let states = find(Box::new(model.states.iter().map(|one| (&one.name, one.suspect))));
-    let memories = find(Box::new(model.memories.iter().map(|one| (&one.name, one.suspect))));
-    let frictions = find(Box::new(model.frictions.iter().map(|one| (&one.name, one.suspect))));
-    let definitions = find(Box::new(model.definitions.iter().map(|one| (&one.name, one.suspect))));
-    let inputs = model.inputs.iter().position(|one| one.name == name);
-    let symbol = inputs
-        .map(Symbol::Input)
-        .or(states.map(Symbol::State))
-        .or(parameters.map(Symbol::Parameter))
-        .or(memories.map(Symbol::Memory))
-        .or(frictions.map(Symbol::Friction))
-        .or(definitions.map(Symbol::Definition));
-    symbol.ok_or_else(|| {
-        let known: Vec<&str> = model
-            .inputs
-            .iter()
-            .map(|one| &one.name)
-            .chain(model.states.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
-            .chain(model.parameters.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
-            .chain(model.memories.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
-            .chain(model.frictions.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
-            .chain(model.definitions.iter().filter(|one| seen(one.suspect)).map(|one| &one.name))
-            .map(String::as_str)
-            .take(30)
-            .collect();
+    let mut parts = named_parts(model).filter(|(_, _, of)| seen(*of));
+    parts.find(|(_, other, _)| *other == name).map(|(symbol, ..)| symbol).ok_or_else(|| {
+        let parts = named_parts(model).filter(|(_, _, of)| seen(*of));
+        let known: Vec<&str> = parts.map(|(_, name, _)| name.as_str()).take(30).collect();
         Wrong::new(at, format!("'{name}' is unknown here; known are t, pi, {}", known.join(", ")))
     })
 }

@@ -7,6 +7,7 @@ mod suspects;
 use crate::file::{
     Definition, Expression, Memory, Model, Output, Parameter, RecordLayout, Solver, Start, State, Table,
 };
+use crate::names::named_parts;
 use crate::rows::Rows;
 use crate::units::{Dimension, Unit};
 use expression::compile::RESERVED;
@@ -249,12 +250,7 @@ impl Reader<'_> {
         }
         let model = &self.model;
         let local = |of: Option<usize>| of.is_none() || of == suspect;
-        let taken = model.inputs.iter().any(|input| input.name == name)
-            || model.parameters.iter().any(|one| one.name == name && local(one.suspect))
-            || model.states.iter().any(|one| one.name == name && local(one.suspect))
-            || model.memories.iter().any(|one| one.name == name && local(one.suspect))
-            || model.frictions.iter().any(|one| one.name == name && local(one.suspect))
-            || model.definitions.iter().any(|one| one.name == name && local(one.suspect))
+        let taken = named_parts(model).any(|(_, other, of)| other == name && local(of))
             || model.outputs.iter().any(|output| output.name == name)
             || model.tables.iter().any(|table| table.name == name);
         if taken {

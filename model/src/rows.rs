@@ -42,46 +42,33 @@ impl Default for Rows {
     }
 }
 
-/// Whether an expression can be computed before the model is.
-pub(crate) fn reads_inputs_alone(model: &Model, place: Place) -> Result<(), Wrong> {
-    let node = model.nodes.get(place);
-    match &node.kind {
-        Kind::Number(..) => Ok(()),
-        Kind::Name(name) => match resolve(model, name, None, node.at)? {
-            Symbol::Time | Symbol::Pi | Symbol::Input(_) => Ok(()),
-            Symbol::Parameter(index) if model.parameters[index].is_one_constant() => Ok(()),
-            _ => Err(Wrong::new(
-                node.at,
-                format!("'{name}': rows and folds read inputs and fixed numbers alone"),
-            )),
-        },
-        Kind::Negation(inner) => reads_inputs_alone(model, *inner),
-        Kind::Binary(_, left, right) => {
-            reads_inputs_alone(model, *left)?;
-            reads_inputs_alone(model, *right)
-        }
-        Kind::Call(_, arguments) => {
-            arguments.iter().try_for_each(|argument| reads_inputs_alone(model, *argument))
-        }
-    }
+/// Refuses an expression that cannot be computed before the model is.
+pub(crate) fn reads_inputs_alone(model: &Model, root: Place) -> Result<(), Wrong> {
+    let is_known = |symbol| match symbol {
+        Symbol::Time | Symbol::Pi | Symbol::Input(_) => true,
+        Symbol::Parameter(index) => model.parameters[index].is_one_constant(),
+        _ => false,
+    };
+    reads_alone((model, root, None), is_known, "rows and folds read inputs and fixed numbers alone")
 }
 
 /// Refuses an expression that reads more than numbers: what a memory is before the first sample.
-pub(crate) fn reads_numbers_alone(model: &Model, place: Place, suspect: Option<usize>) -> Result<(), Wrong> {
-    let node = model.nodes.get(place);
-    match &node.kind {
-        Kind::Number(..) => Ok(()),
-        Kind::Name(name) => match resolve(model, name, suspect, node.at)? {
-            Symbol::Pi | Symbol::Parameter(_) => Ok(()),
-            _ => Err(Wrong::new(node.at, format!("'{name}': the start of a memory reads parameters alone"))),
-        },
-        Kind::Negation(inner) => reads_numbers_alone(model, *inner, suspect),
-        Kind::Binary(_, left, right) => {
-            reads_numbers_alone(model, *left, suspect)?;
-            reads_numbers_alone(model, *right, suspect)
-        }
-        Kind::Call(_, arguments) => {
-            arguments.iter().try_for_each(|argument| reads_numbers_alone(model, *argument, suspect))
+pub(crate) fn reads_numbers_alone(model: &Model, root: Place, suspect: Option<usize>) -> Result<(), Wrong> {
+    let is_number = |symbol| matches!(symbol, Symbol::Pi | Symbol::Parameter(_));
+    reads_alone((model, root, suspect), is_number, "the start of a memory reads parameters alone")
+}
+
+fn reads_alone(
+    (model, root, suspect): (&Model, Place, Option<usize>),
+    is_allowed: impl Fn(Symbol) -> bool,
+    why: &str,
+) -> Result<(), Wrong> {
+    for node in model.nodes.tree(root) {
+        if let Kind::Name(name) = &node.kind
+            && !is_allowed(resolve(model, name, suspect, node.at)?)
+        {
+            return Err(Wrong::new(node.at, format!("'{name}': {why}")));
         }
     }
+    Ok(())
 }

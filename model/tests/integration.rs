@@ -1,6 +1,6 @@
 //! What is integrated, against closed forms, against an integrator by others, derivatives against differences.
 
-use crate::{counting, differences, first_values, read, refused, simulated};
+use crate::{counting, differences, first_values, outputs, read, refused, simulated};
 use model::{Direction, Failure, Inputs, Model, Program, Simulator};
 use nalgebra::DVector;
 use ode_solvers::dop_shared::OutputType;
@@ -104,9 +104,8 @@ fn both_methods_agree_with_an_integrator_by_others() {
             let model = oscillator(hold, solver);
             let (time_s, inputs) = samples();
             let inputs = Inputs { time_s: &time_s, samples_si: &inputs };
-            let program = Program::new(&model, &[]).unwrap();
-            let computed = simulated(&program, &[], &inputs, &first_values(&model)).unwrap();
-            for ((row, expected), (computed, _)) in expected.iter().enumerate().zip(&computed) {
+            let computed = outputs(&model, &[], &inputs).unwrap();
+            for ((row, expected), computed) in expected.iter().enumerate().zip(&computed) {
                 assert!(
                     (computed - expected).abs() < 2e-5,
                     "{hold} {solver:?} row {row}: {computed} for {expected}"
@@ -188,12 +187,7 @@ fn delayed(changes: &str, suspects: &[usize]) -> Vec<f64> {
     let time_s = [0.0, 1.0, 2.0, 3.0, 4.0];
     let samples = [vec![0.0, 2.0, 0.0, 8.0, 4.0], vec![0.0, 10.0, 20.0, 30.0, 40.0]];
     let inputs = Inputs { time_s: &time_s, samples_si: &samples };
-    let program = Program::new(&model, suspects).unwrap();
-    simulated(&program, &[], &inputs, &first_values(&model))
-        .unwrap()
-        .into_iter()
-        .map(|(value, _)| value)
-        .collect()
+    outputs(&model, suspects, &inputs).unwrap()
 }
 
 /// `delay` read the samples of the record, and dropped every term and suspect at its input.
@@ -220,11 +214,7 @@ fn a_lag_and_a_dead_time_at_one_input_are_both_there() {
     let time_s: Vec<f64> = (0..200_u32).map(|index| 0.1 * f64::from(index)).collect();
     let samples = [time_s.iter().map(|time_s| (time_s - 1.0).max(0.0)).collect()];
     let inputs = Inputs { time_s: &time_s, samples_si: &samples };
-    let values = |suspects: &[usize]| -> Vec<f64> {
-        let program = Program::new(&model, suspects).unwrap();
-        let all = simulated(&program, &[], &inputs, &first_values(&model)).unwrap();
-        all.into_iter().map(|(value, _)| value).collect()
-    };
+    let values = |suspects: &[usize]| outputs(&model, suspects, &inputs).unwrap();
     let (lag, orders) = (values(&[0]), [values(&[0, 1]), values(&[1, 0])]);
     for late in orders {
         for row in 20..200 {
@@ -282,9 +272,7 @@ fn a_suspect_changes_its_place_and_leaves_the_model_alone() {
     for (suspects, expected) in
         [(&[][..], 4.0), (&[0][..], 12.0), (&[1][..], 4.5), (&[2][..], 4.0), (&[0, 1, 2][..], 36.5)]
     {
-        let program = Program::new(&model, suspects).unwrap();
-        let computed = simulated(&program, &[], &inputs, &first_values(&model)).unwrap();
-        assert_eq!(computed[0].0, expected, "{suspects:?}");
+        assert_eq!(outputs(&model, suspects, &inputs).unwrap()[0], expected, "{suspects:?}");
     }
 }
 
@@ -312,8 +300,7 @@ fn what_runs_away_or_starts_as_no_number_is_reported() {
         ));
         let time_s = [0.0, 1.0, 5.0];
         let inputs = Inputs { time_s: &time_s, samples_si: &[] };
-        let program = Program::new(&model, &[]).unwrap();
-        simulated(&program, &[], &inputs, &first_values(&model)).expect_err(rate)
+        outputs(&model, &[], &inputs).expect_err(rate)
     };
     let at_start = run("1/x", 0.0);
     assert!(matches!(&at_start, Failure::Start { place, .. } if place == "model.toml:3:15"), "{at_start:?}");

@@ -1,16 +1,13 @@
 //! What jumps or leaves zero within a step, against closed forms and against short steps: step control finds it.
 
-use crate::{first_values, read, refused, simulated};
+use crate::{first_values, outputs, read, refused, simulated};
 use model::{Direction, Failure, Inputs, Program, Simulator};
 
 /// The first output at samples `period_s` apart; inputs in SI.
 fn output(text: &str, period_s: f64, rows: usize, inputs: &[Vec<f64>]) -> Result<Vec<f64>, Failure> {
     let model = read(text);
     let time_s: Vec<f64> = (0..rows).map(|row| period_s * row as f64).collect();
-    let inputs = Inputs { time_s: &time_s, samples_si: inputs };
-    let program = Program::new(&model, &[]).expect("it compiles");
-    let rows = simulated(&program, &[], &inputs, &first_values(&model))?;
-    Ok(rows.into_iter().map(|(value, _)| value).collect())
+    outputs(&model, &[], &Inputs { time_s: &time_s, samples_si: inputs })
 }
 
 /// Six lags in a row behind a step; the last state begins as t^6: 1 - exp(-t) (1 + t + ... + t^5/5!).

@@ -35,6 +35,19 @@ pub(crate) fn refused(text: &str) -> String {
     Model::parse(text, Path::new("model.toml")).expect_err(text).to_string()
 }
 
+/// Refuses a file with each replacement of a part of it, all with their place and with these words.
+pub(crate) fn refuses_each(text: &str, replacements: &[(&str, &str, &str)]) {
+    let mut wrong = Vec::new();
+    for (from, to, message) in replacements {
+        assert!(text.contains(from), "{from}");
+        let found = refused(&text.replacen(from, to, 1));
+        if !found.contains(message) || !found.starts_with("model.toml:") {
+            wrong.push(format!("{from} -> {to}\n  {found}\n  {message}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 /// First values of a model's parameters, states and memories.
 pub(crate) fn first_values(model: &Model) -> [Vec<f64>; 3] {
     let start = |start: Start| match start {
@@ -67,6 +80,13 @@ pub(crate) fn differences(
     };
     let (ahead, behind) = (moved(step), moved(-step));
     ahead.iter().zip(&behind).map(|(ahead, behind)| (ahead.0 - behind.0) / (2.0 * step)).collect()
+}
+
+/// All outputs, row by row, of a model with these suspects and its first values.
+pub(crate) fn outputs(model: &Model, suspects: &[usize], inputs: &Inputs<'_>) -> Result<Vec<f64>, Failure> {
+    let program = Program::new(model, suspects).expect("it compiles");
+    let rows = simulated(&program, &[], inputs, &first_values(model))?;
+    Ok(rows.into_iter().map(|(value, _)| value).collect())
 }
 
 /// Values and derivatives of all outputs, row by row.

@@ -4,7 +4,7 @@ use super::Reader;
 use crate::check::{dimension, target_dimension};
 use crate::file::{Change, Expression, Memory, Parameter, Start, State, Suspect, Target};
 use crate::library::{Entry, EntryFriction, Found, Library, PLACE, Quantity};
-use crate::names::own_name;
+use crate::names::{Symbol, named_parts, own_name};
 use crate::units::{Dimension, Unit};
 use expression::grammar::{Kind, Place, Stands, Wrong, is_of_name, renamed};
 use settings::{Section, SettingsError, Text};
@@ -355,18 +355,18 @@ impl Reader<'_> {
     fn target(&self, text: &Text) -> Result<Target, SettingsError> {
         let model = &self.model;
         let name = &text.text;
-        let input = model.inputs.iter().position(|one| one.name == *name).map(Target::Input);
-        let states = model.states.iter().position(|one| one.suspect.is_none() && one.name == *name);
-        let defined = model.definitions.iter().position(|one| one.suspect.is_none() && one.name == *name);
-        let output = model.outputs.iter().position(|one| one.name == *name).map(Target::Output);
-        let all = input.or(states.map(Target::State)).or(defined.map(Target::Definition)).or(output);
-        all.ok_or_else(|| {
-            let inputs = model.inputs.iter().map(|one| &one.name);
-            let states = model.states.iter().filter(|one| one.suspect.is_none()).map(|one| &one.name);
-            let defined = model.definitions.iter().filter(|one| one.suspect.is_none()).map(|one| &one.name);
-            let outputs = model.outputs.iter().map(|one| &one.name);
-            let all = inputs.chain(states).chain(defined).chain(outputs);
-            let all = all.map(String::as_str).collect::<Vec<_>>().join(", ");
+        let parts = named_parts(model).filter(|(_, _, suspect)| suspect.is_none());
+        let parts = parts.filter_map(|(symbol, name, _)| match symbol {
+            Symbol::Input(index) => Some((Target::Input(index), name)),
+            Symbol::State(index) => Some((Target::State(index), name)),
+            Symbol::Definition(index) => Some((Target::Definition(index), name)),
+            _ => None,
+        });
+        let outputs = model.outputs.iter().enumerate();
+        let outputs = outputs.map(|(index, one)| (Target::Output(index), &one.name));
+        let all: Vec<(Target, &String)> = parts.chain(outputs).collect();
+        all.iter().find(|(_, other)| *other == name).map(|(target, _)| *target).ok_or_else(|| {
+            let all = all.iter().map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ");
             let why =
                 format!("'{name}' is no input, state, definition or output of this model; it has {all}");
             self.source.wrong_from(text.at, &why)
