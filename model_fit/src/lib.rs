@@ -91,7 +91,7 @@ pub use extended::{ExtendError, ReportedModel, extended};
 pub use held_out::{JudgeError, WORSE};
 pub use processing::SPARSEST;
 pub use record::RecordError;
-pub use report::{Left, ModelReport, OfAlternative};
+pub use report::{Left, ModelReport, Number, OfAlternative};
 pub use simulate::{Simulated, SimulatedOutput, simulate};
 pub use verdict::Verdict;
 

@@ -1,9 +1,8 @@
 //! Whether a report says that what is left is more than noise.
 
-use crate::closing::close;
+use crate::closing::{close, file, random};
 use model_fit::ClosedModel;
 use model_fit::Verdict;
-use std::fs;
 
 const LINE: &str = r#"
 [inputs.u]
@@ -26,10 +25,7 @@ parameters.o = { unit = "mm", value = 0.1 }
 /// 600 rows of 3 mm/V, a noise of 0.1 mm, and something more.
 fn closed(model: &str, more: impl Fn(f64) -> f64) -> ClosedModel {
     let mut state = 1_u64;
-    let mut random = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
+    let mut random = || random(&mut state);
     let mut text = "t_s,u,y\n".to_owned();
     for row in 0..600 {
         let [t, u] = [f64::from(row) * 0.1, f64::from(row / 7 % 5) - 2.0];
@@ -37,10 +33,9 @@ fn closed(model: &str, more: impl Fn(f64) -> f64) -> ClosedModel {
         text += &format!("{t},{u},{}\n", 3.0 * u + 0.346 * random() + more(t));
     }
     let folder = tempfile::tempdir().unwrap();
-    let [file, record] = ["model.toml", "record.csv"].map(|name| folder.path().join(name));
-    fs::write(&file, model).unwrap();
-    fs::write(&record, text).unwrap();
-    close(&file, &[record], &[], &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    let [model, record] =
+        [("model.toml", model), ("record.csv", &text)].map(|(name, text)| file(folder.path(), name, text));
+    close(&model, &[record], &[], &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn slow(t: f64) -> f64 {

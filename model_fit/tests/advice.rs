@@ -6,9 +6,8 @@
 //! A gain of the input and a gain of the flow between the two do the same to `lower`, and only the first one changes `upper`. A
 //! gain of the sensor that is fitted hides them both.
 
-use crate::closing::close;
+use crate::closing::{close, file};
 use model_fit::explain;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 const TANKS: &str = r#"
@@ -48,7 +47,6 @@ parameters.k = { value = 0.1, range = [-1, 1] }
 
 /// 40 s at 5 Hz by Euler, an input that jumps, and errors of about a thousandth.
 fn files(folder: &Path, model: &str) -> [PathBuf; 2] {
-    let [file, record] = ["tanks.toml", "record.csv"].map(|name| folder.join(name));
     let (mut upper, mut lower) = (0.0, 0.0);
     let mut text = "t_s,u,level\n".to_owned();
     for row in 0..200 {
@@ -59,9 +57,7 @@ fn files(folder: &Path, model: &str) -> [PathBuf; 2] {
             upper += 2e-3 * (u - upper / 5.0);
         }
     }
-    fs::write(&file, model).unwrap();
-    fs::write(&record, text).unwrap();
-    [file, record]
+    [file(folder, "tanks.toml", model), file(folder, "record.csv", &text)]
 }
 
 #[test]

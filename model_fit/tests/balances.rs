@@ -1,19 +1,14 @@
 //! Model files of one balance, which integrate nothing, on records that are made here.
 
-use crate::closing::close_with;
+use crate::closing::{close_with, file, number, random};
 use model_fit::Verdict;
 use model_fit::{ClosedModel, ModelError, Search};
 use std::fmt::Write as _;
-use std::fs;
-use std::path::{Path, PathBuf};
 
 /// A path that repeats over 2000 samples: position a triangle, speed its sign; noise from a fixed sequence.
 fn path() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let mut seed = 1_u64;
-    let mut noise = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
+    let mut noise = || random(&mut seed);
     let at = |k: usize| (k % 200) as f64 / 100.0;
     let x = (0..2000).map(|k| if at(k) < 1.0 { at(k) } else { 2.0 - at(k) }).collect();
     let v = (0..2000).map(|k| if at(k) < 1.0 { 1.0 } else { -1.0 }).collect();
@@ -52,10 +47,10 @@ fn taken(model: &str, target: impl Fn(usize, f64, f64, f64) -> f64) -> (Verdict,
     let folder = tempfile::tempdir().unwrap();
     let (x, v, noise) = path();
     let row = |k: usize| format!("{k},{},{},{}\n", x[k], v[k], target(k, x[k], v[k], noise[k]));
-    let [file, record] = ["model.toml", "record.csv"].map(|name| folder.path().join(name));
-    fs::write(&file, model).unwrap();
-    fs::write(&record, "t_s,x,v,y\n".to_owned() + &(0..2000).map(row).collect::<String>()).unwrap();
-    let report = close_with(&file, (&[record], &[]), Search::Never, &mut |_| {})
+    let model = file(folder.path(), "model.toml", model);
+    let rows: String = (0..2000).map(row).collect();
+    let record = file(folder.path(), "record.csv", &format!("t_s,x,v,y\n{rows}"));
+    let report = close_with(&model, (&[record], &[]), Search::Never, &mut |_| {})
         .unwrap_or_else(|error| panic!("{error}"))
         .report;
     (report.verdict, report.named.into_iter().map(|named| named.suspect).collect())
@@ -127,23 +122,14 @@ fn mass(change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Result<ClosedModel, Mod
         let [t, x, f] = change(k, [t, x + 1e-6 * noise, force]);
         writeln!(text, "{t},{x},{f}").unwrap();
     }
-    let file = |name: &str, text: &str| -> PathBuf {
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        path
-    };
-    close_with(
-        Path::new(&file("mass.toml", MASS)),
-        (&[file("mass.csv", &text)], &[]),
-        Search::Never,
-        &mut |_| {},
-    )
+    let [model, record] =
+        [("mass.toml", MASS), ("mass.csv", &text)].map(|(name, text)| file(folder.path(), name, text));
+    close_with(&model, (&[record], &[]), Search::Never, &mut |_| {})
 }
 
 /// Whether the mass that a report tells is this, within a hundredth.
 fn is_near(closed: &ClosedModel, mass_kg: f64) -> bool {
-    let number = closed.report.parameters.iter().find(|number| number.name == "mass").unwrap();
-    (number.value / mass_kg - 1.0).abs() < 0.01
+    (number(&closed.report, "mass").value / mass_kg - 1.0).abs() < 0.01
 }
 
 #[test]
@@ -153,7 +139,7 @@ fn a_record_of_one_balance_is_checked_before_it_is_believed() {
     assert!(good.report.notes.is_empty(), "{:?}", good.report.notes);
 
     let turned = mass(|_, [t, x, f]| [t, x, -f]).unwrap().report;
-    let number = turned.parameters.iter().find(|number| number.name == "mass").unwrap();
+    let number = number(&turned, "mass");
     assert!(number.is_at_bound && number.value == 0.0, "{number:?}");
     assert!(
         turned.notes.iter().any(|note| note.contains("mass ended at the end of its range")),

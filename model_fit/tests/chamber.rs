@@ -1,6 +1,6 @@
 //! The model file of a chamber on records that the plant made: a hidden volume, a valve that passes more, nothing.
 
-use crate::closing::close_with;
+use crate::closing::{close_with, file, number};
 use crate::real::crate_folder;
 use model_fit::{ModelReport, Search, Verdict, simulate};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
@@ -33,8 +33,7 @@ fn pressure(start_pa: f64, valve: f64) -> Vec<f64> {
         String::from("time_s,drive_valve,drive_position_m,drive_pressure_a_Pa,drive_pressure_b_Pa\n");
     (0..68).for_each(|k| writeln!(text, "{:.3},{valve},0.1,{start_pa},1e5", f64::from(k) * 1e-3).unwrap());
     let folder = tempfile::tempdir().unwrap();
-    let record = folder.path().join("record.csv");
-    std::fs::write(&record, text).unwrap();
+    let record = file(folder.path(), "record.csv", &text);
     let table = simulate(&model(), &record).unwrap_or_else(|error| panic!("{error}")).table;
     table.lines().skip(1).map(|line| line.rsplit(',').next().unwrap().parse().unwrap()).collect()
 }
@@ -60,18 +59,10 @@ fn model() -> PathBuf {
 
 fn closed(rig: &RigParameters) -> ModelReport {
     let folder = tempfile::tempdir().unwrap();
-    let [train, test] = [1, 2].map(|seed| {
-        let file = folder.path().join(format!("{seed}.csv"));
-        std::fs::write(&file, record(rig, seed)).unwrap();
-        file
-    });
+    let [train, test] = [1, 2].map(|seed| file(folder.path(), &format!("{seed}.csv"), &record(rig, seed)));
     close_with(&model(), (&[train], &[test]), Search::Never, &mut |_| {})
         .unwrap_or_else(|error| panic!("{error}"))
         .report
-}
-
-fn number(report: &ModelReport, name: &str) -> f64 {
-    report.parameters.iter().find(|number| number.name == name).unwrap_or_else(|| panic!("{report:#?}")).value
 }
 
 #[test]
@@ -82,7 +73,7 @@ fn a_hidden_dead_volume_is_named_in_the_pressure_of_its_chamber() {
     assert_eq!(report.verdict, Verdict::Ambiguous, "{}", report.headline);
     assert_eq!(report.named[0].suspect, "dead-volume");
     assert_eq!(report.named[0].alternatives, ["position-sensor-offset"]);
-    let more = number(&report, "more");
+    let more = number(&report, "more").value;
     assert!((more - 30.0).abs() < 5.0, "{more} cm^3 more than the 20 of the file");
     assert_eq!(report.confirmed, Some(true), "{}", report.headline);
 }
@@ -102,5 +93,6 @@ fn a_chamber_whose_valve_passes_more_has_another_scale() {
     let rig = rig.with("valve.kv_supply_m3_per_h", &supply).unwrap();
     let report = closed(&rig.with("valve.kv_exhaust_m3_per_h", &exhaust).unwrap());
     assert_eq!((report.verdict, report.named[0].suspect.as_str()), (Verdict::Named, "valve-passes-more"));
-    assert!((number(&report, "scale") - 1.1).abs() < 0.03, "{}", number(&report, "scale"));
+    let scale = number(&report, "scale").value;
+    assert!((scale - 1.1).abs() < 0.03, "{scale}");
 }

@@ -1,9 +1,46 @@
-//! `close` of this crate, whose report is held against `docs/model-report.schema.json` in every test that closes a model.
+//! `close` of this crate, whose report is held against `docs/model-report.schema.json` in every test that closes a model, and
+//! what these tests share.
 
-use model_fit::{ClosedModel, ModelError, Search};
+use model_fit::{ClosedModel, ModelError, ModelReport, Number, Search};
 use serde_json::Value;
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::{Path, PathBuf};
+
+/// Values in -0.5 to 0.5.
+pub(crate) fn random(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+}
+
+/// A file of this name and text.
+pub(crate) fn file(folder: &Path, name: &str, text: &str) -> PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, text).unwrap();
+    path
+}
+
+/// A model closed on a training record and a held-out one, which lie beside it in the folder.
+pub(crate) fn closed(
+    folder: &Path,
+    (name, model): (&str, &str),
+    [train, test]: [String; 2],
+    search: Search,
+) -> ClosedModel {
+    let model = file(folder, name, model);
+    let (train, test) = (file(folder, "train.csv", &train), file(folder, "test.csv", &test));
+    close_with(&model, (&[train], &[test]), search, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+}
+
+pub(crate) fn number<'a>(report: &'a ModelReport, name: &str) -> &'a Number {
+    let number = report.parameters.iter().find(|number| number.name == name);
+    number.unwrap_or_else(|| panic!("{name}: {:#?}", report.parameters))
+}
+
+/// Names of the suspects that are named.
+pub(crate) fn named(report: &ModelReport) -> Vec<&str> {
+    report.named.iter().map(|named| named.suspect.as_str()).collect()
+}
 
 pub(crate) fn close(
     file: &Path,

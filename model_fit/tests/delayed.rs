@@ -1,9 +1,8 @@
 //! A feedback that acts late, found with its delay.
 
-use crate::closing::close;
-use model_fit::Verdict;
+use crate::closing::{closed, number, random};
+use model_fit::{Search, Verdict};
 use std::fmt::Write as _;
-use std::fs;
 
 const PERIOD_S: f64 = 0.05;
 const RATE: f64 = 0.6;
@@ -21,14 +20,10 @@ const MODEL: &str = "[inputs.u]\n[parameters.rate]\nunit = \"1/s\"\nvalue = 1\nr
     parameters.shift = { unit = \"1/s\", value = 0.1, range = [-5, 5] }\n";
 
 /// x' = 2 u - RATE x - FEEDBACK x(t - LATE) from 0, by 50 steps of Heun in a sample with straight lines between them.
-fn record(seed: u64) -> String {
+fn record(mut seed: u64) -> String {
     const STEPS: usize = 50;
     let step_s = PERIOD_S / STEPS as f64;
-    let mut state = seed;
-    let mut random = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
+    let mut random = || random(&mut seed);
     let mut x = vec![0.0_f64];
     let mut text = "t_s,u,y\n".to_owned();
     let mut u = 0.0;
@@ -57,19 +52,12 @@ fn record(seed: u64) -> String {
 #[test]
 fn a_late_feedback_is_found_with_its_delay() {
     let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        path
-    };
-    let model = file("model.toml", MODEL);
-    let (train, test) = ([file("train.csv", &record(1))], [file("test.csv", &record(2))]);
-    let closed = close(&model, &train, &test, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"));
-    let report = &closed.report;
+    let search = Search::MoreThanNoise;
+    let report = closed(folder.path(), ("model.toml", MODEL), [1, 2].map(record), search).report;
     assert_eq!((report.verdict, report.confirmed), (Verdict::Named, Some(true)), "{}", report.headline);
     assert_eq!(report.named[0].suspect, "late-feedback", "{}", report.headline);
     for (name, expected) in [("rate", RATE), ("gain", FEEDBACK), ("late", LATE_S)] {
-        let number = report.parameters.iter().find(|number| number.name == name).unwrap();
+        let number = number(&report, name);
         let error = number.standard_error.unwrap_or_else(|| panic!("{number:?}"));
         assert!((number.value - expected).abs() < 2.0 * error, "{number:?} for {expected}");
         // Half of the distance to the values from which the fit starts, at most.

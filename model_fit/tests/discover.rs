@@ -4,11 +4,10 @@
 //!   1.2 v' = force - 50 x - 1.3 v - hidden(x, v, low)        x' = v        low' = (x - low)/0.8 s
 //! ```
 
-use crate::closing::close_with;
+use crate::closing::{self, close_with, file, number, random};
 use crate::model_files::OSCILLATOR;
 use model_fit::Verdict;
 use model_fit::{ClosedModel, Search, read};
-use std::fs;
 use std::path::Path;
 
 /// The plant of the tests of model files, with one suspect that does not describe what is hidden here.
@@ -21,10 +20,7 @@ fn oscillator() -> String {
 
 /// 16 s at 50 Hz by 40 steps of leapfrog between two samples, noise of about 0.4 mm, a force that jumps.
 fn record(mut seed: u64, hidden: fn(f64, f64, f64) -> f64) -> String {
-    let mut random = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
+    let mut random = || random(&mut seed);
     let mut text = "t_s,force_N,x_mm\n".to_owned();
     let (mut x, mut v, mut low, mut force) = (0.0, 0.0, 0.0, 0.0);
     for row in 0..800 {
@@ -44,15 +40,8 @@ fn record(mut seed: u64, hidden: fn(f64, f64, f64) -> f64) -> String {
 }
 
 fn closed(folder: &Path, search: Search, hidden: fn(f64, f64, f64) -> f64) -> ClosedModel {
-    let file = |name: &str, text: &str| {
-        let path = folder.join(name);
-        fs::write(&path, text).unwrap();
-        path
-    };
-    let model = file("oscillator.toml", &oscillator());
-    let train = [file("train.csv", &record(1, hidden))];
-    let test = [file("test.csv", &record(3, hidden))];
-    close_with(&model, (&train, &test), search, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    let records = [1, 3].map(|seed| record(seed, hidden));
+    closing::closed(folder, ("oscillator.toml", &oscillator()), records, search)
 }
 
 /// What is left without it hangs together over the whole record; straight lines alone call it a constant.
@@ -83,8 +72,7 @@ fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written()
     // The formula says it, and nothing but noise is left.
     assert!(report.adequate && report.located.is_some(), "{:?}", report.located);
     assert!(!closed.page.contains("Where it comes from"));
-    let extended = folder.path().join("extended.toml");
-    fs::write(&extended, closed.extended.unwrap()).unwrap();
+    let extended = file(folder.path(), "extended.toml", &closed.extended.unwrap());
     let extended = read(&extended).unwrap_or_else(|error| panic!("{error}"));
     let found = extended.suspects.iter().position(|one| one.is_term && one.name == term.name).unwrap();
     let k = extended.parameters.iter().find(|one| one.suspect == Some(found)).unwrap();
@@ -103,13 +91,10 @@ fn a_term_with_memory_is_found_as_such() {
         ("equation of v", "x".to_owned()),
         "{term:?}"
     );
-    let number = |name: &str| report.parameters.iter().find(|one| one.name == name).unwrap();
-    let lag = number("lag_found");
+    let [lag, k] = ["lag_found", "k_found"].map(|name| number(&report, name));
     let error = lag.standard_error.unwrap();
     assert!((lag.value - 0.8).abs() < 4.0 * error + 0.01, "{lag:?}");
-    assert!(
-        number("k_found").standard_error.is_some_and(|error| error < 0.1 * number("k_found").value.abs())
-    );
+    assert!(k.standard_error.is_some_and(|error| error < 0.1 * k.value.abs()));
 }
 
 #[test]
@@ -137,15 +122,15 @@ fn nothing_is_searched_where_it_is_switched_off_or_noise_is_left() {
 #[test]
 fn a_search_that_takes_minutes_is_not_made_unasked() {
     let folder = tempfile::tempdir().unwrap();
-    let [file, train] = ["decay.toml", "train.csv"].map(|name| folder.path().join(name));
     let model = "[fit]\nstarts = 0\n[solver]\nmethod = \"fixed\"\nstep_s = 1.83e-4\n[inputs.u]\n[parameters]\n\
                  k = { unit = \"1/s\", value = 0.3 }\n[states.x]\nstart = 2\nderivative = \"k*(u - x)\"\n\
                  [outputs.y]\nvalue = \"x\"\n";
     // x' = -x^3/2 from 2.
     let row = |row: u32| format!("{},0,{}\n", 0.5 * f64::from(row), (0.25 + 0.5 * f64::from(row)).powf(-0.5));
-    fs::write(&file, model).unwrap();
-    fs::write(&train, "t_s,u,y\n".to_owned() + &(0..40).map(row).collect::<String>()).unwrap();
-    let report = close_with(&file, (&[train], &[]), Search::MoreThanNoise, &mut |_| {}).unwrap().report;
+    let model = file(folder.path(), "decay.toml", model);
+    let rows: String = (0..40).map(row).collect();
+    let train = file(folder.path(), "train.csv", &format!("t_s,u,y\n{rows}"));
+    let report = close_with(&model, (&[train], &[]), Search::MoreThanNoise, &mut |_| {}).unwrap().report;
     assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{report:#?}");
     assert!(report.discovered.is_empty());
     assert!(

@@ -1,6 +1,6 @@
 //! Numbers that are known of each record, and differ.
 
-use crate::closing::close;
+use crate::closing::{close, file, number};
 use model_fit::explain;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -29,10 +29,8 @@ fn record(folder: &Path, name: &str, mass: f64) -> PathBuf {
         let _ = writeln!(text, "{},{force},{}", f64::from(row) * 0.02, v + noise);
         v = force / 4.0 + (v - force / 4.0) * (-0.02 * 4.0 / mass).exp();
     }
-    let file = folder.join(name);
-    std::fs::create_dir_all(file.parent().unwrap()).unwrap();
-    std::fs::write(&file, text).unwrap();
-    file
+    std::fs::create_dir_all(folder.join(name).parent().unwrap()).unwrap();
+    file(folder, name, &text)
 }
 
 #[test]
@@ -40,19 +38,20 @@ fn a_fit_takes_the_mass_of_each_record_and_is_wrong_with_one_mass_for_both() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let train = [record(folder, "light/run.csv", 2.5), record(folder, "heavy.csv", 5.0)];
-    let model = folder.join("model.toml");
     let fitted = |text: &str| {
-        std::fs::write(&model, text).unwrap();
+        let model = file(folder, "model.toml", text);
         let report = close(&model, &train, &[], &mut |_| {}).unwrap_or_else(|error| panic!("{error}")).report;
-        let drag = report.parameters.iter().find(|one| one.name == "drag").unwrap().value;
-        (drag, report.training.iter().map(|left| left.rms_before).fold(0.0, f64::max))
+        (
+            number(&report, "drag").value,
+            report.training.iter().map(|left| left.rms_before).fold(0.0, f64::max),
+        )
     };
     let (drag, left) = fitted(MODEL);
     assert!((drag - 4.0).abs() < 0.01 && left < 1e-3, "{drag} N s/m, {left} m/s left");
     let known = r#"values = { "light/run.csv" = 2.5, "heavy.csv" = 5 }"#;
     let (drag, left) = fitted(&MODEL.replace(known, "value = 3.75, fixed = true"));
     assert!((drag - 4.0).abs() > 0.05 && left > 0.05, "{drag} N s/m, {left} m/s left");
-    std::fs::write(&model, MODEL).unwrap();
+    let model = file(folder, "model.toml", MODEL);
     let told = explain(&model, &[]).unwrap();
     assert!(told.contains("mass = 2.50 kg of light/run.csv, 5.00 kg of heavy.csv, known"), "{told}");
 }
@@ -60,8 +59,7 @@ fn a_fit_takes_the_mass_of_each_record_and_is_wrong_with_one_mass_for_both() {
 #[test]
 fn a_record_that_is_not_listed_is_refused_by_its_name() {
     let folder = tempfile::tempdir().unwrap();
-    let model = folder.path().join("model.toml");
-    std::fs::write(&model, MODEL).unwrap();
+    let model = file(folder.path(), "model.toml", MODEL);
     // The folder is a part of the name, too.
     let other = [record(folder.path(), "other/run.csv", 2.5)];
     let message = close(&model, &other, &[], &mut |_| {}).unwrap_err().to_string();

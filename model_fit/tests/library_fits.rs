@@ -6,11 +6,10 @@
 //! Its numbers are a fifth larger than a value of the library's; those that the library has at 0 are as large as makes it do
 //! half a unit. Records are of the same integrator, so that the laws and their fits are tested here, and not the integration.
 
-use crate::closing::close_with;
+use crate::closing::{close_with, file, number, random};
 use model::{Entry, Inputs, Library, Model, Program, Simulator, Start};
 use model_fit::Search;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 const ROWS: u32 = 200;
@@ -184,17 +183,13 @@ impl<'a> Plant<'a> {
     fn record(&self) -> String {
         let noise = 0.02 * self.effect(&self.measured);
         let mut state = 7_u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-        };
         let mut text = "t".to_owned();
         self.columns.iter().for_each(|(name, _)| text += &format!(",{name}"));
         text += ",y\n";
         for (row, measured) in (0..ROWS).zip(&self.measured) {
             let _ = write!(text, "{}", f64::from(row) * PERIOD_S);
             self.columns.iter().for_each(|(_, column)| text += &format!(",{:e}", column[row as usize]));
-            let normal: f64 = (0..12).map(|_| random()).sum();
+            let normal: f64 = (0..12).map(|_| random(&mut state)).sum();
             let _ = writeln!(text, ",{:e}", measured + noise * normal);
         }
         text
@@ -203,12 +198,12 @@ impl<'a> Plant<'a> {
     /// Whether it is named where the file does not know its numbers, and these are found within 5 % or their interval of 90 %.
     fn is_found(&self) -> Result<(), String> {
         let folder = tempfile::tempdir().unwrap();
-        let [model, train] = ["model.toml", "train.csv"].map(|file| folder.path().join(file));
         let needed = self.entry.parameters.iter().map(|parameter| {
             parameter.values_si.is_empty().then_some(NEEDED[usize::from(!parameter.is_fixed)])
         });
-        fs::write(&model, self.text("suspects", &needed.collect::<Vec<_>>())).unwrap();
-        fs::write(&train, self.record()).unwrap();
+        let text = self.text("suspects", &needed.collect::<Vec<_>>());
+        let model = file(folder.path(), "model.toml", &text);
+        let train = file(folder.path(), "train.csv", &self.record());
         let closed = close_with(&model, (&[train], &[]), Search::Never, &mut |_| {});
         let report = closed.map_err(|error| error.to_string())?.report;
         if report.named.len() != 1 {
@@ -216,7 +211,7 @@ impl<'a> Plant<'a> {
         }
         for (parameter, expected) in self.entry.parameters.iter().zip(&self.truth) {
             let Some(expected) = expected.filter(|_| !parameter.is_fixed) else { continue };
-            let number = report.parameters.iter().find(|one| one.name == parameter.name).unwrap();
+            let number = number(&report, &parameter.name);
             let away = (number.value - expected).abs();
             let is_inside = number.standard_error.is_some_and(|error| away < 1.645 * error);
             if away > 0.05 * expected.abs() && !is_inside {

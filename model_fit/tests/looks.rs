@@ -1,8 +1,7 @@
 //! What is said of a record before a model file is fitted to it.
 
-use crate::closing::close;
+use crate::closing::{close, file, random};
 use model_fit::{look, simulate};
-use std::fs;
 
 /// A tank that drains, a pump that fills it.
 const TANK: &str = r#"
@@ -25,10 +24,7 @@ value = "level"
 /// 400 rows of time, pump and level, 0.5 s apart; the pump jumps, the level has a noise of 10 mV.
 fn rows() -> Vec<[f64; 3]> {
     let (mut level, mut state) = (0.0, 7_u64);
-    let mut random = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
+    let mut random = || random(&mut state);
     let mut pump = 3.0;
     let row = |k: i32| {
         if k % 40 == 0 {
@@ -49,25 +45,24 @@ fn written(rows: impl Iterator<Item = [f64; 3]>) -> String {
 /// Notes of a record beside a model.
 fn notes(model: &str, rows: impl Iterator<Item = [f64; 3]>) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
-    fs::write(&file, model).unwrap();
-    fs::write(&record, written(rows)).unwrap();
-    look(&file, &[record]).unwrap_or_else(|error| panic!("{error}"))[0].notes.join("\n")
+    let model = file(folder.path(), "tank.toml", model);
+    let record = file(folder.path(), "record.csv", &written(rows));
+    look(&model, &[record]).unwrap_or_else(|error| panic!("{error}"))[0].notes.join("\n")
 }
 
 #[test]
 fn a_model_is_simulated_with_the_values_of_its_file_and_nothing_is_fitted() {
     let folder = tempfile::tempdir().unwrap();
-    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
     // In millivolts, with a row of units, and a suspect that does not act.
     let rows = rows().into_iter().map(|[t, pump, level]| [t, pump, level * 1e3]);
-    fs::write(&record, written(rows).replace("level_V\n", "level_V\ns,V,mV\n")).unwrap();
+    let rows = written(rows).replace("level_V\n", "level_V\ns,V,mV\n");
+    let record = file(folder.path(), "record.csv", &rows);
     let suspect = "[[suspects]]\nname = \"brim\"\nplace = \"level\"\nadd = \"-k*level\"\n\
                    parameters.k = { unit = \"1/s\", value = 1 }\n";
     let text = TANK.replace("unit = \"V\"\nvalue = \"level\"", "unit = \"mV\"\nvalue = \"level\"") + suspect;
     let of = |gain: &str| {
-        fs::write(&file, text.replace("value = 0.15", gain)).unwrap();
-        simulate(&file, &record).unwrap_or_else(|error| panic!("{error}"))
+        let model = file(folder.path(), "tank.toml", &text.replace("value = 0.15", gain));
+        simulate(&model, &record).unwrap_or_else(|error| panic!("{error}"))
     };
     let right = of("value = 0.2");
     // Noise of 35 mV / sqrt(12), and a level of some volts.
@@ -82,8 +77,8 @@ fn a_model_is_simulated_with_the_values_of_its_file_and_nothing_is_fitted() {
     assert_eq!(cells[0], 199.5);
     assert!((cells[2] - cells[3]).abs() < 40.0 && cells[3] > 500.0, "{cells:?}");
     let started = text.replace("start = 0", "start = \"fitted\"\nguess = 0");
-    fs::write(&file, started).unwrap();
-    let notes = simulate(&file, &record).unwrap().notes;
+    let model = file(folder.path(), "tank.toml", &started);
+    let notes = simulate(&model, &record).unwrap().notes;
     assert!(
         notes.iter().any(|note| note.starts_with("the start of level is fitted by a close")),
         "{notes:?}"
@@ -101,14 +96,13 @@ fn what_is_filled_into_a_hole_is_not_compared() {
     let said = notes(TANK, without());
     assert!(said.starts_with("lines 101 to 102: no row over 50.5 s, 101 usual periods: nothing"), "{said}");
     let folder = tempfile::tempdir().unwrap();
-    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
-    fs::write(&record, written(without())).unwrap();
+    let record = file(folder.path(), "record.csv", &written(without()));
     // As it is, on an even grid, and on one behind a filter.
     for (more, expected) in
         [("", 300), ("record.period_s = 0.5\n", 300), ("record.period_s = 0.5\nrows.every = 2\n", 150)]
     {
-        fs::write(&file, format!("{more}{TANK}")).unwrap();
-        let report = close(&file, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
+        let model = file(folder.path(), "tank.toml", &format!("{more}{TANK}"));
+        let report = close(&model, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
         let left = &report.training[0];
         assert!(left.rows.abs_diff(expected) <= 1, "{more}: {left:?}");
         assert!(report.notes[0].contains("no row over 50.5 s"), "{:?}", report.notes);
@@ -127,10 +121,9 @@ fn a_spike_is_left_out_with_its_line() {
     let said = notes(TANK, rows().into_iter().map(spiked));
     assert!(said.starts_with("line 122: level_V is 99999, far beyond all others ("), "{said}");
     let folder = tempfile::tempdir().unwrap();
-    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
-    fs::write(&file, TANK).unwrap();
-    fs::write(&record, written(rows().into_iter().map(spiked))).unwrap();
-    let report = close(&file, &[record], &[], &mut |_| {}).unwrap().report;
+    let model = file(folder.path(), "tank.toml", TANK);
+    let record = file(folder.path(), "record.csv", &written(rows().into_iter().map(spiked)));
+    let report = close(&model, &[record], &[], &mut |_| {}).unwrap().report;
     assert!(report.training[0].rows == 399 && report.training[0].rms_before < 0.02, "{:?}", report.training);
 }
 
@@ -180,15 +173,11 @@ fn a_model_of_another_size_than_the_record_is_noted_with_the_factor() {
 #[test]
 fn a_condition_that_few_rows_meet_is_said_with_what_it_reads() {
     let folder = tempfile::tempdir().unwrap();
-    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
-    fs::write(
-        &record,
-        "t_s,pump_V,level_V\n".to_owned() + &(0..40).map(|k| format!("{k},{k},1\n")).collect::<String>(),
-    )
-    .unwrap();
+    let rows: String = (0..40).map(|k| format!("{k},{k},1\n")).collect();
+    let record = file(folder.path(), "record.csv", &format!("t_s,pump_V,level_V\n{rows}"));
     let why = |rows: &str| {
-        fs::write(&file, format!("{rows}\n{TANK}")).unwrap();
-        look(&file, std::slice::from_ref(&record)).unwrap_err().to_string()
+        let model = file(folder.path(), "tank.toml", &format!("{rows}\n{TANK}"));
+        look(&model, std::slice::from_ref(&record)).unwrap_err().to_string()
     };
     let said = why("rows.where = \"pump > 50[V]\"");
     assert!(
@@ -204,13 +193,12 @@ fn a_condition_that_few_rows_meet_is_said_with_what_it_reads() {
 #[test]
 fn a_model_that_explains_nothing_of_an_output_is_noted_first_and_on_top_of_the_page() {
     let folder = tempfile::tempdir().unwrap();
-    let [file, record] = ["tank.toml", "record.csv"].map(|name| folder.path().join(name));
-    let closed = |model: &str, factor: f64| {
-        fs::write(&file, model).unwrap();
-        fs::write(&record, written(rows().into_iter().map(|[t, pump, level]| [t, pump, factor * level])))
-            .unwrap();
-        close(&file, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap()
+    let record = |factor: f64| {
+        let rows = rows().into_iter().map(|[t, pump, level]| [t, pump, factor * level]);
+        file(folder.path(), "record.csv", &written(rows))
     };
+    let model = |text: &str| file(folder.path(), "tank.toml", text);
+    let closed = |text: &str, factor: f64| close(&model(text), &[record(factor)], &[], &mut |_| {}).unwrap();
     let other = closed(TANK, 1e3);
     let [note, page] = [&other.report.notes[0], &other.page];
     assert!(note.contains("leaves more of seen") && note.contains("than its mean would"), "{note}");
@@ -223,10 +211,9 @@ fn a_model_that_explains_nothing_of_an_output_is_noted_first_and_on_top_of_the_p
     assert!(note.contains("leaves nearly as much of seen") && note.contains("as its mean would"), "{note}");
     let good = closed(TANK, 1.0).report.notes;
     assert!(good.iter().all(|note| !note.contains("mean would")), "{good:?}");
-    let text = model_fit::explain(&file, std::slice::from_ref(&record)).unwrap();
+    let text = model_fit::explain(&model(TANK), &[record(1.0)]).unwrap();
     assert!(!text.contains("\nnotes\n"), "{text}");
-    fs::write(&record, written(rows().into_iter().map(|[t, pump, level]| [t, pump, 1e3 * level]))).unwrap();
-    let text = model_fit::explain(&file, std::slice::from_ref(&record)).unwrap();
+    let text = model_fit::explain(&model(TANK), &[record(1e3)]).unwrap();
     assert!(text.contains("\nnotes\n  the fitted model leaves more of seen"), "{text}");
     assert!(text.contains("record.csv: before the fit the model gives 7.50·10⁻⁴ times"), "{text}");
 }

@@ -1,10 +1,9 @@
 //! Model files closed on records that are simulated here, by another integrator, with a term hidden or none.
 
-use crate::closing::close;
+use crate::closing::{close, file, number, random};
 use model_fit::Verdict;
 use model_fit::{ClosedModel, ModelReport, explain};
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A mass on a spring, pushed by a force; what may be missing, and a decoy.
 pub(crate) const OSCILLATOR: &str = r#"
@@ -64,13 +63,9 @@ parameters.rate = { unit = "mm/s", value = 1, range = [-100, 100] }
 "#;
 
 /// 20 s at 50 Hz by 40 steps of semi-implicit Euler between two samples, noise of about 0.6 mm, a force that jumps.
-fn record(seed: u64, hidden: impl Fn(f64, f64) -> f64) -> String {
+fn record(mut seed: u64, hidden: impl Fn(f64, f64) -> f64) -> String {
     let mut text = "t_s,force_N,x_mm\n".to_owned();
-    let mut state = seed;
-    let mut random = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
+    let mut random = || random(&mut seed);
     let (mut x, mut v, mut force) = (0.0, 0.0, 0.0);
     for row in 0..1000 {
         if row % 35 == 0 {
@@ -87,15 +82,10 @@ fn record(seed: u64, hidden: impl Fn(f64, f64) -> f64) -> String {
 }
 
 fn closed(folder: &Path, model: &str, hidden: impl Fn(f64, f64) -> f64 + Copy) -> ClosedModel {
-    let file = |name: &str, text: &str| -> PathBuf {
-        let path = folder.join(name);
-        fs::write(&path, text).unwrap();
-        path
-    };
-    let model = file("oscillator.toml", model);
-    let train = [file("train.csv", &record(1, hidden)), file("more.csv", &record(2, hidden))];
-    let test = [file("test.csv", &record(3, hidden))];
-    close(&model, &train, &test, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    let model = file(folder, "oscillator.toml", model);
+    let [train, more, test] = [("train.csv", 1), ("more.csv", 2), ("test.csv", 3)]
+        .map(|(name, seed)| file(folder, name, &record(seed, hidden)));
+    close(&model, &[train, more], &[test], &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -109,7 +99,7 @@ fn a_hidden_term_is_named_and_confirmed_with_its_number() {
     assert!(report.headline.contains("confirmed"), "{}", report.headline);
     // The mass of 1.2 and the stiffness of 50 come back with it; semi-implicit Euler shifts them by some 1e-3.
     for (name, expected) in [("mass", 1.2), ("stiffness", 50.0), ("damping", 1.3), ("k", 400.0)] {
-        let number = report.parameters.iter().find(|number| number.name == name).unwrap();
+        let number = number(report, name);
         let error = number.standard_error.unwrap();
         assert!((number.value - expected).abs() < 4.0 * error + 5e-3 * expected, "{number:?}");
     }
@@ -165,8 +155,7 @@ fn a_term_of_a_library_is_named_and_written_into_the_extended_model() {
     let closed = closed(folder.path(), &library, |x, _| 400.0 * x * x * x);
     assert_eq!(closed.report.named[0].suspect, "cubic-stiffness", "{}", closed.report.headline);
     assert_eq!(closed.report.named[0].term, "dv/dt = … + (-1/mass*(k*x^3))");
-    let path = folder.path().join("extended.toml");
-    fs::write(&path, closed.extended.unwrap()).unwrap();
+    let path = file(folder.path(), "extended.toml", &closed.extended.unwrap());
     let extended = model_fit::read(&path).unwrap_or_else(|error| panic!("{error}"));
     let k = extended.parameters.iter().find(|one| one.name == "k").unwrap();
     assert!(extended.suspects[0].is_term && (k.values_si[0] / 400.0 - 1.0).abs() < 0.2, "{k:?}");
@@ -225,21 +214,20 @@ fn two_suspects_with_the_same_law_cannot_be_told_apart() {
 #[test]
 fn a_fit_from_several_starts_finds_the_lowest_minimum() {
     let folder = tempfile::tempdir().unwrap();
-    let record = folder.path().join("sine.csv");
     let row = |k: i32| {
         let [t, noise] = [f64::from(k) * 0.02, 0.01 * f64::from(k * k % 17 - 8) / 8.0];
         format!("{t},{}\n", 2.0 * (7.0 * t).sin() + noise)
     };
-    fs::write(&record, "t_s,y\n".to_owned() + &(0..200).map(row).collect::<String>()).unwrap();
+    let rows: String = (0..200).map(row).collect();
+    let record = file(folder.path(), "sine.csv", &format!("t_s,y\n{rows}"));
     let frequency = |starts: u32| {
-        let model = folder.path().join("sine.toml");
         let text = format!(
             "fit.starts = {starts}\n[parameters]\nsize = {{ value = 0.5, range = [0.01, 10] }}\n\
              w = {{ unit = \"1/s\", value = 20, range = [0.1, 100] }}\n[outputs.y]\nvalue = \"size*sin(w*t)\"\n"
         );
-        fs::write(&model, text).unwrap();
+        let model = file(folder.path(), "sine.toml", &text);
         let report = close(&model, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
-        report.parameters.iter().find(|number| number.name == "w").unwrap().value
+        number(&report, "w").value
     };
     assert!((frequency(0) - 7.0).abs() > 1.0, "from one start it stays in a lobe beside: {}", frequency(0));
     assert!((frequency(24) - 7.0).abs() < 0.01, "{}", frequency(24));
@@ -278,11 +266,7 @@ fn a_held_out_record_that_cannot_be_judged_is_refused_before_a_fit() {
         (&fitted, &good, "held_out.start_samples of the model is 0"),
         (&with_start(40), &short, "test.csv: 30 samples, of which the first 40 are for its start"),
     ] {
-        let file = |name: &str, text: &str| {
-            let path = folder.path().join(name);
-            fs::write(&path, text).unwrap();
-            path
-        };
+        let file = |name: &str, text: &str| file(folder.path(), name, text);
         let (model, train) = (file("oscillator.toml", model), file("train.csv", &good));
         let progress = &mut |said: &str| panic!("{hint}: {said} before the held-out record was checked");
         let refused =
@@ -297,8 +281,7 @@ fn a_held_out_record_that_cannot_be_judged_is_refused_before_a_fit() {
 #[test]
 fn a_model_is_explained_with_its_equations_and_units() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("oscillator.toml");
-    fs::write(&path, OSCILLATOR).unwrap();
+    let path = file(folder.path(), "oscillator.toml", OSCILLATOR);
     let text = explain(&path, &[]).unwrap();
     for line in [
         "force [N] from column force_N",
@@ -318,7 +301,6 @@ fn a_model_is_explained_with_its_equations_and_units() {
 #[test]
 fn a_model_is_explained_with_its_record_and_what_suspects_bring() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("oscillator.toml");
     let record = r#"
 [record]
 time = "t_ms"
@@ -367,7 +349,7 @@ start_samples = 40
         .replacen("\n[inputs.force]", record, 1)
         .replacen("\n[parameters]", inputs, 1)
         .replacen("column = \"x_mm\"", "column = \"x_cm\"\nscale = 10\nmodel_error = 0.25", 1);
-    fs::write(&path, text + bringing).unwrap();
+    let path = file(folder.path(), "oscillator.toml", &(text + bringing));
     let text = explain(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
     for lines in [
         "record\n  time from column t_ms, in units of 0.001 s\n  on an even grid of 0.02 s\n",

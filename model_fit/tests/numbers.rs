@@ -1,8 +1,8 @@
 //! What is said of the numbers of a model file, and of a report that is another model's.
 
-use crate::closing::close;
+use crate::closing::{close, file, number};
 use model_fit::{ClosedModel, ReportedModel, explain, read};
-use std::fs;
+use serde_json::Value;
 use std::path::Path;
 
 const LINE: &str = r#"
@@ -30,12 +30,9 @@ fn record(step: f64, output: impl Fn(f64) -> f64) -> String {
 }
 
 fn closed(folder: &Path, model: &str, train: &str, test: Option<&str>) -> ClosedModel {
-    let [file, first, second] = ["model.toml", "train.csv", "test.csv"].map(|name| folder.join(name));
-    fs::write(&file, model).unwrap();
-    fs::write(&first, train).unwrap();
-    fs::write(&second, test.unwrap_or_default()).unwrap();
-    let tests = if test.is_some() { vec![second] } else { Vec::new() };
-    close(&file, &[first], &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    let (model, train) = (file(folder, "model.toml", model), file(folder, "train.csv", train));
+    let tests: Vec<_> = test.into_iter().map(|test| file(folder, "test.csv", test)).collect();
+    close(&model, &[train], &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -71,7 +68,7 @@ fn a_number_whose_error_is_as_large_as_itself_is_said_to_be_hardly_determined() 
         .replace("[outputs.y]", "small = { unit = \"mm/V^2\", value = 0.001, range = [0, 9] }\n[outputs.y]");
     let train = record(0.5, |u| 1.5 * u + 0.003 * u * u);
     let report = closed(folder.path(), &weak, &train, None).report;
-    let small = report.parameters.iter().find(|number| number.name == "small").unwrap();
+    let small = number(&report, "small");
     assert!(
         small.is_at_bound || small.standard_error.is_some_and(|error| error > 0.5 * small.value),
         "{small:?}"
@@ -98,16 +95,19 @@ fn a_held_out_record_that_is_left_much_worse_is_remarked_with_the_ratio() {
     assert_eq!(report.confirmed, Some(true));
 }
 
+/// Whether a report is of a model file of this text, or why not.
+fn is_of(reported: &Value, folder: &Path, text: &str) -> Result<(), String> {
+    let reported: ReportedModel = serde_json::from_value(reported.clone()).unwrap();
+    let model = read(&file(folder, "other.toml", text)).unwrap();
+    reported.is_of(&model).map_err(|error| error.to_string())
+}
+
 #[test]
 fn the_report_of_another_model_extends_none() {
     let folder = tempfile::tempdir().unwrap();
     let report = closed(folder.path(), LINE, &record(0.5, |u| 1.5 * u + u * u), None).report;
-    let reported: ReportedModel = serde_json::from_value(serde_json::to_value(&report).unwrap()).unwrap();
-    let is_of = |text: &str| {
-        let file = folder.path().join("other.toml");
-        fs::write(&file, text).unwrap();
-        reported.is_of(&read(&file).unwrap()).map_err(|error| error.to_string())
-    };
+    let reported = serde_json::to_value(&report).unwrap();
+    let is_of = |text: &str| is_of(&reported, folder.path(), text);
     assert_eq!(is_of(LINE), Ok(()));
     assert_eq!(is_of(&LINE.replace("value = 1,", "value = 1.2,")), Ok(()));
     let other = is_of(&LINE.replace("\"gain*u\"", "\"gain*u + 0.1[mm]\"")).unwrap_err();
@@ -139,12 +139,7 @@ fn the_report_of_another_version_of_a_file_extends_none() {
     let own = LINE.to_owned() + more;
     let report = closed(folder.path(), &own, &record(0.5, |u| 1.5 * u + u * u), None).report;
     let mut reported = serde_json::to_value(&report).unwrap();
-    let is_of = |reported: &serde_json::Value, text: &str| {
-        let file = folder.path().join("other.toml");
-        fs::write(&file, text).unwrap();
-        let reported: ReportedModel = serde_json::from_value(reported.clone()).unwrap();
-        reported.is_of(&read(&file).unwrap()).map_err(|error| error.to_string())
-    };
+    let is_of = |reported: &Value, text: &str| is_of(reported, folder.path(), text);
     assert_eq!(is_of(&reported, &own), Ok(()));
     assert_eq!(is_of(&reported, &format!("# A comment.\n{own}")), Ok(()));
     for [from, to, line] in CHANGES {

@@ -3,7 +3,7 @@
 //! The records lie in `../shared/data` beside the project and are not for copying into it; where they are absent a test says so
 //! and is skipped.
 
-use crate::closing::close_with;
+use crate::closing::{close_with, file, named, number};
 use crate::real::{crate_folder, data};
 use model_fit::Verdict;
 use model_fit::{Left, ModelReport, Search};
@@ -15,8 +15,7 @@ fn shipped(name: &str) -> String {
 
 fn closed(text: &str, train: &[PathBuf], test: &[PathBuf]) -> ModelReport {
     let folder = tempfile::tempdir().unwrap();
-    let model = folder.path().join("model.toml");
-    std::fs::write(&model, text).unwrap();
+    let model = file(folder.path(), "model.toml", text);
     let closed = close_with(&model, (train, test), Search::Never, &mut |_| {})
         .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(closed.not_judged, None);
@@ -74,10 +73,9 @@ fn emps_has_viscous_friction_that_differs_with_the_direction() {
     let (train, test) = emps(&folder);
     let report = closed(&shipped("emps.toml"), &train, &test);
     assert_eq!((report.verdict, report.confirmed), (Verdict::Named, Some(true)), "{}", report.headline);
-    let named: Vec<&str> = report.named.iter().map(|named| named.suspect.as_str()).collect();
-    assert_eq!(named, ["friction-asymmetry"]);
-    let number = |name: &str| report.parameters.iter().find(|number| number.name == name).unwrap().value;
-    let asymmetry = 100.0 * number("difference") / number("viscous");
+    assert_eq!(named(&report), ["friction-asymmetry"]);
+    let [difference, viscous] = ["difference", "viscous"].map(|name| number(&report, name).value);
+    let asymmetry = 100.0 * difference / viscous;
     assert!((-25.0..-15.0).contains(&asymmetry), "{asymmetry} %");
     assert!(report.held_out[0].ratio.unwrap() <= 0.88, "{:?}", report.held_out);
     for other in report.suspects.iter().filter(|other| other.suspect != "friction-asymmetry") {

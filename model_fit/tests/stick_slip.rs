@@ -1,7 +1,7 @@
 //! Dry friction that sticks and slips, in records of another integrator: a mass that a spring pulls over a table.
 
-use crate::closing::close;
-use model_fit::{ClosedModel, Verdict};
+use crate::closing::{self, file, named, random};
+use model_fit::{ClosedModel, Search, Verdict};
 use std::fmt::Write as _;
 use std::fs;
 
@@ -9,12 +9,6 @@ const MASS_KG: f64 = 2.0;
 const STIFFNESS_N_PER_M: f64 = 800.0;
 const SLIDING_N: f64 = 3.0;
 const BREAKAWAY_N: f64 = 4.5;
-
-/// Values in -0.5 to 0.5.
-fn random(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    (*state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-}
 
 /// The other end of the spring, m.
 fn pulled_m(time_s: f64) -> f64 {
@@ -72,20 +66,14 @@ value = "x"
 
 fn closed(rest: &str) -> (ClosedModel, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        path
-    };
-    let model = file("pulled.toml", &format!("{PULLED}{rest}"));
-    let (train, test) = ([file("train.csv", &record(1))], [file("test.csv", &record(2))]);
-    let found = close(&model, &train, &test, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"));
-    (found, folder)
+    let model = format!("{PULLED}{rest}");
+    let search = Search::MoreThanNoise;
+    (closing::closed(folder.path(), ("pulled.toml", &model), [1, 2].map(record), search), folder)
 }
 
 /// A number of the report and its standard error.
 fn number(found: &ClosedModel, name: &str) -> [f64; 2] {
-    let number = found.report.parameters.iter().find(|number| number.name == name).unwrap();
+    let number = closing::number(&found.report, name);
     [number.value, number.standard_error.unwrap_or_else(|| panic!("{number:?}"))]
 }
 
@@ -146,8 +134,7 @@ with.v = "v"
     );
     let report = &found.report;
     assert_eq!((report.verdict, report.confirmed), (Verdict::Named, Some(true)), "{}", report.headline);
-    let names: Vec<&str> = report.named.iter().map(|named| named.suspect.as_str()).collect();
-    assert_eq!(names, ["stick-slip"], "{}", report.headline);
+    assert_eq!(named(report), ["stick-slip"], "{}", report.headline);
     let [sliding, excess] = ["sliding", "excess"].map(|name| number(&found, name)[0]);
     assert!((sliding - SLIDING_N).abs() < 0.1 && (excess - BREAKAWAY_N + SLIDING_N).abs() < 0.15);
     // The extended file is read, explained, and has nothing missing.
@@ -157,8 +144,7 @@ with.v = "v"
         &model_fit::ReportedModel::from(report),
     )
     .unwrap();
-    let path = folder.path().join("extended.toml");
-    fs::write(&path, text).unwrap();
+    let path = file(folder.path(), "extended.toml", &text);
     let words = model_fit::explain(&path, &[]).unwrap();
     assert!(
         words.contains("force = sliding against v, which it holds at rest up to sliding + excess"),

@@ -1,27 +1,13 @@
 //! Suspects that pay together where neither does alone, and fits that need several starts to find what a suspect does.
 
-use crate::closing::close;
-use model_fit::ClosedModel;
-use model_fit::Verdict;
+use crate::closing::{self, named, number, random};
+use model_fit::{ModelReport, Search, Verdict};
 use std::fmt::Write as _;
-use std::fs;
-use std::path::Path;
 
-/// Values in -0.5 to 0.5.
-fn random(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    (*state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-}
-
-fn closed(folder: &Path, model: &str, record: impl Fn(u64) -> String) -> ClosedModel {
-    let file = |name: &str, text: &str| {
-        let path = folder.join(name);
-        fs::write(&path, text).unwrap();
-        path
-    };
-    let model = file("model.toml", model);
-    let (train, test) = ([file("train.csv", &record(1))], [file("test.csv", &record(2))]);
-    close(&model, &train, &test, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+fn closed(model: &str, record: impl Fn(u64) -> String) -> ModelReport {
+    let folder = tempfile::tempdir().unwrap();
+    let search = Search::MoreThanNoise;
+    closing::closed(folder.path(), ("model.toml", model), [1, 2].map(record), search).report
 }
 
 /// What is missing is a small h. One suspect is a large w with h on it, the other w alone: of h + w the first explains the
@@ -43,15 +29,14 @@ fn two_suspects_that_explain_nothing_alone_are_named_together() {
         }
         text
     };
-    let folder = tempfile::tempdir().unwrap();
-    let report = closed(folder.path(), model, record).report;
+    let report = closed(model, record);
     assert_eq!((report.verdict, report.confirmed), (Verdict::Named, Some(true)), "{}", report.headline);
-    let mut names: Vec<&str> = report.named.iter().map(|named| named.suspect.as_str()).collect();
+    let mut names = named(&report);
     names.sort_unstable();
     assert_eq!(names, ["both", "large"], "{}", report.headline);
     assert!(report.notes.iter().any(|note| note.ends_with("were found together: neither passes alone")));
     for (name, expected) in [("a", 3.0), ("b", -3.0)] {
-        let number = report.parameters.iter().find(|number| number.name == name).unwrap();
+        let number = number(&report, name);
         assert!((number.value - expected).abs() < 0.1, "{number:?}");
     }
 }
@@ -74,10 +59,9 @@ fn a_suspect_is_found_far_from_its_first_value() {
         }
         text
     };
-    let folder = tempfile::tempdir().unwrap();
-    let report = closed(folder.path(), model, record).report;
+    let report = closed(model, record);
     assert_eq!(report.named.len(), 1, "{}", report.headline);
-    let place = report.parameters.iter().find(|number| number.name == "c").unwrap();
+    let place = number(&report, "c");
     assert!((place.value - 7.0).abs() < 0.05, "{place:?}");
 }
 
@@ -107,8 +91,7 @@ fn a_wider_range_does_not_leave_more() {
              [states.lower]\nstart = \"fitted\"\nguess = 5\nrange = [0, 50]\n\
              derivative = \"one*sqrt(max(upper, 0)) - two*sqrt(max(lower, 0))\"\n[outputs.y]\nvalue = \"lower\"\n"
         );
-        let folder = tempfile::tempdir().unwrap();
-        closed(folder.path(), &model, record).report.training[0].rms_before
+        closed(&model, record).training[0].rms_before
     };
     // The noise of 0.02 from end to end is 0.0058 rms.
     let [narrow, wide] = ["[0.01, 0.1]", "[0, 100]"].map(left);
