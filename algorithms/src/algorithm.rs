@@ -106,7 +106,7 @@ impl Quantity {
 }
 
 /// Largest result, m/s: several times what any valve of this rig gives.
-pub(crate) const LARGEST_M_PER_S: f64 = 5.0;
+pub const LARGEST_M_PER_S: f64 = 5.0;
 
 /// An algorithm that can be asked for by name.
 pub struct Kind {

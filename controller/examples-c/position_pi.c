@@ -17,6 +17,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* Several times what any valve of this rig gives. */
+static const double LARGEST_M_PER_S = 5.0;
+
 enum { GAIN, INTEGRAL_TIME, TRACKING_TIME, FEED_FORWARD, DEAD_ZONE, COUNT };
 
 static const struct airbench_parameter PARAMETERS[COUNT] = {
@@ -51,6 +54,13 @@ static void reset(void *self, const struct airbench_ready *ready, const double *
     pi->last_result_m_per_s = ready->applied_velocity_m_per_s;
 }
 
+static double within_largest(double velocity_m_per_s)
+{
+    if (velocity_m_per_s > LARGEST_M_PER_S)
+        return LARGEST_M_PER_S;
+    return velocity_m_per_s < -LARGEST_M_PER_S ? -LARGEST_M_PER_S : velocity_m_per_s;
+}
+
 static double step(void *self, const struct airbench_ready *ready, const double *parameters)
 {
     struct position_pi *pi = self;
@@ -59,9 +69,9 @@ static double step(void *self, const struct airbench_ready *ready, const double 
     const double limited = ready->applied_velocity_m_per_s - pi->last_result_m_per_s;
     const double rate = parameters[GAIN] / parameters[INTEGRAL_TIME] * entering + limited / parameters[TRACKING_TIME];
 
-    pi->integral_m_per_s += ready->period_s * rate;
-    pi->last_result_m_per_s = parameters[GAIN] * error + pi->integral_m_per_s
-                              + parameters[FEED_FORWARD] * ready->set_velocity_m_per_s;
+    pi->integral_m_per_s = within_largest(pi->integral_m_per_s + ready->period_s * rate);
+    pi->last_result_m_per_s = within_largest(parameters[GAIN] * error + pi->integral_m_per_s
+                                             + parameters[FEED_FORWARD] * ready->set_velocity_m_per_s);
     return pi->last_result_m_per_s;
 }
 

@@ -1,6 +1,7 @@
 //! The example in C, from the build line of its head to the set-point of the simulated drive.
 
 use crate::build::{Libraries, trier};
+use crate::laws;
 use crate::position_pi::KIND;
 use algorithms::algorithm::{Algorithm, Quantity, Ready};
 use algorithms::guard::Guarded;
@@ -125,6 +126,7 @@ fn the_example_in_rust_gives_the_same_bits_and_is_the_text_of_the_document() {
         "own-algorithm.md shows tests/plugin/position_pi.rs"
     );
 
+    laws::check(&KIND);
     let mut in_c = example();
     let values = defaults(&in_c);
     assert_eq!(in_c.description().parameters, KIND.parameters, "the tables");

@@ -3,6 +3,9 @@
 
 mod build;
 mod example;
+#[allow(dead_code, reason = "the example keeps the first of these laws; wind-up is tested with the plant")]
+#[path = "../../../algorithms/src/laws.rs"]
+mod laws;
 mod latched;
 mod position_pi;
 mod refused;

@@ -1,6 +1,6 @@
 //! Position: proportional-integral with velocity feed-forward.
 
-use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use settings::parameters::declare;
 
 /// In the list of algorithms.
@@ -40,11 +40,13 @@ impl ControlLaw for PositionPi {
         let error = ready.set_position_m - ready.position_m;
         let entering = if error.abs() > p.dead_zone_m { error } else { 0.0 };
         let limited = ready.applied_velocity_m_per_s - self.last_result_m_per_s;
-        self.integral_m_per_s +=
-            ready.period_s * (p.gain_per_s / p.integral_time_s * entering + limited / p.tracking_time_s);
-        self.last_result_m_per_s = p.gain_per_s * error
+        let rate = p.gain_per_s / p.integral_time_s * entering + limited / p.tracking_time_s;
+        let integral = self.integral_m_per_s + ready.period_s * rate;
+        self.integral_m_per_s = integral.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
+        let result = p.gain_per_s * error
             + self.integral_m_per_s
             + p.velocity_feed_forward * ready.set_velocity_m_per_s;
+        self.last_result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         self.last_result_m_per_s
     }
 }
