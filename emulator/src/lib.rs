@@ -5,7 +5,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`node`], `rig` | the node of the bus with console and records; plant, people and faults behind it |
+//! | [`node`], `rig` | the node of the bus with console and records; plant, people and faults behind it. Which command acts: `protocol::commands` |
 //! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
 //! | [`exchange`] | when sensors went out and the commands that answer them came |
 //! | [`wire_limits`] | whether the numbers of a rig fit the frames |

@@ -68,6 +68,14 @@ fn an_unknown_command_is_answered_with_the_commands_that_there_are() {
 }
 
 #[test]
+fn find_effect_hides_at_most_as_many_effects_as_the_catalogue_has() {
+    let all = plant::effects::SHEETS.len();
+    let one_more = (all + 1).to_string();
+    let refused = Prefix::made().run(&["find-effect", "--effects", &one_more]);
+    let _ = refused.expect_code(2).expect_said(&[&format!("must be a whole number from 0 to {all}")]);
+}
+
+#[test]
 fn a_program_or_file_that_is_missing_is_named_with_every_path_looked_at() {
     let prefix = Prefix::made();
     fs::remove_file(prefix.path("lib/airbench/bench")).expect("a link of our own");

@@ -3,10 +3,10 @@
 
 mod build;
 mod example;
+mod latched;
 #[allow(dead_code, reason = "the example keeps the first of these laws; wind-up is tested with the plant")]
 #[path = "../../../algorithms/src/laws.rs"]
 mod laws;
-mod latched;
 mod position_pi;
 mod refused;
 

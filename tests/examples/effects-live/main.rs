@@ -15,8 +15,8 @@ fn main() {
         ("none", Vec::new()),
         ("piston-leakage", drawn_of("piston-leakage")),
         ("ten, seed 7", drawn(7, 10)),
-        ("all 38 at all places, largest drawn", everything(Extreme::Drawn)),
-        ("all 38 at all places, ends of their ranges", everything(Extreme::Mixed)),
+        ("all at all places, largest drawn", everything(Extreme::Drawn)),
+        ("all at all places, ends of their ranges", everything(Extreme::Mixed)),
     ];
     let mut slices: Vec<Vec<Live>> = vec![Vec::new(); kinds.len()];
     for _ in 0..ROUNDS {

@@ -58,7 +58,7 @@ fn halving_the_step_divides_the_difference_by_about_four() {
 }
 
 #[test]
-fn thirty_five_of_the_catalogues_effects_are_smooth() {
+fn all_effects_but_these_are_smooth() {
     let others: Vec<&str> = SHEETS.iter().filter(|sheet| !is_smooth(sheet)).map(|sheet| sheet.name).collect();
     assert_eq!(others, ["spool-rate-limit", "line-delay", "rest-time-dependent-break-away"]);
 }

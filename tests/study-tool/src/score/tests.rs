@@ -3,6 +3,7 @@
 use super::*;
 use crate::folder::{Plan, make_whole};
 use crate::program::{Ended, Taken};
+use plant::effects::SHEETS;
 use serde_json::json;
 use std::fs;
 use std::path::Path;
@@ -112,14 +113,14 @@ fn without(root: &Path) -> Expectations {
 #[test]
 fn with_effects_left_out_only_single_draws_are_wanted_and_the_tables_are_others() {
     let score = scored_without("without");
-    assert_eq!(score.cases.len(), 38);
+    assert_eq!(score.cases.len(), SHEETS.len());
     let tables = score.leave_out.as_ref().unwrap();
     let all = tables.splits.iter().find(|split| split.name == "all").unwrap();
     for rate in [all.no_wrong_name, all.both_right] {
-        assert_eq!((rate.count, rate.of), (38, 38));
+        assert_eq!((rate.count, rate.of), (SHEETS.len(), SHEETS.len()));
     }
-    assert_eq!(all.verdicts["outside-catalogue"], 38);
-    assert_eq!(tables.splits[0].no_wrong_name.of + tables.splits[1].no_wrong_name.of, 38);
+    assert_eq!(all.verdicts["outside-catalogue"], SHEETS.len());
+    assert_eq!(tables.splits[0].no_wrong_name.of + tables.splits[1].no_wrong_name.of, SHEETS.len());
     assert!(tables.splits[0].claimed_closed_ratio.quantiles.unwrap() == [0.625; 4]);
     let line = |name: &str| score.tables.headline.iter().find(|line| line.name.contains(name)).unwrap().rate;
     assert_eq!(line("all signals together closed").count, tables.splits[0].no_wrong_name.of);
@@ -148,11 +149,11 @@ fn whoever_tells_the_truth_has_all_points() {
     let folder = tempfile::tempdir().unwrap();
     study(folder.path(), "oracle");
     let score = score(&[folder.path().to_owned()], "truth", UNKNOWN).unwrap();
-    assert_eq!(score.cases.len(), 38 + 2 + 4 + 1 + 1);
-    assert_eq!(score.without_classes, 40);
+    assert_eq!(score.cases.len(), SHEETS.len() + 2 + 4 + 1 + 1);
+    assert_eq!(score.without_classes, SHEETS.len() + 2);
     let all = &score.tables.splits[0];
     for rate in [all.class_right, all.top, all.alone, all.where_right] {
-        assert_eq!((rate.count, rate.of), (38, 38));
+        assert_eq!((rate.count, rate.of), (SHEETS.len(), SHEETS.len()));
     }
     let rate =
         |name: &str| score.tables.headline.iter().find(|line| line.name.starts_with(name)).unwrap().rate;
@@ -160,7 +161,7 @@ fn whoever_tells_the_truth_has_all_points() {
     assert_eq!(rate("a parameter off: reported").count, 4);
     assert_eq!(rate("no good report").count, 0);
     let foreign = score.cases.iter().filter(|case| case.kind == Kind::Single && case.foreign_form).count();
-    assert_eq!(score.tables.numbers.covered.count, 38 - foreign);
+    assert_eq!(score.tables.numbers.covered.count, SHEETS.len() - foreign);
     // Reading JSON may round the last digit.
     assert!(score.tables.numbers.off_ratio.quantiles.unwrap()[3] < 1e-15);
     assert_eq!(score.tables.claimed_closed_ratio.quantiles.unwrap()[0], 1.0);
@@ -227,7 +228,7 @@ fn folders_are_scored_together_when_each_result_is_there_once() {
     };
     let whole = of(&[&c, &a, &b]).unwrap();
     assert!(whole.cases.iter().enumerate().all(|(at, case)| case.number == at));
-    assert_eq!(whole.tables.splits[0].top.count, 38);
+    assert_eq!(whole.tables.splits[0].top.count, SHEETS.len());
     assert!(matches!(of(&[&a, &b]), Err(ScoreError::MissingRuns { first: 2, .. })));
     assert!(matches!(of(&[&a, &b, &again, &c]), Err(ScoreError::Doubled { number: 1, .. })));
     assert!(matches!(of(&[&a, &other, &c]), Err(ScoreError::Mixed { .. })));
