@@ -15,30 +15,7 @@ const PERIOD_NS: f64 = 1e6;
 const STATES: [&str; Truth::COLUMNS.len()] = Truth::COLUMNS;
 
 /// Both axes linked and on their way together, then each for itself: to and fro, for `--repeat`. Nothing is judged.
-pub const LIVELY: &str = r#"title = "lively"
-[rig]
-carriage_position_m = 0.2
-linked = true
-[[rig.event]]
-at_s = 0.9
-do = "unlink"
-[run]
-settling_s = 0.0
-[drive]
-program = "program.toml"
-start_m = 0.2
-set-point = [
-    { law = "bestehorn", to_m = 0.3, duration_s = 0.4 },
-    { law = "bestehorn", to_m = 0.2, duration_s = 0.4 },
-]
-[load]
-program = "program.toml"
-start_m = 0.2
-set-point = [
-    { law = "bestehorn", to_m = 0.3, duration_s = 0.4 },
-    { law = "bestehorn", to_m = 0.2, duration_s = 0.4 },
-]
-"#;
+pub const LIVELY: &str = include_str!("../scenes/lively.toml");
 
 /// Which end of its range each number has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,97 +8,22 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// An experiment of some 1.6 s: initial positioning 0.5 s, settling, 0.05 m in 0.4 s, a rest, settling, done.
-pub const SHORT: &str = r#"title = "short"
-[rig]
-carriage_position_m = 0.1
-[run]
-settling_s = 0.2
-[drive]
-program = "program.toml"
-start_m = 0.1
-set-point = [
-    { law = "bestehorn", to_m = 0.15, duration_s = 0.4 },
-    { law = "rest", duration_s = 0.25 },
-]
-"#;
+pub const SHORT: &str = include_str!("../scenes/short.toml");
 
 /// To and fro without a rest, for `--repeat`: after the first half second the valve is hardly ever shut.
-pub const RESTLESS: &str = r#"title = "restless"
-[rig]
-carriage_position_m = 0.2
-[run]
-settling_s = 0.0
-[drive]
-program = "program.toml"
-start_m = 0.2
-set-point = [
-    { law = "bestehorn", to_m = 0.3, duration_s = 0.4 },
-    { law = "bestehorn", to_m = 0.2, duration_s = 0.4 },
-]
-"#;
+pub const RESTLESS: &str = include_str!("../scenes/restless.toml");
 
 /// The drive's program of both, which each scene holds as program.toml.
-pub const PROGRAM: &str = r#"title = "stiff"
-[algorithm]
-name = "position-p"
-gain_per_s = 40.0
-velocity_feed_forward = 1.0
-"#;
+pub const PROGRAM: &str = include_str!("../scenes/programs/stiff.toml");
 
 /// Linked axes, the load pressing: some 4 s of preparing, a ramp, 0.05 m in 0.4 s, and a step of the force while it moves.
-pub const LINKED: &str = r#"title = "linked"
-number = 5
-[rig]
-carriage_position_m = 0.2
-linked = true
-[run]
-settling_s = 0.2
-[drive]
-program = "linked-program.toml"
-start_m = 0.2
-set-point = [
-    { law = "bestehorn", to_m = 0.25, duration_s = 1.0 },
-    { law = "rest", duration_s = 0.5 },
-]
-[load]
-program = "load-program.toml"
-prepare = ["relieve", "match"]
-initial_force_n = 100.0
-initial_ramp_s = 0.3
-set-point = [
-    { law = "constant", force_n = 100.0, duration_s = 0.5 },
-    { law = "step", to_n = 150.0, duration_s = 1.0 },
-]
-"#;
+pub const LINKED: &str = include_str!("../scenes/linked.toml");
 
 /// The drive's program of the linked experiment, which each scene holds as linked-program.toml: the shipped one of its time.
-pub const LINKED_PROGRAM: &str = r#"title = "damped"
-[algorithm]
-name = "position-pid"
-gain_per_s = 10.0
-velocity_feed_forward = 1.0
-integral_time_s = 0.0
-derivative_time_s = 0.09
-rest_zone_m = 0.0003
-[post-controller]
-linearisation = "pressure-compensated"
-"#;
+pub const LINKED_PROGRAM: &str = include_str!("../scenes/programs/damped.toml");
 
 /// The load's program of the linked experiment, which each scene holds as load-program.toml: the same.
-pub const LOAD_PROGRAM: &str = r#"title = "presses"
-[pre-controller]
-pressure_filter_hz = 200.0
-[algorithm]
-name = "force-pid-map"
-gain_per_s = 150.0
-integral_time_s = 0.2
-integral_limit_n = 100.0
-[post-controller]
-linearisation = "pressure-compensated"
-dead_zone_m_per_s = 0.004
-[giving-way]
-name = "force-manual"
-"#;
+pub const LOAD_PROGRAM: &str = include_str!("../scenes/programs/presses.toml");
 
 pub struct Scene {
     folder: TempDir,

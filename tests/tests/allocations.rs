@@ -18,56 +18,10 @@ use system_tests::turn;
 use system_tests::xcp::{self, Talk};
 
 /// Faults that begin and end after the warm-up, mild enough for the run to go on as it does.
-const FAULTS: &str = r#"
-[[fault]]
-name = "position-sensor-noise"
-at = "load"
-from_s = 2.0
-to_s = 6.0
-[[fault]]
-name = "chamber-leak"
-at = "load.a"
-leakage_nl_per_min = 1.0
-from_s = 2.5
-to_s = 7.0
-[[fault]]
-name = "friction-rise"
-at = "drive"
-factor = 1.2
-when = "drive.position_m"
-above = -1.0
-from_s = 3.0
-for_s = 2.0
-[[fault]]
-name = "valve-slow"
-at = "load"
-from_s = 3.5
-to_s = 8.0
-[[fault]]
-name = "bus-loss"
-at = "bus.LoadChainValues"
-from_s = 4.0
-to_s = 8.0
-"#;
+const FAULTS: &str = include_str!("../scenes/faults/allocations.toml");
 
 /// A declared term of each kind, too small to disturb.
-const TERMS: &str = r#"
-[[terms]]
-name = "eddy-brake"
-place = "drive.force"
-add = "-(c0 + c1*x)*v - 1[N/m]*(x - w)"
-memory.w = { unit = "m", range = [0, 1], start = "x", update = "min(max(w, x - 1[mm]), x + 1[mm])" }
-parameters.c0 = { unit = "N s/m", value = 5, range = [0, 200] }
-parameters.c1 = { unit = "N s/m^2", value = 10 }
-[[terms]]
-name = "drift"
-place = "load.pressure-a-reading"
-add = "2[Pa]*sin(t/1[s]) + 1e-4*max(p_a, p_b) + 3[Pa]*u*s"
-[[terms]]
-name = "seep"
-place = "load.flow-b"
-add = "-1e-9[kg/(s Pa)]*max(p_b - 1[bar], 0)/10"
-"#;
+const TERMS: &str = include_str!("../scenes/terms/three-with-memory.toml");
 
 #[test]
 fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {

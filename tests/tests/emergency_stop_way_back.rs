@@ -17,21 +17,7 @@ use system_tests::scene::{LINKED, Scene};
 use system_tests::turn;
 
 /// 0.3 m in 0.5 s: 1.2 m/s at its fastest, which the valve gives for a moment only.
-const FAST: &str = r#"title = "fast"
-number = 7
-[rig]
-carriage_position_m = 0.1
-[run]
-settling_s = 0.2
-after_emergency_stop = "end"
-[drive]
-program = "program.toml"
-start_m = 0.1
-set-point = [
-    { law = "bestehorn", to_m = 0.4, duration_s = 0.5 },
-    { law = "rest", duration_s = 0.5 },
-]
-"#;
+const FAST: &str = include_str!("../scenes/fast.toml");
 /// The experiment begins in cycle 710, and half of the way is done 250 ms later.
 const TRIP: usize = 1000;
 const RELEASE: usize = 2500;

@@ -8,42 +8,7 @@ use system_tests::scene::{RESTLESS, Scene};
 use system_tests::turn;
 
 /// By time, so that real time and lockstep can be held against each other; one by a condition that is soon met.
-const SCRIPT: &str = r#"
-seed = 5
-[[fault]]
-name = "valve-stuck"
-at = "load"
-from_s = 0.6
-to_s = 1.4
-[[fault]]
-name = "pressure-sensor-stuck"
-at = "load.a"
-from_s = 0.7
-for_s = 0.5
-[[fault]]
-name = "bus-loss"
-at = "bus.LoadChainValues"
-from_s = 0.8
-to_s = 1.2
-[[fault]]
-name = "babbling-node"
-frames_per_ms = 0.5
-bytes = 2
-from_s = 0.9
-to_s = 1.3
-[[fault]]
-name = "bus-delay"
-at = "bus.RigStatus"
-delay_ms = 4
-from_s = 1.0
-to_s = 1.1
-[[fault]]
-name = "friction-rise"
-at = "drive"
-factor = 1.5
-when = "drive.position_m"
-above = 0.22
-"#;
+const SCRIPT: &str = include_str!("../scenes/faults/real-time.toml");
 
 fn run(pace: Pace) -> Scene {
     let scene = Scene::new(RESTLESS);

@@ -88,30 +88,7 @@ fn a_flood_through_it_arrives_whole_and_in_order() {
     assert_eq!(told("missing elsewhere "), 0, "{}", received.stdout);
 }
 
-/// Sends by an address until the bus takes no more, then natively until its own queue does not.
-const SENDER: &str = "
-import errno, socket, struct, sys
-can = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-can.bind(('vcan0',))
-frame = struct.pack('=IB3x8s', 0x7F7, 8, bytes(8))
-print('ready', flush=True)
-sys.stdin.readline()
-addressed, native = 0, 0
-try:
-    while True:
-        can.sendto(frame, ('vcan0',))
-        addressed += 1
-except OSError as refused:
-    print('refused with', errno.errorcode[refused.errno], flush=True)
-can.setblocking(False)
-try:
-    while True:
-        can.send(frame)
-        native += 1
-except BlockingIOError:
-    print('accepted', addressed + native, 'of them natively', native, flush=True)
-sys.stdin.readline()
-";
+const SENDER: &str = include_str!("../python/guests/fills_the_bus.py");
 
 #[test]
 fn a_bus_that_stands_still_refuses_with_enobufs_holds_native_senders_and_loses_nothing_it_accepted() {
@@ -141,28 +118,7 @@ fn a_bus_that_stands_still_refuses_with_enobufs_holds_native_senders_and_loses_n
     assert_eq!(peer.receive(Duration::from_millis(100)), None);
 }
 
-/// Fills the bus, and then writes ISO-TP messages of 8 and 16 bytes, which are native: a broadcast, so that nobody need answer.
-const TRANSPORT_SENDER: &str = "
-import errno, os, socket, struct, sys
-raw = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-raw.bind(('vcan0',))
-can = socket.socket(socket.PF_CAN, socket.SOCK_DGRAM, socket.CAN_ISOTP)
-can.setsockopt(106, 1, struct.pack('IIBBBB', 0x1000, 0, 0, 0, 0, 0))
-can.bind(('vcan0', 0x7E8, 0x7E0))
-print('ready', flush=True)
-sys.stdin.readline()
-try:
-    while True:
-        raw.sendto(struct.pack('=IB3x8s', 0x7F7, 8, bytes(8)), ('vcan0',))
-except OSError as refused:
-    print('refused with', errno.errorcode[refused.errno], flush=True)
-for number in range(40):
-    os.write(can.fileno(), bytes([number]) * (8 if number % 3 == 0 else 16))
-can.getsockname()
-print('written', flush=True)
-sys.stdin.readline()
-os.write(can.fileno(), bytes([40]) * 8)
-";
+const TRANSPORT_SENDER: &str = include_str!("../python/guests/fills_the_bus_isotp.py");
 
 /// The next message of a broadcast sender at a peer; frames of others are passed over.
 fn next_message(peer: &Peer) -> Option<Vec<u8>> {
@@ -248,22 +204,7 @@ fn a_sender_that_is_killed_while_it_waits_leaves_no_socket_behind() {
     let _ = running.wait().expect_code(0);
 }
 
-/// Writes as many ISO-TP messages to nobody as it can, and ends.
-const QUEUER: &str = "
-import os, socket
-can = socket.socket(socket.PF_CAN, socket.SOCK_DGRAM, socket.CAN_ISOTP)
-can.bind(('vcan0', 0x7E8, 0x7E0))
-can.setblocking(False)
-accepted = 0
-for _ in range(4):
-    try:
-        while True:
-            os.write(can.fileno(), bytes(16))
-            accepted += 1
-    except BlockingIOError:
-        can.getsockname()
-print('accepted', accepted)
-";
+const QUEUER: &str = include_str!("../python/guests/queues_to_nobody.py");
 
 #[test]
 fn it_ends_soon_after_a_program_that_left_hundreds_of_messages_to_nobody() {
@@ -283,28 +224,7 @@ fn it_ends_soon_after_a_program_that_left_hundreds_of_messages_to_nobody() {
     assert!(dropped < accepted && dropped > accepted - 20, "{dropped} of {accepted}");
 }
 
-/// Closes a socket in the middle of a message to nobody; another of the channel must not break into it.
-const HURRIED: &str = "
-import ctypes, errno, os, socket
-def channel():
-    can = socket.socket(socket.PF_CAN, socket.SOCK_DGRAM, socket.CAN_ISOTP)
-    can.bind(('vcan0', 0x7E8, 0x7E0))
-    can.setblocking(False)
-    return can
-first = channel()
-os.write(first.fileno(), bytes(20))
-first.close()
-second = channel()
-try:
-    print('second', os.write(second.fileno(), bytes(20)))
-except BlockingIOError:
-    print('second waits its turn')
-libc = ctypes.CDLL(None, use_errno=True)
-headers = bytes(64)
-print('sendmmsg of none', libc.sendmmsg(second.fileno(), headers, 0, 0))
-libc.recvmmsg(second.fileno(), headers, 1, 0x10000 | socket.MSG_DONTWAIT, None)
-print('recvmmsg for one', errno.errorcode[ctypes.get_errno()])
-";
+const HURRIED: &str = include_str!("../python/guests/closes_in_a_message.py");
 
 #[test]
 fn a_sender_that_does_not_wait_leaves_the_message_of_a_closed_socket_whole() {
@@ -315,22 +235,7 @@ fn a_sender_that_does_not_wait_leaves_the_message_of_a_closed_socket_whole() {
     ended.expect_printed(&["second waits its turn", "sendmmsg of none 0", "recvmmsg for one EAGAIN"]);
 }
 
-/// Waits for a frame, and then leaves in 16 bytes, which are written natively, how `recvmsg` and the next call ended.
-const ORPHAN: &str = "
-import errno, os, socket, sys
-can = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-can.bind(('vcan0',))
-left = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT)
-def ended(call):
-    try:
-        return str(call())
-    except OSError as refused:
-        return errno.errorcode[refused.errno]
-print('waits', flush=True)
-first = ended(lambda: can.recvmsg(16))
-second = ended(lambda: socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW))
-os.write(left, f'{first} {second}'.ljust(16).encode())
-";
+const ORPHAN: &str = include_str!("../python/guests/outlives_bench_can.py");
 
 #[test]
 fn a_program_ends_with_a_bench_can_that_is_killed_and_its_children_get_enosys() {

@@ -12,27 +12,9 @@ use system_tests::scene::Scene;
 use system_tests::turn;
 
 /// An eddy brake on the carriage that grows along the stroke.
-const HIDDEN: &str = r#"
-[[terms]]
-name = "nobody-knows"
-place = "drive.force"
-add = "-(30[N s/m] + 160[N s/m^2]*x)*v"
-"#;
+const HIDDEN: &str = include_str!("../scenes/terms/hidden.toml");
 
-const SUSPECTS: &str = r#"
-[[suspects]]
-name = "eddy-brake"
-place = "drive.force"
-add = "-(c0 + c1*x)*v"
-parameters.c0 = { unit = "N s/m", range = [0, 300], prior = 50 }
-parameters.c1 = { unit = "N s/m^2", range = [0, 1000], prior = 200 }
-
-[[suspects]]
-name = "wind-drag"
-place = "drive.force"
-add = "-k*v*abs(v)"
-parameters.k = { unit = "N s^2/m^2", range = [0, 500], prior = 100 }
-"#;
+const SUSPECTS: &str = include_str!("../scenes/terms/suspects.toml");
 
 /// Some 7 s of strokes over most of the way, at several speeds, and rests.
 fn strokes(to_m: [f64; 2], duration_s: [f64; 3]) -> String {

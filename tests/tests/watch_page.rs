@@ -17,20 +17,7 @@ use system_tests::scene::Scene;
 use system_tests::turn;
 
 /// To and fro, slowly enough for an eye, and a start after a stop.
-const TO_AND_FRO: &str = r#"title = "to and fro"
-[rig]
-carriage_position_m = 0.1
-[run]
-settling_s = 0.2
-after_emergency_stop = "on-start"
-[drive]
-program = "program.toml"
-start_m = 0.1
-set-point = [
-    { law = "bestehorn", to_m = 0.3, duration_s = 1.5 },
-    { law = "bestehorn", to_m = 0.1, duration_s = 1.5 },
-]
-"#;
+const TO_AND_FRO: &str = include_str!("../scenes/to-and-fro.toml");
 
 /// Cases of the script that use the first run; the next one has the emulator started anew.
 const CASES_OF_FIRST_RUN: usize = 10;
