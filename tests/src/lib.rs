@@ -26,12 +26,12 @@
 //!
 //! Everything here panics where a test would have to fail: a file that is missing or not whole, a program that does not start,
 //! answer or end as it should. Nothing here waits without a limit; what is waited for, and what the programs said, stands in the
-//! panic. Programs are killed with their whole process group when their [`process::Running`] goes. No test asserts on timing: a
+//! panic. Programs are killed with their whole process group when their [`Running`] goes. No test asserts on timing: a
 //! limit is a protection against hanging, many times longer than what it limits takes.
 
 pub mod account;
-pub mod axis_table;
-pub mod binaries;
+mod axis_table;
+mod binaries;
 pub mod broken;
 pub mod bus_cycles;
 pub mod discrepancy;
@@ -42,16 +42,16 @@ pub mod firmware;
 pub mod foreign_python;
 pub mod guest;
 pub mod hidden;
-pub mod launch;
+mod launch;
 pub mod load;
 pub mod noise;
 pub mod onlooker;
 pub mod own;
 pub mod pairs;
-pub mod peer;
-pub mod process;
-pub mod records;
-pub mod scene;
+mod peer;
+mod process;
+mod records;
+mod scene;
 pub mod skip;
 pub mod small_disk;
 pub mod socketcan;
@@ -59,3 +59,11 @@ pub mod stalls;
 pub mod turn;
 pub mod viewers;
 pub mod xcp;
+
+pub use axis_table::AxisTable;
+pub use binaries::{Build, Program, executable, install, script, shipped_experiments, workspace};
+pub use launch::{Launch, Pace, run_both};
+pub use peer::{Packet, Peer};
+pub use process::{Ended, PATIENCE, Running, wait_until};
+pub use records::{Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, expect_whole_lines, json};
+pub use scene::{LINKED, PROGRAM, RESTLESS, SHORT, Scene};

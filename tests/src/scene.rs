@@ -20,10 +20,10 @@ pub const PROGRAM: &str = include_str!("../scenes/programs/stiff.toml");
 pub const LINKED: &str = include_str!("../scenes/linked.toml");
 
 /// The drive's program of the linked experiment, which each scene holds as linked-program.toml: the shipped one of its time.
-pub const LINKED_PROGRAM: &str = include_str!("../scenes/programs/damped.toml");
+const LINKED_PROGRAM: &str = include_str!("../scenes/programs/damped.toml");
 
 /// The load's program of the linked experiment, which each scene holds as load-program.toml: the same.
-pub const LOAD_PROGRAM: &str = include_str!("../scenes/programs/presses.toml");
+const LOAD_PROGRAM: &str = include_str!("../scenes/programs/presses.toml");
 
 pub struct Scene {
     folder: TempDir,

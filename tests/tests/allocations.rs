@@ -7,15 +7,9 @@
 
 use protocol::can::CanFrame;
 use rustix::process::Signal;
-use system_tests::axis_table::AxisTable;
-use system_tests::binaries::Build;
-use system_tests::launch::{Pace, run_both};
 use system_tests::onlooker::Viewer;
-use system_tests::peer::Peer;
-use system_tests::records::{count, json};
-use system_tests::scene::{LINKED, RESTLESS, Scene};
-use system_tests::turn;
 use system_tests::xcp::{self, Talk};
+use system_tests::{AxisTable, Build, LINKED, Pace, Peer, RESTLESS, Scene, count, json, run_both, turn};
 
 /// Faults that begin and end after the warm-up, mild enough for the run to go on as it does.
 const FAULTS: &str = include_str!("../scenes/faults/allocations.toml");

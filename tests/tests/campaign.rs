@@ -6,11 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
-use system_tests::binaries::{Build, Program, executable, install, workspace};
-use system_tests::process::{Ended, PATIENCE, Running};
-use system_tests::records::json;
-use system_tests::skip;
 use system_tests::small_disk::SmallDisk;
+use system_tests::{Build, Ended, PATIENCE, Program, Running, executable, install, json, skip, workspace};
 use tempfile::TempDir;
 
 const GOOD: i32 = 0;

@@ -8,12 +8,7 @@ use protocol::checksum;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, ValveCommand};
 use std::collections::BTreeMap;
 use std::path::Path;
-use system_tests::binaries::{Build, Program, executable};
-use system_tests::firmware;
-use system_tests::peer::Peer;
-use system_tests::process::{Ended, Running};
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Build, Ended, Peer, Program, Running, SHORT, Scene, executable, firmware, turn};
 
 /// The check on the scene's bus; what follows `--` is the controller's command line.
 fn check(scene: &Scene, options: &str, controller: &[&str]) -> Running {

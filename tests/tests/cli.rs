@@ -2,10 +2,7 @@
 
 use std::path::Path;
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable};
-use system_tests::launch::{Launch, Pace};
-use system_tests::process::{Ended, Running};
-use system_tests::scene::{PROGRAM, SHORT, Scene};
+use system_tests::{Build, Ended, Launch, PROGRAM, Pace, Program, Running, SHORT, Scene, executable};
 
 const BAD_INPUT: i32 = 2;
 const BUS_FAILED: i32 = 3;

@@ -5,12 +5,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use system_tests::binaries::Program;
-use system_tests::launch::{Pace, run_both};
-use system_tests::process::Running;
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
-use system_tests::xcp;
+use system_tests::{Pace, Program, Running, SHORT, Scene, run_both, turn, xcp};
 
 /// System calls that make, change or remove something in a file system.
 const CALLS: &str = "open,openat,openat2,creat,mkdir,mkdirat,rename,renameat,renameat2,link,linkat,symlink,symlinkat,unlink,\

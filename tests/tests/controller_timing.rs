@@ -8,10 +8,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
-use system_tests::launch::Pace;
-use system_tests::records::{count, count_of_id, json};
-use system_tests::scene::{RESTLESS, Scene};
-use system_tests::turn;
+use system_tests::{Pace, RESTLESS, Scene, count, count_of_id, json, turn};
 
 fn table(path: &Path) -> Vec<CycleTiming> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

@@ -10,11 +10,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use system_tests::launch::Pace;
-use system_tests::process::{Running, wait_until};
-use system_tests::records::{bus_log, count, json};
-use system_tests::scene::{RESTLESS, Scene};
-use system_tests::turn;
+use system_tests::{Pace, RESTLESS, Running, Scene, bus_log, count, json, turn, wait_until};
 
 const MS: u64 = 1_000_000;
 

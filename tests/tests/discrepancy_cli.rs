@@ -12,12 +12,8 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use system_tests::binaries::Program;
 use system_tests::discrepancy::{discrepancy, rig};
-use system_tests::launch::Pace;
-use system_tests::process::{Ended, Running};
-use system_tests::records::json;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, json};
 use tempfile::TempDir;
 
 const GOOD: i32 = 0;

@@ -7,7 +7,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::discrepancy::{discrepancy, rig};
-use system_tests::records::json;
+use system_tests::json;
 
 const GOOD: i32 = 0;
 const BAD_INPUT: i32 = 2;

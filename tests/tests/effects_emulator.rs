@@ -11,10 +11,7 @@ use std::thread;
 use system_tests::hidden::{
     Extreme, LIVELY, Live, drawn, each_alone, everything, expect_physical, live, rig_with,
 };
-use system_tests::launch::{Pace, run_both};
-use system_tests::records::Table;
-use system_tests::scene::Scene;
-use system_tests::turn;
+use system_tests::{Pace, Scene, Table, run_both, turn};
 
 /// Each slice of a comparison in real time, s.
 const SECONDS: u32 = 2;

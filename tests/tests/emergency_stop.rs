@@ -1,9 +1,7 @@
 //! Emergency stop over the bus: who stops must release, the record shows what acts, and the run ends by itself.
 
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
-use system_tests::launch::Pace;
-use system_tests::records::{Table, json};
-use system_tests::scene::{RESTLESS, Scene};
+use system_tests::{Pace, RESTLESS, Scene, Table, json};
 
 const BOUND_BROKEN: i32 = 1;
 /// The carriage moves by then.

@@ -6,15 +6,8 @@
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand};
 use rustix::process::Signal;
 use serde_json::Value;
-use system_tests::axis_table::AxisTable;
-use system_tests::binaries::Program;
 use system_tests::bus_cycles::read;
-use system_tests::launch::Pace;
-use system_tests::own;
-use system_tests::process::Ended;
-use system_tests::records::{Table, json};
-use system_tests::scene::{LINKED, Scene};
-use system_tests::turn;
+use system_tests::{AxisTable, Ended, LINKED, Pace, Program, Scene, Table, json, own, turn};
 
 /// 0.3 m in 0.5 s: 1.2 m/s at its fastest, which the valve gives for a moment only.
 const FAST: &str = include_str!("../scenes/fast.toml");

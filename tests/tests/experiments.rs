@@ -1,10 +1,7 @@
 //! Every shipped experiment runs to its end, passes its own bounds, and is listed with its sentence.
 
 use std::path::{Path, PathBuf};
-use system_tests::binaries::{Program, script, shipped_experiments, workspace};
-use system_tests::process::PATIENCE;
-use system_tests::records::json;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{PATIENCE, Program, SHORT, Scene, json, script, shipped_experiments, workspace};
 
 fn about(path: &Path) -> String {
     let text = std::fs::read_to_string(path).expect("it is listed");

@@ -3,11 +3,8 @@
 
 use plant::RigParameters;
 use std::path::Path;
-use system_tests::binaries::workspace;
 use system_tests::discrepancy::{discrepancy, rig};
-use system_tests::launch::Pace;
-use system_tests::records::{Table, json};
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Pace, SHORT, Scene, Table, json, workspace};
 
 /// Periods after the valve's edge that are compared: the valve stays at its limit.
 const COMPARED: usize = 50;

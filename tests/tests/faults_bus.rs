@@ -8,11 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use system_tests::account::of_sensors;
 use system_tests::events::{self, expect_valve_shut_between};
-use system_tests::launch::{Pace, run_both};
-use system_tests::process::Running;
-use system_tests::records::{Table, bus_log, count, count_of_id, json};
-use system_tests::scene::{RESTLESS, SHORT, Scene};
-use system_tests::turn;
+use system_tests::{
+    Pace, RESTLESS, Running, SHORT, Scene, Table, bus_log, count, count_of_id, json, run_both, turn,
+};
 
 const UNDER_WAY: usize = 900;
 

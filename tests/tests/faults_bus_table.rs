@@ -10,8 +10,7 @@ use protocol::frames::{
 };
 use serde_json::Value;
 use system_tests::broken::{Left, Plan, fault};
-use system_tests::events;
-use system_tests::records::{count, count_of_id};
+use system_tests::{count, count_of_id, events};
 
 const BEGINS: usize = 200;
 const ENDS: usize = 300;

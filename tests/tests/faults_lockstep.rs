@@ -1,9 +1,7 @@
 //! Faults of the lockstep barrier: nobody hangs, the culprit is named, the exit code says which kind it was.
 
 use rustix::process::Signal;
-use system_tests::launch::Pace;
-use system_tests::records::{Table, count, expect_whole_lines, json};
-use system_tests::scene::{RESTLESS, SHORT, Scene};
+use system_tests::{Pace, RESTLESS, SHORT, Scene, Table, count, expect_whole_lines, json};
 
 const BUS_FAILED: i32 = 3;
 const LOCKSTEP_TIMEOUT: i32 = 4;

@@ -1,10 +1,7 @@
 //! Without privileges for real time a run works all the same; what was refused is reported with its remedy.
 
 use std::os::unix::fs::{PermissionsExt, chown};
-use system_tests::launch::Pace;
-use system_tests::records::{count, json};
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Pace, SHORT, Scene, count, json, turn};
 
 const NOBODY: u32 = 65534;
 /// Limits under which no user but root may have FIFO priority or locked memory.

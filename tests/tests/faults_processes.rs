@@ -4,11 +4,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use std::time::Duration;
 use system_tests::events::{self, expect_valve_shut_between};
-use system_tests::launch::Pace;
-use system_tests::process::Running;
-use system_tests::records::{Table, count, count_of_id, json};
-use system_tests::scene::{RESTLESS, SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Pace, RESTLESS, Running, SHORT, Scene, Table, count, count_of_id, json, turn};
 
 /// Rows after which the valve moves.
 const UNDER_WAY: usize = 900;

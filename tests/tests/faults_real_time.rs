@@ -1,11 +1,7 @@
 //! A handful of faults in real time: by the script that means the same in lockstep, and by hand while the run goes on.
 
 use system_tests::broken::{Row, rows};
-use system_tests::events;
-use system_tests::launch::{Pace, run_both};
-use system_tests::records::{Table, bus_log, count, count_of_id, json};
-use system_tests::scene::{RESTLESS, Scene};
-use system_tests::turn;
+use system_tests::{Pace, RESTLESS, Scene, Table, bus_log, count, count_of_id, events, json, run_both, turn};
 
 /// By time, so that real time and lockstep can be held against each other; one by a condition that is soon met.
 const SCRIPT: &str = include_str!("../scenes/faults/real-time.toml");

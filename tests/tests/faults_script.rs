@@ -1,10 +1,8 @@
 //! Scripts of faults: the same bytes from the same one, refused when wrong, and a table of which no row is forgotten.
 
 use std::collections::BTreeSet;
-use system_tests::binaries::{Program, workspace};
 use system_tests::broken::{Left, Plan};
-use system_tests::launch::Pace;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Pace, Program, SHORT, Scene, workspace};
 
 #[test]
 fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() {

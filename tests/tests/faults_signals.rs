@@ -1,11 +1,7 @@
 //! Ctrl-C and SIGTERM, to each program and to both, in real time and in lockstep: exit 130, and every file complete.
 
 use rustix::process::Signal;
-use system_tests::launch::Pace;
-use system_tests::process::Running;
-use system_tests::records::{Table, bus_log, count, expect_whole_lines, json};
-use system_tests::scene::{RESTLESS, Scene};
-use system_tests::turn;
+use system_tests::{Pace, RESTLESS, Running, Scene, Table, bus_log, count, expect_whole_lines, json, turn};
 
 const INTERRUPTED: i32 = 130;
 const SIGNALS: [Signal; 2] = [Signal::INT, Signal::TERM];

@@ -3,10 +3,7 @@
 
 use std::fs;
 use std::path::Path;
-use system_tests::binaries::{install, script};
-use system_tests::process::{Ended, PATIENCE};
-use system_tests::records::json;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Ended, PATIENCE, SHORT, Scene, install, json, script};
 
 /// Draws a leakage of 5.9 Nl/min across the load's piston: far above its detection limit.
 const SEED: &str = "9";

@@ -6,13 +6,8 @@ use protocol::frames::{Frame, MainChainState};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::binaries::workspace;
-use system_tests::bus_cycles;
 use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned};
-use system_tests::launch::Pace;
-use system_tests::process::Running;
-use system_tests::records::{bus_log, count, json};
-use system_tests::scene::Scene;
+use system_tests::{Pace, Running, Scene, bus_cycles, bus_log, count, json, workspace};
 
 fn built() -> &'static Path {
     static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();

@@ -11,13 +11,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned_in};
 use system_tests::foreign_python::{light_path, run_script_of, tools_path};
-use system_tests::launch::Pace;
-use system_tests::process::Running;
-use system_tests::records::{bus_log, count, count_of_id, json};
-use system_tests::scene::Scene;
+use system_tests::{
+    Build, Pace, Program, Running, Scene, bus_log, count, count_of_id, executable, json, workspace,
+};
 
 /// The approach, 1 s, settling, 2 s, and the first of two repetitions, 8 s: the shortest run with all bounds in it.
 const ONE_REPETITION_S: f64 = 11.01;

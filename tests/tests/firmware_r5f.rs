@@ -8,16 +8,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Duration;
-use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::firmware::{DYNAMIC_M, Positioned, STATIC_M, build, positioned_where_it_ran};
 use system_tests::foreign_python::{python, tools_path};
-use system_tests::launch::Pace;
-use system_tests::peer::Packet;
-use system_tests::process::{PATIENCE, Running};
-use system_tests::records::{bus_log, count, json};
-use system_tests::scene::Scene;
 use system_tests::stalls::Stalls;
-use system_tests::turn;
+use system_tests::{
+    Build, PATIENCE, Pace, Packet, Program, Running, Scene, bus_log, count, executable, json, turn, workspace,
+};
 
 /// The first of two repetitions: out, a rest, back, a rest.
 const REPETITION_CYCLES: u32 = 8_000;

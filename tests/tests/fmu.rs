@@ -4,11 +4,8 @@ use plant::{Inputs, Plant, RigParameters, Setup, quantise_valve};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use system_tests::binaries::Program;
 use system_tests::foreign_python::run_script;
-use system_tests::process::{Ended, Running};
-use system_tests::records::Table;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Ended, Program, Running, SHORT, Scene, Table};
 
 /// Largest difference that is none: the numbers go through a CSV with all their digits.
 const TOLERANCE: f64 = 1e-9;

@@ -5,10 +5,8 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, install, workspace};
 use system_tests::foreign_python::{of, tools_path};
-use system_tests::process::{Ended, Running};
-use system_tests::turn;
+use system_tests::{Build, Ended, Program, Running, executable, install, turn, workspace};
 
 /// PREFIX/bin/airbench, PREFIX/lib/airbench with the programs, PREFIX/share/airbench with the files, and a working directory.
 struct Prefix(tempfile::TempDir);

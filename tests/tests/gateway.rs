@@ -10,12 +10,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 use system_tests::door::{Door, DoorClient};
 use system_tests::foreign_python::{light_path, python};
-use system_tests::launch::Pace;
-use system_tests::peer::{Packet, Peer};
-use system_tests::process::{PATIENCE, Running, wait_until};
-use system_tests::records::count;
-use system_tests::scene::{SHORT, Scene};
-use system_tests::{binaries::workspace, turn};
+use system_tests::{PATIENCE, Pace, Packet, Peer, Running, SHORT, Scene, count, turn, wait_until, workspace};
 
 /// Identifiers and data of a candump log, without time and interface.
 fn frames(log: &Path) -> Vec<String> {

@@ -10,10 +10,7 @@ use std::io::Write;
 use std::net::{Shutdown, TcpStream};
 use std::time::Duration;
 use system_tests::door::{Door, DoorClient};
-use system_tests::peer::Peer;
-use system_tests::process::wait_until;
-use system_tests::records::count;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Peer, SHORT, Scene, count, wait_until};
 
 /// What the gateway may need over what it had before, KiB: 32 clients with full queues would be 14 MiB.
 const MORE_MEMORY_KIB: u64 = 24 << 10;

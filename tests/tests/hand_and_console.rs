@@ -5,13 +5,8 @@ use protocol::can::CanFrame;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
 use rehearsal::{Rehearsal, RehearsalParts};
 use std::path::Path;
-use system_tests::binaries::Build;
 use system_tests::events::{Event, all, times};
-use system_tests::launch::Pace;
-use system_tests::process::{Running, wait_until};
-use system_tests::records::{Table, bus_log, count, json};
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Build, Pace, Running, SHORT, Scene, Table, bus_log, count, json, turn, wait_until};
 
 /// The experiment of the other tests, with more in its `[rig]`.
 fn with_people(rig: &str) -> Scene {

@@ -3,10 +3,7 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
-use system_tests::binaries::{Program, script, workspace};
-use system_tests::process::{Ended, PATIENCE, Running};
-use system_tests::records::json;
-use system_tests::skip;
+use system_tests::{Ended, PATIENCE, Program, Running, json, script, skip, workspace};
 
 fn latency(arguments: &[&str]) -> Ended {
     script("latency", arguments, 2 * PATIENCE)

@@ -1,11 +1,6 @@
 //! Parameters that change while running: planned by the experiment, to the cycle; and by a person who edits a program file.
 
-use system_tests::axis_table::AxisTable;
-use system_tests::launch::Pace;
-use system_tests::process::Running;
-use system_tests::records::json;
-use system_tests::scene::{RESTLESS, SHORT, Scene};
-use system_tests::turn;
+use system_tests::{AxisTable, Pace, RESTLESS, Running, SHORT, Scene, json, turn};
 
 /// Without feed-forward, so that the wanted velocity is gain times error.
 const PROGRAM: &str = "title = \"gain alone\"\n[algorithm]\nname = \"position-p\"\ngain_per_s = 20.0\n\

@@ -2,10 +2,8 @@
 
 use rustix::process::Signal;
 use std::time::Duration;
-use system_tests::launch::Pace;
 use system_tests::load::BusyLoops;
-use system_tests::records::{Table, bus_log, json};
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Pace, SHORT, Scene, Table, bus_log, json};
 
 /// Files of emulator and controller that must be the same.
 const FILES: [&str; 4] =

@@ -6,12 +6,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use system_tests::binaries::Program;
 use system_tests::foreign_python::{light_path, python, run_script};
-use system_tests::launch::{Pace, run_both};
-use system_tests::process::{Ended, Running};
-use system_tests::records::Table;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, Table, run_both};
 
 fn run_folder() -> PathBuf {
     static RUN: OnceLock<Scene> = OnceLock::new();

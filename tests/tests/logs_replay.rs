@@ -6,13 +6,7 @@ use rustix::process::Signal;
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
-use system_tests::binaries::Program;
-use system_tests::launch::{Pace, run_both};
-use system_tests::peer::{Packet, Peer};
-use system_tests::process::Running;
-use system_tests::records::{count, json};
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Pace, Packet, Peer, Program, Running, SHORT, Scene, count, json, run_both, turn};
 
 /// Silence after which nothing more comes.
 const SILENCE: Duration = Duration::from_millis(500);
@@ -27,7 +21,7 @@ fn replay(scene: &Scene, log: &Path, options: &str) -> Running {
 fn received(peer: &Peer, least: usize) -> Vec<CanFrame> {
     let mut frames = Vec::new();
     loop {
-        let patience = if frames.len() < least { system_tests::process::PATIENCE } else { SILENCE };
+        let patience = if frames.len() < least { system_tests::PATIENCE } else { SILENCE };
         match peer.receive(patience) {
             Some(Packet::Frame(frame)) => frames.push(frame),
             Some(other) => panic!("{other:?}"),
@@ -129,7 +123,7 @@ fn a_rig_that_comes_alive_ends_a_replay_that_would_disturb_it() {
 
 fn received_some(peer: &Peer, count: usize) -> usize {
     for _ in 0..count {
-        let came = peer.receive(system_tests::process::PATIENCE);
+        let came = peer.receive(system_tests::PATIENCE);
         assert!(matches!(came, Some(Packet::Frame(_))), "{came:?}");
     }
     count

@@ -5,12 +5,7 @@ use runlog::timing::{self, CycleTiming};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use system_tests::binaries::Program;
-use system_tests::launch::{Pace, run_both};
-use system_tests::process::{Ended, Running};
-use system_tests::records::json;
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, json, run_both, turn};
 
 const FAULTS: &str = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\nfrom_s = 0.2\nto_s = 0.25\n";
 

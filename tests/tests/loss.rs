@@ -15,10 +15,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use std::path::Path;
 use system_tests::account::{command_counters, gaps, of_sensors};
-use system_tests::launch::Pace;
-use system_tests::records::{count, count_of_id, json};
-use system_tests::scene::{RESTLESS, Scene};
-use system_tests::turn;
+use system_tests::{Pace, RESTLESS, Scene, count, count_of_id, json, turn};
 
 const WIRE: &str = "loss=0.01&seed=7";
 

@@ -6,10 +6,7 @@
 use crate::malformed_table::{COUNTERS, Counter, Injection, table};
 use protocol::frames::{Frame, Tick, ValveCommand};
 use serde_json::Value;
-use system_tests::launch::Pace;
-use system_tests::peer::Peer;
-use system_tests::records::{count, json};
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{Pace, Peer, SHORT, Scene, count, json};
 
 /// The carriage moves from here on; before, an open valve would show as well, but later is closer to what matters.
 const FIRST_CYCLE: u32 = 750;

@@ -5,12 +5,7 @@ use protocol::response_time::rig::{RigAnalysis, RigFrame};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
-use system_tests::binaries::shipped_experiments;
-use system_tests::launch::Pace;
-use system_tests::process::Ended;
-use system_tests::records::{bus_log, count, json};
-use system_tests::scene::{LINKED, SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Ended, LINKED, Pace, SHORT, Scene, bus_log, count, json, shipped_experiments, turn};
 
 const CYCLE_NS: u64 = 1_000_000;
 

@@ -1,14 +1,8 @@
 //! An own algorithm as a shared library, from its C file to the end of a run; and libraries that fail while the carriage moves.
 
 use protocol::frames::{EmergencyStopReason, Frame};
-use system_tests::axis_table::AxisTable;
 use system_tests::bus_cycles::read;
-use system_tests::launch::Pace;
-use system_tests::own;
-use system_tests::process::Ended;
-use system_tests::records::{Table, json};
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
+use system_tests::{AxisTable, Ended, Pace, SHORT, Scene, Table, json, own, turn};
 
 /// A scene whose drive is controlled by the scene's own_algorithm.so.
 fn scene() -> Scene {

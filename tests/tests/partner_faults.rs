@@ -8,14 +8,10 @@ use protocol::frames::{
 };
 use rustix::process::Signal;
 use std::path::PathBuf;
-use system_tests::axis_table::AxisTable;
 use system_tests::bus_cycles::{Logged, read, read_to_last_whole_line};
-use system_tests::events;
-use system_tests::launch::{Pace, run_both};
-use system_tests::process::{Ended, Running};
-use system_tests::records::{Table, count, json};
-use system_tests::scene::{LINKED, SHORT, Scene};
-use system_tests::turn;
+use system_tests::{
+    AxisTable, Ended, LINKED, Pace, Running, SHORT, Scene, Table, count, events, json, run_both, turn,
+};
 
 const STOPPED: i32 = 1;
 /// Cycles from the partner's last frame to the emergency stop.

@@ -2,10 +2,8 @@
 //! runner.
 
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::foreign_python::of;
-use system_tests::process::{Ended, Running};
-use system_tests::turn;
+use system_tests::{Build, Ended, Program, Running, executable, turn, workspace};
 
 fn with_programs(command: &mut Command) -> &mut Command {
     let emulator = executable(Program::Emulator, Build::Shipped);

@@ -3,11 +3,8 @@
 use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::firmware;
 use system_tests::foreign_python::{light_path, of, tools_path};
-use system_tests::process::{Ended, Running};
-use system_tests::turn;
+use system_tests::{Build, Ended, Program, Running, executable, firmware, turn, workspace};
 
 /// pytest in the environment of `python/`, with the programs as they ship.
 fn pytest() -> Command {

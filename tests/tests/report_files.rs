@@ -2,13 +2,8 @@
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use system_tests::binaries::Program;
 use system_tests::foreign_python::run_script;
-use system_tests::launch::{Pace, run_both};
-use system_tests::process::{Ended, Running};
-use system_tests::records::{count, json};
-use system_tests::scene::{SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, count, json, run_both, turn};
 
 fn run(scene: &Scene) -> PathBuf {
     let _machine = turn::take();

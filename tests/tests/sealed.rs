@@ -12,13 +12,8 @@ use plant::effects::draw::as_toml;
 use plant::effects::sheet::Switched;
 use plant::effects::{SHEETS, sheet};
 use protocol::frames::{DRIVE_SENSORS, MESSAGES};
-use system_tests::binaries::Program;
 use system_tests::hidden::{Extreme, LIVELY, drawn, everything, rig_with};
-use system_tests::launch::{Pace, run_both};
-use system_tests::process::Running;
-use system_tests::records::{Table, bus_log, json};
-use system_tests::scene::Scene;
-use system_tests::turn;
+use system_tests::{Pace, Program, Running, Scene, Table, bus_log, json, run_both, turn};
 
 const SEALED_RUNS: u64 = 20;
 /// Shorter texts of numbers stand anywhere by chance.
@@ -253,7 +248,7 @@ fn a_controller_takes_the_nominal_numbers_of_a_rig_file_with_effects() {
     let rig = rig_with(&scene, &everything(Extreme::Drawn));
     let both = lockstep(&scene, &rig, "both", "");
     let folder = scene.path("nominal");
-    let start = |launch: system_tests::launch::Launch, name: &str| launch.out(&folder.join(name)).start();
+    let start = |launch: system_tests::Launch, name: &str| launch.out(&folder.join(name)).start();
     let emulator = start(scene.emulator(Pace::Lockstep).rig(&rig).with("--seconds 1.3"), "emulator");
     let controller = start(scene.controller(Pace::Lockstep).with("--repeat"), "controller");
     let _ = emulator.wait().expect_code(0);

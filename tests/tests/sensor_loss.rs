@@ -5,11 +5,7 @@
 
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, MainChainState, RigStatus, Sensors, Tick};
 use std::time::Duration;
-use system_tests::launch::Pace;
-use system_tests::peer::{Packet, Peer};
-use system_tests::process::PATIENCE;
-use system_tests::records::json;
-use system_tests::scene::{SHORT, Scene};
+use system_tests::{PATIENCE, Pace, Packet, Peer, SHORT, Scene, json};
 
 const SILENT_FROM: u64 = 800;
 /// Five ticks, one every ten cycles.

@@ -2,9 +2,7 @@
 //! else.
 
 use protocol::frames::{Frame, HandSetPoint, HandSetPointAxis, MainChainState};
-use system_tests::axis_table::AxisTable;
-use system_tests::launch::Pace;
-use system_tests::scene::{LINKED, Scene};
+use system_tests::{AxisTable, LINKED, Pace, Scene};
 
 /// Both axes at rest for three seconds, linked, for a hand to lead.
 fn experiment(drive: &str, load: &str) -> String {

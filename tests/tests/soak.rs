@@ -2,11 +2,7 @@
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
-use system_tests::binaries::Program;
-use system_tests::process::{Running, wait_until};
-use system_tests::records::{count, expect_whole_lines, json};
-use system_tests::scene::{RESTLESS, Scene};
-use system_tests::turn;
+use system_tests::{Program, RESTLESS, Running, Scene, count, expect_whole_lines, json, turn, wait_until};
 
 /// A soak in the scene's folder `soak`, in segments of 8 s, with a program that does nothing as its load generator.
 fn soak(scene: &Scene, minutes: f64) -> Running {

@@ -5,12 +5,9 @@ use rustix::process::Signal;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::foreign_python::tools_path;
-use system_tests::process::{Ended, Running, wait_until};
-use system_tests::scene::{SHORT, Scene};
 use system_tests::socketcan::{self, built, expected, guest};
-use system_tests::turn;
+use system_tests::{Build, Ended, Program, Running, SHORT, Scene, executable, turn, wait_until, workspace};
 
 /// What a program prints, on a bus of its own.
 #[track_caller]

@@ -5,13 +5,10 @@ use rustix::process::Signal;
 use std::fs;
 use std::time::{Duration, Instant};
 use system_tests::foreign_python::python;
-use system_tests::launch::Pace;
-use system_tests::peer::{Packet, Peer};
-use system_tests::process::{PATIENCE, Running, wait_until};
-use system_tests::records::{count, json};
-use system_tests::scene::{RESTLESS, SHORT, Scene};
 use system_tests::socketcan::{built, guest, shell};
-use system_tests::turn;
+use system_tests::{
+    PATIENCE, Pace, Packet, Peer, RESTLESS, Running, SHORT, Scene, count, json, turn, wait_until,
+};
 
 /// Rows of the rig's record that must follow: it goes on.
 const GOES_ON: usize = 200;

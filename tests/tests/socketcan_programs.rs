@@ -5,15 +5,12 @@ use rustix::process::Signal;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, install, workspace};
 use system_tests::foreign_python::python;
-use system_tests::launch::Pace;
-use system_tests::peer::Packet;
-use system_tests::process::{PATIENCE, Running, wait_until};
-use system_tests::records::{count, json};
-use system_tests::scene::{SHORT, Scene};
 use system_tests::socketcan::{built, guest, shell};
-use system_tests::{firmware, turn};
+use system_tests::{
+    Build, PATIENCE, Pace, Packet, Program, Running, SHORT, Scene, count, executable, firmware, install,
+    json, turn, wait_until, workspace,
+};
 use tempfile::TempDir;
 
 #[test]

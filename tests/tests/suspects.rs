@@ -4,12 +4,8 @@
 use plant::RigParameters;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use system_tests::binaries::Build;
 use system_tests::discrepancy::{discrepancy, rig};
-use system_tests::launch::{Pace, run_both};
-use system_tests::records::{Table, count, json};
-use system_tests::scene::Scene;
-use system_tests::turn;
+use system_tests::{Build, Pace, Scene, Table, count, json, run_both, turn};
 
 /// An eddy brake on the carriage that grows along the stroke.
 const HIDDEN: &str = include_str!("../scenes/terms/hidden.toml");

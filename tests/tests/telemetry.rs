@@ -4,11 +4,8 @@ use runlog::telemetry::Packet;
 use serde_json::{Value, json as value};
 use std::os::unix::fs::PermissionsExt;
 use system_tests::events::{all, times};
-use system_tests::launch::{Launch, Pace};
 use system_tests::onlooker::{Told, Viewer};
-use system_tests::records::{Table, json};
-use system_tests::scene::{RESTLESS, SHORT, Scene};
-use system_tests::turn;
+use system_tests::{Launch, Pace, RESTLESS, SHORT, Scene, Table, json, turn};
 
 fn with_telemetry(scene: &Scene, pace: Pace) -> Launch {
     scene.emulator(pace).with(&format!("--telemetry {}", scene.path("telemetry").display()))

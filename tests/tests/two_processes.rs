@@ -4,11 +4,7 @@
 //! do not come to the same order of frames by chance: a run of thousands of cycles would show it.
 
 use std::time::Duration;
-use system_tests::axis_table::AxisTable;
-use system_tests::binaries::workspace;
-use system_tests::launch::{Launch, Pace};
-use system_tests::records::{bus_log, json};
-use system_tests::scene::{LINKED, SHORT, Scene};
+use system_tests::{AxisTable, LINKED, Launch, Pace, SHORT, Scene, bus_log, json, workspace};
 
 /// What a rehearsal leaves too.
 const TABLES: [&str; 4] = ["measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv"];

@@ -11,11 +11,9 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use system_tests::account;
-use system_tests::binaries::workspace;
 use system_tests::foreign_python::python;
 use system_tests::guest::{Guest, InterfaceCounters, compare_candump, data_frames, link};
-use system_tests::records::{Table, count, json};
+use system_tests::{Table, account, count, json, workspace};
 
 const LOG_OF_CAN1: &str = "candump-can1.log";
 /// What `job-cards` lets cangen send.

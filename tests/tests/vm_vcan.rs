@@ -10,11 +10,9 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::OnceLock;
-use system_tests::firmware;
 use system_tests::foreign_python::python;
 use system_tests::guest::{Guest, compare_candump, data_frames};
-use system_tests::records::{Table, count, json};
-use system_tests::socketcan;
+use system_tests::{Table, count, firmware, json, socketcan};
 
 /// The machine after its jobs.
 fn machine() -> &'static Guest {

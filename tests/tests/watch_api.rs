@@ -6,14 +6,12 @@ use std::ffi::OsStr;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::foreign_python::python;
-use system_tests::launch::Pace;
 use system_tests::onlooker::LivePage;
-use system_tests::process::{Running, wait_until};
-use system_tests::records::{Table, bus_log, count, json};
-use system_tests::scene::{LINKED, RESTLESS, Scene};
-use system_tests::turn;
+use system_tests::{
+    Build, LINKED, Pace, Program, RESTLESS, Running, Scene, Table, bus_log, count, executable, json, turn,
+    wait_until, workspace,
+};
 
 /// Emulator and controller of a scene, watched with controls.
 struct Watched {

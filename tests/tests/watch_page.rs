@@ -8,13 +8,8 @@ use protocol::frames::{EmergencyStop, Frame, HandSetPoint, HandSetPointAxis};
 use rustix::process::Signal;
 use std::path::PathBuf;
 use std::process::Command;
-use system_tests::binaries::workspace;
-use system_tests::launch::Pace;
 use system_tests::onlooker::LivePage;
-use system_tests::process::Running;
-use system_tests::records::{Table, bus_log};
-use system_tests::scene::Scene;
-use system_tests::turn;
+use system_tests::{Pace, Running, Scene, Table, bus_log, turn, workspace};
 
 /// To and fro, slowly enough for an eye, and a start after a stop.
 const TO_AND_FRO: &str = include_str!("../scenes/to-and-fro.toml");

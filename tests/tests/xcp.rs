@@ -5,13 +5,8 @@
 
 use serde_json::Value;
 use std::collections::BTreeMap;
-use system_tests::axis_table::AxisTable;
-use system_tests::launch::Pace;
-use system_tests::process::Running;
-use system_tests::records::{Table, bus_log, count, json};
-use system_tests::scene::{RESTLESS, Scene};
-use system_tests::turn;
 use system_tests::xcp::{Foreign, config, wait_for_a2l, xcp_packet};
+use system_tests::{AxisTable, Pace, RESTLESS, Running, Scene, Table, bus_log, count, json, turn};
 
 /// pyXCP takes its time to start, on a busy machine more than a controller waits for those that are missing.
 const PATIENT: &str = "--bus-grace 60";

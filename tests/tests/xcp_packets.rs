@@ -2,11 +2,8 @@
 //! time.
 
 use protocol::can::CanFrame;
-use system_tests::axis_table::AxisTable;
-use system_tests::launch::{Pace, run_both};
-use system_tests::records::{count, json};
-use system_tests::scene::{PROGRAM, SHORT, Scene};
 use system_tests::xcp::{SECRET, command, config, xcp_packet};
+use system_tests::{AxisTable, PROGRAM, Pace, SHORT, Scene, count, json, run_both};
 
 /// Cycle of the first command: the experiment moves.
 const START: u32 = 852;

@@ -2,8 +2,8 @@
 #![allow(clippy::print_stdout)] // This is what it is for.
 
 use plant::effects::sheet::Switched;
+use system_tests::Scene;
 use system_tests::hidden::{Extreme, LIVELY, Live, drawn, everything, live};
-use system_tests::scene::Scene;
 
 /// Each slice, s.
 const SECONDS: u32 = 10;

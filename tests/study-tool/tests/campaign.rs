@@ -5,8 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
-use system_tests::binaries::{Build, Program, executable, install, workspace};
-use system_tests::process::{Ended, PATIENCE, Running};
+use system_tests::{Build, Ended, PATIENCE, Program, Running, executable, install, workspace};
 use tempfile::TempDir;
 
 const GOOD: i32 = 0;
