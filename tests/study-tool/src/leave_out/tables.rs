@@ -70,48 +70,23 @@ fn split(name: &str, cases: &[(&Case, &LeftOut)]) -> Split {
 
 pub fn headline(cases: &[Case]) -> Vec<Line> {
     let left = || cases.iter().filter_map(|case| case.left_out.as_ref());
-    let line = |name: &str, wanted, rate| Line { name: name.to_owned(), rate, wanted };
     let no_memory =
         || cases.iter().filter(|case| case.left_out.as_ref().is_some_and(|left| !left.with_memory));
-    let closed = |claim: &dyn Fn(&Case) -> Option<f64>| {
-        Rate::of(no_memory().filter_map(claim), |closed| closed >= STILL_CLOSED)
-    };
+    let worst = || no_memory().filter_map(|case| case.judgement.claimed_closed_ratio);
+    let joint = || no_memory().filter_map(|case| case.judgement.claimed_joint_ratio);
+    let told = |case: &Case| case.judgement.claimed_closed_ratio.is_some();
+    let closed = |ratio: f64| ratio >= STILL_CLOSED;
+    let both_right = |left: &LeftOut| left.balance_right && left.variable_right;
+    let variable = "the same: right variable among the first two";
+    let both = "the same: right balance, and right variable among the first two";
     vec![
-        line(
-            "one effect left out: no wrong name",
-            "at least 85 %",
-            Rate::of(left(), |left| left.no_wrong_name),
-        ),
-        line(
-            "the same: right balance, and right variable among the first two",
-            "at least 85 %",
-            Rate::of(left(), |left| left.balance_right && left.variable_right),
-        ),
-        line("the same: right balance", "no target", Rate::of(left(), |left| left.balance_right)),
-        line(
-            "the same: right variable among the first two",
-            "no target",
-            Rate::of(left(), |left| left.variable_right),
-        ),
-        line(
-            "effects without memory: a gap told",
-            "all",
-            Rate::of(no_memory(), |case| case.judgement.claimed_closed_ratio.is_some()),
-        ),
-        line(
-            "the same, gap told: all signals together closed by at least 60 %",
-            "all",
-            closed(&|case| case.judgement.claimed_joint_ratio),
-        ),
-        line(
-            "the same, gap told: every signal closed by at least 60 %",
-            "no target",
-            closed(&|case| case.judgement.claimed_closed_ratio),
-        ),
-        line(
-            "no good report (crash, time limit, bad JSON, refused)",
-            "none",
-            Rate::of(cases, |case| case.judgement.error.is_some()),
-        ),
+        Line::of("one effect left out: no wrong name", "at least 85 %", left(), |left| left.no_wrong_name),
+        Line::of(both, "at least 85 %", left(), both_right),
+        Line::of("the same: right balance", "no target", left(), |left| left.balance_right),
+        Line::of(variable, "no target", left(), |left| left.variable_right),
+        Line::of("effects without memory: a gap told", "all", no_memory(), told),
+        Line::of("the same, gap told: all signals together closed by at least 60 %", "all", joint(), closed),
+        Line::of("the same, gap told: every signal closed by at least 60 %", "no target", worst(), closed),
+        Line::of_errors(cases),
     ]
 }

@@ -40,6 +40,21 @@ pub struct Line {
 }
 
 impl Line {
+    /// How many of the items are so.
+    pub(crate) fn of<T>(
+        name: &str,
+        wanted: &'static str,
+        items: impl IntoIterator<Item = T>,
+        is: impl FnMut(T) -> bool,
+    ) -> Self {
+        Line { name: name.to_owned(), rate: Rate::of(items, is), wanted }
+    }
+
+    pub(crate) fn of_errors(cases: &[Case]) -> Self {
+        let name = "no good report (crash, time limit, bad JSON, refused)";
+        Self::of(name, "none", cases, |case| case.judgement.error.is_some())
+    }
+
     /// Whether the rate should be low: then its upper bound is reported.
     pub fn is_low(&self) -> bool {
         self.wanted == "none" || self.wanted.starts_with("at most")
@@ -161,66 +176,42 @@ fn is_clear(case: &Case) -> bool {
 
 fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
     let clear = || singles.iter().copied().filter(|case| is_clear(case));
-    let line = |name: &str, wanted, rate| Line { name: name.to_owned(), rate, wanted };
+    let alone = || clear().filter(|case| hidden(case).class_size == 1);
+    let named = || clear().filter(|case| right(case));
+    let white = || named().filter(|case| !case.foreign_form).filter_map(|case| case.judgement.claimed_white);
     let nulls = || of_kind(cases, Kind::Null);
     let parameters = || of_kind(cases, Kind::Parameter);
     let pairs = || of_kind(cases, Kind::Pair).filter(|case| case.separable);
     let triples = || of_kind(cases, Kind::Triple).filter(|case| case.separable);
     let all_right = |case: &Case| case.judgement.hidden.iter().all(|hidden| hidden.right);
-    let alone_in_class = |case: &&Case| hidden(case).class_size == 1;
+    let false_alarm = |case: &Case| case.judgement.false_alarm;
+    let reported = |case: &Case| case.judgement.parameter_right;
     vec![
-        line(
+        Line::of(
             "one effect, 3 x limit and more: its class among the names",
             "at least 95 %",
-            Rate::of(clear(), right),
+            clear(),
+            right,
         ),
-        line(
-            "the same, alone in its class: right alone",
-            "at least 85 %",
-            Rate::of(clear().filter(alone_in_class), |case| case.judgement.alone),
-        ),
-        line(
-            "the same, class named: where right",
-            "all",
-            Rate::of(clear().filter(|case| right(case)), |case| hidden(case).where_right),
-        ),
-        line(
+        Line::of("the same, alone in its class: right alone", "at least 85 %", alone(), |case| {
+            case.judgement.alone
+        }),
+        Line::of("the same, class named: where right", "all", named(), |case| hidden(case).where_right),
+        Line::of(
             "the same, the catalogue's form: held-out chi2 claimed to be that of nothing missing",
             "at least 80 %",
-            Rate::of(
-                clear()
-                    .filter(|case| right(case) && !case.foreign_form)
-                    .filter_map(|case| case.judgement.claimed_white),
-                |white| white,
-            ),
+            white(),
+            |white| white,
         ),
-        line(
-            "nothing hidden: called missing",
-            "at most 2 %",
-            Rate::of(nulls(), |case| case.judgement.false_alarm),
-        ),
-        line(
-            "a parameter off: reported, no effect named",
-            "all",
-            Rate::of(parameters(), |case| case.judgement.parameter_right),
-        ),
-        line(
-            "a parameter off: called missing",
-            "none",
-            Rate::of(parameters(), |case| case.judgement.false_alarm),
-        ),
-        line("two effects, separable: both classes named", "at least 80 %", Rate::of(pairs(), all_right)),
-        line(
-            "two effects, separable: no third",
-            "at least 90 %",
-            Rate::of(pairs(), |case| case.judgement.too_many == 0),
-        ),
-        line("three effects, separable: all classes named", "no target", Rate::of(triples(), all_right)),
-        line(
-            "no good report (crash, time limit, bad JSON, refused)",
-            "none",
-            Rate::of(cases, |case| case.judgement.error.is_some()),
-        ),
+        Line::of("nothing hidden: called missing", "at most 2 %", nulls(), false_alarm),
+        Line::of("a parameter off: reported, no effect named", "all", parameters(), reported),
+        Line::of("a parameter off: called missing", "none", parameters(), false_alarm),
+        Line::of("two effects, separable: both classes named", "at least 80 %", pairs(), all_right),
+        Line::of("two effects, separable: no third", "at least 90 %", pairs(), |case| {
+            case.judgement.too_many == 0
+        }),
+        Line::of("three effects, separable: all classes named", "no target", triples(), all_right),
+        Line::of_errors(cases),
     ]
 }
 
