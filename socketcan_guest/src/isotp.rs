@@ -69,6 +69,15 @@ pub(crate) struct Identifiers {
     pub(crate) received: u32,
 }
 
+/// A frame of the channel, and what the socket wants of it.
+#[derive(Clone, Copy)]
+struct Incoming<'a> {
+    data: &'a [u8],
+    length: usize,
+    settings: &'a Settings,
+    now: Instant,
+}
+
 /// One socket's end of a transport channel.
 #[derive(Debug, Default)]
 pub(crate) struct IsoTp {
@@ -195,15 +204,13 @@ impl IsoTp {
         {
             return;
         }
-        let (settings, receiver) = (&self.settings, &mut self.receiver);
+        let incoming = Incoming { data, length, settings: &self.settings, now };
         let mut replies = Vec::new();
         match kind {
-            kind::FLOW_CONTROL => self.sender.take_flow_control(data, length, settings, now, events),
-            kind::SINGLE => receiver.take_single(data, length, settings, events),
-            kind::FIRST => replies.extend(receiver.take_first(data, length, settings, now)),
-            kind::CONSECUTIVE => {
-                replies.extend(receiver.take_consecutive(data, length, settings, now, events));
-            }
+            kind::FLOW_CONTROL => self.sender.take_flow_control(incoming, events),
+            kind::SINGLE => self.receiver.take_single(incoming, events),
+            kind::FIRST => replies.extend(self.receiver.take_first(incoming)),
+            kind::CONSECUTIVE => replies.extend(self.receiver.take_consecutive(incoming, events)),
             _ => {}
         }
         events.extend(replies.iter().map(|data| Event::Reply(self::frame(sent, data))));

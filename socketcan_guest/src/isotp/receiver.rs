@@ -1,7 +1,7 @@
 //! The side that receives a message.
 
-use super::settings::{Settings, flag};
-use super::{DATA_BYTES, Event, LONGEST_PDU, OTHER_SIDE};
+use super::settings::flag;
+use super::{DATA_BYTES, Event, Incoming, LONGEST_PDU, OTHER_SIDE};
 use rustix::io::Errno;
 use std::time::Instant;
 
@@ -43,13 +43,8 @@ impl Receiver {
     }
 
     /// A single frame ends whatever was being received.
-    pub(super) fn take_single(
-        &mut self,
-        data: &[u8],
-        length: usize,
-        settings: &Settings,
-        events: &mut Vec<Event>,
-    ) {
+    pub(super) fn take_single(&mut self, incoming: Incoming<'_>, events: &mut Vec<Event>) {
+        let Incoming { data, length, settings, .. } = incoming;
         self.0 = None;
         let begin = settings.address_bytes() + 1;
         let count = usize::from(data[begin - 1] & 0x0F);
@@ -66,13 +61,8 @@ impl Receiver {
     }
 
     /// Gives the data of a flow control frame.
-    pub(super) fn take_first(
-        &mut self,
-        data: &[u8],
-        length: usize,
-        settings: &Settings,
-        now: Instant,
-    ) -> Option<Vec<u8>> {
+    pub(super) fn take_first(&mut self, incoming: Incoming<'_>) -> Option<Vec<u8>> {
+        let Incoming { data, length, settings, now } = incoming;
         self.0 = None;
         // It fills its frame.
         if length != DATA_BYTES {
@@ -109,12 +99,10 @@ impl Receiver {
     /// Gives the data of a flow control frame at the end of a block.
     pub(super) fn take_consecutive(
         &mut self,
-        data: &[u8],
-        length: usize,
-        settings: &Settings,
-        now: Instant,
+        incoming: Incoming<'_>,
         events: &mut Vec<Event>,
     ) -> Option<Vec<u8>> {
+        let Incoming { data, length, settings, now } = incoming;
         let reception = self.0.as_mut()?;
         if let Some(least) = settings.least_received_gap() {
             if reception.last.is_some_and(|last| now - last < least) {

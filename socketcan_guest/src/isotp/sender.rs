@@ -1,7 +1,7 @@
 //! The side that sends a message.
 
 use super::settings::{Settings, flag};
-use super::{DATA_BYTES, Event, INTERFACE, LONGEST_PDU, OTHER_SIDE, kind};
+use super::{DATA_BYTES, Event, INTERFACE, Incoming, LONGEST_PDU, OTHER_SIDE, kind};
 use rustix::io::Errno;
 use std::time::{Duration, Instant};
 
@@ -114,14 +114,8 @@ impl Sender {
         }
     }
 
-    pub(super) fn take_flow_control(
-        &mut self,
-        data: &[u8],
-        length: usize,
-        settings: &Settings,
-        now: Instant,
-        events: &mut Vec<Event>,
-    ) {
+    pub(super) fn take_flow_control(&mut self, incoming: Incoming<'_>, events: &mut Vec<Event>) {
+        let Incoming { data, length, settings, now } = incoming;
         let State::Awaits { is_first, .. } = self.progress.state else { return };
         let at = settings.address_bytes();
         let end = at + FLOW_CONTROL_BYTES;
