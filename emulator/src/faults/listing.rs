@@ -67,7 +67,7 @@ pub fn faults() -> Vec<Value> {
 fn fault(spec: &FaultSpec) -> Value {
     json!({
         "fault": spec.name,
-        "group": spec.group.name(),
+        "group": spec.group,
         "about": spec.about,
         "places": spec.places.names(),
         "keys": spec.keys,

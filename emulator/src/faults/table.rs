@@ -44,7 +44,8 @@ pub struct FaultKey {
 }
 
 /// What a fault concerns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Group {
     Sensor,
     Valve,
@@ -193,19 +194,6 @@ impl FaultKey {
         let whole = if self.whole { "whole numbers from " } else { "" };
         let unit = if self.unit == "1" { "" } else { self.unit };
         format!("{whole}{} to {} {unit}", self.min, self.max).trim_end().to_owned()
-    }
-}
-
-impl Group {
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sensor => "sensor",
-            Self::Valve => "valve",
-            Self::Supply => "supply",
-            Self::Air => "air",
-            Self::Mechanics => "mechanics",
-            Self::Bus => "bus",
-        }
     }
 }
 
