@@ -90,9 +90,15 @@ pub fn largest_factor(
 
 /// `work` on each of `items` on all processors; the results in the order of the items.
 ///
+/// # Errors
+/// One of those of `work`.
+///
 /// # Panics
 /// When `work` does.
-pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+pub fn in_parallel<T: Sync, R: Send>(
+    items: &[T],
+    work: impl Fn(&T) -> Result<R, TrialError> + Sync + Send,
+) -> Result<Vec<R>, TrialError> {
     items.par_iter().map(work).collect()
 }
 
@@ -122,10 +128,8 @@ mod tests {
     #[test]
     fn results_of_all_threads_stand_in_the_order_of_the_items() {
         let items: Vec<u32> = (0..100).collect();
-        assert_eq!(
-            in_parallel(&items, |item| item * 2),
-            items.iter().map(|item| item * 2).collect::<Vec<_>>()
-        );
+        let doubled: Vec<u32> = items.iter().map(|item| item * 2).collect();
+        assert_eq!(in_parallel(&items, |item| Ok(item * 2)).unwrap(), doubled);
     }
 
     #[test]

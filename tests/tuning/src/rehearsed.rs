@@ -86,8 +86,8 @@ pub fn worst_gain_margin(inputs: &Inputs, scene: &Scene) -> Result<f64, TrialErr
     super::largest_factor(&Trial::default(), |Trial { loop_factor, .. }| {
         let corners =
             Trial::corners().into_iter().map(|corner| Trial { loop_factor: *loop_factor, ..corner });
-        let still = in_parallel(&corners.collect::<Vec<_>>(), |trial| is_still(inputs, scene, trial));
-        Ok(still.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().all(|still| still))
+        let still = in_parallel(&corners.collect::<Vec<_>>(), |trial| is_still(inputs, scene, trial))?;
+        Ok(still.into_iter().all(|still| still))
     })
 }
 

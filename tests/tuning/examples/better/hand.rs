@@ -47,8 +47,7 @@ pub(crate) fn table() -> Result<(), Box<dyn Error>> {
         let set: Vec<_> = subject.set.iter().map(|set| (*set).to_owned()).collect();
         let case =
             Case::new(&Made { experiment: EXPERIMENT, load: Some(subject.load), set: &set, drive: None })?;
-        let runs = in_parallel(&SEEDS, |seed| reported(&case, *seed));
-        let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let runs = in_parallel(&SEEDS, |seed| reported(&case, *seed))?;
         let scales = [1e3, 1.0, 1.0, 1.0, 1e3, 1e3, 1e2, 1e3];
         let cell = |place: usize| Spread::cell(Spread::of(runs.iter().map(|run| run[place])), scales[place]);
         println!("| {} | {} |", subject.name, (0..scales.len()).map(cell).collect::<Vec<_>>().join(" | "));

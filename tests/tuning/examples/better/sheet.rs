@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use tuning::cases::{Case, Made, figures};
-use tuning::{Trial, TrialError, in_parallel, rounded};
+use tuning::{Trial, in_parallel, rounded};
 
 pub(crate) const SEEDS: [u64; 5] = [1, 2, 3, 4, 5];
 
@@ -83,9 +83,8 @@ impl Sheet<'_> {
         let case = Case::new(&Made { experiment: self.experiment, drive, load, set: &[] })?;
         let runs = in_parallel(&SEEDS, |seed| {
             let figure = figures(&case.run(&Trial { seed: *seed, ..Trial::default() })?);
-            Ok::<_, TrialError>(self.columns.iter().map(|column| figure(column.figure)).collect::<Vec<_>>())
-        });
-        let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
+            Ok(self.columns.iter().map(|column| figure(column.figure)).collect::<Vec<_>>())
+        })?;
         Ok((0..self.columns.len()).map(|place| Spread::of(runs.iter().map(|run| run[place]))).collect())
     }
 

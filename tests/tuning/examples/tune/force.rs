@@ -93,10 +93,8 @@ struct Told {
 impl Told {
     fn of(case: &Case) -> Result<Self, TrialError> {
         let worst_of = |trials: &[Trial]| {
-            let runs = in_parallel(trials, |trial| figures_of(case, trial)).into_iter();
-            Ok::<_, TrialError>(
-                runs.collect::<Result<Vec<_>, _>>()?.into_iter().reduce(worst).unwrap_or_default(),
-            )
+            let runs = in_parallel(trials, |trial| figures_of(case, trial))?;
+            Ok::<_, TrialError>(runs.into_iter().reduce(worst).unwrap_or_default())
         };
         Ok(Self {
             nominal: worst_of(&SEEDS.map(|seed| Trial { seed, ..Trial::default() }))?,
@@ -173,8 +171,8 @@ fn by_corner(case: &Case) -> Result<(), TrialError> {
         let [settling_s, overshoot, ..] = figures_of(case, trial)?;
         let margin = gain_margin(&case.inputs, &case.scene, trial)?;
         Ok(format!("{margin} / {} ms / {} %", ms(settling_s), number(overshoot * 1e2, 1)))
-    });
-    corners(&cells.into_iter().collect::<Result<Vec<_>, TrialError>>()?);
+    })?;
+    corners(&cells);
     Ok(())
 }
 

@@ -61,8 +61,7 @@ impl Shipped {
             let moved = positioning(make)?;
             let tried = in_parallel(&Trial::corners(), |trial| {
                 Ok((gain_margin(make, trial)?, attempt(make(), STEP, trial)?.overshoot_m))
-            });
-            let tried = tried.into_iter().collect::<Result<Vec<_>, TrialError>>()?;
+            })?;
             let (margin, overshoot_m) = tried[nominal()];
             let worst = tried.iter().fold((f64::MAX, 0.0_f64), |(least, most), (margin, overshoot)| {
                 (least.min(*margin), most.max(*overshoot))
@@ -97,8 +96,7 @@ impl Shipped {
                 let margin = gain_margin(make, &Trial::default())?;
                 let (dynamic_mm, static_mm) = (figures.dynamic_m * 1e3, figures.static_m * 1e3);
                 Ok(format!("{dynamic_mm:.2} mm / {static_mm:.2} mm / {margin}"))
-            });
-            let cells = cells.into_iter().collect::<Result<Vec<_>, TrialError>>()?;
+            })?;
             println!("| {gain} | {} |", cells.join(" | "));
         }
         Ok(())
@@ -110,9 +108,10 @@ impl Shipped {
         let cells = in_parallel(&Trial::corners(), |trial| {
             let late = delay_margin(make, trial)?.map_or("-".to_owned(), |cycles| format!("{cycles} ms"));
             let moved = attempt(make(), POINT_TO_POINT, trial)?;
-            Ok(format!("{} / {late} / {:.2} mm", gain_margin(make, trial)?, moved.dynamic_m * 1e3))
-        });
-        corners(&cells.into_iter().collect::<Result<Vec<_>, TrialError>>()?);
+            let margin = gain_margin(make, trial)?;
+            Ok(format!("{margin} / {late} / {:.2} mm", moved.dynamic_m * 1e3))
+        })?;
+        corners(&cells);
         Ok(())
     }
 }
