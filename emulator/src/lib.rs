@@ -1,11 +1,11 @@
 //! The rig behind a CAN bus: the plant in real time or in lockstep, recorded.
 //!
 //! It cannot tell whose controller sits on the bus, and puts nothing on it that the rig would not send. What only a
-//! simulation knows goes to `truth.csv`.
+//! simulation knows goes to `truth.csv`. Which command acts: `protocol::commands`.
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`node`], `rig` | the node of the bus with console and records; plant, people and faults behind it. Which command acts: `protocol::commands` |
+//! | [`node`], `rig` | the node of the bus with console and records; plant, people and faults behind it |
 //! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
 //! | [`exchange`] | when sensors went out and the commands that answer them came |
 //! | [`wire_limits`] | whether the numbers of a rig fit the frames |
