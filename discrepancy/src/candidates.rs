@@ -131,7 +131,7 @@ impl Candidate {
             let here = rig.terms().iter().find(|term| term.is_same(&suspect.declared));
             let present = here.map(|term| {
                 let mut numbers = [0.0; MOST_KEYS];
-                numbers.iter_mut().zip(term.numbers()).for_each(|(own, number)| *own = number.value());
+                numbers.iter_mut().zip(term.numbers()).for_each(|(own, number)| *own = number.value);
                 numbers
             });
             Candidate { sheet: &suspect.sheet, place: suspect.place, suspect: Some(suspect), present }
@@ -320,7 +320,7 @@ mod tests {
         assert_eq!(candidate.effect_parameters(&[1.0, 0.0, 0.0])[0], 40.0);
         assert_eq!(candidate.probes(), [[0.3, 0.0, 0.0]]);
         let with = candidate.rig(&rig, &[0.5, 0.1, 0.0]).unwrap();
-        assert_eq!(with.terms()[0].numbers()[0].value(), 20.0);
+        assert_eq!(with.terms()[0].numbers()[0].value, 20.0);
         let here = all(&with, [true, false])[0];
         assert!(here.is_present());
         assert_eq!(here.rig(&with, &here.origin()).unwrap(), with);

@@ -157,8 +157,8 @@ pub(crate) fn add_terms(
         let document = Document::parse(text.as_str()).map_err(|error| layout(error.message()))?;
         let mut edits = Edits::new(&text);
         let errors = |(number, quantity): (&Number, &Quantity)| {
-            let value = quantity_text(quantity.value, quantity.standard_error, number.unit());
-            format!("{} = {value}", number.name())
+            let value = quantity_text(quantity.value, quantity.standard_error, &number.unit.text);
+            format!("{} = {value}", number.name)
         };
         let found: Vec<String> = term.numbers().iter().zip(&effect.parameters).map(errors).collect();
         let comment = format!("Found{}: {}.", source(records), found.join(", "));

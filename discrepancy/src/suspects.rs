@@ -78,8 +78,7 @@ impl Suspect {
     fn of(declared: Declared) -> Suspect {
         let kept = |text: String| -> &'static str { Box::leak(text.into_boxed_str()) };
         let target = declared.target();
-        let key =
-            |number: &Number| key(number, kept(number.name().to_owned()), kept(number.unit().to_owned()));
+        let key = |number: &Number| key(number, kept(number.name.clone()), kept(number.unit.text.clone()));
         let sheet = Sheet {
             name: kept(declared.name().to_owned()),
             group: match target.kind() {
@@ -99,14 +98,14 @@ impl Suspect {
 }
 
 fn key(number: &Number, name: &'static str, unit: &'static str) -> EffectKey {
-    let [min, max] = number.range();
-    let is_amplitude = number.value() == 0.0;
-    let usual = number.prior().unwrap_or(0.5 * min.abs().max(max.abs()));
+    let [min, max] = number.range;
+    let is_amplitude = number.value == 0.0;
+    let usual = number.prior.unwrap_or(0.5 * min.abs().max(max.abs()));
     let drawn = if is_amplitude {
         let sign = if max > 0.0 { 1.0 } else { -1.0 };
         [sign * 0.1 * usual, sign * usual]
     } else {
-        let (value, half) = (number.value(), number.prior().unwrap_or(0.5 * (max - min)));
+        let (value, half) = (number.value, number.prior.unwrap_or(0.5 * (max - min)));
         // A positive shape may be scaled by its logarithm: not down to 0.
         let least = if value > 0.0 { value / 20.0 } else { f64::NEG_INFINITY };
         [(value - half).max(min).max(least), (value + half).min(max)]
@@ -118,7 +117,7 @@ fn key(number: &Number, name: &'static str, unit: &'static str) -> EffectKey {
         max,
         drawn,
         signed: min < 0.0 && max > 0.0,
-        default: Some(number.value()),
+        default: Some(number.value),
         neutral: is_amplitude.then_some(0.0),
         meaning: "declared by the suspect",
     }

@@ -13,9 +13,10 @@ mod user;
 pub use user::Found;
 
 use crate::file::Change;
+use crate::read::named;
 use crate::units::{Dimension, Unit};
 use expression::grammar::renamed;
-use settings::{Section, SettingsError, Source};
+use settings::{Result, Section, Source};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -264,13 +265,13 @@ pub(crate) fn names(text: &str) -> Vec<String> {
     found.into_inner()
 }
 
-fn library(name: &str, text: &str, file: &Path) -> Result<Library, SettingsError> {
+fn library(name: &str, text: &str, file: &Path) -> Result<Library> {
     let source = Source::parse(text, file)?.with_columns();
     let mut root = source.root();
     let about = root.needed_text("about", "what it is about")?.text;
     let place = unit(&mut root, "unit")?;
     let mut variables = Vec::new();
-    for (name, mut section) in tables(&mut root, "variables")? {
+    for (name, mut section) in named(&mut root, "variables")? {
         let about = section.needed_text("about", "what it means")?.text;
         let default = section.text("default")?.map(|text| text.text);
         variables.push(Variable { name, about, unit: unit(&mut section, "unit")?, default });
@@ -281,7 +282,7 @@ fn library(name: &str, text: &str, file: &Path) -> Result<Library, SettingsError
     Ok(Library { name: name.to_owned(), about, place, variables, entries })
 }
 
-fn entry(mut section: Section<'_>) -> Result<Entry, SettingsError> {
+fn entry(mut section: Section<'_>) -> Result<Entry> {
     let name = section.needed_text("name", "the second part of use")?.text;
     let about = section.needed_text("about", "its law in words")?.text;
     let all = [("add", Change::Add), ("multiply", Change::Multiply), ("replace", Change::Replace)];
@@ -291,7 +292,7 @@ fn entry(mut section: Section<'_>) -> Result<Entry, SettingsError> {
     let effect = section.text("effect")?.map(|text| text.text);
     let is_local = section.flag("local")?;
     let mut parameters = Vec::new();
-    for (name, mut section) in tables(&mut section, "parameters")? {
+    for (name, mut section) in named(&mut section, "parameters")? {
         let quantity = quantity(&mut section)?;
         let factor = quantity.unit.factor;
         let values_si = section.numbers("value")?.iter().map(|value| value * factor).collect();
@@ -304,7 +305,7 @@ fn entry(mut section: Section<'_>) -> Result<Entry, SettingsError> {
         parameters.push(EntryParameter { name, quantity, values_si, range_si, is_fixed });
     }
     let mut states = Vec::new();
-    for (name, mut section) in tables(&mut section, "states")? {
+    for (name, mut section) in named(&mut section, "states")? {
         let quantity = quantity(&mut section)?;
         let is_zero_at_start = section.choice("start", &[("zero", true), (PLACE, false)])?;
         let derivative = section.needed_text("derivative", "an expression")?.text;
@@ -312,14 +313,14 @@ fn entry(mut section: Section<'_>) -> Result<Entry, SettingsError> {
         states.push(EntryState { name, quantity, is_zero_at_start, derivative });
     }
     let mut memories = Vec::new();
-    for (name, mut section) in tables(&mut section, "memory")? {
+    for (name, mut section) in named(&mut section, "memory")? {
         let quantity = quantity(&mut section)?;
         let update = section.needed_text("update", "an expression")?.text;
         section.finish()?;
         memories.push(EntryMemory { name, quantity, update });
     }
     let mut frictions = Vec::new();
-    for (name, mut section) in tables(&mut section, "friction")? {
+    for (name, mut section) in named(&mut section, "friction")? {
         let quantity = quantity(&mut section)?;
         let mut text = |key| section.needed_text(key, "an expression").map(|text| text.text);
         let [velocity, sliding, breakaway] = [text("velocity")?, text("sliding")?, text("breakaway")?];
@@ -330,15 +331,11 @@ fn entry(mut section: Section<'_>) -> Result<Entry, SettingsError> {
     Ok(Entry { name, about, change, expression, effect, is_local, parameters, states, memories, frictions })
 }
 
-fn tables<'a>(section: &mut Section<'a>, key: &str) -> Result<Vec<(String, Section<'a>)>, SettingsError> {
-    crate::read::named(section, key)
-}
-
-fn quantity(section: &mut Section<'_>) -> Result<Quantity, SettingsError> {
+fn quantity(section: &mut Section<'_>) -> Result<Quantity> {
     Ok(Quantity { unit: unit(section, "unit")?, dimension: section.text("dimension")?.map(|text| text.text) })
 }
 
-fn unit(section: &mut Section<'_>, key: &str) -> Result<Unit, SettingsError> {
+fn unit(section: &mut Section<'_>, key: &str) -> Result<Unit> {
     let Some(text) = section.text(key)? else { return Ok(Unit::one()) };
     Unit::parse(&text.text).map_err(|error| section.wrong_at(key, &error.why))
 }

@@ -12,7 +12,7 @@ use crate::rows::Rows;
 use crate::units::{Dimension, Unit};
 use expression::compile::RESERVED;
 use expression::grammar::{Nodes, is_of_name};
-use settings::{Section, SettingsError, Source, Text};
+use settings::{Result, Section, Source, Text};
 use std::path::Path;
 
 /// Unit of a column that holds times of a calendar.
@@ -33,7 +33,7 @@ struct Reader<'a> {
     starts: Vec<(usize, Text)>,
 }
 
-pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsError> {
+pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model> {
     let mut root = source.root();
     root.allow(&TOP.split_whitespace().collect::<Vec<_>>())?;
     let stem = file.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy().into_owned());
@@ -92,7 +92,7 @@ pub(crate) fn model(source: &Source<'_>, file: &Path) -> Result<Model, SettingsE
     Ok(reader.model)
 }
 
-fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, SettingsError> {
+fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout> {
     let mut layout = RecordLayout {
         period_s: None,
         time_column: "t_s".into(),
@@ -137,7 +137,7 @@ fn record(root: &mut Section<'_>, source: &Source<'_>) -> Result<RecordLayout, S
     Ok(layout)
 }
 
-fn solver(root: &mut Section<'_>) -> Result<Solver, SettingsError> {
+fn solver(root: &mut Section<'_>) -> Result<Solver> {
     let Some(mut section) = root.section("solver")? else {
         return Ok(Solver::Adaptive { relative_tolerance: 1e-6 });
     };
@@ -156,12 +156,7 @@ fn solver(root: &mut Section<'_>) -> Result<Solver, SettingsError> {
 }
 
 /// The number under a key, in its range.
-fn one_or(
-    section: &mut Section<'_>,
-    key: &str,
-    default: f64,
-    [least, most]: [f64; 2],
-) -> Result<f64, SettingsError> {
+fn one_or(section: &mut Section<'_>, key: &str, default: f64, [least, most]: [f64; 2]) -> Result<f64> {
     match section.numbers(key)?.as_slice() {
         [] => Ok(default),
         [one] if (least..=most).contains(one) => Ok(*one),
@@ -170,17 +165,17 @@ fn one_or(
 }
 
 /// The unit of a section, 1 when it is absent.
-fn unit(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit, SettingsError> {
+fn unit(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit> {
     unit_of(section, source, "unit")
 }
 
-fn unit_of(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit, SettingsError> {
+fn unit_of(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit> {
     let Some(text) = section.text(key)? else { return Ok(Unit::one()) };
     Unit::parse(&text.text).map_err(|error| source.wrong_from(text.at + error.at, &error.why))
 }
 
 /// The factor that brings what stands in a column to its unit.
-fn scale(section: &mut Section<'_>) -> Result<f64, SettingsError> {
+fn scale(section: &mut Section<'_>) -> Result<f64> {
     match one_or(section, "scale", 1.0, [-1e12, 1e12])? {
         0.0 => Err(section.wrong_at("scale", "scale: allowed is a number that is not 0")),
         scale => Ok(scale),
@@ -188,7 +183,7 @@ fn scale(section: &mut Section<'_>) -> Result<f64, SettingsError> {
 }
 
 /// The range of a section in SI.
-fn range(section: &mut Section<'_>, unit: &Unit) -> Result<[f64; 2], SettingsError> {
+fn range(section: &mut Section<'_>, unit: &Unit) -> Result<[f64; 2]> {
     match section.numbers("range")?.as_slice() {
         [] => Ok([f64::NEG_INFINITY, f64::INFINITY]),
         [least, most] if least < most => Ok([least * unit.factor, most * unit.factor]),
@@ -215,10 +210,7 @@ fn example(key: &str, name: &str) -> Option<String> {
 }
 
 /// The tables under a key, by their names.
-pub(crate) fn named<'a>(
-    section: &mut Section<'a>,
-    key: &str,
-) -> Result<Vec<(String, Section<'a>)>, SettingsError> {
+pub(crate) fn named<'a>(section: &mut Section<'a>, key: &str) -> Result<Vec<(String, Section<'a>)>> {
     let Some(mut all) = section.section_as(key, example(key, "NAME").as_deref())? else {
         return Ok(Vec::new());
     };
@@ -231,14 +223,14 @@ pub(crate) fn named<'a>(
 }
 
 impl Reader<'_> {
-    fn expression(&mut self, text: Text) -> Result<Expression, SettingsError> {
+    fn expression(&mut self, text: Text) -> Result<Expression> {
         let root = self.model.nodes.parse(&text.text, text.at);
         let root = root.map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))?;
         Ok(Expression { text: text.text.trim().into(), root, at: text.at })
     }
 
     /// A name that is new, is one, and means nothing else.
-    fn is_new(&self, name: &str, suspect: Option<usize>, section: &Section<'_>) -> Result<(), SettingsError> {
+    fn is_new(&self, name: &str, suspect: Option<usize>, section: &Section<'_>) -> Result<()> {
         let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
         if !begins || !name.chars().all(is_of_name) || name.chars().count() > 64 {
             let allowed =
@@ -263,7 +255,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn tables(&mut self, root: &mut Section<'_>) -> Result<(), SettingsError> {
+    fn tables(&mut self, root: &mut Section<'_>) -> Result<()> {
         for (name, mut section) in named(root, "tables")? {
             self.is_new(&name, None, &section)?;
             let from = unit_of(&mut section, self.source, "x_unit")?;
@@ -278,7 +270,7 @@ impl Reader<'_> {
     }
 
     /// Parameters, states, memories and definitions, of the model or of a suspect.
-    fn members(&mut self, parent: &mut Section<'_>, suspect: Option<usize>) -> Result<(), SettingsError> {
+    fn members(&mut self, parent: &mut Section<'_>, suspect: Option<usize>) -> Result<()> {
         for (name, section) in named(parent, "parameters")? {
             self.is_new(&name, suspect, &section)?;
             let parameter = Parameter {
@@ -331,7 +323,7 @@ impl Reader<'_> {
     }
 
     /// A parameter with what the file says of it in place of what it is without.
-    fn parameter(&mut self, mut section: Section<'_>, before: Parameter) -> Result<(), SettingsError> {
+    fn parameter(&mut self, mut section: Section<'_>, before: Parameter) -> Result<()> {
         // Each key is asked for, so that a message of one that is misspelt names it.
         let given = unit(&mut section, self.source)?;
         let unit = if section.has("unit") { given } else { before.unit };
@@ -387,11 +379,7 @@ impl Reader<'_> {
     }
 
     /// Known values of records, by the end of their path.
-    fn of_records(
-        &self,
-        section: &mut Section<'_>,
-        unit: &Unit,
-    ) -> Result<Vec<(String, f64)>, SettingsError> {
+    fn of_records(&self, section: &mut Section<'_>, unit: &Unit) -> Result<Vec<(String, f64)>> {
         let Some(mut given) = section.section("values")? else { return Ok(Vec::new()) };
         let more = ["value", "range", "tolerance", "per_record"].into_iter().find(|key| section.has(key));
         if let Some(key) = more {
@@ -412,7 +400,7 @@ impl Reader<'_> {
         Ok(all)
     }
 
-    fn start(&mut self, section: &mut Section<'_>, unit: &Unit) -> Result<Start, SettingsError> {
+    fn start(&mut self, section: &mut Section<'_>, unit: &Unit) -> Result<Start> {
         let range_si = range(section, unit)?;
         let guess = section.numbers("guess")?;
         if section.peek("start").is_none() {
@@ -436,7 +424,7 @@ impl Reader<'_> {
         Ok(Start::Record { output: usize::MAX })
     }
 
-    fn resolve_starts(&mut self) -> Result<(), SettingsError> {
+    fn resolve_starts(&mut self) -> Result<()> {
         for (state, text) in &self.starts {
             let output = self.model.outputs.iter().position(|output| output.name == text.text);
             let input = self.model.inputs.iter().position(|input| input.name == text.text);
@@ -457,7 +445,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn outputs(&mut self, root: &mut Section<'_>) -> Result<(), SettingsError> {
+    fn outputs(&mut self, root: &mut Section<'_>) -> Result<()> {
         for (name, mut section) in named(root, "outputs")? {
             self.is_new(&name, None, &section)?;
             let column = section.text("column")?.map_or_else(|| name.clone(), |text| text.text);

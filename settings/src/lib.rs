@@ -7,7 +7,7 @@
 pub mod parameters;
 mod section;
 
-pub use section::{Section, SettingsError, Source, Text};
+pub use section::{Result, Section, SettingsError, Source, Text};
 
 use std::ops::Range;
 use toml::Value;

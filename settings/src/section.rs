@@ -14,6 +14,9 @@ use toml::de::{DeTable, DeValue};
 #[error("{0}")]
 pub struct SettingsError(String);
 
+/// What a file says, or its place and what is wrong there.
+pub type Result<T, E = SettingsError> = core::result::Result<T, E>;
+
 /// A TOML file that is being read.
 pub struct Source<'a> {
     text: &'a str,
@@ -27,7 +30,7 @@ impl<'a> Source<'a> {
     ///
     /// # Errors
     /// [`SettingsError`] for what is no TOML.
-    pub fn parse(text: &'a str, file: &'a Path) -> Result<Self, SettingsError> {
+    pub fn parse(text: &'a str, file: &'a Path) -> Result<Self> {
         let root =
             DeTable::parse(text).map_err(|error| SettingsError(format!("{}: {error}", file.display())))?;
         Ok(Self { text, file, root, columns: false })
@@ -111,7 +114,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No finite number, and no list of them.
-    pub fn numbers(&mut self, key: &str) -> Result<Vec<f64>, SettingsError> {
+    pub fn numbers(&mut self, key: &str) -> Result<Vec<f64>> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let finite =
             |value: &Spanned<DeValue<'_>>| number(value.get_ref()).filter(|number| number.is_finite());
@@ -126,7 +129,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// Neither true nor false.
-    pub fn flag(&mut self, key: &str) -> Result<bool, SettingsError> {
+    pub fn flag(&mut self, key: &str) -> Result<bool> {
         let Some(value) = self.value(key) else { return Ok(false) };
         value.get_ref().as_bool().ok_or_else(|| self.not_allowed(value, key, "true or false"))
     }
@@ -135,7 +138,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No list of texts.
-    pub fn texts(&mut self, key: &str) -> Result<Vec<String>, SettingsError> {
+    pub fn texts(&mut self, key: &str) -> Result<Vec<String>> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let list = value.get_ref().as_array();
         let texts =
@@ -175,7 +178,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No number, or out of range.
-    pub fn number(&mut self, parameter: &Parameter) -> Result<Option<f64>, SettingsError> {
+    pub fn number(&mut self, parameter: &Parameter) -> Result<Option<f64>> {
         let Some(value) = self.value(&parameter.name) else { return Ok(None) };
         match number(value.get_ref()) {
             Some(number) => {
@@ -193,7 +196,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No number, or out of range.
-    pub fn number_or_default(&mut self, parameter: &Parameter) -> Result<f64, SettingsError> {
+    pub fn number_or_default(&mut self, parameter: &Parameter) -> Result<f64> {
         Ok(self.number(parameter)?.unwrap_or(parameter.default))
     }
 
@@ -201,7 +204,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// Missing, no number, or out of range.
-    pub fn needed_number(&mut self, parameter: &Parameter) -> Result<f64, SettingsError> {
+    pub fn needed_number(&mut self, parameter: &Parameter) -> Result<f64> {
         let Parameter { name, unit, least, most, meaning, .. } = parameter;
         let missing = format!("{name} is missing: {meaning}, {least} to {most} {unit}");
         self.number(parameter)?.ok_or_else(|| self.lacks(missing.trim_end()))
@@ -211,7 +214,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No whole number, or out of range.
-    pub fn whole_or_default(&mut self, parameter: &Parameter) -> Result<u32, SettingsError> {
+    pub fn whole_or_default(&mut self, parameter: &Parameter) -> Result<u32> {
         let number = self.number_or_default(parameter)?;
         if number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number) {
             return Ok(number as u32);
@@ -224,7 +227,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No text.
-    pub fn text(&mut self, key: &str) -> Result<Option<Text>, SettingsError> {
+    pub fn text(&mut self, key: &str) -> Result<Option<Text>> {
         let Some(value) = self.value(key) else { return Ok(None) };
         match value.get_ref().as_str() {
             Some(text) => Ok(Some(Text {
@@ -240,7 +243,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// Missing, or no text.
-    pub fn needed_text(&mut self, key: &str, meaning: &str) -> Result<Text, SettingsError> {
+    pub fn needed_text(&mut self, key: &str, meaning: &str) -> Result<Text> {
         self.text(key)?.ok_or_else(|| self.lacks(&format!("{key} is missing: {meaning}")))
     }
 
@@ -248,7 +251,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// None of them.
-    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T, SettingsError> {
+    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T> {
         let Some(written) = self.text(key)? else { return Ok(choices[0].1) };
         self.chosen(key, &written.text, choices)
     }
@@ -257,7 +260,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No list, or one that holds something else.
-    pub fn choices<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<Vec<T>, SettingsError> {
+    pub fn choices<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<Vec<T>> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let list = value.get_ref().as_array();
         let texts = list.and_then(|list| list.iter().map(|item| item.get_ref().as_str()).collect());
@@ -267,7 +270,7 @@ impl<'a> Section<'a> {
         texts.into_iter().map(|text| self.chosen(key, text, choices)).collect()
     }
 
-    fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T, SettingsError> {
+    fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T> {
         choices.iter().find(|(name, _)| *name == text).map(|(_, choice)| *choice).ok_or_else(|| {
             let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
             self.wrong_at(key, &format!("{key} = \"{text}\"; allowed is {}", names.join(", ")))
@@ -278,7 +281,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No table.
-    pub fn section(&mut self, key: &str) -> Result<Option<Self>, SettingsError> {
+    pub fn section(&mut self, key: &str) -> Result<Option<Self>> {
         self.section_as(key, None)
     }
 
@@ -286,7 +289,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No table.
-    pub fn section_as(&mut self, key: &str, example: Option<&str>) -> Result<Option<Self>, SettingsError> {
+    pub fn section_as(&mut self, key: &str, example: Option<&str>) -> Result<Option<Self>> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.inner(self.path_of(key), value, example).map(Some)
     }
@@ -295,7 +298,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No list of tables.
-    pub fn sections(&mut self, key: &str) -> Result<Vec<Self>, SettingsError> {
+    pub fn sections(&mut self, key: &str) -> Result<Vec<Self>> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let Some(list) = value.get_ref().as_array() else {
             return Err(
@@ -310,7 +313,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No table.
-    pub fn opaque(&mut self, key: &str) -> Result<toml::Table, SettingsError> {
+    pub fn opaque(&mut self, key: &str) -> Result<toml::Table> {
         let Some(section) = self.section(key)? else { return Ok(toml::Table::new()) };
         // The text parsed before, so its parts do.
         let whole: toml::Table = toml::from_str(self.source.text)
@@ -330,7 +333,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// The first of them.
-    pub fn finish(&self) -> Result<(), SettingsError> {
+    pub fn finish(&self) -> Result<()> {
         let asked: Vec<&str> = self.asked.iter().map(String::as_str).collect();
         self.allow(&asked)
     }
@@ -339,7 +342,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// The first of them.
-    pub fn allow(&self, allowed: &[&str]) -> Result<(), SettingsError> {
+    pub fn allow(&self, allowed: &[&str]) -> Result<()> {
         let unknown = |name: &&Spanned<_>| !allowed.iter().any(|allowed| name.get_ref() == allowed);
         let Some(name) = self.table.keys().find(unknown) else { return Ok(()) };
         let path = self.path_of(name.get_ref());
@@ -393,12 +396,7 @@ impl<'a> Section<'a> {
         self.table.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
     }
 
-    fn inner(
-        &self,
-        path: String,
-        value: &'a Spanned<DeValue<'a>>,
-        example: Option<&str>,
-    ) -> Result<Self, SettingsError> {
+    fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>, example: Option<&str>) -> Result<Self> {
         let Some(table) = value.get_ref().as_table() else {
             let example = example.map_or_else(|| format!("[{path}] with its keys below"), str::to_owned);
             let message = match value.get_ref() {

@@ -151,9 +151,9 @@ impl<'t> Edits<'t> {
         };
         let Some(table) = terms.and_then(|terms| terms.iter().find(is_it)) else { return false };
         for number in term.numbers() {
-            let parameter = table.get("parameters").and_then(|all| all.as_table_like()?.get(number.name()));
+            let parameter = table.get("parameters").and_then(|all| all.as_table_like()?.get(&number.name));
             let value = parameter.and_then(|parameter| parameter.as_table_like()?.get("value")?.span());
-            value.into_iter().for_each(|span| self.replace(span, written(number.value())));
+            value.into_iter().for_each(|span| self.replace(span, written(number.value)));
         }
         if let Some(name) = table.get("name").and_then(Item::span) {
             self.comment_above(name.start, comment);

@@ -391,7 +391,7 @@ fn a_named_suspect_stands_at_the_end_as_a_term_and_another_close_renews_its_numb
         let numbers = |text: &str| -> Vec<f64> {
             let rig = RigParameters::from_toml(text, "rig.toml").unwrap();
             assert_eq!(rig.terms().len(), 1);
-            rig.terms()[0].numbers().iter().map(Number::value).collect()
+            rig.terms()[0].numbers().iter().map(|number| number.value).collect()
         };
         assert_eq!(numbers(&one), [41.5, 100.0 / 3.0]);
         let two = extended(&one, &eddy(50.25, -1.5)).unwrap();

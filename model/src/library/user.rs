@@ -5,7 +5,7 @@
 
 use super::{Entry, Library, PLACE, library, names};
 use expression::compile::RESERVED;
-use settings::{SettingsError, Source};
+use settings::{Result, Source};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -63,7 +63,7 @@ impl Library {
     }
 
     /// Checks that each name in its expressions is one of its own. Those that ship are bound in tests.
-    fn checked(self, text: &str, file: &Path) -> Result<Self, SettingsError> {
+    fn checked(self, text: &str, file: &Path) -> Result<Self> {
         let source = Source::parse(text, file)?;
         let refused = |name: &str, of: &str, why: &str| {
             let at = text.find(&format!("\"{of}\"")).or_else(|| text.find(of)).unwrap_or(0);

@@ -3,17 +3,13 @@
 use super::{Reader, named, unit};
 use crate::file::{Expression, Friction};
 use crate::units::Unit;
-use settings::{Section, SettingsError};
+use settings::{Result, Section};
 
 /// Most frictions of a file: the equation of each speed is compiled once more for what holds it.
 const MOST: usize = 20;
 
 impl Reader<'_> {
-    pub(super) fn frictions(
-        &mut self,
-        parent: &mut Section<'_>,
-        suspect: Option<usize>,
-    ) -> Result<(), SettingsError> {
+    pub(super) fn frictions(&mut self, parent: &mut Section<'_>, suspect: Option<usize>) -> Result<()> {
         for (name, mut section) in named(parent, "friction")? {
             self.is_new(&name, suspect, &section)?;
             let unit = unit(&mut section, self.source)?;
@@ -37,7 +33,7 @@ impl Reader<'_> {
         (state, at): (&str, usize),
         [sliding, breakaway]: [Expression; 2],
         suspect: Option<usize>,
-    ) -> Result<(), SettingsError> {
+    ) -> Result<()> {
         let model = &self.model;
         let is_seen = |of: Option<usize>| of.is_none() || of == suspect;
         let Some(velocity) = model.states.iter().position(|one| one.name == state && is_seen(one.suspect))

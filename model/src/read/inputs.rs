@@ -5,10 +5,10 @@ use crate::file::{Input, Smoothing};
 use crate::inputs::Hold;
 use crate::rows::Rows;
 use crate::units::Dimension;
-use settings::{Section, SettingsError};
+use settings::{Result, Section};
 
 impl Reader<'_> {
-    pub(super) fn inputs(&mut self, root: &mut Section<'_>) -> Result<(), SettingsError> {
+    pub(super) fn inputs(&mut self, root: &mut Section<'_>) -> Result<()> {
         let mut rates = Vec::new();
         for (name, mut section) in named(root, "inputs")? {
             self.is_new(&name, None, &section)?;
@@ -42,7 +42,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    pub(super) fn rows(&mut self, mut section: Section<'_>) -> Result<(), SettingsError> {
+    pub(super) fn rows(&mut self, mut section: Section<'_>) -> Result<()> {
         let default = Rows::default();
         let whole = |section: &mut Section<'_>, key: &str, default: usize, most: f64| {
             one_or(section, key, default as f64, [1.0, most]).map(|value| value as usize)
@@ -70,7 +70,7 @@ impl Reader<'_> {
 }
 
 /// How the samples of an input are smoothed.
-fn smoothing(section: &mut Section<'_>) -> Result<Smoothing, SettingsError> {
+fn smoothing(section: &mut Section<'_>) -> Result<Smoothing> {
     let low_pass_hz = one_or(section, "low_pass_hz", 0.0, [0.0, 1e9])?;
     let low_pass_order = one_or(section, "low_pass_order", 4.0, [1.0, 10.0])? as usize;
     let moving_average = one_or(section, "moving_average", 1.0, [1.0, 100_001.0])? as usize;

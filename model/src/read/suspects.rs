@@ -7,7 +7,7 @@ use crate::library::{Entry, EntryFriction, Found, Library, PLACE, Quantity};
 use crate::names::{Symbol, named_parts, own_name};
 use crate::units::{Dimension, Unit};
 use expression::grammar::{Kind, Place, Stands, Wrong, is_of_name, renamed};
-use settings::{Section, SettingsError, Text};
+use settings::{Result, Section, SettingsError, Text};
 use std::path::Path;
 
 /// Where a suspect of a library stands, and what it is bound to.
@@ -60,7 +60,7 @@ fn bracketed(text: &str) -> String {
 }
 
 impl Reader<'_> {
-    pub(super) fn suspect(&mut self, mut section: Section<'_>, is_term: bool) -> Result<(), SettingsError> {
+    pub(super) fn suspect(&mut self, mut section: Section<'_>, is_term: bool) -> Result<()> {
         let index = self.model.suspects.len();
         let used = section.text("use")?;
         let found = used.as_ref().map(|used| self.found(used)).transpose()?;
@@ -107,11 +107,7 @@ impl Reader<'_> {
     }
 
     /// A suspect whose law the file has.
-    fn written_out(
-        &mut self,
-        section: &mut Section<'_>,
-        index: usize,
-    ) -> Result<(Change, Expression), SettingsError> {
+    fn written_out(&mut self, section: &mut Section<'_>, index: usize) -> Result<(Change, Expression)> {
         self.members(section, Some(index))?;
         let mut found = None;
         for (key, change) in
@@ -130,7 +126,7 @@ impl Reader<'_> {
         })
     }
 
-    fn found(&self, used: &Text) -> Result<Found, SettingsError> {
+    fn found(&self, used: &Text) -> Result<Found> {
         let folder = self.model.file.parent().unwrap_or(Path::new(""));
         Library::find(&used.text, folder)
             .map_err(|why| self.source.wrong_from(used.at, &format!("use: {why}")))
@@ -142,7 +138,7 @@ impl Reader<'_> {
         section: &mut Section<'_>,
         (library, entry): (&Library, &Entry),
         (index, target, at): (usize, Target, usize),
-    ) -> Result<Expression, SettingsError> {
+    ) -> Result<Expression> {
         if entry.reads_place() && matches!(target, Target::State(_)) {
             let name = &entry.name;
             return Err(section.wrong_at(
@@ -200,11 +196,7 @@ impl Reader<'_> {
     }
 
     /// A friction of a library, which holds the state that its variable is bound to.
-    fn friction_of_library(
-        &mut self,
-        bound: &Bound<'_>,
-        friction: &EntryFriction,
-    ) -> Result<(), SettingsError> {
+    fn friction_of_library(&mut self, bound: &Bound<'_>, friction: &EntryFriction) -> Result<()> {
         let variable = &friction.velocity;
         let place = bound.bound.iter().find(|(name, _)| name == variable).map(|(_, place)| *place);
         let node = self.model.nodes.get(place.expect("a test binds each of a library")).clone();
@@ -228,7 +220,7 @@ impl Reader<'_> {
         section: &mut Section<'_>,
         library: &'b Library,
         bound: &mut Bound<'b>,
-    ) -> Result<(), SettingsError> {
+    ) -> Result<()> {
         let variables = library.variables_of(bound.entry);
         let mut with = section.section("with")?;
         let mut without = Vec::new();
@@ -258,12 +250,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn put<'b>(
-        &self,
-        bound: &mut Bound<'b>,
-        name: &'b str,
-        (root, text): (Place, String),
-    ) -> Result<(), SettingsError> {
+    fn put<'b>(&self, bound: &mut Bound<'b>, name: &'b str, (root, text): (Place, String)) -> Result<()> {
         let measured = dimension(&self.model, root).map_err(|wrong| self.wrong(&wrong))?;
         bound.bound.push((name, root));
         bound.texts.push((name, text));
@@ -271,14 +258,14 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn of_library(&mut self, bound: &Bound<'_>, text: &str) -> Result<Expression, SettingsError> {
+    fn of_library(&mut self, bound: &Bound<'_>, text: &str) -> Result<Expression> {
         let root = self.model.nodes.parse_bound(text, bound.at, &|name| bound.stands(name));
         let root = root.map_err(|wrong| self.wrong(&wrong))?;
         Ok(Expression { text: bound.written(text), root, at: bound.at })
     }
 
     /// The numbers of a suspect of a library, with what the file says of them.
-    fn numbers(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<(), SettingsError> {
+    fn numbers(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<()> {
         let mut given = section.section("parameters")?;
         for number in &bound.entry.parameters {
             let (unit, is_usual) = bound.unit(&number.quantity);
@@ -320,7 +307,7 @@ impl Reader<'_> {
     }
 
     /// The states of a suspect of a library; the file may say where they start.
-    fn states(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<(), SettingsError> {
+    fn states(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<()> {
         let mut given = section.section("states")?;
         for state in &bound.entry.states {
             let mut unit = bound.unit(&state.quantity).0;
@@ -352,7 +339,7 @@ impl Reader<'_> {
         given.map_or(Ok(()), |given| given.finish())
     }
 
-    fn target(&self, text: &Text) -> Result<Target, SettingsError> {
+    fn target(&self, text: &Text) -> Result<Target> {
         let model = &self.model;
         let name = &text.text;
         let parts = named_parts(model).filter(|(_, _, suspect)| suspect.is_none());

@@ -160,43 +160,16 @@ pub(crate) fn dimension(unit: &str) -> Dimension {
 /// A number of a declared term.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Number {
-    pub(crate) name: String,
-    pub(crate) unit: expression::units::Unit,
-    pub(crate) value: f64,
-    pub(crate) range: [f64; 2],
-    pub(crate) prior: Option<f64>,
-}
-
-impl Number {
     /// Its name in the expression.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
+    pub name: String,
     /// Its unit, as the file writes it.
-    #[must_use]
-    pub fn unit(&self) -> &str {
-        &self.unit.text
-    }
-
+    pub unit: expression::units::Unit,
     /// Its value, in the unit of the file; of a suspect the value at which it is off.
-    #[must_use]
-    pub fn value(&self) -> f64 {
-        self.value
-    }
-
+    pub value: f64,
     /// Least and largest value, in the unit of the file.
-    #[must_use]
-    pub fn range(&self) -> [f64; 2] {
-        self.range
-    }
-
+    pub range: [f64; 2],
     /// How large it is where the term matters, in the unit of the file, if the file says so.
-    #[must_use]
-    pub fn prior(&self) -> Option<f64> {
-        self.prior
-    }
+    pub prior: Option<f64>,
 }
 
 /// A term as a file declares it, checked.

@@ -21,10 +21,11 @@ const BEFORE: usize = VARIABLES.len();
 /// A value that a term keeps, as a file declares it, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remembered {
-    pub(crate) name: String,
+    /// Its name in the expressions.
+    pub name: String,
     pub(crate) unit: Unit,
-    /// In the unit of the file.
-    pub(crate) range: [f64; 2],
+    /// Least and largest value, in the unit of the file.
+    pub range: [f64; 2],
     pub(crate) start: String,
     pub(crate) update: String,
     pub(crate) start_formula: Formula,
@@ -32,18 +33,6 @@ pub struct Remembered {
 }
 
 impl Remembered {
-    /// Its name in the expressions.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Least and largest value, in the unit of the file.
-    #[must_use]
-    pub fn range(&self) -> [f64; 2] {
-        self.range
-    }
-
     pub(crate) fn set(&mut self, parameters_si: &[f64]) {
         self.start_formula.set(parameters_si);
         self.update_formula.set(parameters_si);

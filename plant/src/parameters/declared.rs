@@ -41,7 +41,7 @@ use expression::curve::Table;
 use expression::formula::{Formula, Known, Variable};
 use expression::grammar::is_of_name;
 use expression::units::Unit;
-use settings::{Section, SettingsError, Source, Text};
+use settings::{Result, Section, Source, Text};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -136,7 +136,7 @@ impl KeptText {
 }
 
 /// The curves under `tables` of a section.
-fn tables(section: &mut Section<'_>, source: &Source<'_>) -> Result<Vec<Table>, SettingsError> {
+fn tables(section: &mut Section<'_>, source: &Source<'_>) -> Result<Vec<Table>> {
     let Some(mut all) = section.section("tables")? else { return Ok(Vec::new()) };
     let mut found = Vec::new();
     for name in all.keys() {
@@ -158,7 +158,7 @@ fn tables(section: &mut Section<'_>, source: &Source<'_>) -> Result<Vec<Table>, 
 }
 
 /// Refuses a key that no expression could read.
-fn is_name(section: &Section<'_>, name: &str) -> Result<(), SettingsError> {
+fn is_name(section: &Section<'_>, name: &str) -> Result<()> {
     let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
     if begins && name.chars().all(is_of_name) && name.chars().count() <= 64 {
         return Ok(());
@@ -167,12 +167,12 @@ fn is_name(section: &Section<'_>, name: &str) -> Result<(), SettingsError> {
 }
 
 /// The unit of a section, 1 when it is absent.
-pub(super) fn unit_of(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit, SettingsError> {
+pub(super) fn unit_of(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit> {
     unit_at(section, source, "unit")
 }
 
 /// The same under another key.
-fn unit_at(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit, SettingsError> {
+fn unit_at(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit> {
     match section.text(key)? {
         None => Ok(Unit::one()),
         Some(text) => {
@@ -191,7 +191,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn term(&mut self, mut section: Section<'_>) -> Result<Declared, SettingsError> {
+    fn term(&mut self, mut section: Section<'_>) -> Result<Declared> {
         let used = match self.laws {
             Some(laws) => used(&mut section, self.source, laws)?,
             None => None,
@@ -289,7 +289,7 @@ impl Reader<'_> {
                 let formulas = (compiled(&one.start, &before)?, compiled(&one.update, &while_kept)?);
                 Ok(one.with(formulas))
             })
-            .collect::<Result<Vec<_>, SettingsError>>()?;
+            .collect::<Result<Vec<_>>>()?;
         let reads = |table: &Table| {
             let kept = memory.iter().flat_map(|one| [&one.start_formula, &one.update_formula]);
             [&formula].into_iter().chain(kept).any(|formula| formula.reads_table(&table.name))
@@ -304,7 +304,7 @@ impl Reader<'_> {
     }
 
     /// Refuses a suspect that is not off at the values of its file.
-    fn adds_nothing(&self, term: &Declared, at: usize) -> Result<(), SettingsError> {
+    fn adds_nothing(&self, term: &Declared, at: usize) -> Result<()> {
         let is_off = |number: &&Number| number.value == 0.0;
         let Some(first) = term.numbers.first().filter(is_off) else {
             let why = "the first of its parameters is its amplitude, and has no value: it is 0 where the suspect is off";
@@ -319,7 +319,7 @@ impl Reader<'_> {
         else {
             return Ok(());
         };
-        let off: Vec<&str> = term.numbers.iter().filter(is_off).map(Number::name).collect();
+        let off: Vec<&str> = term.numbers.iter().filter(is_off).map(|number| number.name.as_str()).collect();
         let (unit, many) = (term.target.unit(), if off.len() > 1 { "are" } else { "is" });
         let why = format!(
             "where {} {many} 0 a suspect adds nothing, and this adds {added} {unit}: begin with {}*(...)",
@@ -335,8 +335,8 @@ impl Reader<'_> {
         section: &mut Section<'_>,
         table: &str,
         most: usize,
-        one: impl Fn(&Self, String, Section<'_>) -> Result<T, SettingsError>,
-    ) -> Result<Vec<T>, SettingsError> {
+        one: impl Fn(&Self, String, Section<'_>) -> Result<T>,
+    ) -> Result<Vec<T>> {
         let Some(mut all) = section.section(table)? else { return Ok(Vec::new()) };
         let names = all.keys();
         if names.len() > most {
@@ -353,7 +353,7 @@ impl Reader<'_> {
     }
 
     /// What the term keeps, its expressions as they are written.
-    fn kept(&self, name: String, mut section: Section<'_>) -> Result<KeptText, SettingsError> {
+    fn kept(&self, name: String, mut section: Section<'_>) -> Result<KeptText> {
         let unit = self.unit(&mut section)?;
         let range = match section.numbers("range")?.as_slice() {
             [least, most] if least < most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],
@@ -369,11 +369,11 @@ impl Reader<'_> {
         Ok(KeptText { name, unit, range, start, update })
     }
 
-    fn unit(&self, section: &mut Section<'_>) -> Result<Unit, SettingsError> {
+    fn unit(&self, section: &mut Section<'_>) -> Result<Unit> {
         unit_of(section, self.source)
     }
 
-    fn number(&self, name: String, mut section: Section<'_>) -> Result<Number, SettingsError> {
+    fn number(&self, name: String, mut section: Section<'_>) -> Result<Number> {
         let unit = self.unit(&mut section)?;
         let value = match section.numbers("value")?.as_slice() {
             [one] => *one,
@@ -421,7 +421,7 @@ impl Declared {
                 out,
                 "parameters.{} = {{ unit = {}, value = {:?}, range = [{least:?}, {most:?}]{prior} }}",
                 number.name,
-                text(number.unit()),
+                text(&number.unit.text),
                 number.value
             );
         }

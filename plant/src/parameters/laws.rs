@@ -14,7 +14,7 @@ use super::declared::unit_of;
 use crate::effects::declared::{Number, VARIABLES};
 use expression::grammar::renamed;
 use expression::units::Unit;
-use settings::{Section, SettingsError, Source};
+use settings::{Result, Section, Source};
 
 /// A law of a library, as a file of suspects names it.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,11 +70,7 @@ pub(super) struct Used {
 }
 
 /// Reads what stands beside `use` in a suspect; `None` where it has none.
-pub(super) fn used(
-    section: &mut Section<'_>,
-    source: &Source<'_>,
-    laws: Laws<'_>,
-) -> Result<Option<Used>, SettingsError> {
+pub(super) fn used(section: &mut Section<'_>, source: &Source<'_>, laws: Laws<'_>) -> Result<Option<Used>> {
     let Some(used) = section.text("use")? else { return Ok(None) };
     let law = laws(&used.text).map_err(|why| source.wrong_from(used.at, &format!("use: {why}")))?;
     if let Some(key) = ["add", "memory"].into_iter().find(|key| section.has(key)) {
@@ -92,7 +88,7 @@ pub(super) fn used(
 }
 
 /// What stands for each variable of the law.
-fn variables(section: &mut Section<'_>, law: &Law) -> Result<Vec<(String, String)>, SettingsError> {
+fn variables(section: &mut Section<'_>, law: &Law) -> Result<Vec<(String, String)>> {
     let mut with = section.section("with")?;
     let mut given = Vec::new();
     for variable in &law.variables {
@@ -145,7 +141,7 @@ fn numbers(
     source: &Source<'_>,
     (law, suspect): (&Law, &str),
     stands: &mut Vec<(String, String)>,
-) -> Result<Vec<Number>, SettingsError> {
+) -> Result<Vec<Number>> {
     let mut given = section.section("parameters")?;
     let mut numbers = Vec::new();
     for number in &law.numbers {
@@ -178,10 +174,7 @@ fn numbers(
 }
 
 /// A number of a library with what the file has in place of it, or what is missing.
-fn one(
-    number: &LawNumber,
-    table: Option<(&mut Section<'_>, &Source<'_>)>,
-) -> Result<Result<Number, String>, SettingsError> {
+fn one(number: &LawNumber, table: Option<(&mut Section<'_>, &Source<'_>)>) -> Result<Result<Number, String>> {
     let usual = Unit::parse(&number.unit).unwrap_or_else(|_| Unit::one());
     let (mut unit, mut values, mut ends, mut priors) = (usual.clone(), Vec::new(), Vec::new(), Vec::new());
     if let Some((table, source)) = table {
