@@ -10,7 +10,7 @@
 //! Source: Moore, Kearfott, Cloud, Introduction to Interval Analysis, SIAM 2009, chapter 2.
 
 use crate::curve::Table;
-use crate::grammar::{Binary, Kind, Nodes, Place, Wrong};
+use crate::grammar::{Binary, Kind, Nodes, Place, Result, Wrong};
 
 /// Largest bound that counts as finite.
 pub const MOST: f64 = 1e100;
@@ -23,12 +23,7 @@ pub type Range = [f64; 2];
 ///
 /// # Errors
 /// [`Wrong`] at the node that is not proven finite.
-pub fn bounds(
-    nodes: &Nodes,
-    place: Place,
-    of: &dyn Fn(&str) -> Range,
-    tables: &[Table],
-) -> Result<Range, Wrong> {
+pub fn bounds(nodes: &Nodes, place: Place, of: &dyn Fn(&str) -> Range, tables: &[Table]) -> Result<Range> {
     let node = nodes.get(place);
     let bounds = |place: Place| bounds(nodes, place, of, tables);
     let range = match &node.kind {
@@ -149,7 +144,7 @@ mod tests {
     use crate::units::Dimension;
     use proptest::prelude::*;
 
-    fn range(text: &str, of: Range) -> Result<Range, Wrong> {
+    fn range(text: &str, of: Range) -> Result<Range> {
         let mut nodes = Nodes::default();
         let root = nodes.parse(text, 0).expect("an expression");
         bounds(&nodes, root, &|_| of, &[])

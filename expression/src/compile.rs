@@ -1,6 +1,6 @@
 //! From a tree to registers: what every expression has in common. Names, and functions of its own, are the caller's.
 
-use crate::grammar::{Binary, Kind, Node, Place, Wrong};
+use crate::grammar::{Binary, Kind, Node, Place, Result, Wrong};
 use crate::tape::{Builder, Code, Register};
 
 /// Names that mean something in every expression.
@@ -45,7 +45,7 @@ pub trait Compile {
     ///
     /// # Errors
     /// [`Wrong`] for a name that means nothing here.
-    fn named(&mut self, name: &str, at: usize, scope: Self::Scope) -> Result<Register, Wrong>;
+    fn named(&mut self, name: &str, at: usize, scope: Self::Scope) -> Result<Register>;
 
     /// The register of a function that is not one of [`function`]; `None` where there is none of this name.
     ///
@@ -57,13 +57,13 @@ pub trait Compile {
         arguments: &[Place],
         at: usize,
         scope: Self::Scope,
-    ) -> Result<Option<Register>, Wrong>;
+    ) -> Result<Option<Register>>;
 
     /// The register of a node; dimensions and numbers of arguments were checked.
     ///
     /// # Errors
     /// [`Wrong`] with the byte of the file.
-    fn node(&mut self, place: Place, scope: Self::Scope) -> Result<Register, Wrong> {
+    fn node(&mut self, place: Place, scope: Self::Scope) -> Result<Register> {
         let node = self.at(place);
         Ok(match node.kind {
             Kind::Number(value, _) => self.builder().constant(value),
@@ -90,13 +90,7 @@ pub trait Compile {
     ///
     /// # Errors
     /// [`Wrong`] with the byte of the file.
-    fn call(
-        &mut self,
-        name: &str,
-        arguments: &[Place],
-        at: usize,
-        scope: Self::Scope,
-    ) -> Result<Register, Wrong> {
+    fn call(&mut self, name: &str, arguments: &[Place], at: usize, scope: Self::Scope) -> Result<Register> {
         if let Some(register) = self.called(name, arguments, at, scope)? {
             return Ok(register);
         }

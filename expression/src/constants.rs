@@ -4,7 +4,7 @@
 //! it. What depends on a name can be 0 at some samples alone, or be guarded by a condition: that is seen when it is computed.
 
 use crate::compile::{code_of, function};
-use crate::grammar::{Binary, Kind, Nodes, Wrong};
+use crate::grammar::{Binary, Kind, Nodes, Result, Wrong};
 use crate::inputs::Inputs;
 use crate::operation::{Around, Code};
 use crate::past::NONE;
@@ -13,7 +13,7 @@ use crate::past::NONE;
 ///
 /// # Errors
 /// [`Wrong`] at the operator or function whose value is no finite number.
-pub fn constants(nodes: &Nodes) -> Result<Vec<Option<f64>>, Wrong> {
+pub fn constants(nodes: &Nodes) -> Result<Vec<Option<f64>>> {
     let mut values: Vec<Option<f64>> = Vec::new();
     // What a node is made of stands before it.
     for node in nodes.all() {
@@ -63,7 +63,7 @@ fn computed(code: Code, operands: [f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    fn last(text: &str) -> Result<Option<f64>, Wrong> {
+    fn last(text: &str) -> Result<Option<f64>> {
         let mut nodes = Nodes::default();
         nodes.parse(text, 0).expect("an expression");
         constants(&nodes).map(|values| values[values.len() - 1])

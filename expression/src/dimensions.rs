@@ -1,7 +1,7 @@
 //! The dimension of an expression, and the numbers of arguments in it.
 
 use crate::compile::function;
-use crate::grammar::{Binary, Kind, Node, Place, Wrong};
+use crate::grammar::{Binary, Kind, Node, Place, Result, Wrong};
 use crate::units::{Dimension, Unit};
 
 /// `None` is the dimension of 0, which is any.
@@ -19,7 +19,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] for a name that means nothing here.
-    fn named(&mut self, name: &str, at: usize, scope: Self::Scope) -> Result<Measure, Wrong>;
+    fn named(&mut self, name: &str, at: usize, scope: Self::Scope) -> Result<Measure>;
 
     /// Number of arguments of a function that is not one of [`function`], and what follows the known ones in a message.
     fn arguments(&self, name: &str) -> Option<usize>;
@@ -36,7 +36,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] for arguments that it does not take.
-    fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure, Wrong>;
+    fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure>;
 
     /// Checks an expression against the dimension that it must have; it begins at byte `at`.
     ///
@@ -48,7 +48,7 @@ pub trait Dimensions {
         scope: Self::Scope,
         wanted: Dimension,
         (at, what): (usize, &str),
-    ) -> Result<(), Wrong> {
+    ) -> Result<()> {
         let found = self.node(place, scope).map_err(|wrong| match wrong.is_of_units {
             true if wanted != Dimension::NONE => {
                 Wrong { why: format!("{}; {what} is in {}", wrong.why, self.in_units(wanted)), ..wrong }
@@ -68,7 +68,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] with the byte of the file.
-    fn node(&mut self, place: Place, scope: Self::Scope) -> Result<Measure, Wrong> {
+    fn node(&mut self, place: Place, scope: Self::Scope) -> Result<Measure> {
         let node = self.at(place);
         match &node.kind {
             Kind::Number(value, None) => Ok((*value != 0.0).then_some(Dimension::NONE)),
@@ -102,7 +102,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] with the byte of the file.
-    fn power(&self, base: Measure, exponent: Measure, place: Place, at: usize) -> Result<Measure, Wrong> {
+    fn power(&self, base: Measure, exponent: Measure, place: Place, at: usize) -> Result<Measure> {
         if exponent.is_some_and(|exponent| exponent != Dimension::NONE) {
             return Err(Wrong::new(at, "an exponent has no unit"));
         }
@@ -131,13 +131,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] with the byte of the file.
-    fn call(
-        &mut self,
-        name: &str,
-        arguments: &[Place],
-        at: usize,
-        scope: Self::Scope,
-    ) -> Result<Measure, Wrong> {
+    fn call(&mut self, name: &str, arguments: &[Place], at: usize, scope: Self::Scope) -> Result<Measure> {
         let own = self.arguments(name);
         let least = match (own, function(name)) {
             (Some(count), _) => count,
@@ -198,7 +192,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] where it is another.
-    fn takes(&self, name: &str, measure: Measure, wanted: Dimension, at: usize) -> Result<(), Wrong> {
+    fn takes(&self, name: &str, measure: Measure, wanted: Dimension, at: usize) -> Result<()> {
         match measure {
             Some(found) if found != wanted => {
                 let [wanted, found] = [wanted, found].map(|one| self.in_units(one));
@@ -212,7 +206,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] where it has a unit.
-    fn truth(&self, name: &str, measure: Measure, at: usize) -> Result<(), Wrong> {
+    fn truth(&self, name: &str, measure: Measure, at: usize) -> Result<()> {
         match measure {
             Some(found) if found != Dimension::NONE => {
                 let found = self.in_units(found);
@@ -226,7 +220,7 @@ pub trait Dimensions {
     ///
     /// # Errors
     /// [`Wrong`] where they have not.
-    fn same(&self, operands: [(Measure, Place); 2], at: usize, what: &str) -> Result<Measure, Wrong> {
+    fn same(&self, operands: [(Measure, Place); 2], at: usize, what: &str) -> Result<Measure> {
         let [(a, left), (b, right)] = operands;
         match (a, b) {
             (Some(a), Some(b)) if a != b => {

@@ -10,7 +10,7 @@ use crate::bounds::{Range, bounds};
 use crate::compile::Compile;
 use crate::curve::Table;
 use crate::dimensions::{Dimensions, Measure};
-use crate::grammar::{Kind, Node, Nodes, Place, Wrong};
+use crate::grammar::{Kind, Node, Nodes, Place, Result, Wrong};
 use crate::tape::{Builder, Code, Leaves, Register, Tape};
 use crate::units::Dimension;
 
@@ -62,7 +62,7 @@ impl Formula {
         (text, at): (&str, usize),
         known: Known<'_>,
         (wanted, what): (Dimension, &str),
-    ) -> Result<Self, Wrong> {
+    ) -> Result<Self> {
         let mut nodes = Nodes::default();
         let root = nodes.parse(text, at)?;
         let is_called = |table: &&Table| {
@@ -182,7 +182,7 @@ impl Dimensions for Names<'_> {
         self.nodes.get(place).clone()
     }
 
-    fn named(&mut self, name: &str, at: usize, (): ()) -> Result<Measure, Wrong> {
+    fn named(&mut self, name: &str, at: usize, (): ()) -> Result<Measure> {
         match self.place(name) {
             Some(place) => Ok(Some(self.variable(place).dimension)),
             None if name == "pi" => Ok(Some(Dimension::NONE)),
@@ -198,7 +198,7 @@ impl Dimensions for Names<'_> {
         if self.has_tables { ", and the tables" } else { "" }
     }
 
-    fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure, Wrong> {
+    fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure> {
         let table = self.table(name).ok_or_else(|| self.unknown(name, at))?;
         let Table { from, to, .. } = &self.known.tables[table];
         match measures[0] {
@@ -222,7 +222,7 @@ impl Compile for Names<'_> {
         &mut self.builder
     }
 
-    fn named(&mut self, name: &str, _at: usize, (): ()) -> Result<Register, Wrong> {
+    fn named(&mut self, name: &str, _at: usize, (): ()) -> Result<Register> {
         let leaves = self.builder.leaves();
         Ok(match self.place(name) {
             Some(place) if place < self.known.variables.len() => leaves.input(place),
@@ -231,13 +231,7 @@ impl Compile for Names<'_> {
         })
     }
 
-    fn called(
-        &mut self,
-        name: &str,
-        arguments: &[Place],
-        _at: usize,
-        (): (),
-    ) -> Result<Option<Register>, Wrong> {
+    fn called(&mut self, name: &str, arguments: &[Place], _at: usize, (): ()) -> Result<Option<Register>> {
         let Some(table) = self.table(name) else { return Ok(None) };
         let operand = Compile::node(self, arguments[0], ())?;
         Ok(Some(self.builder.push(Code::Table(table as u16), &[operand])))
@@ -253,7 +247,7 @@ mod tests {
         Unit::parse(unit).unwrap().dimension
     }
 
-    fn compiled(text: &str) -> Result<Formula, Wrong> {
+    fn compiled(text: &str) -> Result<Formula> {
         let variables = [
             Variable { name: "x", dimension: dimension("m"), range: [0.0, 1.0] },
             Variable { name: "v", dimension: dimension("m/s"), range: [-1e3, 1e3] },

@@ -85,6 +85,9 @@ pub struct Wrong {
     pub is_of_units: bool,
 }
 
+/// What is made of an expression, or why it is none.
+pub type Result<T, E = Wrong> = core::result::Result<T, E>;
+
 impl Wrong {
     pub fn new(at: usize, why: impl Into<String>) -> Self {
         Self { at, why: why.into(), is_of_units: false }
@@ -115,7 +118,7 @@ impl Nodes {
         })
     }
 
-    fn push(&mut self, kind: Kind, at: usize) -> Result<Place, Wrong> {
+    fn push(&mut self, kind: Kind, at: usize) -> Result<Place> {
         let depth = 1 + kind.operands().iter().map(|place| self.get(*place).depth).max().unwrap_or(0);
         if depth > DEEPEST {
             return Err(Wrong::new(at, too_deep()));
@@ -131,7 +134,7 @@ impl Nodes {
     }
 
     /// Reads an expression that begins at byte `at` of its file.
-    pub fn parse(&mut self, text: &str, at: usize) -> Result<Place, Wrong> {
+    pub fn parse(&mut self, text: &str, at: usize) -> Result<Place> {
         Parser { text, begins: at, at: 0, nested: 0, nodes: self, names: None }.all()
     }
 
@@ -139,7 +142,7 @@ impl Nodes {
     ///
     /// # Errors
     /// [`Wrong`] at byte `at`.
-    pub fn parse_bound(&mut self, text: &str, at: usize, names: &Names<'_>) -> Result<Place, Wrong> {
+    pub fn parse_bound(&mut self, text: &str, at: usize, names: &Names<'_>) -> Result<Place> {
         Parser { text, begins: at, at: 0, nested: 0, nodes: self, names: Some(names) }.all()
     }
 
@@ -147,7 +150,7 @@ impl Nodes {
     ///
     /// # Errors
     /// [`Wrong`] at byte `at` where it is nested too deep.
-    pub fn product(&mut self, left: Place, right: Place, at: usize) -> Result<Place, Wrong> {
+    pub fn product(&mut self, left: Place, right: Place, at: usize) -> Result<Place> {
         self.push(Kind::Binary(Binary::Multiply, left, right), at)
     }
 
@@ -155,7 +158,7 @@ impl Nodes {
     ///
     /// # Errors
     /// [`Wrong`] at byte `at` where there are too many.
-    pub fn name(&mut self, name: &str, at: usize) -> Result<Place, Wrong> {
+    pub fn name(&mut self, name: &str, at: usize) -> Result<Place> {
         self.push(Kind::Name(name.into()), at)
     }
 }
@@ -205,7 +208,7 @@ fn too_deep() -> String {
 }
 
 impl Parser<'_> {
-    fn all(mut self) -> Result<Place, Wrong> {
+    fn all(mut self) -> Result<Place> {
         let place = self.level(0)?;
         self.skip_blanks();
         if self.at < self.text.len() {
@@ -244,11 +247,7 @@ impl Parser<'_> {
     }
 
     /// Brackets and signs within each other are bounded before the stack is; `at` is the place of the outer one.
-    fn deeper<T>(
-        &mut self,
-        at: usize,
-        inner: impl FnOnce(&mut Self) -> Result<T, Wrong>,
-    ) -> Result<T, Wrong> {
+    fn deeper<T>(&mut self, at: usize, inner: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         self.nested += 1;
         if self.nested > DEEPEST {
             return Err(Wrong::new(at, too_deep()));
@@ -258,7 +257,7 @@ impl Parser<'_> {
         Ok(value)
     }
 
-    fn level(&mut self, level: usize) -> Result<Place, Wrong> {
+    fn level(&mut self, level: usize) -> Result<Place> {
         let Some(operators) = LEVELS.get(level) else { return self.negation() };
         let first = self.level(level + 1)?;
         let mut rest = Vec::new();
@@ -271,7 +270,7 @@ impl Parser<'_> {
         self.nodes.chain(first, &rest)
     }
 
-    fn negation(&mut self) -> Result<Place, Wrong> {
+    fn negation(&mut self) -> Result<Place> {
         self.skip_blanks();
         let at = self.place();
         if self.take("-") {
@@ -291,7 +290,7 @@ impl Parser<'_> {
         Ok(base)
     }
 
-    fn atom(&mut self) -> Result<Place, Wrong> {
+    fn atom(&mut self) -> Result<Place> {
         self.skip_blanks();
         let at = self.place();
         if self.take("(") {
@@ -336,7 +335,7 @@ impl Parser<'_> {
         self.nodes.push(Kind::Call(name, arguments), at)
     }
 
-    fn number(&mut self, at: usize) -> Result<Place, Wrong> {
+    fn number(&mut self, at: usize) -> Result<Place> {
         let length = number_length(self.rest());
         let text = &self.rest()[..length];
         let Some(value) = text.parse::<f64>().ok().filter(|value| value.is_finite()) else {
@@ -419,7 +418,7 @@ mod tests {
         }
     }
 
-    fn read(text: &str) -> Result<String, Wrong> {
+    fn read(text: &str) -> Result<String> {
         let mut nodes = Nodes::default();
         nodes.parse(text, 0).map(|place| shown(&nodes, place))
     }

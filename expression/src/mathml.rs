@@ -20,32 +20,9 @@ const FRACTION: u8 = 60;
 const POWER: u8 = 70;
 const ATOM: u8 = 90;
 
-const GREEK: [(&str, char); 24] = [
-    ("alpha", 'α'),
-    ("beta", 'β'),
-    ("gamma", 'γ'),
-    ("delta", 'δ'),
-    ("epsilon", 'ε'),
-    ("zeta", 'ζ'),
-    ("eta", 'η'),
-    ("theta", 'θ'),
-    ("iota", 'ι'),
-    ("kappa", 'κ'),
-    ("lambda", 'λ'),
-    ("mu", 'μ'),
-    ("nu", 'ν'),
-    ("xi", 'ξ'),
-    ("pi", 'π'),
-    ("rho", 'ρ'),
-    ("sigma", 'σ'),
-    ("tau", 'τ'),
-    ("upsilon", 'υ'),
-    ("phi", 'φ'),
-    ("chi", 'χ'),
-    ("psi", 'ψ'),
-    ("omega", 'ω'),
-    ("Delta", 'Δ'),
-];
+/// Names of Greek letters from α on, in the order of Unicode; - has no name here.
+const GREEK: &str = "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi - pi rho - sigma tau upsilon \
+                     phi chi psi omega";
 
 /// Where an expression stands: as an operand it is in brackets where what stands beside it would be read as a part of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,8 +55,9 @@ pub fn expression(nodes: &Nodes, root: Place, operand: Operand) -> String {
 #[must_use]
 pub fn name(name: &str) -> String {
     let name = name.trim_start_matches('#');
-    let letter = |part: &str| match GREEK.iter().find(|(word, _)| *word == part) {
-        Some((_, letter)) => format!("<mi>{letter}</mi>"),
+    let letter = |part: &str| match GREEK.split(' ').position(|word| word == part && word != "-") {
+        _ if part == "Delta" => "<mi>Δ</mi>".to_owned(),
+        Some(place) => format!("<mi>{}</mi>", ('α'..='ω').nth(place).expect("a name for each letter")),
         None => format!("<mi>{}</mi>", escaped(part)),
     };
     match name.split_once('_').filter(|(base, index)| !base.is_empty() && !index.is_empty()) {

@@ -5,7 +5,7 @@
 //!   a - b + … z  ──► (a - b + …) + (… z), and so on       longer: as deep as its logarithm
 //! ```
 
-use super::{Binary, Kind, Nodes, Place, Wrong};
+use super::{Binary, Kind, Nodes, Place, Result};
 
 #[derive(Clone, Copy)]
 pub(super) enum Operator {
@@ -53,7 +53,7 @@ impl Operator {
 impl Nodes {
     /// Operands between operators of one level, from left to right; a long chain is halved, so that a flat sum of a thousand
     /// terms is ten deep.
-    pub(super) fn chain(&mut self, first: Place, rest: &[Operand]) -> Result<Place, Wrong> {
+    pub(super) fn chain(&mut self, first: Place, rest: &[Operand]) -> Result<Place> {
         if rest.len() >= LONGEST && rest.iter().all(|operand| operand.operator.turn().is_some()) {
             return self.halved(first, rest);
         }
@@ -62,7 +62,7 @@ impl Nodes {
         })
     }
 
-    fn halved(&mut self, first: Place, rest: &[Operand]) -> Result<Place, Wrong> {
+    fn halved(&mut self, first: Place, rest: &[Operand]) -> Result<Place> {
         let middle = rest.len() / 2;
         let Some(Operand { operator, at, place }) = rest.get(middle).copied() else { return Ok(first) };
         let left = self.halved(first, &rest[..middle])?;
