@@ -12,63 +12,82 @@ use serde::Serialize;
 
 use super::RigParameters;
 
-/// A unit of the rig file; the model computes in SI.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
+/// Declares each unit with its name, as the file and the messages print it.
+macro_rules! units {
+    ($($(#[$doc:meta])* $unit:ident $name:literal;)*) => {
+        /// A unit of the rig file; the model computes in SI.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Unit {
+            $($(#[$doc])* $unit,)*
+            /// As a declared term writes it; the term computes in it.
+            Written(&'static str),
+        }
+
+        impl Unit {
+            /// The unit's name as the file and the messages print it.
+            pub fn name(self) -> &'static str {
+                match self {
+                    Unit::Written(name) => name,
+                    $(Unit::$unit => $name,)*
+                }
+            }
+        }
+    };
+}
+
+units! {
     /// A plain number.
-    One,
+    One "";
     /// A whole number of bits.
-    Bits,
+    Bits "bits";
     /// 1e5 Pa, absolute unless the key says otherwise.
-    Bar,
+    Bar "bar";
     /// Pascal.
-    Pascal,
+    Pascal "Pa";
     /// Kelvin.
-    Kelvin,
+    Kelvin "K";
     /// 1e-3 m.
-    Millimetre,
+    Millimetre "mm";
     /// 1e-6 m.
-    Micrometre,
+    Micrometre "um";
     /// 1e-6 m^2.
-    SquareMillimetre,
+    SquareMillimetre "mm^2";
     /// 1e-6 m^3.
-    CubicCentimetre,
+    CubicCentimetre "cm^3";
     /// Second.
-    Second,
+    Second "s";
     /// 1e-3 s.
-    Millisecond,
+    Millisecond "ms";
     /// m^3/h, the unit of K_V.
-    CubicMetrePerHour,
+    CubicMetrePerHour "m^3/h";
     /// Kilogram.
-    Kilogram,
+    Kilogram "kg";
     /// Newton.
-    Newton,
+    Newton "N";
     /// N/(mm/s), 1e3 N s/m.
-    NewtonSecondPerMillimetre,
+    NewtonSecondPerMillimetre "N/(mm/s)";
     /// N/m.
-    NewtonPerMetre,
+    NewtonPerMetre "N/m";
     /// N s/m.
-    NewtonSecondPerMetre,
+    NewtonSecondPerMetre "N s/m";
     /// Hundredth.
-    Percent,
+    Percent "%";
     /// 100 Pa.
-    Millibar,
+    Millibar "mbar";
     /// Metre.
-    Metre,
+    Metre "m";
     /// 1e-3 m/s.
-    MillimetrePerSecond,
+    MillimetrePerSecond "mm/s";
     /// Hertz.
-    Hertz,
+    Hertz "Hz";
     /// 1/s.
-    PerSecond,
+    PerSecond "1/s";
     /// Normal litre per minute, 1e-3/60 m^3/s.
-    NormalLitrePerMinute,
+    NormalLitrePerMinute "Nl/min";
     /// 1e-5 N/Pa.
-    NewtonPerBar,
+    NewtonPerBar "N/bar";
     /// W/(m^2 K).
-    WattPerSquareMetreKelvin,
-    /// As a declared term writes it; the term computes in it.
-    Written(&'static str),
+    WattPerSquareMetreKelvin "W/(m^2 K)";
 }
 
 impl Unit {
@@ -85,39 +104,6 @@ impl Unit {
             Unit::Micrometre | Unit::SquareMillimetre | Unit::CubicCentimetre => value / 1e6,
             Unit::NewtonSecondPerMillimetre => value * 1e3,
             _ => value,
-        }
-    }
-
-    /// The unit's name as the file and the messages print it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Unit::Written(name) => name,
-            Unit::One => "",
-            Unit::Bits => "bits",
-            Unit::Bar => "bar",
-            Unit::Pascal => "Pa",
-            Unit::Kelvin => "K",
-            Unit::Millimetre => "mm",
-            Unit::Micrometre => "um",
-            Unit::SquareMillimetre => "mm^2",
-            Unit::CubicCentimetre => "cm^3",
-            Unit::Second => "s",
-            Unit::Millisecond => "ms",
-            Unit::CubicMetrePerHour => "m^3/h",
-            Unit::Kilogram => "kg",
-            Unit::Newton => "N",
-            Unit::NewtonSecondPerMillimetre => "N/(mm/s)",
-            Unit::NewtonPerMetre => "N/m",
-            Unit::NewtonSecondPerMetre => "N s/m",
-            Unit::Percent => "%",
-            Unit::Millibar => "mbar",
-            Unit::Metre => "m",
-            Unit::MillimetrePerSecond => "mm/s",
-            Unit::Hertz => "Hz",
-            Unit::PerSecond => "1/s",
-            Unit::NormalLitrePerMinute => "Nl/min",
-            Unit::NewtonPerBar => "N/bar",
-            Unit::WattPerSquareMetreKelvin => "W/(m^2 K)",
         }
     }
 }
