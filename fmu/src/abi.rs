@@ -125,13 +125,9 @@ fn get<V>(
     (references, values, count): (*const c_uint, *mut V, usize),
     work: impl FnOnce(&mut Simulation, &[c_uint], &mut [V]) -> Result<(), Refusal>,
 ) -> Status {
-    on(component, |instance| {
-        let (references, values) = (slice(references, count), slice_mut(values, count));
-        if references.len() != count || values.len() != count {
-            return Ok(null_array(instance));
-        }
-        work(&mut instance.simulation, references, values).map(|()| Status::Ok)
-    })
+    let (references, values) = (slice(references, count), slice_mut(values, count));
+    let is_there = references.len() == count && values.len() == count;
+    on_arrays(component, is_there, |simulation| work(simulation, references, values))
 }
 
 /// The same for a `fmi2Set…`, which only reads the values.
@@ -140,18 +136,24 @@ fn set<V>(
     (references, values, count): (*const c_uint, *const V, usize),
     work: impl FnOnce(&mut Simulation, &[c_uint], &[V]) -> Result<(), Refusal>,
 ) -> Status {
-    on(component, |instance| {
-        let (references, values) = (slice(references, count), slice(values, count));
-        if references.len() != count || values.len() != count {
-            return Ok(null_array(instance));
-        }
-        work(&mut instance.simulation, references, values).map(|()| Status::Ok)
-    })
+    let (references, values) = (slice(references, count), slice(values, count));
+    let is_there = references.len() == count && values.len() == count;
+    on_arrays(component, is_there, |simulation| work(simulation, references, values))
 }
 
-fn null_array(component: &Component) -> Status {
-    component.teller.tell(Status::Error, "a null pointer in place of value references or values");
-    Status::Error
+fn on_arrays(
+    component: *mut c_void,
+    is_there: bool,
+    work: impl FnOnce(&mut Simulation) -> Result<(), Refusal>,
+) -> Status {
+    on(component, |instance| {
+        if !is_there {
+            let why = "a null pointer in place of value references or values";
+            instance.teller.tell(Status::Error, why);
+            return Ok(Status::Error);
+        }
+        work(&mut instance.simulation).map(|()| Status::Ok)
+    })
 }
 
 fn text(pointer: *const c_char) -> Option<String> {
@@ -298,98 +300,54 @@ extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
     })
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetReal(
-    component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    values: *mut c_double,
-) -> Status {
-    get(component, (references, values, count), Simulation::reals)
+/// Functions that get or set values by their references, from `name(values) hands, work`.
+macro_rules! by_references {
+    ($($name:ident($values:ty) $hands:ident, $work:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(
+            component: *mut c_void,
+            references: *const c_uint,
+            count: usize,
+            values: $values,
+        ) -> Status {
+            $hands(component, (references, values, count), $work)
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetInteger(
+by_references! {
+    fmi2GetReal(*mut c_double) get, Simulation::reals;
+    fmi2GetInteger(*mut c_int) get, |instance, references, values| instance.integers(references, values);
+    fmi2GetBoolean(*mut c_int) get, booleans;
+    fmi2GetString(*mut *const c_char) no_strings, ();
+    fmi2SetReal(*const c_double) set, Simulation::set_reals;
+    fmi2SetInteger(*const c_int) set, Simulation::set_integers;
+    fmi2SetBoolean(*const c_int) set, set_booleans;
+    fmi2SetString(*const *const c_char) no_strings, ();
+}
+
+fn booleans(instance: &mut Simulation, references: &[c_uint], values: &mut [c_int]) -> Result<(), Refusal> {
+    let mut flags = vec![false; values.len()];
+    instance.booleans(references, &mut flags)?;
+    values.iter_mut().zip(flags).for_each(|(value, flag)| *value = c_int::from(flag));
+    Ok(())
+}
+
+fn set_booleans(instance: &mut Simulation, references: &[c_uint], values: &[c_int]) -> Result<(), Refusal> {
+    let flags: Vec<_> = values.iter().map(|value| *value != 0).collect();
+    instance.set_booleans(references, &flags)
+}
+
+/// No variable is a string.
+fn no_strings<V>(
     component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    values: *mut c_int,
+    (references, _values, count): (*const c_uint, V, usize),
+    (): (),
 ) -> Status {
-    get(component, (references, values, count), |instance, references, values| {
-        instance.integers(references, values)
+    on(component, |_| match slice(references, count).first() {
+        Some(first) => Err(Refusal::Reference(*first, "String")),
+        None => Ok(Status::Ok),
     })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetBoolean(
-    component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    values: *mut c_int,
-) -> Status {
-    get(component, (references, values, count), |instance, references, values| {
-        let mut flags = vec![false; count];
-        instance.booleans(references, &mut flags)?;
-        values.iter_mut().zip(flags).for_each(|(value, flag)| *value = c_int::from(flag));
-        Ok(())
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetString(
-    component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    _values: *mut *const c_char,
-) -> Status {
-    on(component, |_| no_strings(slice(references, count)))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetReal(
-    component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    values: *const c_double,
-) -> Status {
-    set(component, (references, values, count), Simulation::set_reals)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetInteger(
-    component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    values: *const c_int,
-) -> Status {
-    set(component, (references, values, count), Simulation::set_integers)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetBoolean(
-    component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    values: *const c_int,
-) -> Status {
-    set(component, (references, values, count), |instance, references, values| {
-        let flags: Vec<_> = values.iter().map(|value| *value != 0).collect();
-        instance.set_booleans(references, &flags)
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetString(
-    component: *mut c_void,
-    references: *const c_uint,
-    count: usize,
-    _values: *const *const c_char,
-) -> Status {
-    on(component, |_| no_strings(slice(references, count)))
-}
-
-fn no_strings(references: &[c_uint]) -> Result<Status, Refusal> {
-    references.first().map_or(Ok(Status::Ok), |first| Err(Refusal::Reference(*first, "String")))
 }
 
 #[unsafe(no_mangle)]
