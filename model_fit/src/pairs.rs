@@ -16,7 +16,7 @@ use super::fit::{Fitting, What};
 use super::judge::{Evaluation, GAIN_APART, Sides, judge};
 use super::select::{Fitted, Found, fitted_from};
 use super::starts;
-use super::structure::{Beside, changed};
+use super::structure::{self, Beside};
 use super::watch::Done;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -135,6 +135,8 @@ fn in_place_of([one, two]: [usize; 2], [first, second]: [usize; 2]) -> [usize; 2
 fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Response>> {
     let (fitting, point) = (&base.fitting, &base.point);
     let beside = Beside::new(fitting, point)?;
+    let (taken, values_si, scale) = (&base.suspects[..], &point.values_si[..], &beside.scale[..]);
+    let base = structure::Base { fitting, taken, values_si, scale };
     let of_suspect = |(suspect, fit): &&(usize, Fitted<'_>)| -> Vec<Response> {
         let own = |values_si: &[f64]| -> Vec<(What, f64)> {
             let all = fit.fitting.unknowns.iter().zip(values_si);
@@ -145,9 +147,7 @@ fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Re
         let points = points.iter().map(Vec::as_slice).chain([fit.point.values_si.as_slice()]);
         let response = |values_si: &[f64]| {
             let values_si = own(values_si);
-            let said_with =
-                changed(fitting, (&base.suspects, &point.values_si), *suspect, &values_si, &beside.scale);
-            let change = beside.rest(said_with.ok()? - &beside.said);
+            let change = beside.rest(base.changed(*suspect, &values_si).ok()? - &beside.said);
             let size = change.norm_squared();
             let gain = change.dot(&beside.left);
             (size > 0.0 && size.is_finite()).then_some(Response {

@@ -22,7 +22,7 @@ use std::path::Path;
 pub(super) const SCHEMA_VERSION: u32 = 1;
 
 /// `report.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct ModelReport {
     pub schema_version: u32,
     /// Path of the model file as it was given.
@@ -244,23 +244,15 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         train: fitting.records.iter().map(|record| record.name.clone()).collect(),
         verdict,
         headline,
-        confirmed: None,
-        taken_back: false,
         adequate: true,
-        residuals: Vec::new(),
         parameters,
         training: training.collect(),
-        held_out: Vec::new(),
-        held_out_alternatives: Vec::new(),
         named,
-        discovered: Vec::new(),
-        located: None,
         suspects,
         structure: structure.clone(),
         notes,
         unreached,
-        equations: Vec::new(),
-        declared: Vec::new(),
+        ..ModelReport::default()
     }
 }
 
@@ -273,24 +265,18 @@ impl ModelReport {
         traces: &[Traces],
     ) {
         let name = |suspect: usize| model.suspects[suspect].name.clone();
-        let of_alternative = |one: &Alternative| {
-            let [suspect, instead_of] = [one.suspect, one.instead_of].map(name);
-            let left = one
-                .judged
-                .iter()
-                .map(|one| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows));
-            let each = left.map(move |left| OfAlternative {
-                suspect: suspect.clone(),
-                instead_of: instead_of.clone(),
-                left,
-            });
-            each.collect::<Vec<_>>()
+        let left =
+            |one: &Judged| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows);
+        let of_alternative = |alternative: &Alternative| {
+            let [suspect, instead_of] = [alternative.suspect, alternative.instead_of].map(name);
+            let of = |one: &Judged| {
+                let (suspect, instead_of) = (suspect.clone(), instead_of.clone());
+                OfAlternative { suspect, instead_of, left: left(one) }
+            };
+            alternative.judged.iter().map(of).collect::<Vec<_>>()
         };
         self.held_out_alternatives = alternatives.iter().flat_map(of_alternative).collect();
-        self.held_out = judged
-            .iter()
-            .map(|one| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows))
-            .collect();
+        self.held_out = judged.iter().map(left).collect();
         if self.named.is_empty() && self.discovered.is_empty() {
             return;
         }

@@ -7,7 +7,7 @@
 use super::fit::Fitting;
 use super::record::Measured;
 use super::select::Fitted;
-use super::structure::{Advice, Hardly, Seen, TWINS, cosine, seen};
+use super::structure::{Advice, Base, Hardly, Seen, TWINS, cosine};
 use crate::stats::mean_and_variance;
 use model::{Model, Part, Program};
 
@@ -100,7 +100,8 @@ fn with_sensor(
     let mut asked: Vec<usize> = confused.iter().flatten().copied().collect();
     asked.sort_unstable();
     asked.dedup();
-    seen(&fitting, (taken, values_si), &scale, &asked).ok().map(|(seen, ..)| seen)
+    let base = Base { fitting: &fitting, taken, values_si, scale: &scale };
+    base.seen(&asked).ok().map(|(seen, ..)| seen)
 }
 
 /// The least that is left of an output over its variation.

@@ -106,13 +106,11 @@ pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     let errors = standard_errors(&baseline.normal);
     let undetermined = fitting.unknowns.iter().zip(errors).filter(|(_, error)| error.is_none());
     let undetermined = undetermined.map(|(unknown, _)| fitting.name_of(unknown)).collect();
-    let scale: Vec<f64> = (0..model.outputs.len())
-        .map(|output| fitting.variance(output, point.squares[output]).sqrt().recip())
-        .collect();
+    let scale = scale(fitting, point);
     let is_asked = |suspect: &model::Suspect| !suspect.is_decoy && !suspect.is_term;
     let asked: Vec<usize> = (0..model.suspects.len()).filter(|one| is_asked(&model.suspects[*one])).collect();
-    let seen = seen(fitting, (&baseline.suspects, &point.values_si), &scale, &asked);
-    let Ok((seen, base, moved)) = seen else {
+    let base = Base { fitting, taken: &baseline.suspects, values_si: &point.values_si, scale: &scale };
+    let Ok((seen, base, moved)) = base.seen(&asked) else {
         return Structure { undetermined, ..Structure::default() };
     };
     let name = |suspect: usize| model.suspects[suspect].name.clone();
@@ -197,37 +195,96 @@ fn twins(seen: &[Seen], predicted: impl Fn(&Seen, &Seen) -> f64) -> Vec<([usize;
 /// Suspects, what the model says, and how much each of its numbers moves that.
 type Sight = (Vec<Seen>, DVector<f64>, Vec<f64>);
 
-/// What these suspects do, each beside the model with what was `taken`, what that says, and how much each of
-/// its numbers moves it; a suspect that cannot be simulated is left out.
-pub(super) fn seen(
-    fitting: &Fitting<'_>,
-    (taken, values_si): (&[usize], &[f64]),
-    scale: &[f64],
-    asked: &[usize],
-) -> Result<Sight, Failure> {
-    let (columns, base) = columns(fitting, values_si, scale)?;
-    // Other steps of the integration move outputs, too, by no more than this.
-    let least = match fitting.model.solver {
-        Solver::Adaptive { relative_tolerance } => 10.0 * relative_tolerance * base.norm(),
-        Solver::Fixed { .. } => 0.0,
-    };
-    let of = |suspect: &usize| {
-        let change = changed(fitting, (taken, values_si), *suspect, &[], scale).ok()? - &base;
-        let seen = |change: DVector<f64>| {
-            let (rest, size) = (&change - &columns * projected(&columns, &change), change.norm());
-            let share = if size > 0.0 { rest.norm() / size } else { 0.0 };
-            Seen { suspect: *suspect, share, change: size, direction: rest.normalize() }
+/// A model with what was taken, beside which suspects are seen, and the scale of each output.
+#[derive(Clone, Copy)]
+pub(super) struct Base<'a> {
+    pub(super) fitting: &'a Fitting<'a>,
+    pub(super) taken: &'a [usize],
+    pub(super) values_si: &'a [f64],
+    pub(super) scale: &'a [f64],
+}
+
+impl<'a> Base<'a> {
+    /// What these suspects do, what the model says, and how much each of its numbers moves it; a suspect that cannot be simulated
+    /// is left out.
+    pub(super) fn seen(self, asked: &[usize]) -> Result<Sight, Failure> {
+        let (columns, base) = columns(self.fitting, self.values_si, self.scale)?;
+        // Other steps of the integration move outputs, too, by no more than this.
+        let least = match self.fitting.model.solver {
+            Solver::Adaptive { relative_tolerance } => 10.0 * relative_tolerance * base.norm(),
+            Solver::Fixed { .. } => 0.0,
         };
-        if change.norm() > least {
-            return Some(seen(change));
+        let of = |suspect: &usize| {
+            let change = self.changed(*suspect, &[]).ok()? - &base;
+            let seen = |change: DVector<f64>| {
+                let (rest, size) = (&change - &columns * projected(&columns, &change), change.norm());
+                let share = if size > 0.0 { rest.norm() / size } else { 0.0 };
+                Seen { suspect: *suspect, share, change: size, direction: rest.normalize() }
+            };
+            if change.norm() > least {
+                return Some(seen(change));
+            }
+            let begun = self.begun(*suspect).into_iter().map(seen);
+            let most = begun.max_by(|one, other| one.share.total_cmp(&other.share));
+            Some(most.unwrap_or_else(|| seen(change * 0.0)))
+        };
+        let all = asked.iter().filter_map(of).collect();
+        let moved = columns.column_iter().map(|column| column.norm()).collect();
+        Ok((all, base, moved))
+    }
+
+    /// What a suspect that does nothing at its first values does per unit of each of its numbers that starts at 0; of those alone
+    /// that move an output.
+    fn begun(self, suspect: usize) -> Vec<DVector<f64>> {
+        let (extended, values_si) = self.beside(suspect, &[]);
+        let parameters = &self.fitting.model.parameters;
+        let at_0 = |index: usize| {
+            let Parameter { suspect: owner, values_si, is_fixed, .. } = &parameters[index];
+            *owner == Some(suspect) && !is_fixed && values_si[0] == 0.0
+        };
+        let numbers: Vec<usize> = (0..parameters.len()).filter(|index| at_0(*index)).collect();
+        if numbers.is_empty() {
+            return Vec::new();
         }
-        let begun = begun(fitting, (taken, values_si), *suspect, scale).into_iter().map(seen);
-        let most = begun.max_by(|one, other| one.share.total_cmp(&other.share));
-        Some(most.unwrap_or_else(|| seen(change * 0.0)))
-    };
-    let all = asked.iter().filter_map(of).collect();
-    let moved = columns.column_iter().map(|column| column.norm()).collect();
-    Ok((all, base, moved))
+        let Ok((columns, _)) = columns(&extended, &values_si, self.scale) else { return Vec::new() };
+        let of_number = |index: &usize| {
+            let is_it = |what: What| matches!(what, What::Shared(of) | What::OfRecord(of, _) if of == *index);
+            let of_number = extended.unknowns.iter().zip(columns.column_iter());
+            of_number
+                .filter(|(unknown, _)| is_it(unknown.what))
+                .map(|(_, column)| column)
+                .fold(DVector::zeros(columns.nrows()), |sum, column| sum + column)
+        };
+        numbers.iter().map(of_number).filter(|change| change.norm() > 0.0).collect()
+    }
+
+    /// Scaled outputs with a suspect at these values, or its first; all other numbers as they are.
+    pub(super) fn changed(self, suspect: usize, own: &[(What, f64)]) -> Result<DVector<f64>, Failure> {
+        let (extended, values_si) = self.beside(suspect, own);
+        Ok(DVector::from_vec(extended.said(&values_si, self.scale)?))
+    }
+
+    /// The fit with one suspect more, and its numbers.
+    fn beside(self, suspect: usize, own: &[(What, f64)]) -> (Fitting<'a>, Vec<f64>) {
+        let Base { fitting, taken, values_si, .. } = self;
+        let mut suspects = taken.to_vec();
+        suspects.push(suspect);
+        let program = Program::new(fitting.model, &suspects).expect("all suspects together were compiled");
+        let extended = Fitting::new(fitting.model, program, fitting.records, &suspects);
+        let known = |what| fitting.unknowns.iter().position(|unknown| unknown.what == what);
+        let value = |unknown: &Unknown| {
+            let own = own.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
+            own.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
+        };
+        let values_si = extended.unknowns.iter().map(value).collect();
+        (extended, values_si)
+    }
+}
+
+/// What the model leaves of each output as a unit.
+fn scale(fitting: &Fitting<'_>, point: &Point) -> Vec<f64> {
+    let variance = |output: usize| fitting.variance(output, point.squares[output]);
+    (0..fitting.model.outputs.len()).map(|output| variance(output).sqrt().recip()).collect()
 }
 
 /// Coefficients of the columns that come nearest to a change.
@@ -259,9 +316,7 @@ pub(super) struct Beside {
 impl Beside {
     /// `None` where it cannot be simulated.
     pub(super) fn new(fitting: &Fitting<'_>, point: &Point) -> Option<Self> {
-        let scale: Vec<f64> = (0..fitting.model.outputs.len())
-            .map(|output| fitting.variance(output, point.squares[output]).sqrt().recip())
-            .collect();
+        let scale = scale(fitting, point);
         let (columns, said) = columns(fitting, &point.values_si, &scale).ok()?;
         let left = DVector::from_vec(fitting.measured(&scale)) - &said;
         let beside = Self { scale, said, left: DVector::zeros(0), columns };
@@ -273,68 +328,6 @@ impl Beside {
         let taken = &self.columns * projected(&self.columns, &change);
         change - taken
     }
-}
-
-/// What a suspect that does nothing at its first values does per unit of each of its numbers that starts at 0; of those alone
-/// that move an output.
-fn begun(
-    fitting: &Fitting<'_>,
-    (taken, values_si): (&[usize], &[f64]),
-    suspect: usize,
-    scale: &[f64],
-) -> Vec<DVector<f64>> {
-    let (extended, values_si) = beside(fitting, (taken, values_si), suspect, &[]);
-    let parameters = &fitting.model.parameters;
-    let at_0 = |index: usize| {
-        let Parameter { suspect: owner, values_si, is_fixed, .. } = &parameters[index];
-        *owner == Some(suspect) && !is_fixed && values_si[0] == 0.0
-    };
-    let numbers: Vec<usize> = (0..parameters.len()).filter(|index| at_0(*index)).collect();
-    if numbers.is_empty() {
-        return Vec::new();
-    }
-    let Ok((columns, _)) = columns(&extended, &values_si, scale) else { return Vec::new() };
-    let of_number = |index: &usize| {
-        let is_it = |what: What| matches!(what, What::Shared(of) | What::OfRecord(of, _) if of == *index);
-        let of_number = extended.unknowns.iter().zip(columns.column_iter());
-        of_number
-            .filter(|(unknown, _)| is_it(unknown.what))
-            .map(|(_, column)| column)
-            .fold(DVector::zeros(columns.nrows()), |sum, column| sum + column)
-    };
-    numbers.iter().map(of_number).filter(|change| change.norm() > 0.0).collect()
-}
-
-/// Scaled outputs with a suspect at these values, or its first; all other numbers as they are.
-pub(super) fn changed(
-    fitting: &Fitting<'_>,
-    base: (&[usize], &[f64]),
-    suspect: usize,
-    own: &[(What, f64)],
-    scale: &[f64],
-) -> Result<DVector<f64>, Failure> {
-    let (extended, values_si) = beside(fitting, base, suspect, own);
-    Ok(DVector::from_vec(extended.said(&values_si, scale)?))
-}
-
-/// The fit with one suspect more, and its numbers.
-fn beside<'a>(
-    fitting: &Fitting<'a>,
-    (taken, values_si): (&[usize], &[f64]),
-    suspect: usize,
-    own: &[(What, f64)],
-) -> (Fitting<'a>, Vec<f64>) {
-    let mut suspects = taken.to_vec();
-    suspects.push(suspect);
-    let program = Program::new(fitting.model, &suspects).expect("all suspects together were compiled");
-    let extended = Fitting::new(fitting.model, program, fitting.records, &suspects);
-    let known = |what| fitting.unknowns.iter().position(|unknown| unknown.what == what);
-    let value = |unknown: &Unknown| {
-        let own = own.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
-        own.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
-    };
-    let values_si = extended.unknowns.iter().map(value).collect();
-    (extended, values_si)
 }
 
 #[cfg(test)]
