@@ -27,8 +27,8 @@ pub struct Calibrated {
 }
 
 pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> Calibrated {
-    let first = refit(engine, baseline, &[], 0.0).expect("the baseline is a rig");
-    Calibrated { fit: relinearise(engine, first, 0.0, CALIBRATION) }
+    let first = refit(engine, baseline, &[]).expect("the baseline is a rig");
+    Calibrated { fit: relinearise(engine, first, CALIBRATION) }
 }
 
 impl Calibrated {

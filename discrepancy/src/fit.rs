@@ -287,24 +287,15 @@ impl Products {
         let count = first.len();
         let (matrix, _) = self.normal(first, weights, precisions);
         let inverse = matrix.try_inverse().unwrap_or_else(|| DMatrix::zeros(count, count));
+        let weighted = |row: usize, column: usize| -> f64 {
+            let windows = weights.iter().zip(&self.information);
+            windows.map(|(weight, products)| weight * products[row * self.columns + column]).sum()
+        };
         (count..self.columns)
             .map(|column| {
-                let cross = DVector::from_iterator(
-                    count,
-                    first.iter().map(|at| {
-                        weights
-                            .iter()
-                            .zip(&self.information)
-                            .map(|(weight, products)| weight * products[at * self.columns + column])
-                            .sum::<f64>()
-                    }),
-                );
+                let cross = DVector::from_iterator(count, first.iter().map(|at| weighted(*at, column)));
                 let shares = &inverse * &cross;
-                let whole: f64 = weights
-                    .iter()
-                    .zip(&self.information)
-                    .map(|(weight, products)| weight * products[column * self.columns + column])
-                    .sum();
+                let whole = weighted(column, column);
                 let scores = weights
                     .iter()
                     .zip(&self.scores)

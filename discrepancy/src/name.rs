@@ -137,8 +137,7 @@ pub fn name(
     let (null_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
-    let RefitWithInitialStates { engine: mut restarted, fit } =
-        refit_with_starts(engine, &calibrated.fit, 0.0);
+    let RefitWithInitialStates { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated.fit);
     let calibrated = Calibrated { fit };
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
@@ -247,7 +246,7 @@ pub(crate) fn on_all(engine: &Engine<'_>, found: &mut SelectionResult) {
 
 /// Refits a model with sensitivities relinearised at itself.
 fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
-    crate::refit::relinearise(engine, model, EFFECT_PARAMETER_PENALTY, RELINEARISED)
+    crate::refit::relinearise(engine, model, RELINEARISED)
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.

@@ -119,8 +119,8 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
         .sum()
 }
 
-pub(crate) fn model_penalty(effect_parameters: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
-    penalty * effect_parameters as f64 + PARAMETER_COSTS * parameters_off(factors)
+pub(crate) fn model_penalty(effect_parameters: usize, factors: &[f64; COUNT]) -> f64 {
+    EFFECT_PARAMETER_PENALTY * effect_parameters as f64 + PARAMETER_COSTS * parameters_off(factors)
 }
 
 /// Prior precision of a coordinate.
@@ -183,16 +183,11 @@ impl Iterate for Projected {
     }
 }
 
-/// Fits effects from a start; `penalty` is due for each coordinate.
+/// Fits effects from a start.
 ///
 /// `None` where no rig can have the start.
-pub fn refit(
-    engine: &Engine<'_>,
-    linearisation: &Linearisation,
-    start: &[EffectEstimate],
-    penalty: f64,
-) -> Option<Refit> {
-    refit_steps(engine, linearisation, start, penalty, CANDIDATE.steps)
+pub fn refit(engine: &Engine<'_>, linearisation: &Linearisation, start: &[EffectEstimate]) -> Option<Refit> {
+    refit_steps(engine, linearisation, start, CANDIDATE.steps)
 }
 
 /// The same with another maximum of steps; 0 evaluates the start.
@@ -200,7 +195,6 @@ pub(crate) fn refit_steps(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
     start: &[EffectEstimate],
-    penalty: f64,
     steps: usize,
 ) -> Option<Refit> {
     let parameters: Vec<usize> = (0..COUNT).collect();
@@ -281,7 +275,7 @@ pub(crate) fn refit_steps(
     for (factor, change) in factors.iter_mut().zip(&iterate.fit.coefficients) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
-    let loss = iterate.loss() + model_penalty(coordinates.len(), &factors, penalty);
+    let loss = iterate.loss() + model_penalty(coordinates.len(), &factors);
     let Projected { placed, fit, .. } = iterate;
     Some(Refit { placed, factors, loss, squares: fit.squares, errors, design_effect, convergence })
 }
@@ -302,9 +296,9 @@ pub(crate) fn linearise_at(
 }
 
 /// Refits a model with the parameters linearised anew at its own values, until the loss converges.
-pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, penalty: f64, options: Options) -> Refit {
+pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, options: Options) -> Refit {
     let (fit, outer) = Estimator::new(options).descend(model, |_, best| {
-        let Some(next) = refit(engine, &linearise(engine, best), &best.placed, penalty) else {
+        let Some(next) = refit(engine, &linearise(engine, best), &best.placed) else {
             return Step::Impossible;
         };
         if next.loss < best.loss {

@@ -1,9 +1,7 @@
 //! Backward elimination of effects, swaps between rounds, and alternatives.
 
 use super::null_distribution::NullDistribution;
-use super::{
-    Alternative, EFFECT_PARAMETER_PENALTY, STEPS, THRESHOLD_FACTOR_SINGLE, axes_of, loss_on, relinearise,
-};
+use super::{Alternative, STEPS, THRESHOLD_FACTOR_SINGLE, axes_of, loss_on, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Refit, linearise, refit_steps};
@@ -14,7 +12,7 @@ use rayon::prelude::*;
 const SWAPPED: usize = 3;
 /// Fits are indistinguishable when their objectives differ by less than this times the design effect. Noise alone makes the wrong
 /// one of two better by more in one record of 700 at most, if both have the same number of effect parameters; each further
-/// parameter shifts the difference by [`EFFECT_PARAMETER_PENALTY`].
+/// parameter shifts the difference by [`super::EFFECT_PARAMETER_PENALTY`].
 pub(crate) const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;
 /// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
 const INDISTINGUISHABLE_LOSS_SHARE: f64 = 0.02;
@@ -45,9 +43,7 @@ pub(super) fn swap(
     progress(&format!("trying {} other combinations", tried.len()));
     let best = tried
         .par_iter()
-        .filter_map(|(at, rank, placed)| {
-            Some((*at, *rank, refit_steps(engine, &point, placed, EFFECT_PARAMETER_PENALTY, STEPS)?))
-        })
+        .filter_map(|(at, rank, placed)| Some((*at, *rank, refit_steps(engine, &point, placed, STEPS)?)))
         .collect::<Vec<_>>()
         .into_iter()
         .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
@@ -101,7 +97,7 @@ pub(super) fn eliminate_backward<'a>(
                 if placed.is_empty() {
                     return Some(calibrated.fit.clone());
                 }
-                refit_steps(engine, &linearisation, &placed, EFFECT_PARAMETER_PENALTY, 4)
+                refit_steps(engine, &linearisation, &placed, 4)
             })
             .collect();
         let least = without

@@ -7,7 +7,6 @@
 //! Forward selection moves the parameters on the linearised model, which suffices to compare models. The final numbers come from
 //! the simulator.
 
-use super::EFFECT_PARAMETER_PENALTY;
 use super::null_distribution::above_outlier_limit;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
@@ -44,7 +43,7 @@ pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COU
 /// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
-    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors, EFFECT_PARAMETER_PENALTY);
+    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 

@@ -14,10 +14,7 @@
 //! Source: DerSimonian, Laird 1986, Control. Clin. Trials 7(3): random effects. Takkouche et al. 1999, Am. J. Epidemiol. 150(2):
 //! between-study coefficient of variation.
 
-use super::{
-    EFFECT_PARAMETER_PENALTY, MIN_LOSS_REDUCTION, STEPS, is_large, lacks_fit, leading_key,
-    loss_where_last_acts, relinearise,
-};
+use super::{MIN_LOSS_REDUCTION, STEPS, is_large, lacks_fit, leading_key, loss_where_last_acts, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{
@@ -93,7 +90,7 @@ pub(super) fn eliminate_heterogeneous(
         *model = if placed.is_empty() {
             calibrated.fit.clone()
         } else {
-            let fit = refit_steps(engine, &linearisation, &placed, EFFECT_PARAMETER_PENALTY, STEPS);
+            let fit = refit_steps(engine, &linearisation, &placed, STEPS);
             let Some(fit) = fit else { break };
             relinearise(engine, fit)
         };

@@ -6,7 +6,7 @@
 //!
 //! Over a travel D two pitches are indistinguishable while D (1/P_1 - 1/P_2) is well below one, so that the grid is even in 1/P.
 
-use super::{EFFECT_PARAMETER_PENALTY, STEPS};
+use super::STEPS;
 use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{
@@ -66,5 +66,5 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
     let (at, fit) = fits.min_by(|left, right| left.1.loss.total_cmp(&right.1.loss))?;
     let [smallest, largest] = candidate.fit_bounds(ripple);
     let amplitude = (PROBE * fit.coefficients[always]).clamp(smallest, largest);
-    refit_steps(engine, &linearisation, &with(amplitude, pitches[at]), EFFECT_PARAMETER_PENALTY, STEPS)
+    refit_steps(engine, &linearisation, &with(amplitude, pitches[at]), STEPS)
 }

@@ -9,10 +9,7 @@ use super::elimination::same;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
 use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_starts};
-use super::{
-    EFFECT_PARAMETER_PENALTY, LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, lacks_fit,
-    relinearise,
-};
+use super::{LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, lacks_fit, relinearise};
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Linearisation, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
@@ -154,7 +151,7 @@ impl<'a> Round<'a> {
             .par_iter()
             .filter_map(|screened| {
                 let start = best_start(engine, linearisation, &model.placed, screened, *null_loss);
-                refit_steps(engine, linearisation, &start, EFFECT_PARAMETER_PENALTY, STEPS)
+                refit_steps(engine, linearisation, &start, STEPS)
             })
             .collect();
         sort(&mut fits);
@@ -165,13 +162,7 @@ impl<'a> Round<'a> {
             fits.iter().take(RELINEARISED).filter(|fit| null_loss - fit.loss >= 0.5 * gain).count().max(1);
         let restarted = fits[..near]
             .par_iter()
-            .map(|fit| {
-                refit_with_starts(
-                    engine,
-                    &relinearise(engine, at_best_pitch(engine, fit)),
-                    EFFECT_PARAMETER_PENALTY,
-                )
-            })
+            .map(|fit| refit_with_starts(engine, &relinearise(engine, at_best_pitch(engine, fit))))
             .collect();
         let mut round = Self { fits, restarted };
         round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
@@ -210,10 +201,10 @@ impl<'a> Round<'a> {
         backlash: &Screened,
     ) {
         let start = backlash_start(engine, linearisation, &model.placed, &backlash.start);
-        let Some(fit) = refit_steps(engine, linearisation, &start, EFFECT_PARAMETER_PENALTY, STEPS) else {
+        let Some(fit) = refit_steps(engine, linearisation, &start, STEPS) else {
             return;
         };
-        let restarted = refit_with_starts(engine, &relinearise(engine, fit), EFFECT_PARAMETER_PENALTY);
+        let restarted = refit_with_starts(engine, &relinearise(engine, fit));
         // The fit from the screened width is the same effect, not an alternative.
         let is_backlash =
             |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &backlash.start));

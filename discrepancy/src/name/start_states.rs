@@ -17,17 +17,12 @@ pub(super) struct RefitWithInitialStates<'a> {
 }
 
 /// Refits a model of linked rods, alternating with estimates of the window start states under it.
-pub(super) fn refit_with_starts<'a>(
-    engine: &Engine<'a>,
-    model: &Refit,
-    penalty: f64,
-) -> RefitWithInitialStates<'a> {
+pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit) -> RefitWithInitialStates<'a> {
     let mut best = RefitWithInitialStates { engine: None, fit: model.clone() };
     for _ in 0..if engine.is_linked() { MAX_ALTERNATIONS } else { 0 } {
         let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
         let restarted = engine.with_starts_under(&rig);
-        let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.placed, penalty)
-        else {
+        let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.placed) else {
             break;
         };
         let converged =
