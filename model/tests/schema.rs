@@ -23,32 +23,22 @@ fn the_schema_has_the_keys_of_the_reader() {
     let suspect = |lines: &str| format!("{head}[[suspects]]\nname = \"s\"\nplace = \"u\"\n{lines}");
     let used = |lines: &str| suspect(&format!("use = \"actuator/lag\"\n{lines}"));
     let written = |lines: &str| suspect(&format!("add = \"1\"\n{lines}"));
+    let table = |lines: &str| vec![format!("{head}{lines}\nnonsense = 1\n")];
+    let solver = ["", "method = \"fixed\"\nstep_s = 1"].map(|keys| table(&format!("[solver]\n{keys}")));
     for (place, texts) in [
         ("", vec![format!("nonsense = 1\n{head}")]),
-        ("/properties/record", vec![format!("{head}[record]\nnonsense = 1\n")]),
-        ("/properties/rows", vec![format!("{head}[rows]\nnonsense = 1\n")]),
-        ("/properties/held_out", vec![format!("{head}[held_out]\nnonsense = 1\n")]),
-        ("/properties/fit", vec![format!("{head}[fit]\nnonsense = 1\n")]),
-        (
-            "/properties/solver",
-            vec![
-                format!("{head}[solver]\nnonsense = 1\n"),
-                format!("{head}[solver]\nmethod = \"fixed\"\nstep_s = 1\nnonsense = 1\n"),
-            ],
-        ),
-        ("/$defs/table", vec![format!("{head}[tables.f]\nx = [0, 1]\ny = [0, 1]\nnonsense = 1\n")]),
-        ("/$defs/input", vec![format!("{head}[inputs.v]\nnonsense = 1\n")]),
-        ("/$defs/parameter", vec![format!("{head}[parameters.p]\nvalue = 1\nnonsense = 1\n")]),
-        (
-            "/$defs/state",
-            vec![format!("{head}[states.z]\nstart = 0\nderivative = \"0/1[s]\"\nnonsense = 1\n")],
-        ),
-        ("/$defs/memory", vec![format!("{head}[memory.m]\nupdate = \"m\"\nnonsense = 1\n")]),
-        (
-            "/$defs/friction",
-            vec![format!("{head}[friction.f]\nvelocity = \"x\"\nsliding = \"1\"\nnonsense = 1\n")],
-        ),
-        ("/$defs/output", vec![format!("{head}[outputs.z]\nvalue = \"1\"\nnonsense = 1\n")]),
+        ("/properties/record", table("[record]")),
+        ("/properties/rows", table("[rows]")),
+        ("/properties/held_out", table("[held_out]")),
+        ("/properties/fit", table("[fit]")),
+        ("/properties/solver", solver.concat()),
+        ("/$defs/table", table("[tables.f]\nx = [0, 1]\ny = [0, 1]")),
+        ("/$defs/input", table("[inputs.v]")),
+        ("/$defs/parameter", table("[parameters.p]\nvalue = 1")),
+        ("/$defs/state", table("[states.z]\nstart = 0\nderivative = \"0/1[s]\"")),
+        ("/$defs/memory", table("[memory.m]\nupdate = \"m\"")),
+        ("/$defs/friction", table("[friction.f]\nvelocity = \"x\"\nsliding = \"1\"")),
+        ("/$defs/output", table("[outputs.z]\nvalue = \"1\"")),
         ("/$defs/written_suspect", vec![written("nonsense = 1\n")]),
         (
             "/$defs/library_suspect",

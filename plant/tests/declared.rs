@@ -1,14 +1,14 @@
 //! Declared terms in the rig file and in the plant: read as written, refused with reasons, the same as an effect of that law.
 
 use crate::tabulated::{inputs, run};
-use plant::effects::declared::Target;
+use plant::effects::declared::{Declared, Target};
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::parameters::suspects;
 use plant::{Axis, Inputs, Plant, RigParameters, Setup};
 
 /// A rig with terms: place, expression and numbers of each.
 fn with(terms: &[(&str, &str, &str)]) -> RigParameters {
-    RigParameters::from_toml(&text(terms), "rig.toml").unwrap_or_else(|error| panic!("{error}"))
+    read(&text(terms))
 }
 
 fn text(terms: &[(&str, &str, &str)]) -> String {
@@ -17,6 +17,20 @@ fn text(terms: &[(&str, &str, &str)]) -> String {
     };
     let terms: String = terms.iter().enumerate().map(one).collect();
     format!("{}{terms}", RigParameters::BASELINE_TOML)
+}
+
+fn read(text: &str) -> RigParameters {
+    RigParameters::from_toml(text, "rig.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn refused(text: &str) -> String {
+    RigParameters::from_toml(text, "rig.toml").expect_err(text).to_string()
+}
+
+/// The baseline with terms as they write themselves.
+fn written_again(terms: &[Declared]) -> RigParameters {
+    let terms: String = terms.iter().map(|term| term.toml("terms")).collect();
+    read(&format!("{}{terms}", RigParameters::BASELINE_TOML))
 }
 
 /// Both come to the same state but for rounding.
@@ -45,9 +59,7 @@ fn a_file_with_terms_is_read_as_it_was_written_numbers_to_the_bit() {
     assert_eq!((drift.axis(), drift.target()), (Axis::Load, Target::PressureB));
     assert_eq!(eddy.numbers().iter().map(|own| own.range).collect::<Vec<_>>(), [[0.0, 200.0], [0.12; 2]]);
     let changed = eddy.with(&[100.0 / 3.0, 0.12]).expect("in range");
-    let again: String = [&changed, drift].map(|term| term.toml("terms")).concat();
-    let again = format!("{}{again}", RigParameters::BASELINE_TOML);
-    let again = RigParameters::from_toml(&again, "rig.toml").unwrap_or_else(|error| panic!("{error}"));
+    let again = written_again(&[changed.clone(), drift.clone()]);
     assert_eq!(again, rig.with_term(&changed));
     assert_ne!(again, rig);
     assert_eq!(rig.without_effects(), RigParameters::baseline());
@@ -107,13 +119,11 @@ fn a_table_of_the_term_or_of_the_file_is_the_same_curve_in_a_table_of_the_rig() 
     let of_file = "[tables.lift]\nx_unit = \"mm\"\ny_unit = \"kN\"\nx = [0, 100, 500]\ny = [0, 0.02, -0.0075]\n\
                    [tables.other]\nx = [0, 1]\ny = [0.1, 1e-7]\n";
     let both = text(&[("load.force", "lift(x)", ""), ("drive.force", "lift(x)", own)]);
-    let both = RigParameters::from_toml(&format!("{both}{of_file}"), "rig.toml")
-        .unwrap_or_else(|error| panic!("{error}"));
+    let both = read(&format!("{both}{of_file}"));
     alike(&both, &with(&[("load.force", "lift(x)", own), ("drive.force", "lift(x)", own)]));
     let again: String = both.terms().iter().map(|term| term.toml("terms")).collect();
     assert!(!again.contains("other") && again.contains("y_unit = \"kN\""), "{again}");
-    let again = RigParameters::from_toml(&format!("{}{again}", RigParameters::BASELINE_TOML), "rig.toml");
-    assert_eq!(again.expect("written as it is read"), both);
+    assert_eq!(written_again(both.terms()), both);
     let suspect = "[[suspects]]\nname = \"lift\"\nplace = \"load.force\"\nadd = \"c*lift(x)\"\n\
                    parameters.c = { range = [0, 3] }\n";
     let suspect =
@@ -133,13 +143,11 @@ fn a_table_that_is_none_is_refused_at_its_key() {
         ("1[N]*g(s)", "x = [0, 1], y = [0, 1]", "'g' is no function; known are abs, "),
     ] {
         let table = format!("tables.f = {{ {table} }}");
-        let error =
-            RigParameters::from_toml(&text(&[("drive.force", add, &table)]), "rig.toml").expect_err(add);
-        let error = error.to_string();
+        let error = refused(&text(&[("drive.force", add, &table)]));
         assert!(error.starts_with("rig.toml:") && error.contains(message), "{add}\n{error}");
     }
     let taken = text(&[("drive.force", "0", "tables.sin = { x = [0, 1], y = [0, 1] }")]);
-    let error = RigParameters::from_toml(&taken, "rig.toml").unwrap_err().to_string();
+    let error = refused(&taken);
     assert!(error.contains("sin: the name has a meaning in expressions"), "{error}");
 }
 
@@ -278,9 +286,7 @@ fn a_play_moves_only_when_the_axis_has_taken_it_up() {
     assert!(off[0] < -199.0 && off[0] > -206.0 && off[1] > 199.0 && off[1] < 206.0, "{off:?}");
     let [_, with_play, _] = rig.terms() else { panic!("three terms") };
     assert_eq!((with_play.memory()[0].name.as_str(), with_play.memory()[0].range), ("w", [-1.0, 1.0]));
-    let again: String = rig.terms().iter().map(|term| term.toml("terms")).collect();
-    let again = RigParameters::from_toml(&format!("{}{again}", RigParameters::BASELINE_TOML), "rig.toml");
-    assert_eq!(again.expect("written as it is read"), rig);
+    assert_eq!(written_again(rig.terms()), rig);
 }
 
 #[test]
@@ -310,9 +316,7 @@ fn what_a_term_keeps_is_refused_where_it_cannot_run() {
             "more than 2 names under memory",
         ),
     ] {
-        let error = RigParameters::from_toml(&text(&[("drive.force", add, &numbers)]), "rig.toml")
-            .expect_err(&numbers)
-            .to_string();
+        let error = refused(&text(&[("drive.force", add, &numbers)]));
         assert!(error.starts_with("rig.toml:") && error.contains(message), "{numbers}\n{error}");
     }
 }
@@ -370,10 +374,10 @@ fn whatever_is_wrong_is_named_with_line_column_and_what_is_allowed() {
         assert!(error.contains(message), "{add}\n{error}");
     }
     let twice = text(&[EDDY, EDDY]).replace("term-1", "term-0");
-    let error = RigParameters::from_toml(&twice, "rig.toml").unwrap_err().to_string();
+    let error = refused(&twice);
     assert!(error.contains("name: term-0 is at drive.force already"), "{error}");
     let catalogue = text(&[EDDY]).replace("term-0", "inclination");
-    let error = RigParameters::from_toml(&catalogue, "rig.toml").unwrap_err().to_string();
+    let error = refused(&catalogue);
     assert!(error.contains("an effect of the catalogue has it"), "{error}");
 }
 
