@@ -31,6 +31,7 @@ use crate::parameters::RigParameters;
 use crate::state::Axis;
 pub(crate) use acting::Effects;
 use declared::{DeclaredTerms, Target};
+pub(crate) use friction::Friction;
 pub(crate) use replaced::{dead_volumes_m3, linkage};
 pub(crate) use sheet::OpenBalance;
 use sheet::{Effect, Element, Law, Part, Place, PlaceKind, Sheet, Switched};

@@ -13,8 +13,8 @@
 //!
 //! Source: rig-model.md, One axis, Masses and linkage.
 
-use crate::effects::Effects;
 use crate::effects::tabulated::Seen;
+use crate::effects::{Effects, Friction};
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
 use crate::motion::side;
@@ -269,15 +269,12 @@ impl Forces {
             let effect_n =
                 effects.map_or(0.0, |effects| effects.force(i, &Seen::at(lanes, &air, i)).sum(0.0));
             let force = pneumatic[i] + hand_n + contact_n + effect_n;
-            let rubbing = effects.map(|effects| (effects, effects.rubbing_at(integrator, i, place, &air)));
-            let levels = rubbing.as_ref().map_or(*motion.levels(), |(effects, rubbing)| {
-                effects.levels(integrator, i, rubbing, place.velocity.abs())
-            });
+            let friction = effects.map(|effects| Friction::at(effects, integrator, i, place, &air));
+            let levels = friction.map_or(*motion.levels(), |friction| friction.levels(place.velocity.abs()));
             let viscous_n = -(levels.viscous_n_s_per_m[side(place.velocity)] * place.velocity);
             let mut sliding_n = 0.0;
             let mut holding_n = 0.0;
-            let bristles = rubbing
-                .and_then(|(effects, rubbing)| effects.bristles(integrator, i, &rubbing, place, force));
+            let bristles = friction.and_then(|friction| friction.bristles(place, force));
             if let Some(bristles) = bristles {
                 sliding_n = bristles.sum(0.0);
                 // What the bristles leave of a force that presses against an end, the end takes.

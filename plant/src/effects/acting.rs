@@ -305,16 +305,16 @@ impl Laws for Effects {
             let axis_states = &carried.axes[axis];
             let velocity = at.from.velocity.to_array()[axis];
             let push = push.to_array()[axis];
-            let rubbing = self.rubbing(of, axis, middle, axis_states);
+            let friction = self.friction(of, axis, middle, axis_states);
             if let Some(effect) = self.on[axis].presliding {
                 let bristle = Bristle { velocity_m_per_s: velocity, deflection_m: axis_states.deflection_m };
-                return effect.force(bristle, self.under(of, axis, &rubbing, velocity, velocity.abs(), push));
+                return effect.force(bristle, friction.under(velocity, velocity.abs(), push));
             }
             if velocity == 0.0 {
                 return 0.0;
             }
-            let speed = self.middle_speed(of, axis, &rubbing, velocity, push, at.span.span_s);
-            -velocity.signum() * self.sliding_n(of, axis, &rubbing, speed, direction_of(velocity))
+            let speed = friction.middle_speed(velocity, push, at.span.span_s);
+            -velocity.signum() * friction.sliding_n(speed, direction_of(velocity))
         });
         Pair::new(drive, load).where_true(moving)
     }
@@ -327,8 +327,8 @@ impl Laws for Effects {
         let [drive, load] = [0, 1].map(|axis| {
             let axis_states = &self.memory.moving.axes[axis];
             let force = force.to_array()[axis];
-            let rubbing = self.rubbing(of, axis, middle, axis_states);
-            -force.signum() * self.sliding_n(of, axis, &rubbing, 0.0, direction_of(force))
+            let friction = self.friction(of, axis, middle, axis_states);
+            -force.signum() * friction.sliding_n(0.0, direction_of(force))
         });
         Pair::new(drive, load).where_true(starts)
     }
@@ -343,8 +343,8 @@ impl Laws for Effects {
                 return f64::INFINITY; // it moves
             }
             let axis_states = &self.memory.moving.axes[axis];
-            let rubbing = self.rubbing(of, axis, middle, axis_states);
-            self.break_away_n(of, axis, &rubbing, direction_of(force.to_array()[axis]))
+            let friction = self.friction(of, axis, middle, axis_states);
+            friction.break_away_n(direction_of(force.to_array()[axis]))
         });
         Pair::new(drive, load)
     }
@@ -362,8 +362,8 @@ impl Laws for Effects {
         if self.baseline_friction {
             return Baseline.holds(at, middle, axis, force);
         }
-        let rubbing = self.rubbing(at.of, axis, middle, &self.memory.moving.axes[axis]);
-        let break_away_n = self.break_away_n(at.of, axis, &rubbing, direction_of(force));
+        let friction = self.friction(at.of, axis, middle, &self.memory.moving.axes[axis]);
+        let break_away_n = friction.break_away_n(direction_of(force));
         at.of.motion.holds(at.from.place(axis).extension, force, break_away_n)
     }
 
@@ -373,15 +373,15 @@ impl Laws for Effects {
         }
         let (of, start) = (at.of, at.from.place(axis));
         let axis_states = &mut carried.axes[axis];
-        let rubbing = self.rubbing(of, axis, middle, axis_states);
+        let friction = self.friction(of, axis, middle, axis_states);
         let span_s = at.span.span_s;
         let Some(effect) = self.on[axis].presliding else {
-            let speed = self.middle_speed(of, axis, &rubbing, start.velocity, force, span_s);
-            return of.motion.advance(axis, start, force, &self.levels(of, axis, &rubbing, speed), span_s);
+            let speed = friction.middle_speed(start.velocity, force, span_s);
+            return of.motion.advance(axis, start, force, &friction.levels(speed), span_s);
         };
         let bristle = Bristle { velocity_m_per_s: start.velocity, deflection_m: axis_states.deflection_m };
-        let speed = self.middle_speed(of, axis, &rubbing, start.velocity, force, span_s);
-        let under = self.under(of, axis, &rubbing, start.velocity, speed, force);
+        let speed = friction.middle_speed(start.velocity, force, span_s);
+        let under = friction.under(start.velocity, speed, force);
         let (way_m, bristle) = effect.advance(bristle, under, span_s);
         axis_states.deflection_m = bristle.deflection_m;
         of.motion

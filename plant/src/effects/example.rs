@@ -67,7 +67,7 @@ fn unit(balance: &OpenBalance<'_>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::acting::Effects;
-    use super::super::friction::Rubbing;
+    use super::super::friction::{Friction, Rubbing};
     use super::super::tabulated::Seen;
     use super::*;
     use crate::{Inputs, Plant, Setup};
@@ -123,11 +123,12 @@ mod tests {
         let rubbing = Rubbing { extension_m: 0.2, gauge_pa: [3e5, 2e5], rest_s: 0.0 };
         let sums = |effects: &Effects| {
             let at = effects.declared_at(0, &seen, 0.0);
+            let friction = Friction { effects, of: integrator, axis: 0, rubbing };
             [
                 effects.force(0, &seen).sum(0.0),
                 effects.leakage(integrator, 0, &seen)[1].sum(0.0),
-                effects.levels(integrator, 0, &rubbing, 0.1).sliding_n[0],
-                effects.levels(integrator, 0, &rubbing, 0.1).break_away_n[1],
+                friction.levels(0.1).sliding_n[0],
+                friction.levels(0.1).break_away_n[1],
                 effects.position_reading(0, 0.0, &at).sum(0.0),
                 effects.force_reading(0, 0.0, &at).sum(0.0),
                 effects.pressure_reading(0, 1, 0.0, &at).sum(0.0),

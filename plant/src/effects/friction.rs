@@ -20,6 +20,15 @@ pub(crate) struct Rubbing {
     pub(crate) rest_s: f64,
 }
 
+/// The friction of an axis at an instant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Friction<'a> {
+    pub(super) effects: &'a Effects,
+    pub(super) of: &'a Integrator,
+    pub(super) axis: usize,
+    pub(super) rubbing: Rubbing,
+}
+
 /// Place of a direction in [`Levels`] as a sign.
 const DIRECTIONS: [f64; 2] = [1.0, -1.0];
 
@@ -29,63 +38,6 @@ pub(super) fn direction_of(value: f64) -> f64 {
 }
 
 impl Effects {
-    /// Terms of the sliding level in a direction (1 extending, -1 retracting) at a speed.
-    pub(crate) fn sliding_level(
-        &self,
-        of: &Integrator,
-        axis: usize,
-        at: &Rubbing,
-        speed: f64,
-        direction: f64,
-    ) -> SlidingLevel {
-        let on = &self.on[axis];
-        let file = of.motion.levels().sliding_n[0];
-        SlidingLevel {
-            stribeck_friction: on.stribeck_friction.map_or(0.0, |effect| effect.term(speed)),
-            friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
-            pressure_dependent_friction: on
-                .pressure_dependent_friction
-                .map_or(0.0, |effect| effect.term(at.gauge_pa[0], at.gauge_pa[1])),
-            position_dependent_friction: on
-                .position_dependent_friction
-                .map_or(0.0, |effect| effect.term(at.extension_m)),
-            added: on.added(OpenBalance::SlidingLevel { at, speed_m_per_s: speed, direction }),
-        }
-    }
-
-    /// Terms of the break-away level in a direction.
-    pub(crate) fn break_away_level(
-        &self,
-        of: &Integrator,
-        axis: usize,
-        at: &Rubbing,
-        direction: f64,
-    ) -> BreakAwayLevel {
-        self.break_away_beside(of, axis, at, direction, self.sliding_level(of, axis, at, 0.0, direction))
-    }
-
-    /// The same where the terms of the sliding level at rest are known.
-    fn break_away_beside(
-        &self,
-        of: &Integrator,
-        axis: usize,
-        at: &Rubbing,
-        direction: f64,
-        sliding: SlidingLevel,
-    ) -> BreakAwayLevel {
-        let on = &self.on[axis];
-        let file = of.motion.levels().break_away_n[0];
-        BreakAwayLevel {
-            friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
-            pressure_dependent_friction: sliding.pressure_dependent_friction,
-            position_dependent_friction: sliding.position_dependent_friction,
-            rest_time_dependent_break_away: on
-                .rest_time_dependent_break_away
-                .map_or(0.0, |effect| effect.term(at.rest_s)),
-            added: on.added(OpenBalance::BreakAwayLevel { at, direction }),
-        }
-    }
-
     pub(crate) fn viscous_term(&self, of: &Integrator, axis: usize, direction: f64) -> Viscous {
         let file = of.motion.levels().viscous_n_s_per_m[0];
         Viscous {
@@ -101,121 +53,137 @@ impl Effects {
         sound.max(0.0) * self.friction_factors[axis]
     }
 
-    /// Level of sliding friction of an axis in a direction (1 extending, -1 retracting) at a speed, N, not below 0.
-    pub(crate) fn sliding_n(
-        &self,
-        of: &Integrator,
+    /// Friction in the middle of a step.
+    pub(super) fn friction<'a>(
+        &'a self,
+        of: &'a Integrator,
         axis: usize,
-        at: &Rubbing,
-        speed: f64,
-        direction: f64,
-    ) -> f64 {
-        let file = of.motion.levels().sliding_n[0];
-        let level = if self.touched[axis].friction {
-            self.sliding_level(of, axis, at, speed, direction).sum(file).max(0.0)
+        middle: &Middle,
+        axis_states: &AxisMoving,
+    ) -> Friction<'a> {
+        let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
+        let rubbing = Rubbing {
+            extension_m: middle.extension.to_array()[axis],
+            gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa()),
+            rest_s: axis_states.rest_s,
+        };
+        Friction { effects: self, of, axis, rubbing }
+    }
+}
+
+impl<'a> Friction<'a> {
+    pub(crate) fn at(
+        effects: &'a Effects,
+        of: &'a Integrator,
+        axis: usize,
+        place: Place,
+        air: &AirAt,
+    ) -> Self {
+        let rubbing = Rubbing {
+            extension_m: place.extension,
+            gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa()),
+            rest_s: effects.memory.moving.axes[axis].rest_s,
+        };
+        Self { effects, of, axis, rubbing }
+    }
+
+    /// Terms of the sliding level in a direction (1 extending, -1 retracting) at a speed.
+    pub(crate) fn sliding_level(&self, speed: f64, direction: f64) -> SlidingLevel {
+        let (on, at) = (&self.effects.on[self.axis], &self.rubbing);
+        let file = self.of.motion.levels().sliding_n[0];
+        SlidingLevel {
+            stribeck_friction: on.stribeck_friction.map_or(0.0, |effect| effect.term(speed)),
+            friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
+            pressure_dependent_friction: on
+                .pressure_dependent_friction
+                .map_or(0.0, |effect| effect.term(at.gauge_pa[0], at.gauge_pa[1])),
+            position_dependent_friction: on
+                .position_dependent_friction
+                .map_or(0.0, |effect| effect.term(at.extension_m)),
+            added: on.added(OpenBalance::SlidingLevel { at, speed_m_per_s: speed, direction }),
+        }
+    }
+
+    /// Terms of the break-away level in a direction, beside those of its sliding level.
+    pub(crate) fn break_away_level(&self, direction: f64, sliding: &SlidingLevel) -> BreakAwayLevel {
+        let (on, at) = (&self.effects.on[self.axis], &self.rubbing);
+        let file = self.of.motion.levels().break_away_n[0];
+        BreakAwayLevel {
+            friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
+            pressure_dependent_friction: sliding.pressure_dependent_friction,
+            position_dependent_friction: sliding.position_dependent_friction,
+            rest_time_dependent_break_away: on
+                .rest_time_dependent_break_away
+                .map_or(0.0, |effect| effect.term(at.rest_s)),
+            added: on.added(OpenBalance::BreakAwayLevel { at, direction }),
+        }
+    }
+
+    fn viscous(&self, direction: f64) -> f64 {
+        self.effects.viscous(self.of, self.axis, direction)
+    }
+
+    /// Level of sliding friction in a direction (1 extending, -1 retracting) at a speed, N, not below 0.
+    pub(super) fn sliding_n(&self, speed: f64, direction: f64) -> f64 {
+        let file = self.of.motion.levels().sliding_n[0];
+        let level = if self.effects.touched[self.axis].friction {
+            self.sliding_level(speed, direction).sum(file).max(0.0)
         } else {
             file
         };
-        level * self.friction_factors[axis]
+        level * self.effects.friction_factors[self.axis]
     }
 
-    /// Break-away level of an axis in a direction, N: not easier than to slide.
-    pub(crate) fn break_away_n(&self, of: &Integrator, axis: usize, at: &Rubbing, direction: f64) -> f64 {
-        let (file, factor) = (of.motion.levels(), self.friction_factors[axis]);
-        if !self.touched[axis].friction {
+    /// Break-away level in a direction, N: not easier than to slide.
+    pub(super) fn break_away_n(&self, direction: f64) -> f64 {
+        let (file, factor) = (self.of.motion.levels(), self.effects.friction_factors[self.axis]);
+        if !self.effects.touched[self.axis].friction {
             return file.break_away_n[0] * factor;
         }
-        let sliding = self.sliding_level(of, axis, at, 0.0, direction);
-        let level = self.break_away_beside(of, axis, at, direction, sliding).sum(file.break_away_n[0]);
+        let sliding = self.sliding_level(0.0, direction);
+        let level = self.break_away_level(direction, &sliding).sum(file.break_away_n[0]);
         (level * factor).max(sliding.sum(file.sliding_n[0]).max(0.0) * factor)
     }
 
-    /// All levels of an axis at a speed, both directions.
-    pub(crate) fn levels(&self, of: &Integrator, axis: usize, at: &Rubbing, speed: f64) -> Levels {
+    /// All levels at a speed, both directions.
+    pub(crate) fn levels(&self, speed: f64) -> Levels {
         Levels {
-            sliding_n: DIRECTIONS.map(|direction| self.sliding_n(of, axis, at, speed, direction)),
-            break_away_n: DIRECTIONS.map(|direction| self.break_away_n(of, axis, at, direction)),
-            viscous_n_s_per_m: DIRECTIONS.map(|direction| self.viscous(of, axis, direction)),
+            sliding_n: DIRECTIONS.map(|direction| self.sliding_n(speed, direction)),
+            break_away_n: DIRECTIONS.map(|direction| self.break_away_n(direction)),
+            viscous_n_s_per_m: DIRECTIONS.map(|direction| self.viscous(direction)),
         }
     }
 
-    /// What friction depends on at an instant.
-    pub(crate) fn rubbing_at(&self, of: &Integrator, axis: usize, place: Place, air: &AirAt) -> Rubbing {
-        Rubbing {
-            extension_m: place.extension,
-            gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa()),
-            rest_s: self.memory.moving.axes[axis].rest_s,
-        }
-    }
-
-    /// Friction of the bristles at an instant, along the own extension; `None` for an axis without them.
-    pub(crate) fn bristles(
-        &self,
-        of: &Integrator,
-        axis: usize,
-        rubbing: &Rubbing,
-        place: Place,
-        force_n: f64,
-    ) -> Option<Bristles> {
-        let effect = self.on[axis].presliding?;
-        let deflection_m = self.memory.moving.axes[axis].deflection_m;
+    /// Friction of the bristles, along the own extension; `None` for an axis without them.
+    pub(crate) fn bristles(&self, place: Place, force_n: f64) -> Option<Bristles> {
+        let effect = self.effects.on[self.axis].presliding?;
+        let deflection_m = self.effects.memory.moving.axes[self.axis].deflection_m;
         let bristle = Bristle { velocity_m_per_s: place.velocity, deflection_m };
-        let under = self.under(of, axis, rubbing, place.velocity, place.velocity.abs(), force_n);
+        let under = self.under(place.velocity, place.velocity.abs(), force_n);
         Some(Bristles { presliding: effect.force(bristle, under) })
     }
 
     /// Where a bristled axis stands: all that its friction depends on, its levels those at a speed.
-    pub(crate) fn under(
-        &self,
-        of: &Integrator,
-        axis: usize,
-        rubbing: &Rubbing,
-        velocity: f64,
-        speed: f64,
-        force_n: f64,
-    ) -> Under {
+    pub(super) fn under(&self, velocity: f64, speed: f64, force_n: f64) -> Under {
         let direction = direction_of(if velocity == 0.0 { force_n } else { velocity });
         Under {
             force_n,
-            mass_kg: of.motion.mass_kg(axis),
-            viscous_n_s_per_m: self.viscous(of, axis, direction),
-            sliding_n: self.sliding_n(of, axis, rubbing, speed, direction),
-            break_away_n: self.break_away_n(of, axis, rubbing, direction),
-        }
-    }
-
-    pub(super) fn rubbing(
-        &self,
-        of: &Integrator,
-        axis: usize,
-        middle: &Middle,
-        axis_states: &AxisMoving,
-    ) -> Rubbing {
-        let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
-        Rubbing {
-            extension_m: middle.extension.to_array()[axis],
-            gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa()),
-            rest_s: axis_states.rest_s,
+            mass_kg: self.of.motion.mass_kg(self.axis),
+            viscous_n_s_per_m: self.viscous(direction),
+            sliding_n: self.sliding_n(speed, direction),
+            break_away_n: self.break_away_n(direction),
         }
     }
 
     /// The speed of a moving axis in the middle of a step, m/s, by its force at the beginning; 0 if it would turn.
-    pub(super) fn middle_speed(
-        &self,
-        of: &Integrator,
-        axis: usize,
-        rubbing: &Rubbing,
-        velocity: f64,
-        push: f64,
-        span_s: f64,
-    ) -> f64 {
-        if self.on[axis].stribeck_friction.is_none() {
+    pub(super) fn middle_speed(&self, velocity: f64, push: f64, span_s: f64) -> f64 {
+        if self.effects.on[self.axis].stribeck_friction.is_none() {
             return velocity.abs();
         }
         let direction = if velocity == 0.0 { push.signum() } else { velocity.signum() };
-        let friction = self.sliding_n(of, axis, rubbing, velocity.abs(), direction_of(direction))
-            + self.viscous(of, axis, direction_of(direction)) * velocity.abs();
-        let acceleration = (push * direction - friction) / of.motion.mass_kg(axis);
+        let friction = self.sliding_n(velocity.abs(), direction_of(direction))
+            + self.viscous(direction_of(direction)) * velocity.abs();
+        let acceleration = (push * direction - friction) / self.of.motion.mass_kg(self.axis);
         (velocity.abs() + acceleration * span_s / 2.0).max(0.0)
     }
 }

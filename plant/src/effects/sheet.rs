@@ -258,7 +258,7 @@ pub(crate) enum OpenBalance<'a> {
     /// Normal flow into a chamber beside the valve's, m^3/s; laws: [`Law::StoredAir`].
     Leakage { chamber: usize, seen: &'a Seen },
     /// Sliding level at a speed, N; direction 1 extending, -1 retracting; laws: [`Law::Friction`]. A term over the speed is of
-    /// second order in the step only where `Effects::middle_speed` knows its effect.
+    /// second order in the step only where `Friction::middle_speed` knows its effect.
     SlidingLevel { at: &'a Rubbing, speed_m_per_s: f64, direction: f64 },
     /// Break-away level, N; laws: [`Law::Friction`].
     BreakAwayLevel { at: &'a Rubbing, direction: f64 },

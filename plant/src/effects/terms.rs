@@ -6,13 +6,13 @@
 use super::OpenBalance;
 use super::acting::Effects;
 use super::air::HeatAt;
+use super::friction::{Friction, direction_of};
 use super::sheet::{Element, Part};
 use super::sums::Balance;
 use super::sums::{Damping, DeadSpace, ExhaustSide, Gap, Stiffness};
 use super::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
-use crate::motion::side;
 use crate::state::{Inputs, State};
 use crate::truth::{AirAt, Forces, hand_forces};
 
@@ -169,20 +169,17 @@ impl Effects {
             }
 
             // Friction in the direction of the motion, or of the force on a resting piston.
-            let rubbing = self.rubbing_at(of, axis, place, &air);
+            let friction = Friction::at(self, of, axis, place, &air);
             let force = forces.unresisted_n(axis);
-            let direction = if side(if place.velocity == 0.0 { force } else { place.velocity }) == 0 {
-                1.0
-            } else {
-                -1.0
-            };
-            let (at, speed) = (&rubbing, place.velocity.abs());
+            let direction = direction_of(if place.velocity == 0.0 { force } else { place.velocity });
+            let (at, speed) = (&friction.rubbing, place.velocity.abs());
+            let sliding = friction.sliding_level(speed, direction);
             let open = OpenBalance::SlidingLevel { at, speed_m_per_s: speed, direction };
-            teller.open(&self.sliding_level(of, axis, at, speed, direction), None, &open);
+            teller.open(&sliding, None, &open);
             let open = OpenBalance::BreakAwayLevel { at, direction };
-            teller.open(&self.break_away_level(of, axis, at, direction), None, &open);
+            teller.open(&friction.break_away_level(direction, &sliding), None, &open);
             teller.balance(&self.viscous_term(of, axis, direction), None, None);
-            let bristles = self.bristles(of, axis, &rubbing, place, force).unwrap_or_default();
+            let bristles = friction.bristles(place, force).unwrap_or_default();
             teller.balance(&bristles, None, None);
             teller.open(&self.force(axis, &seen), None, &OpenBalance::Force(&seen));
 
