@@ -15,26 +15,14 @@ use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{Linearisation, Refit, refit, relinearise};
 use crate::report::Quantity;
 use model_fit::estimator::CALIBRATION;
-use plant::RigParameters;
 
 /// Share of the tolerance above which an error means that the records do not determine the parameter.
 const UNRESOLVED: f64 = 0.7;
 
-/// Fitted parameters without effects.
-#[derive(Clone, Debug)]
-pub struct Calibrated {
-    pub fit: Refit,
-}
-
-pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> Calibrated {
+/// Fits the parameters without effects.
+pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> Refit {
     let first = refit(engine, baseline, &[]).expect("the baseline is a rig");
-    Calibrated { fit: relinearise(engine, first, CALIBRATION) }
-}
-
-impl Calibrated {
-    pub fn rig(&self, rig: &RigParameters) -> RigParameters {
-        with_factors(rig, &self.fit.factors)
-    }
+    relinearise(engine, first, CALIBRATION)
 }
 
 /// A parameter of a fit, in the unit of the rig file; of tables their common factor.

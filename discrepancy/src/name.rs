@@ -26,15 +26,16 @@ mod probabilities;
 mod round;
 mod start_states;
 
-use crate::calibrate::{Calibrated, calibrate};
+use crate::calibrate::calibrate;
 use crate::candidates::Candidate;
 use crate::engine::Engine;
+use crate::parameters::with_factors;
 use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 pub use decision::NotExplained;
 use decision::{Decision, Searched, decide};
+use elimination::Selection;
 pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, same};
-use elimination::{alternatives, eliminate_backward, swap};
 pub use explanations::{Explanation, ExplanationKind, Features};
 use explanations::{Fits, explanations};
 use gauss_newton::{fit_selected, shrink_parameters};
@@ -88,7 +89,7 @@ pub struct Alternative {
 #[derive(Debug)]
 pub struct SelectionResult {
     /// Calibration: parameters without effects.
-    pub(crate) calibrated: Calibrated,
+    pub(crate) calibrated: Refit,
     pub model: Refit,
     /// The model to report: parameters that it does not need are back at the rig file's values. Where the model is no
     /// explanation, the calibration alone.
@@ -137,30 +138,28 @@ pub fn name(
     let (null_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
-    let RefitWithInitialStates { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated.fit);
-    let calibrated = Calibrated { fit };
-    let mut model = calibrated.fit.clone();
+    let RefitWithInitialStates { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated);
+    let mut selection = Selection { calibrated: fit.clone(), model: fit, rounds: Vec::new() };
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
-    // For each accepted effect the fits of its round, best first.
-    let mut rounds: Vec<Vec<Refit>> = Vec::new();
     let mut any_homogeneous = false;
     for number in 0..MAX_ROUNDS {
         let here = restarted.as_ref().unwrap_or(engine);
+        let model = &selection.model;
         let screening =
-            if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, &model) };
-        let at_model = if number == 0 { linearisation.clone() } else { linearise(here, &model) };
+            if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, model) };
+        let at_model = if number == 0 { linearisation.clone() } else { linearise(here, model) };
         // What is left where a model lacks fit is signal: it is no measure of what chance gains.
         let searched = if lacks_fit(here, model.loss) { 0.0 } else { threshold };
-        let selected = Round::selected(here, &at_model, &columns, &model, screening, searched, progress);
+        let selected = Round::selected(here, &at_model, &columns, model, screening, searched, progress);
         let Some(mut round) = selected else { break };
         fitted.extend(round.fits.iter().cloned());
         let inexact = round.fits.first().is_some_and(|best| lacks_fit(here, best.loss));
         let homogeneous = if inexact {
             progress("comparing explanations");
-            prefer_homogeneous(here, &at_model, &model, &mut round.fits)
+            prefer_homogeneous(here, &at_model, model, &mut round.fits)
         } else {
-            prefer_large(here, &model, &mut round.fits);
+            prefer_large(here, model, &mut round.fits);
             false
         };
         let best_restarted = round.take_engine();
@@ -168,40 +167,42 @@ pub fn name(
         let Some(best) = round.fits.first_mut() else { break };
         // The null distribution is drawn from the residual of the best model, since explained signal is not noise. No threshold
         // applies here: an effect that turns out unnecessary is eliminated at the end.
-        if !homogeneous && (number >= MAX_EFFECTS || !gains_enough(here, &model, best)) {
+        if !homogeneous && (number >= MAX_EFFECTS || !gains_enough(here, model, best)) {
             break;
         }
         any_homogeneous |= homogeneous;
         // Its loss, squares and errors stay those of the factors before; the next fits start from these.
         best.factors = shrink_parameters(there, best);
         threshold = NullDistribution::new(there, &columns, &linearise(there, best), best).threshold();
-        model = best.clone();
-        rounds.push(round.fits);
+        selection.model = best.clone();
+        selection.rounds.push(round.fits);
         if number > 0 {
-            swap(there, &mut model, &calibrated, &mut rounds, progress);
+            selection.swap(there, progress);
         }
         restarted = best_restarted.or(restarted);
     }
     let here = restarted.as_ref().unwrap_or(engine);
-    let all_rounds = rounds.clone();
-    if lacks_fit(here, model.loss) {
-        eliminate_heterogeneous(here, &calibrated, &mut model, &mut rounds);
+    let all_rounds = selection.rounds.clone();
+    if lacks_fit(here, selection.model.loss) {
+        eliminate_heterogeneous(here, &mut selection);
     } else {
-        eliminate_backward(here, &calibrated, &columns, &mut model, &mut rounds);
+        selection.eliminate_backward(here, &columns);
     }
-    let null = NullDistribution::new(here, &columns, &linearise(here, &model), &model);
+    let Selection { calibrated, model, .. } = &selection;
+    let null = NullDistribution::new(here, &columns, &linearise(here, model), model);
     threshold = null.threshold();
     let limits = limits_of(&null, &columns, threshold);
     let lacks_fit = lacks_fit(here, model.loss);
     progress("weighing explanations");
-    let fits = Fits { parameters: &calibrated.fit, model: &model, fitted: &fitted };
+    let fits = Fits { parameters: calibrated, model, fitted: &fitted };
     let explanations = explanations(here, &linearisation, &columns, &fits);
-    let searched = Searched { model, rounds, all_rounds, lacks_fit, any_homogeneous };
-    let decision = decide(here, &calibrated, &explanations, searched);
-    let Decision { model, rounds, shares, is_named, explained, not_explained } = decision;
+    let searched = Searched { selection, all_rounds, lacks_fit, any_homogeneous };
+    let decision = decide(here, &explanations, searched);
+    let Decision { selection, shares, is_named, explained, not_explained } = decision;
     let reported = if not_explained.is_some() {
-        let restarted = engine.is_linked().then(|| engine.with_starts_under(&calibrated.rig(engine.rig())));
-        with_needed(restarted.as_ref().unwrap_or(engine), &calibrated.fit)
+        let rig = with_factors(engine.rig(), &selection.calibrated.factors);
+        let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
+        with_needed(restarted.as_ref().unwrap_or(engine), &selection.calibrated)
     } else {
         explained
     };
@@ -210,10 +211,9 @@ pub fn name(
     } else {
         Vec::new()
     };
-    let with_shares = model.placed.iter().zip(&shares);
-    let alternatives = with_shares
-        .map(|(placed, share)| alternatives(placed, *share, &model, &calibrated, &rounds))
-        .collect();
+    let with_shares = selection.model.placed.iter().zip(&shares);
+    let alternatives = with_shares.map(|(placed, share)| selection.alternatives(placed, *share)).collect();
+    let Selection { calibrated, model, .. } = selection;
     SelectionResult {
         calibrated,
         model,

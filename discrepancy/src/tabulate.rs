@@ -17,12 +17,12 @@
 
 mod fit;
 
-use crate::calibrate::{Calibrated, quantity};
+use crate::calibrate::quantity;
 use crate::engine::Engine;
 use crate::locate::maps::map;
 use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
 use crate::name::MIN_LOSS_REDUCTION;
-use crate::parameters::COUNT;
+use crate::parameters::{COUNT, with_factors};
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
 use fit::{FittedTable, Iterate, LinearisedTable, Model, TableLinearisation};
@@ -57,7 +57,7 @@ pub(crate) struct Tables {
 /// Tables for an unknown input, or the reason why there are none; `reported` is the calibration with the needed parameters.
 pub(crate) fn tabulate(
     engine: &Engine<'_>,
-    calibrated: &Calibrated,
+    calibrated: &Refit,
     reported: &Refit,
     outside: &Outside,
     unknowns: &[UnknownSeries],
@@ -65,7 +65,8 @@ pub(crate) fn tabulate(
 ) -> Result<Tables, String> {
     let (axis, balance) = parse_balance(&outside.balance)
         .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
-    let restarted = engine.is_linked().then(|| engine.with_starts_under(&calibrated.rig(engine.rig())));
+    let rig = with_factors(engine.rig(), &calibrated.factors);
+    let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
     let engine = restarted.as_ref().unwrap_or(engine);
     let free = reported.factors.map(|factor| factor != 1.0);
     let without_tables = Model::without_tables(reported.factors, free);

@@ -21,7 +21,7 @@ use crate::locate::{UnknownSeries, locate};
 use crate::name::{SelectionResult, is_off, on_all};
 use crate::outside::outside;
 use crate::page::Pictures;
-use crate::parameters::COUNT;
+use crate::parameters::{COUNT, with_factors};
 use crate::refit::{Refit, rig_of};
 use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Report, Verdict};
 use crate::suspects::Suspect;
@@ -192,7 +192,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     report.location = Some(location);
     if report.verdict == Verdict::OutsideCatalogue {
         // Under the calibrated rig, so that a wrong mass is not an unknown force.
-        let calibrated = found.calibrated.rig(rig);
+        let calibrated = with_factors(rig, &found.calibrated.factors);
         let unknowns = locate(&calibrated, &records, progress).unknowns;
         let located = report.location.as_ref().and_then(|location| location.dependence.as_ref());
         report.outside = outside(&unknowns, located, progress);

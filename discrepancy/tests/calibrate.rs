@@ -20,7 +20,7 @@ fn what_is_reported_of_a_parameter_is_what_was_simulated_and_a_rig_file() {
     let rig = RigParameters::baseline();
     let records = [gridded(&rig, &rig)];
     let engine = Engine::new(&records, &rig);
-    let mut fit = calibrate(&engine, &Linearisation::at_baseline(&engine)).fit;
+    let mut fit = calibrate(&engine, &Linearisation::at_baseline(&engine));
     // A fit on lines may have rest below what slides.
     let [sliding, rest] = ["parameter:sliding-friction", "parameter:break-away-force"]
         .map(|name| PARAMETERS.iter().position(|parameter| parameter.name == name).expect("one of them"));

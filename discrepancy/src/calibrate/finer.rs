@@ -9,7 +9,7 @@
 //!
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
-use super::{Calibrated, UNRESOLVED};
+use super::UNRESOLVED;
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
@@ -65,15 +65,15 @@ pub struct Finer {
 }
 
 /// Fits entries and parameters jointly; `None` where no rig can have the result.
-pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
+pub fn finer(engine: &Engine<'_>, calibrated: &Refit) -> Option<Finer> {
     let rig = engine.rig();
     let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
-    let entries = entries(rig, &calibrated.fit.factors);
+    let entries = entries(rig, &calibrated.factors);
     let mut precisions = parameter_precisions();
     precisions.extend(entries.iter().map(|entry| entry.prior_std.powi(-2)));
     let all: Vec<usize> = (0..precisions.len()).collect();
 
-    let mut factors: Vec<f64> = calibrated.fit.factors.to_vec();
+    let mut factors: Vec<f64> = calibrated.factors.to_vec();
     factors.resize(precisions.len(), 1.0);
     let linearised = |factors: Vec<f64>| -> Option<Linearised> {
         let residual = engine.residual(&engine.simulate(&with(rig, &entries, &factors)?));
@@ -101,11 +101,8 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
 
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
-    let refit = Refit {
-        factors: parameter_factors,
-        errors: factor_errors[..COUNT].to_vec(),
-        ..calibrated.fit.clone()
-    };
+    let refit =
+        Refit { factors: parameter_factors, errors: factor_errors[..COUNT].to_vec(), ..calibrated.clone() };
     let parameters: Vec<Quantity> = (0..COUNT).map(|at| super::quantity(engine, at, &refit)).collect();
     let mut quantities = parameters.clone();
     let mut changed: Vec<Quantity> = parameters

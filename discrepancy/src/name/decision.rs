@@ -12,11 +12,10 @@
 //! more than noise, the set leaves [`MOST_LOSS_LEFT`] of the loss at most. The model of the search has no name either where more
 //! than [`MAX_PARAMETERS_OFF`] parameters are off beside it, unless an effect of it joined as a homogeneous one.
 
-use super::elimination::{close_alternatives, shares};
+use super::elimination::Selection;
 use super::explanations::{Explanation, ExplanationKind};
 use super::needed_parameters::{off, with_needed};
 use super::{axes_of, is_large, loss_on};
-use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::Refit;
 
@@ -56,20 +55,17 @@ impl NotExplained {
 
 /// What the search found.
 pub(super) struct Searched {
-    pub(super) model: Refit,
-    /// For each effect of the model the fits of its round, best first.
-    pub(super) rounds: Vec<Vec<Refit>>,
-    /// The same before effects were eliminated.
+    pub(super) selection: Selection,
+    /// Its rounds before effects were eliminated.
     pub(super) all_rounds: Vec<Vec<Refit>>,
-    /// Of this model, on the searched part of the records.
+    /// Of its model, on the searched part of the records.
     pub(super) lacks_fit: bool,
     /// Whether an effect joined because its amplitude is homogeneous over windows: the model may need many parameters then.
     pub(super) any_homogeneous: bool,
 }
 
 pub(super) struct Decision {
-    pub(super) model: Refit,
-    pub(super) rounds: Vec<Vec<Refit>>,
+    pub(super) selection: Selection,
     /// Of each effect of the model.
     pub(super) shares: Vec<f64>,
     pub(super) is_named: Vec<bool>,
@@ -78,13 +74,8 @@ pub(super) struct Decision {
     pub(super) not_explained: Option<NotExplained>,
 }
 
-pub(super) fn decide(
-    engine: &Engine<'_>,
-    calibrated: &Calibrated,
-    explanations: &[Explanation],
-    searched: Searched,
-) -> Decision {
-    let Searched { mut model, mut rounds, all_rounds, lacks_fit, any_homogeneous } = searched;
+pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched: Searched) -> Decision {
+    let Searched { mut selection, all_rounds, lacks_fit, any_homogeneous } = searched;
     let likely = explanations.iter().find(|one| one.probability >= DECIDES);
     let falls_short = |one: &Explanation| {
         one.features.is_some_and(|features| {
@@ -98,57 +89,54 @@ pub(super) fn decide(
     let likely_fit = sets.filter(|one| !falls_short(one)).and_then(|one| one.fit.as_ref());
     let is_likely = likely_fit.is_some();
     if let Some(fit) = likely_fit {
-        rounds = rounds_of(fit, &all_rounds, calibrated);
-        model = fit.clone();
+        selection.rounds = selection.rounds_of(fit, &all_rounds);
+        selection.model = fit.clone();
     }
-    let shares_of = |model: &Refit, rounds: &[Vec<Refit>]| {
-        shares(engine, model, rounds, calibrated, (calibrated.fit.loss - model.loss).max(1e-9))
-    };
-    let mut shares = shares_of(&model, &rounds);
-    let only_large = model.placed.iter().all(is_large);
+    let mut shares = selection.shares(engine);
+    let only_large = selection.model.placed.iter().all(is_large);
     let named = |(placed, share): (_, &f64)| {
         is_large(placed) && (is_likely || only_large || *share >= MIN_SHARE_BESIDE_SMALL)
     };
-    let mut is_named: Vec<bool> = model.placed.iter().zip(&shares).map(named).collect();
+    let mut is_named: Vec<bool> = selection.model.placed.iter().zip(&shares).map(named).collect();
     let too_little = !is_likely
         && lacks_fit
-        && (is_outside
-            || !is_named.contains(&true)
-            || share_left(engine, &model, &calibrated.fit) > MOST_LOSS_LEFT);
+        && (is_outside || !is_named.contains(&true) || share_left(engine, &selection) > MOST_LOSS_LEFT);
     if too_little && let Some(first) = all_rounds.first().and_then(|round| round.first()) {
         // It comes nearest to what is outside the catalogue.
-        rounds = vec![vec![first.clone()]];
-        model = first.clone();
-        shares = shares_of(&model, &rounds);
-        is_named = vec![false; model.placed.len()];
+        selection.rounds = vec![vec![first.clone()]];
+        selection.model = first.clone();
+        shares = selection.shares(engine);
+        is_named = vec![false; selection.model.placed.len()];
     }
-    let explained = with_needed(engine, &model);
+    let explained = with_needed(engine, &selection.model);
     let parameters_off = off(engine, &explained).into_iter().filter(|off| *off).count();
     let not_explained = if too_little {
         Some(NotExplained::TooLittle)
     } else if !is_likely
         && !any_homogeneous
-        && !model.placed.is_empty()
+        && !selection.model.placed.is_empty()
         && parameters_off > MAX_PARAMETERS_OFF
     {
         Some(NotExplained::TooManyParametersOff)
     } else {
         None
     };
-    Decision { model, rounds, shares, is_named, explained, not_explained }
+    Decision { selection, shares, is_named, explained, not_explained }
 }
 
-/// The rounds in which the effects of a fit joined: it is the best of the last one, beside others that are hardly worse.
-fn rounds_of(fit: &Refit, all_rounds: &[Vec<Refit>], calibrated: &Calibrated) -> Vec<Vec<Refit>> {
-    let last = fit.placed.len().saturating_sub(1);
-    let others = all_rounds.get(last).map_or(&[][..], Vec::as_slice);
-    let mut rounds: Vec<Vec<Refit>> = all_rounds.iter().take(last).cloned().collect();
-    rounds.push(std::iter::once(fit).chain(close_alternatives(fit, others, calibrated)).cloned().collect());
-    rounds
+impl Selection {
+    /// The rounds in which the effects of a fit joined: it is the best of the last one, beside others that are hardly worse.
+    fn rounds_of(&self, fit: &Refit, all_rounds: &[Vec<Refit>]) -> Vec<Vec<Refit>> {
+        let last = fit.placed.len().saturating_sub(1);
+        let others = all_rounds.get(last).map_or(&[][..], Vec::as_slice);
+        let mut rounds: Vec<Vec<Refit>> = all_rounds.iter().take(last).cloned().collect();
+        rounds.push([vec![fit.clone()], self.close_alternatives(fit, others)].concat());
+        rounds
+    }
 }
 
 /// Share of the loss after calibration that a model leaves on the axes that its effects act on.
-fn share_left(engine: &Engine<'_>, model: &Refit, calibrated: &Refit) -> f64 {
+fn share_left(engine: &Engine<'_>, Selection { calibrated, model, .. }: &Selection) -> f64 {
     let [left, before] = [model, calibrated].map(|fit| loss_on(engine, axes_of(&model.placed), fit));
     left / before.max(1e-9)
 }

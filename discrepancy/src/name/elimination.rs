@@ -2,7 +2,6 @@
 
 use super::null_distribution::NullDistribution;
 use super::{Alternative, STEPS, THRESHOLD_FACTOR_SINGLE, axes_of, loss_on, relinearise};
-use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Refit, linearise, refit_steps};
 use crate::screen::Columns;
@@ -21,155 +20,146 @@ const THRESHOLD_FACTOR_SEVERAL: f64 = 3.0;
 /// Share of the loss reduction of all effects together below which an effect is eliminated, whatever the threshold.
 const MIN_SHARE_OF_REDUCTION: f64 = 0.002;
 
-/// Swaps the winner of an earlier round for one of its runners-up where that lowers the loss beside the effects that joined
-/// since.
-pub(super) fn swap(
-    engine: &Engine<'_>,
-    model: &mut Refit,
-    calibrated: &Calibrated,
-    rounds: &mut [Vec<Refit>],
-    progress: &mut dyn FnMut(&str),
-) {
-    let point = linearise(engine, model);
-    let mut tried = Vec::new();
-    for (at, refits) in rounds.iter().enumerate().take(model.placed.len() - 1) {
-        for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
-            let Some(other) = other.placed.last() else { continue };
-            let mut placed = model.placed.clone();
-            placed[at] = other.clone();
-            tried.push((at, rank, placed));
+/// What the search selected.
+#[derive(Clone)]
+pub(super) struct Selection {
+    /// Parameters without effects.
+    pub(super) calibrated: Refit,
+    pub(super) model: Refit,
+    /// For each effect of the model the fits of its round, best first.
+    pub(super) rounds: Vec<Vec<Refit>>,
+}
+
+impl Selection {
+    /// Swaps the winner of an earlier round for one of its runners-up where that lowers the loss beside the effects that joined
+    /// since.
+    pub(super) fn swap(&mut self, engine: &Engine<'_>, progress: &mut dyn FnMut(&str)) {
+        let Self { model, rounds, .. } = self;
+        let point = linearise(engine, model);
+        let mut tried = Vec::new();
+        for (at, refits) in rounds.iter().enumerate().take(model.placed.len() - 1) {
+            for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
+                let Some(other) = other.placed.last() else { continue };
+                let mut placed = model.placed.clone();
+                placed[at] = other.clone();
+                tried.push((at, rank, placed));
+            }
+        }
+        progress(&format!("trying {} other combinations", tried.len()));
+        let best = tried
+            .par_iter()
+            .filter_map(|(at, rank, placed)| Some((*at, *rank, refit_steps(engine, &point, placed, STEPS)?)))
+            .collect::<Vec<_>>()
+            .into_iter()
+            .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
+        let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
+        let best = relinearise(engine, best);
+        // The replaced effect stays as an alternative where it fits as well.
+        let is_alike = self.model.loss - best.loss < self.alike(&best);
+        let refits = &mut self.rounds[at];
+        let came = refits.remove(rank);
+        refits.truncate(usize::from(is_alike));
+        refits.insert(0, came);
+        self.model = best;
+    }
+
+    /// Those of other fits whose loss differs from that of a fit by hardly anything.
+    pub(super) fn close_alternatives(&self, fit: &Refit, others: &[Refit]) -> Vec<Refit> {
+        let (most, last) = (self.alike(fit), fit.placed.last());
+        let is_close = |other: &&Refit| {
+            let is_it = other.placed.last().zip(last).is_some_and(|(other, last)| same(other, last));
+            !is_it && (other.loss - fit.loss).abs() < most
+        };
+        others.iter().filter(is_close).cloned().collect()
+    }
+
+    /// Largest difference in loss at which an explanation is indistinguishable from the best.
+    fn alike(&self, best: &Refit) -> f64 {
+        (INDISTINGUISHABLE_LOSS_DIFFERENCE * best.design_effect)
+            .max(INDISTINGUISHABLE_LOSS_SHARE * best.loss.min(self.calibrated.loss - best.loss))
+    }
+
+    /// Eliminates effects whose removal raises the loss by less than a multiple of the null threshold.
+    pub(super) fn eliminate_backward(&mut self, engine: &Engine<'_>, columns: &Columns) {
+        let Self { calibrated, model, rounds } = self;
+        while !model.placed.is_empty() {
+            let linearisation = linearise(engine, model);
+            let left = NullDistribution::new(engine, columns, &linearisation, model);
+            let threshold = left.threshold();
+            let without: Vec<Option<Refit>> = (0..model.placed.len())
+                .into_par_iter()
+                .map(|at| {
+                    let mut placed = model.placed.clone();
+                    placed.remove(at);
+                    if placed.is_empty() {
+                        return Some(calibrated.clone());
+                    }
+                    refit_steps(engine, &linearisation, &placed, 4)
+                })
+                .collect();
+            let least = without
+                .into_iter()
+                .enumerate()
+                .filter_map(|(at, fit)| Some((at, fit?)))
+                .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
+            let Some((at, fit)) = least else { break };
+            let loss_rise = left.loss_rise(engine, &fit, model);
+            let safety =
+                if fit.placed.is_empty() { THRESHOLD_FACTOR_SINGLE } else { THRESHOLD_FACTOR_SEVERAL };
+            let share = loss_rise / (calibrated.loss - model.loss).max(1e-9);
+            if loss_rise > safety * threshold && share > MIN_SHARE_OF_REDUCTION {
+                break;
+            }
+            rounds.remove(at.min(rounds.len() - 1));
+            *model = fit;
         }
     }
-    progress(&format!("trying {} other combinations", tried.len()));
-    let best = tried
-        .par_iter()
-        .filter_map(|(at, rank, placed)| Some((*at, *rank, refit_steps(engine, &point, placed, STEPS)?)))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
-    let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
-    let best = relinearise(engine, best);
-    // The replaced effect stays as an alternative where it fits as well.
-    let refits = &mut rounds[at];
-    let came = refits.remove(rank);
-    let is_alike = model.loss - best.loss < alike(&best, calibrated);
-    refits.truncate(usize::from(is_alike));
-    refits.insert(0, came);
-    *model = best;
-}
 
-/// Those of other fits whose loss differs from that of a fit by hardly anything.
-pub(super) fn close_alternatives<'a>(
-    fit: &Refit,
-    others: &'a [Refit],
-    calibrated: &Calibrated,
-) -> impl Iterator<Item = &'a Refit> {
-    let (loss, most, last) = (fit.loss, alike(fit, calibrated), fit.placed.last().cloned());
-    others.iter().filter(move |other| {
-        let is_it = other.placed.last().zip(last.as_ref()).is_some_and(|(other, last)| same(other, last));
-        !is_it && (other.loss - loss).abs() < most
-    })
-}
-
-/// Largest difference in loss at which an explanation is indistinguishable from the best.
-fn alike(best: &Refit, calibrated: &Calibrated) -> f64 {
-    (INDISTINGUISHABLE_LOSS_DIFFERENCE * best.design_effect)
-        .max(INDISTINGUISHABLE_LOSS_SHARE * best.loss.min(calibrated.fit.loss - best.loss))
-}
-
-/// Eliminates effects whose removal raises the loss by less than a multiple of the null threshold.
-pub(super) fn eliminate_backward<'a>(
-    engine: &Engine<'a>,
-    calibrated: &Calibrated,
-    columns: &Columns,
-    model: &mut Refit,
-    rounds: &mut Vec<Vec<Refit>>,
-) {
-    while !model.placed.is_empty() {
-        let linearisation = linearise(engine, model);
-        let left = NullDistribution::new(engine, columns, &linearisation, model);
-        let threshold = left.threshold();
-        let without: Vec<Option<Refit>> = (0..model.placed.len())
-            .into_par_iter()
-            .map(|at| {
-                let mut placed = model.placed.clone();
-                placed.remove(at);
-                if placed.is_empty() {
-                    return Some(calibrated.fit.clone());
-                }
-                refit_steps(engine, &linearisation, &placed, 4)
+    /// Alternatives to an effect of the model; `share` is the share of the excess that the effect removes.
+    pub(super) fn alternatives(&self, placed: &EffectEstimate, share: f64) -> Vec<Alternative> {
+        // The round in which it joined.
+        let Some(refits) = self.rounds.iter().find(|refits| {
+            refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
+        }) else {
+            return Vec::new();
+        };
+        let best = &refits[0];
+        let is_new = |fit: &Refit| {
+            fit.placed.last().is_some_and(|other| !self.model.placed.iter().any(|placed| same(placed, other)))
+        };
+        refits[1..]
+            .iter()
+            .filter(|fit| fit.loss - best.loss < self.alike(best) && is_new(fit))
+            .map(|fit| {
+                let less = (fit.loss - best.loss) / self.calibrated.loss.max(1e-9);
+                Alternative { fit: fit.clone(), share: (share - less).clamp(0.0, 1.0) }
             })
-            .collect();
-        let least = without
-            .into_iter()
+            .collect()
+    }
+
+    /// Share of the excess on its axes that each effect removed in the round in which it joined.
+    pub(super) fn shares(&self, engine: &Engine<'_>) -> Vec<f64> {
+        let Self { calibrated, model, rounds } = self;
+        let excess = (calibrated.loss - model.loss).max(1e-9);
+        let whole = (excess / calibrated.loss.max(1e-9)).clamp(0.0, 1.0);
+        let mut before = calibrated.loss;
+        model
+            .placed
+            .iter()
             .enumerate()
-            .filter_map(|(at, fit)| Some((at, fit?)))
-            .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
-        let Some((at, fit)) = least else { break };
-        let loss_rise = left.loss_rise(engine, &fit, model);
-        let safety = if fit.placed.is_empty() { THRESHOLD_FACTOR_SINGLE } else { THRESHOLD_FACTOR_SEVERAL };
-        let share = loss_rise / (calibrated.fit.loss - model.loss).max(1e-9);
-        if loss_rise > safety * threshold && share > MIN_SHARE_OF_REDUCTION {
-            break;
-        }
-        rounds.remove(at.min(rounds.len() - 1));
-        *model = fit;
+            .map(|(at, placed)| {
+                let after =
+                    rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |fit| fit.loss);
+                let on_axes = loss_on(engine, axes_of(std::slice::from_ref(placed)), calibrated);
+                let share = (before - after) / excess * whole * (calibrated.loss / on_axes);
+                before = after;
+                share.clamp(0.0, 1.0)
+            })
+            .collect()
     }
 }
 
 /// Whether two are the same effect at the same place.
 pub(crate) fn same(left: &EffectEstimate, right: &EffectEstimate) -> bool {
     left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
-}
-
-/// Alternatives to an effect of the model; `share` is the share of the excess that the effect removes.
-pub(super) fn alternatives(
-    placed: &EffectEstimate,
-    share: f64,
-    model: &Refit,
-    calibrated: &Calibrated,
-    rounds: &[Vec<Refit>],
-) -> Vec<Alternative> {
-    // The round in which it joined.
-    let Some(refits) = rounds.iter().find(|refits| {
-        refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
-    }) else {
-        return Vec::new();
-    };
-    let best = &refits[0];
-    let is_new = |fit: &Refit| {
-        fit.placed.last().is_some_and(|other| !model.placed.iter().any(|placed| same(placed, other)))
-    };
-    refits[1..]
-        .iter()
-        .filter(|fit| fit.loss - best.loss < alike(best, calibrated) && is_new(fit))
-        .map(|fit| {
-            let less = (fit.loss - best.loss) / calibrated.fit.loss.max(1e-9);
-            Alternative { fit: fit.clone(), share: (share - less).clamp(0.0, 1.0) }
-        })
-        .collect()
-}
-
-/// Share of the excess on its axes that each effect removed in the round in which it joined.
-pub(super) fn shares(
-    engine: &Engine<'_>,
-    model: &Refit,
-    rounds: &[Vec<Refit>],
-    calibrated: &Calibrated,
-    excess: f64,
-) -> Vec<f64> {
-    let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
-    let mut before = calibrated.fit.loss;
-    model
-        .placed
-        .iter()
-        .enumerate()
-        .map(|(at, placed)| {
-            let after = rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |fit| fit.loss);
-            let on_axes = loss_on(engine, axes_of(std::slice::from_ref(placed)), &calibrated.fit);
-            let share = (before - after) / excess * whole * (calibrated.fit.loss / on_axes);
-            before = after;
-            share.clamp(0.0, 1.0)
-        })
-        .collect()
 }

@@ -14,8 +14,8 @@
 //! Source: DerSimonian, Laird 1986, Control. Clin. Trials 7(3): random effects. Takkouche et al. 1999, Am. J. Epidemiol. 150(2):
 //! between-study coefficient of variation.
 
+use super::elimination::Selection;
 use super::{MIN_LOSS_REDUCTION, STEPS, is_large, lacks_fit, leading_key, loss_where_last_acts, relinearise};
-use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{
     Linearisation, Refit, coordinate_columns, linearise, prior_precisions, refit_steps, rig_of,
@@ -73,12 +73,8 @@ pub(super) fn prefer_large(engine: &Engine<'_>, before: &Refit, fits: &mut Vec<R
 }
 
 /// Eliminates effects on whose amplitude the windows do not agree, the worst first.
-pub(super) fn eliminate_heterogeneous(
-    engine: &Engine<'_>,
-    calibrated: &Calibrated,
-    model: &mut Refit,
-    rounds: &mut Vec<Vec<Refit>>,
-) {
+pub(super) fn eliminate_heterogeneous(engine: &Engine<'_>, selection: &mut Selection) {
+    let Selection { calibrated, model, rounds } = selection;
     while !model.placed.is_empty() {
         let linearisation = linearise(engine, model);
         let Some(variation) = amplitude_variation(engine, &linearisation, model) else { break };
@@ -88,7 +84,7 @@ pub(super) fn eliminate_heterogeneous(
         placed.remove(at);
         rounds.remove(at.min(rounds.len() - 1));
         *model = if placed.is_empty() {
-            calibrated.fit.clone()
+            calibrated.clone()
         } else {
             let fit = refit_steps(engine, &linearisation, &placed, STEPS);
             let Some(fit) = fit else { break };

@@ -142,7 +142,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let is_alike = found.alternatives.iter().flatten().any(|alternative| is_last(&&alternative.fit));
             let shown = alone.map_or(placed, |fit| &fit.placed[0]);
             let share = alone.map(|fit| {
-                ((found.calibrated.fit.loss - fit.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
+                ((found.calibrated.loss - fit.loss) / found.calibrated.loss.max(1e-9)).clamp(0.0, 1.0)
             });
             let decision = if let Some(reason) = of_model.and(found.not_explained) {
                 reason.reason()
