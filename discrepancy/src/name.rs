@@ -39,7 +39,9 @@ pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, same};
 pub use explanations::{Explanation, ExplanationKind, Features};
 use explanations::{Fits, explanations};
 use gauss_newton::{fit_selected, shrink_parameters};
-use heterogeneity::{amplitude_variation, eliminate_heterogeneous, prefer_homogeneous, prefer_large};
+use heterogeneity::{
+    Heterogeneity, eliminate_heterogeneous, heterogeneity, prefer_homogeneous, prefer_large,
+};
 use model_fit::estimator::RELINEARISED;
 use needed_parameters::with_needed;
 pub(crate) use needed_parameters::{is_off, off};
@@ -112,9 +114,8 @@ pub struct SelectionResult {
     /// Whether the model of the search, before the probabilities may have replaced it, leaves more than noise on the searched
     /// part of the records.
     pub lacks_fit: bool,
-    /// Coefficient of variation of the amplitude of each effect of the reported model between windows; empty where the model
-    /// leaves no more than noise.
-    pub amplitude_variation: Vec<f64>,
+    /// How much the windows disagree on each effect of the reported model; empty without one.
+    pub(crate) heterogeneity: Vec<Heterogeneity>,
     /// Why the effects of the model are not named.
     pub not_explained: Option<NotExplained>,
     /// Whether each effect of the model has a name.
@@ -206,8 +207,8 @@ pub fn name(
     } else {
         explained
     };
-    let amplitude_variation = if lacks_fit && not_explained.is_none() {
-        amplitude_variation(here, &linearise(here, &reported), &reported).unwrap_or_default()
+    let heterogeneity = if not_explained.is_none() && !reported.placed.is_empty() {
+        heterogeneity(here, &linearise(here, &reported), &reported).unwrap_or_default()
     } else {
         Vec::new()
     };
@@ -227,7 +228,7 @@ pub fn name(
         null_loss,
         limits,
         lacks_fit,
-        amplitude_variation,
+        heterogeneity,
         not_explained,
         is_named,
         explanations,

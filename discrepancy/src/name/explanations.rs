@@ -12,7 +12,7 @@
 //! log-likelihood of the windows, priors and penalties included.
 
 use super::probabilities::probabilities;
-use super::{amplitude_ratio, axes_of, heterogeneity::amplitude_variation, is_large, loss_on, same};
+use super::{amplitude_ratio, axes_of, heterogeneity::heterogeneity, is_large, loss_on, same};
 use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -113,9 +113,9 @@ pub(super) fn explanations(
     ];
     all.extend(classes.iter().map(|class| {
         let best = class[0];
-        let variations = amplitude_variation(engine, &at_model, best).map(|all| {
+        let variations = heterogeneity(engine, &at_model, best).map(|all| {
             let of_large = all.into_iter().zip(&best.placed).filter(|(_, placed)| is_large(placed));
-            of_large.map(|(variation, _)| variation).fold(0.0, f64::max)
+            of_large.map(|(effect, _)| effect.variation).fold(0.0, f64::max)
         });
         let named = large(best);
         let axes = axes_of(&named);

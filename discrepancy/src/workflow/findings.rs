@@ -61,7 +61,14 @@ fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
     let model = if found.not_explained.is_some() { &found.model } else { &found.reported };
     let all = model.placed.iter().zip(&found.shares).zip(&found.alternatives);
     for (index, ((placed, share), alternatives)) in all.enumerate() {
-        let errors = &model.errors[at..at + placed.coordinates.len()];
+        let disagreement = found.heterogeneity.get(index);
+        let within = &model.errors[at..at + placed.coordinates.len()];
+        let errors: Vec<f64> = match disagreement {
+            Some(windows) => {
+                within.iter().zip(&windows.spread).map(|(one, other)| one.hypot(*other)).collect()
+            }
+            None => within.to_vec(),
+        };
         at += placed.coordinates.len();
         let alternatives = alternatives
             .iter()
@@ -71,9 +78,9 @@ fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
                 Some(named_effect(placed, &other.fit.errors[from..], other.share, Vec::new()))
             })
             .collect();
-        let amplitude_variation = found.amplitude_variation.get(index).copied();
+        let amplitude_variation = disagreement.filter(|_| found.lacks_fit).map(|windows| windows.variation);
         let effect =
-            NamedEffect { amplitude_variation, ..named_effect(placed, errors, *share, alternatives) };
+            NamedEffect { amplitude_variation, ..named_effect(placed, &errors, *share, alternatives) };
         if found.not_explained.is_some() || found.is_named[index] {
             named.push(effect)
         } else {
