@@ -25,9 +25,9 @@ use rayon::prelude::*;
 /// CV_B above which an effect neither comes first in a round nor stays in a model that lacks fit: right names had 0.01 to 0.24 on
 /// seed 13, a development seed, impostors 0.1 to 2.
 const MAX_CV_IN_SEARCH: f64 = 0.3;
-/// I^2, the share of Q that is not chance, above which tau counts in a standard error: high heterogeneity in the terms of Higgins et
-/// al. 2003, BMJ 327. Below it Q is what windows of an exact law show too: their I^2 was 0 to 0.70 on seed 3769683697404522, a
-/// development seed, and 0.76 to 0.996 where the law had another form and its number was off by more than half a per cent.
+/// I^2, the share of Q that is not chance, above which tau counts in a standard error: high heterogeneity in the terms of Higgins
+/// et al. 2003, BMJ 327. Below it Q is what windows of an exact law show too: their I^2 was 0 to 0.70 on seed 3769683697404522,
+/// a development seed, and 0.76 to 0.996 where the law had another form and its number was off by more than half a per cent.
 const HIGH_I2: f64 = 0.75;
 /// Share of the most informative window's information below which a window says nothing of an amplitude.
 const NOTHING: f64 = 1e-9;

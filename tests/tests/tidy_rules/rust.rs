@@ -195,7 +195,7 @@ pub(super) const UNITS_IN_NAMES: Rule = Rule {
             if !field || !float || is_dimensionless(name) || has_unit(name) {
                 return None;
             }
-            Some(format!("end '{name}' with its unit, as supply_pressure_pa does, or add it to DIMENSIONLESS of this rule"))
+            Some(format!("end '{name}' with its unit, as supply_pressure_pa, or add it to dimensionless.txt of this rule"))
         })
     },
     bad: &[
