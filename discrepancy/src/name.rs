@@ -9,8 +9,8 @@
 //!
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
 //! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
-//! joins and stays when its amplitude is homogeneous over windows ([`heterogeneity`]), small ones too. Probabilities of all sets
-//! that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
+//! joins and stays when its amplitude is homogeneous over windows (`name/heterogeneity.rs`), small ones too. Probabilities of
+//! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
