@@ -23,7 +23,7 @@ fuzz_target!(|text: &str| {
     }
     for suspect in suspects(text, "suspects.toml").into_iter().flatten().take(MOST) {
         for end in 0..2 {
-            let ends: Vec<f64> = suspect.numbers().iter().map(|number| number.range()[end]).collect();
+            let ends: Vec<f64> = suspect.numbers().iter().map(|number| number.range[end]).collect();
             if let Ok(term) = suspect.with(&ends) {
                 moves(&baseline.with_term(&term));
             }
