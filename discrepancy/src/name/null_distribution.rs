@@ -23,7 +23,7 @@ const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
 /// Chi2 per degree of freedom of an outlying window, and the largest share of outliers that is excluded. In such a window the
 /// break-away came at another moment.
 pub(super) const OUTLIER_CHI2_PER_DOF: f64 = 3.0;
-const MAX_OUTLIER_SHARE: f64 = 0.05;
+pub(super) const MAX_OUTLIER_SHARE: f64 = 0.05;
 
 /// Window scores of all candidates against a model's residual.
 pub(super) struct NullDistribution {
