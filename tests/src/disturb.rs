@@ -8,6 +8,7 @@ use crate::binaries::Program;
 use crate::launch::Pace;
 use crate::own;
 use crate::process::Running;
+use crate::records;
 use crate::scene::{RESTLESS, Scene};
 use realtime::Request;
 use rustix::process::Signal;
@@ -76,6 +77,8 @@ impl Disturbance {
 pub struct Named {
     pub cause: String,
     pub sentence: String,
+    /// The causes of all findings of the report, the named one among them.
+    pub findings: Vec<String>,
 }
 
 /// Runs emulator and controller for some seconds with a disturbance after `after`, reports, and has the cause named.
@@ -158,6 +161,16 @@ fn step_the_clock(scene: &Scene) {
 fn name_cause(out: &Path) -> Named {
     let report = out.join("report");
     let _ = Program::Bench.start(&[&"report", &out, &"--out", &report]).wait().expect_code(0);
-    let named = Program::Bench.start(&[&"cause", &report.join("report.json")]).wait().expect_code(0);
-    Named { cause: named.stdout.trim().to_owned(), sentence: named.stderr.trim().to_owned() }
+    let file = report.join("report.json");
+    let named = Program::Bench.start(&[&"cause", &file]).wait().expect_code(0);
+    let report = records::json(&file);
+    let findings = report["findings"].as_array().expect("a report holds its findings");
+    Named {
+        cause: named.stdout.trim().to_owned(),
+        sentence: named.stderr.trim().to_owned(),
+        findings: findings
+            .iter()
+            .map(|finding| finding["cause"].as_str().unwrap_or_default().to_owned())
+            .collect(),
+    }
 }
