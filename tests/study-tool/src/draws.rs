@@ -19,6 +19,8 @@
 
 mod worlds;
 
+pub use worlds::is_beyond_drawn;
+
 use crate::limits::Scale;
 use plant::Axis;
 use plant::effects::SHEETS;

@@ -31,7 +31,13 @@ pub struct Rate {
 impl Rate {
     pub fn new(count: usize, of: usize) -> Self {
         let share = (of > 0).then(|| count as f64 / of as f64);
-        Rate { count, of, share, interval: wilson(count, of), at_most: at_most(count, of) }
+        Rate {
+            count,
+            of,
+            share,
+            interval: wilson(count as f64, of as f64, CONFIDENCE),
+            at_most: at_most(count, of),
+        }
     }
 
     /// The rate of those that `is` holds for.
@@ -45,18 +51,19 @@ impl Rate {
     }
 }
 
-fn wilson(count: usize, of: usize) -> [f64; 2] {
-    if of == 0 {
+/// Wilson's interval of `count` of `of`, which need not be whole where they are weighted.
+pub(crate) fn wilson(count: f64, of: f64, confidence: f64) -> [f64; 2] {
+    if of <= 0.0 {
         return [0.0, 1.0];
     }
-    let (n, p) = (of as f64, count as f64 / of as f64);
-    let z = Normal::standard().inverse_cdf(0.5 + CONFIDENCE / 2.0);
+    let (n, p) = (of, count / of);
+    let z = Normal::standard().inverse_cdf(0.5 + confidence / 2.0);
     let centre = p + z * z / (2.0 * n);
     let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
     let scale = 1.0 + z * z / n;
     // Rounding must not push an end out of [0, 1], nor away from an extreme rate.
-    let low = if count == 0 { 0.0 } else { (centre - half) / scale };
-    let high = if count == of { 1.0 } else { (centre + half) / scale };
+    let low = if count <= 0.0 { 0.0 } else { (centre - half) / scale };
+    let high = if count >= of { 1.0 } else { (centre + half) / scale };
     [low.max(0.0), high.min(1.0)]
 }
 

@@ -22,6 +22,8 @@
 //! | [`interval`] | what so many of so many prove |
 //! | [`score`] | all cases: rates, confusion matrix, parameters, time |
 //! | [`page`] | the score as one page |
+//! | [`probability`] | whether the probabilities of explanations keep what they promise |
+//! | [`worlds`] | exact world and world with a background side by side |
 //! | [`compare`] | several scores side by side |
 //! | [`curve`] | how rates fall with noise and amplitude |
 //! | [`trajectory`], [`signature`] | true states of a record; what an effect changes in windows that start from them |
@@ -46,6 +48,7 @@ pub mod leave_out;
 pub mod ledger;
 pub mod limits;
 pub mod page;
+pub mod probability;
 pub mod program;
 pub mod report;
 pub mod resolve;
@@ -53,5 +56,6 @@ pub mod score;
 pub mod signature;
 pub mod step;
 pub mod trajectory;
+pub mod worlds;
 
 pub const SCHEMA_VERSION: u32 = 1;

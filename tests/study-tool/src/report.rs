@@ -26,6 +26,7 @@ pub struct Report {
     pub dependence: Option<LocatedTerm>,
     /// What the program says of its model on the held-out record.
     pub verification: Option<Verification>,
+    pub explanations: Vec<Explanation>,
     pub next: Option<Next>,
 }
 
@@ -55,6 +56,42 @@ pub struct Parameter {
     /// Its standard error, in its unit; some programs have none.
     #[serde(rename = "standard_error")]
     pub error_value: Option<f64>,
+    /// The rig file's value, of a parameter of the baseline.
+    #[serde(default)]
+    pub before: Option<f64>,
+}
+
+/// What may be the case, and how probable the program says it is.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Explanation {
+    pub kind: ExplanationKind,
+    /// Of effects: sets that the record does not tell apart.
+    pub sets: Vec<Vec<ExplainingEffect>>,
+    /// In [0, 1]; all of a report add up to one.
+    pub probability: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExplanationKind {
+    Nothing,
+    Parameters,
+    Effects,
+    NoneOfThese,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+pub struct ExplainingEffect {
+    pub effect: String,
+    #[serde(rename = "where")]
+    place: RawPlace,
+}
+
+impl ExplainingEffect {
+    /// As `drive.a`.
+    pub fn place(&self) -> String {
+        self.place.name()
+    }
 }
 
 /// The gap of one signal; all in one unit, which is the program's choice.
@@ -129,6 +166,7 @@ struct RawReport {
     verification: Option<Verification>,
     #[serde(default)]
     location: Option<Location>,
+    explanations: Option<Vec<Explanation>>,
     next: Option<Next>,
 }
 
@@ -148,10 +186,16 @@ struct RawNamed {
     alternatives: Vec<RawNamed>,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 struct RawPlace {
     axis: String,
     element: Option<String>,
+}
+
+impl RawPlace {
+    fn name(&self) -> String {
+        self.element.as_ref().map_or_else(|| self.axis.clone(), |element| format!("{}.{element}", self.axis))
+    }
 }
 
 /// Reads a report; says what is wrong with it.
@@ -180,17 +224,15 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     }
     let gap = raw.gap.unwrap_or_default();
     let dependence = raw.location.and_then(|location| location.dependence);
+    let explanations = raw.explanations.unwrap_or_default();
     let RawReport { verdict, parameters, outside, verification, next, .. } = raw;
-    Ok(Report { verdict, named, parameters, gap, outside, dependence, verification, next })
+    Ok(Report { verdict, named, parameters, gap, outside, dependence, verification, explanations, next })
 }
 
 fn known(raw: RawNamed) -> Result<Named, String> {
     let sheet = plant::effects::sheet(&raw.effect)
         .ok_or_else(|| format!("names '{}', which is not in the catalogue", raw.effect))?;
-    let place = match &raw.place.element {
-        Some(element) => format!("{}.{element}", raw.place.axis),
-        None => raw.place.axis.clone(),
-    };
+    let place = raw.place.name();
     let place = sheet.place_named(&place).ok_or_else(|| format!("{} cannot be at '{place}'", sheet.name))?;
     let alternatives = raw.alternatives.into_iter().map(known).collect::<Result<_, _>>()?;
     Ok(Named { sheet, place, parameters: raw.parameters, alternatives })

@@ -1,13 +1,14 @@
 //! All cases of a study, from one folder or from several: rates with intervals, confusion matrix, parameters, time.
 
 use crate::classes::{DrawClasses, Member, read_draw};
-use crate::draws::{Draw, Kind, Shape};
+use crate::draws::{Draw, Kind, Shape, is_beyond_drawn};
 use crate::folder::{FolderError, Study, draw_as_json};
 use crate::judge::{Judgement, judge};
 use crate::leave_out::{self, Expectations, LeftOut};
 use crate::limits::Limits;
+use crate::probability::{self, Said};
 use crate::program::Identity;
-use crate::report;
+use crate::report::{self, Parameter, Report};
 use crate::step::{RunResult, read_result};
 use serde::Serialize;
 use serde_json::Value;
@@ -48,10 +49,18 @@ pub struct Case {
     /// Whether two or more hidden effects are of different classes, and all three times above their limits.
     pub separable: bool,
     pub foreign_form: bool,
+    /// Whether everything is a little wrong beside what is hidden.
+    pub background: bool,
+    /// Whether an amplitude lies beyond its drawn range.
+    pub beyond_drawn: bool,
     pub wrong_parameters: bool,
     /// Whether its noise is coloured and its sampling jitters.
     pub coloured_noise: bool,
     pub judgement: Judgement,
+    /// How probable it said what was so, and what was not.
+    pub explanations: Vec<Said>,
+    /// Reported parameters of the baseline that the rig file has right: by which share of its value each is off.
+    pub parameter_errors: Vec<f64>,
     /// What it came to when the hidden effect was left out of the program's catalogue.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<LeftOut>,
@@ -91,6 +100,8 @@ pub struct Known<'a> {
     pub classes: Option<&'a BTreeMap<usize, DrawClasses>>,
     /// What must show of effects that are left out.
     pub expectations: Option<&'a Expectations>,
+    /// Whether draws without a result are passed over; otherwise they are an error.
+    pub partly: bool,
 }
 
 /// Scores a study whose results are in one folder or in several, as machines without a common disk leave them.
@@ -105,7 +116,7 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
     let mut cases = Vec::new();
     let mut program: Option<Identity> = None;
     let mut without_classes = 0;
-    for (study, draw) in places(&studies, label, leave_out)? {
+    for (study, draw) in places(&studies, label, leave_out, known.partly)? {
         let result = read_result(&study.run(label, draw.number).join("result.json"))?;
         let own = program.get_or_insert_with(|| result.program.clone());
         if *own != result.program {
@@ -161,6 +172,7 @@ fn places<'a>(
     studies: &'a [Study],
     label: &str,
     leave_out: bool,
+    partly: bool,
 ) -> Result<Vec<(&'a Study, &'a Draw)>, ScoreError> {
     let name = |study: &Study| study.root.display().to_string();
     let mut places = Vec::new();
@@ -178,7 +190,7 @@ fn places<'a>(
             }
         }
     }
-    let Some(first) = missing.first() else { return Ok(places) };
+    let Some(first) = missing.first().filter(|_| !partly) else { return Ok(places) };
     let folders = studies.iter().map(name).collect::<Vec<_>>().join(", ");
     Err(ScoreError::MissingRuns { folders, label: label.to_owned(), count: missing.len(), first: *first })
 }
@@ -224,9 +236,9 @@ fn case(
     });
     let clear = over_limit.iter().all(|ratio| ratio.is_some_and(|ratio| ratio >= CLEAR));
     let judgement = judge(draw, &members, &result.taken, &report);
+    let good = report.as_ref().ok().filter(|_| judgement.error.is_none());
     let left_out = if result.program.leave_out {
         let expectations = known.expectations.ok_or(ScoreError::NoExpectations)?;
-        let good = report.as_ref().ok().filter(|_| judgement.error.is_none());
         Some(leave_out::judge(draw, &result.without, expectations, good))
     } else {
         None
@@ -240,8 +252,13 @@ fn case(
         separable: recipe.hidden.len() > 1 && clear && !twins,
         over_limit,
         foreign_form: recipe.foreign_form,
+        background: recipe.background.is_some(),
+        beyond_drawn: recipe.hidden.iter().any(is_beyond_drawn),
         wrong_parameters: !recipe.wrong_parameters.is_empty(),
         coloured_noise: recipe.coloured_noise,
+        explanations: good
+            .map_or_else(Vec::new, |own| probability::judge(draw, &members, left_out.is_some(), own)),
+        parameter_errors: good.map_or_else(Vec::new, |own| parameters_off(draw, own)),
         judgement,
         left_out,
         wall_s: result.taken.wall_s,
@@ -250,6 +267,12 @@ fn case(
             "scripts/study one {step} --out {root} --draw {number} --label again --program PROGRAM"
         ),
     })
+}
+
+fn parameters_off(draw: &Draw, report: &Report) -> Vec<f64> {
+    let wrong = |name: &str| draw.recipe.wrong_parameters.iter().any(|(own, _)| own == name);
+    let off = |own: &Parameter| (own.value / own.before.unwrap_or(1.0) - 1.0).abs();
+    report.parameters.iter().filter(|own| !wrong(&own.name)).map(off).collect()
 }
 
 /// How far a hidden effect lies above its limit.

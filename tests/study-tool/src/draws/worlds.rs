@@ -67,6 +67,18 @@ fn beyond(hidden: &mut Hidden, factor: f64) {
     hidden.numbers[0] = if key.signed { hidden.numbers[0].signum() * value } else { value };
 }
 
+/// Whether the amplitude of a hidden effect lies beyond the stronger end of its drawn range.
+pub fn is_beyond_drawn(hidden: &Hidden) -> bool {
+    let keys = plant::effects::sheet(hidden.name).map_or(&[][..], |sheet| sheet.keys);
+    let Some((key, number)) = keys.first().zip(hidden.numbers.first()) else { return false };
+    Scale::of(key).into_iter().filter_map(|scale| Some((scale, scale.excursion(*number)?))).any(
+        |(scale, own)| {
+            let ends = key.drawn.map(|end| scale.excursion(end).unwrap_or(0.0));
+            own > ends[0].max(ends[1]) * (1.0 + f64::EPSILON)
+        },
+    )
+}
+
 impl Generator {
     fn background(&mut self, recipe: &Recipe) -> Background {
         let count = 5 + self.below(6);

@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Share of the gap that must close for effects without memory.
-const STILL_CLOSED: f64 = 0.6;
+pub const STILL_CLOSED: f64 = 0.6;
 
 #[derive(Debug, Serialize)]
 pub struct Tables {

@@ -170,7 +170,7 @@ pub(crate) fn over_limit(case: &Case) -> Option<f64> {
     case.over_limit.first().copied().flatten()
 }
 
-fn is_clear(case: &Case) -> bool {
+pub(crate) fn is_clear(case: &Case) -> bool {
     over_limit(case).is_some_and(|ratio| ratio >= CLEAR)
 }
 

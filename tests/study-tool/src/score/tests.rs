@@ -142,7 +142,7 @@ fn with_effects_left_out_only_single_draws_are_wanted_and_the_tables_are_others(
     assert!(matches!(missing, Err(ScoreError::MissingRuns { count: 1, first: 7, .. })));
 }
 
-const UNKNOWN: Known<'_> = Known { limits: None, classes: None, expectations: None };
+const UNKNOWN: Known<'_> = Known { limits: None, classes: None, expectations: None, partly: false };
 
 #[test]
 fn whoever_tells_the_truth_has_all_points() {

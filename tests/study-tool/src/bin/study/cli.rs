@@ -26,6 +26,8 @@ pub(crate) enum Command {
     One(OneArguments),
     /// Scores the results: score-LABEL.json and score-LABEL.html.
     Score(ScoreArguments),
+    /// Both worlds of a study side by side: worlds-LABEL.json and worlds-LABEL.md, of the draws that have a result.
+    Worlds(WorldsArguments),
     /// Several scores side by side, as tables in Markdown: ours beside the competitors.
     Compare(CompareArguments),
     /// How rates fall over noise and amplitude: curve-LABEL.md and curve-LABEL.svg.
@@ -200,6 +202,22 @@ pub(crate) struct ScoreArguments {
     /// Where the score is written; the first folder without it.
     #[arg(long)]
     pub(crate) to: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct WorldsArguments {
+    /// Folder of the study, or all of them where machines without a common disk filled several.
+    #[arg(required = true)]
+    pub(crate) folders: Vec<PathBuf>,
+    /// What the results are called.
+    #[arg(long, default_value = "program")]
+    pub(crate) label: String,
+    /// What those are called in which the hidden effects were left out.
+    #[arg(long)]
+    pub(crate) left_out: Option<String>,
+    /// Writes the tables into tests/docs/study.md.
+    #[arg(long)]
+    pub(crate) write: bool,
 }
 
 #[derive(Args)]

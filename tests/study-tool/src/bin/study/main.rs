@@ -42,6 +42,7 @@ fn main() -> ExitCode {
         Command::Limits(arguments) => limits(&arguments),
         Command::Cosines(arguments) => cosines(&arguments, &stop),
         Command::Score(arguments) => scores::score(&arguments),
+        Command::Worlds(arguments) => scores::worlds(&arguments),
         Command::Compare(arguments) => scores::compare(&arguments),
         Command::Curve(arguments) => scores::curve(&arguments),
         Command::Ledger(arguments) => ledger(&arguments),

@@ -89,8 +89,12 @@ fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Bo
     }
     let limits: Option<Limits> = read_if_there(&committed(LIMITS))?;
     let expectations: Option<Expectations> = read_if_there(&committed(EXPECTED))?;
-    let known =
-        Known { limits: limits.as_ref(), classes: Some(&classes), expectations: expectations.as_ref() };
+    let known = Known {
+        limits: limits.as_ref(),
+        classes: Some(&classes),
+        expectations: expectations.as_ref(),
+        partly: false,
+    };
     Ok(Some(answer::of_case(&score::one(&study, draw, &arguments.label, known)?)))
 }
 

@@ -1,6 +1,6 @@
 //! The commands that score: one label as a page, several side by side, several over their noise.
 
-use crate::cli::{Column, CompareArguments, CurveArguments, ScoreArguments};
+use crate::cli::{Column, CompareArguments, CurveArguments, ScoreArguments, WorldsArguments};
 use crate::{Done, EXPECTED, LIMITS, PAGE, committed, known_classes, read_if_there, say};
 use std::error::Error;
 use std::path::PathBuf;
@@ -9,10 +9,11 @@ use study::folder::{Study, write_whole};
 use study::leave_out::Expectations;
 use study::limits::Limits;
 use study::score::{Known, Score};
+use study::worlds::Worlds;
 use study::{compare, document, page, score};
 
 pub(crate) fn score(arguments: &ScoreArguments) -> Done {
-    let score = scored(&arguments.folders, &arguments.label)?;
+    let score = scored(&arguments.folders, &arguments.label, false)?;
     let folder = arguments.to.as_ref().unwrap_or(&arguments.folders[0]);
     let path = |extension: &str| folder.join(format!("score-{}.{extension}", arguments.label));
     write_whole(&path("json"), format!("{:#}\n", serde_json::json!(score)).as_bytes())?;
@@ -22,6 +23,24 @@ pub(crate) fn score(arguments: &ScoreArguments) -> Done {
         say(&format!("{}: {} of {} (wanted: {})", line.name, rate.count, rate.of, line.wanted));
     }
     say(&path("html").display().to_string());
+    Ok(())
+}
+
+/// Both worlds of a study, as far as it was run.
+pub(crate) fn worlds(arguments: &WorldsArguments) -> Done {
+    let WorldsArguments { folders, label, left_out, write } = arguments;
+    let of_label = |label| scored(folders, label, true);
+    let left_out = left_out.as_deref().map(of_label).transpose()?;
+    let draws = Study::open(&folders[0])?.draws.len();
+    let worlds = Worlds::of(&of_label(label)?, left_out.as_ref(), draws);
+    let text = worlds.markdown();
+    let path = |extension: &str| folders[0].join(format!("worlds-{label}.{extension}"));
+    write_whole(&path("json"), format!("{:#}\n", serde_json::json!(worlds)).as_bytes())?;
+    write_whole(&path("md"), text.as_bytes())?;
+    if *write {
+        document::put(&committed(PAGE), "worlds", &text)?;
+    }
+    say(&format!("\n{text}"));
     Ok(())
 }
 
@@ -61,11 +80,11 @@ pub(crate) fn curve(arguments: &CurveArguments) -> Done {
 }
 
 fn all(columns: &[Column]) -> Result<Vec<Score>, Box<dyn Error>> {
-    columns.iter().map(|column| scored(&column.folders, &column.label)).collect()
+    columns.iter().map(|column| scored(&column.folders, &column.label, false)).collect()
 }
 
 /// Scores results with all that is committed about their draws.
-fn scored(folders: &[PathBuf], label: &str) -> Result<Score, Box<dyn Error>> {
+fn scored(folders: &[PathBuf], label: &str, partly: bool) -> Result<Score, Box<dyn Error>> {
     let limits: Option<Limits> = read_if_there(&committed(LIMITS))?;
     let expectations: Option<Expectations> = read_if_there(&committed(EXPECTED))?;
     let mut draws = Vec::new();
@@ -73,7 +92,11 @@ fn scored(folders: &[PathBuf], label: &str) -> Result<Score, Box<dyn Error>> {
         draws.extend(Study::open(folder)?.draws);
     }
     let classes = known_classes(&draws)?;
-    let known =
-        Known { limits: limits.as_ref(), classes: Some(&classes), expectations: expectations.as_ref() };
+    let known = Known {
+        limits: limits.as_ref(),
+        classes: Some(&classes),
+        expectations: expectations.as_ref(),
+        partly,
+    };
     Ok(score::score(folders, label, known)?)
 }

@@ -1,0 +1,237 @@
+//! Whether probabilities keep what they promise: of what is said at 90 %, 90 % should be right.
+//!
+//! An explanation is *right* when it is what was hidden: nothing, parameters alone, or a set of effects in which each stands
+//! for one hidden effect, itself or a twin at its place. Where none of a report is, or the effect was left out of the
+//! catalogue, *none of these* is right; so it is, beside nothing or parameters, of a record whose background alone is
+//! missing. The weights of the probabilities were fitted by the same rules (`discrepancy/study/explanations.py`).
+
+use crate::classes::Member;
+use crate::draws::{Draw, Kind};
+use crate::interval::wilson;
+use crate::report::{ExplainingEffect, Explanation, ExplanationKind, Report};
+use record_maker::Hidden;
+use serde::Serialize;
+
+/// Edges between the bins before small ones are joined.
+const EDGES: [f64; 5] = [0.01, 0.1, 0.5, 0.9, 0.99];
+/// Explanations that a bin holds at least.
+const LEAST_IN_BIN: usize = 60;
+/// Share of the weight that records with nothing hidden have.
+const NULL_SHARE: f64 = 1.0 / 3.0;
+const CONFIDENCE: f64 = 0.95;
+
+/// One explanation of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Said {
+    pub probability: f64,
+    pub right: bool,
+}
+
+/// Judges the explanations of a report about a draw.
+pub fn judge(draw: &Draw, classes: &[Vec<Member>], left_out: bool, report: &Report) -> Vec<Said> {
+    let recipe = &draw.recipe;
+    let alone = recipe.hidden.is_empty();
+    let is_right = |explanation: &Explanation| match explanation.kind {
+        _ if left_out => explanation.kind == ExplanationKind::NoneOfThese,
+        ExplanationKind::Nothing => alone && recipe.wrong_parameters.is_empty(),
+        ExplanationKind::Parameters => alone && !recipe.wrong_parameters.is_empty(),
+        ExplanationKind::Effects => {
+            !alone && explanation.sets.iter().any(|set| stand_for(set, &recipe.hidden, classes))
+        }
+        ExplanationKind::NoneOfThese => alone && recipe.background.is_some(),
+    };
+    let said = |explanation: &Explanation| Said {
+        probability: explanation.probability,
+        right: is_right(explanation),
+    };
+    let mut judged: Vec<Said> = report.explanations.iter().map(said).collect();
+    let any = judged.iter().any(|said| said.right);
+    let fallen = report.explanations.iter().position(|own| own.kind == ExplanationKind::NoneOfThese);
+    if let Some(none) = fallen.filter(|_| !any) {
+        judged[none].right = true;
+    }
+    judged
+}
+
+/// Whether each effect of a set stands for one that is hidden, and none is over.
+fn stand_for(set: &[ExplainingEffect], hidden: &[Hidden], classes: &[Vec<Member>]) -> bool {
+    let Some(first) = set.first().filter(|_| set.len() == hidden.len()) else { return hidden.is_empty() };
+    (0..hidden.len()).any(|at| {
+        let (mut others, mut twins) = (hidden.to_vec(), classes.to_vec());
+        twins.resize(hidden.len(), Vec::new());
+        let (own, class) = (others.remove(at), twins.remove(at));
+        stands_for(first, &own, &class) && stand_for(&set[1..], &others, &twins)
+    })
+}
+
+fn stands_for(named: &ExplainingEffect, hidden: &Hidden, class: &[Member]) -> bool {
+    let place = named.place();
+    let twin = |member: &Member| member.is_twin() && member.effect == named.effect && member.place == place;
+    named.effect == hidden.name && place == hidden.place.to_string() || class.iter().any(twin)
+}
+
+/// What was said with like probabilities.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bin {
+    /// Probabilities from the first to the second.
+    pub between: [f64; 2],
+    pub explanations: usize,
+    /// Weighted means.
+    pub said: f64,
+    pub right: f64,
+    /// Simultaneous over the bins at 95 %: Wilson's at the Bonferroni level, of the effective number.
+    pub band: [f64; 2],
+}
+
+/// Reliability of the probabilities of all reports, and the expected calibration error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reliability {
+    pub bins: Vec<Bin>,
+    /// Mean over the explanations of |said - right| of their bins.
+    pub calibration_error: f64,
+    /// Reports whose most probable explanation is right, and all.
+    pub first_right: [usize; 2],
+}
+
+impl Reliability {
+    /// Of reports by the kind of their draw; weighted so that a third are of nothing hidden.
+    pub fn of(reports: &[(Kind, &[Said])]) -> Self {
+        let told: Vec<_> = reports.iter().filter(|(_, said)| !said.is_empty()).collect();
+        let is_null = |kind: Kind| matches!(kind, Kind::Null | Kind::Parameter);
+        let nulls = told.iter().filter(|(kind, _)| is_null(*kind)).count();
+        let others = told.len() - nulls;
+        let weight = |kind| match (nulls, others) {
+            (0, _) | (_, 0) => 1.0,
+            _ if is_null(kind) => NULL_SHARE / nulls as f64,
+            _ => (1.0 - NULL_SHARE) / others as f64,
+        };
+        let mut all: Vec<(f64, Said)> =
+            told.iter().flat_map(|(kind, said)| said.iter().map(|own| (weight(*kind), *own))).collect();
+        all.sort_by(|left, right| left.1.probability.total_cmp(&right.1.probability));
+        let parts = parts(&all);
+        let bins: Vec<Bin> = parts.iter().map(|part| bin(part, parts.len())).collect();
+        let weight_of = |part: &[(f64, Said)]| part.iter().map(|(weight, _)| weight).sum::<f64>();
+        let errors =
+            bins.iter().zip(&parts).map(|(bin, part)| (bin.said - bin.right).abs() * weight_of(part));
+        let first =
+            |said: &[Said]| said.iter().copied().max_by(|a, b| a.probability.total_cmp(&b.probability));
+        let right = told.iter().filter(|(_, said)| first(said).is_some_and(|said| said.right)).count();
+        Reliability {
+            calibration_error: errors.sum::<f64>() / weight_of(&all),
+            bins,
+            first_right: [right, told.len()],
+        }
+    }
+}
+
+/// Explanations cut at the edges; what is below the least number joins what lies above it, the last what lies below.
+fn parts(all: &[(f64, Said)]) -> Vec<&[(f64, Said)]> {
+    let mut cuts = vec![0];
+    for edge in EDGES {
+        let at = all.partition_point(|(_, said)| said.probability < edge);
+        if at >= cuts[cuts.len() - 1] + LEAST_IN_BIN {
+            cuts.push(at);
+        }
+    }
+    while cuts.len() > 1 && all.len() < cuts[cuts.len() - 1] + LEAST_IN_BIN {
+        cuts.pop();
+    }
+    cuts.push(all.len());
+    cuts.windows(2).map(|ends| &all[ends[0]..ends[1]]).filter(|part| !part.is_empty()).collect()
+}
+
+fn bin(part: &[(f64, Said)], of: usize) -> Bin {
+    let sum = |value: &dyn Fn(&(f64, Said)) -> f64| part.iter().map(value).sum::<f64>();
+    let total = sum(&|(weight, _)| *weight);
+    let right = sum(&|(weight, said)| weight * f64::from(said.right)) / total;
+    let effective = total * total / sum(&|(weight, _)| weight * weight);
+    Bin {
+        between: [part[0].1.probability, part[part.len() - 1].1.probability],
+        explanations: part.len(),
+        said: sum(&|(weight, said)| weight * said.probability) / total,
+        right,
+        band: wilson(right * effective, effective, 1.0 - (1.0 - CONFIDENCE) / of as f64),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draws::{Shape, draws};
+    use crate::report::parse;
+    use serde_json::json;
+
+    fn report(explanations: &serde_json::Value) -> Report {
+        parse(json!({"verdict": "nothing-missing", "explanations": explanations}).to_string().as_bytes())
+            .unwrap()
+    }
+
+    #[test]
+    fn an_explanation_is_right_when_each_effect_stands_for_a_hidden_one() {
+        let all = draws(1, &Shape::SMALL);
+        let pair = all.iter().find(|draw| draw.kind == Kind::Pair).unwrap();
+        let effect = |hidden: &Hidden| {
+            let place = hidden.place.to_string();
+            let (axis, element) =
+                place.split_once('.').map_or((&*place, None), |(axis, own)| (axis, Some(own)));
+            json!({"effect": hidden.name, "where": {"axis": axis, "element": element}})
+        };
+        let [one, other] = [&pair.recipe.hidden[0], &pair.recipe.hidden[1]].map(effect);
+        let said = |draw: &Draw, left_out| {
+            let explanations = json!([
+                {"kind": "nothing", "sets": [], "probability": 0.1},
+                {"kind": "effects", "sets": [[one.clone()]], "probability": 0.2},
+                {"kind": "effects", "sets": [[one.clone(), one.clone()], [other.clone(), one.clone()]], "probability": 0.3},
+                {"kind": "none-of-these", "sets": [], "probability": 0.4}
+            ]);
+            judge(draw, &[], left_out, &report(&explanations))
+                .iter()
+                .map(|said| said.right)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(said(pair, false), [false, false, true, false]);
+        assert_eq!(said(pair, true), [false, false, false, true]);
+        let null = all.iter().find(|draw| draw.kind == Kind::Null && draw.recipe.wrong_parameters.is_empty());
+        assert_eq!(said(null.unwrap(), false), [true, false, false, false]);
+        // Nothing of what was said is so.
+        let parameter = all.iter().find(|draw| draw.kind == Kind::Parameter).unwrap();
+        assert_eq!(said(parameter, false), [false, false, false, true]);
+    }
+
+    #[test]
+    fn probabilities_that_keep_their_promise_have_no_error_and_others_have() {
+        // 80 reports: of what is said at 75 %, three quarters are right.
+        let of = |right: usize| -> Vec<Vec<Said>> {
+            (0..80)
+                .map(|at| {
+                    let first = at % 4 < right;
+                    vec![Said { probability: 0.75, right: first }, Said { probability: 0.25, right: !first }]
+                })
+                .collect()
+        };
+        let reliability = |reports: &[Vec<Said>]| {
+            Reliability::of(&reports.iter().map(|said| (Kind::Single, &said[..])).collect::<Vec<_>>())
+        };
+        let good = reliability(&of(3));
+        assert!(good.calibration_error < 1e-12 && good.bins.len() == 2, "{good:?}");
+        assert!(
+            good.bins
+                .iter()
+                .all(|bin| bin.explanations == 80 && bin.band[0] < bin.right && bin.right < bin.band[1])
+        );
+        assert_eq!(good.first_right, [60, 80]);
+        let overconfident = reliability(&of(1));
+        assert!((overconfident.calibration_error - 0.5).abs() < 1e-12, "{overconfident:?}");
+        // A bin that would hold too few joins its neighbour.
+        assert_eq!(reliability(&of(3)[..20]).bins.len(), 1);
+    }
+
+    #[test]
+    fn a_third_of_the_weight_is_of_records_with_nothing_hidden() {
+        let [right, wrong] = [true, false].map(|right| vec![Said { probability: 0.5, right }]);
+        let mut reports: Vec<(Kind, &[Said])> = vec![(Kind::Null, &right); 90];
+        reports.extend(vec![(Kind::Single, &wrong[..]); 10]);
+        let bins = Reliability::of(&reports).bins;
+        assert!(bins.len() == 1 && (bins[0].right - 1.0 / 3.0).abs() < 1e-12, "{bins:?}");
+    }
+}

@@ -1,0 +1,280 @@
+//! A study of two worlds as one table: what the program says where the catalogue's laws are exact, and where everything is a
+//! little wrong.
+//!
+//! Source: issue 32, What must be seen.
+
+use crate::draws::Kind;
+use crate::interval::Rate;
+use crate::judge::NumberJudged;
+use crate::leave_out::LeftOut;
+use crate::leave_out::tables::STILL_CLOSED;
+use crate::probability::Reliability;
+use crate::score::tables::{Spread, hidden, is_clear, over_limit};
+use crate::score::{Case, Score};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Excursion of a parameter from which on it is off by much, as a share of its value.
+const MUCH_OFF: f64 = 0.02;
+/// Multiple of the limit that parts weak and strong effects.
+const STRONG: f64 = 10.0;
+
+#[derive(Debug, Serialize)]
+pub struct Worlds {
+    pub rows: Vec<Row>,
+    /// Draws that have a result, of all that the study has; the same of those left out.
+    pub done: [usize; 2],
+    pub left_out: usize,
+    /// Exact world, world with a background.
+    pub reliability: [Reliability; 2],
+    pub wall_s: [Spread; 2],
+    pub errors: usize,
+}
+
+/// A rate in both worlds, and what is wanted of it.
+#[derive(Debug, Serialize)]
+pub struct Row {
+    pub name: &'static str,
+    pub rates: [Rate; 2],
+    pub wanted: [&'static str; 2],
+}
+
+impl Worlds {
+    /// Of a score with the whole catalogue, and of one with the hidden effects left out.
+    pub fn of(score: &Score, left: Option<&Score>, draws: usize) -> Self {
+        let in_world = |score: &Score, background| -> Vec<Case> {
+            score.cases.iter().filter(|case| case.background == background).cloned().collect()
+        };
+        let worlds = [false, true].map(|background| in_world(score, background));
+        let left =
+            [false, true].map(|background| left.map_or_else(Vec::new, |left| in_world(left, background)));
+        let mut rows = rows(&worlds);
+        rows.extend(left_out_rows(&left));
+        let reliability = [0, 1].map(|world: usize| {
+            let all = worlds[world].iter().chain(&left[world]);
+            Reliability::of(&all.map(|case| (case.kind, &case.explanations[..])).collect::<Vec<_>>())
+        });
+        let cases = || worlds.iter().chain(&left).flatten();
+        Worlds {
+            rows,
+            done: [worlds.iter().map(Vec::len).sum(), draws],
+            left_out: left.iter().map(Vec::len).sum(),
+            reliability,
+            wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
+            errors: cases().filter(|case| case.judgement.error.is_some()).count(),
+        }
+    }
+
+    /// As a page of Markdown.
+    pub fn markdown(&self) -> String {
+        let mut text = format!(
+            "{} of {} draws, and {} with what is hidden left out of the catalogue; {} without a good report, which count as \
+             wrong.\n\n\
+             | | exact world | wanted | background | wanted |\n|---|---|---|---|---|\n",
+            self.done[0], self.done[1], self.left_out, self.errors
+        );
+        for Row { name, rates, wanted } in &self.rows {
+            let [exact, background] = rates.map(in_words);
+            let _ = writeln!(text, "| {name} | {exact} | {} | {background} | {} |", wanted[0], wanted[1]);
+        }
+        for (at, name) in ["median", "longest"].into_iter().enumerate() {
+            let told = self.wall_s.map(|spread| {
+                spread
+                    .quantiles
+                    .map_or_else(String::new, |quantiles| format!("{:.0} s", quantiles[1 + 2 * at]))
+            });
+            let wanted = [["12 s", "15 s"], ["60 s", "90 s"]][at];
+            let _ = writeln!(
+                text,
+                "| {name} of the wall time | {} | {} | {} | {} |",
+                told[0], wanted[0], told[1], wanted[1]
+            );
+        }
+        for (world, reliability) in ["exact world", "background"].into_iter().zip(&self.reliability) {
+            let [right, of] = reliability.first_right;
+            let _ = write!(
+                text,
+                "\nProbabilities, {world}: the most probable explanation is right for {right} of {of}; expected \
+                 calibration error {:.1} points.\n\n| said | explanations | mean said | right | band |\n|---|---|---|---|---|\n",
+                100.0 * reliability.calibration_error
+            );
+            for bin in &reliability.bins {
+                let [low, high] = bin.between.map(|end| 100.0 * end);
+                let [least, most] = bin.band.map(|end| 100.0 * end);
+                let _ = writeln!(
+                    text,
+                    "| {low:.1} to {high:.1} % | {} | {:.1} % | {:.1} % | {least:.1} to {most:.1} % |",
+                    bin.explanations,
+                    100.0 * bin.said,
+                    100.0 * bin.right
+                );
+            }
+        }
+        text
+    }
+}
+
+fn in_words(rate: Rate) -> String {
+    let [low, high] = rate.interval.map(|end| 100.0 * end);
+    let share = rate.share.map_or_else(String::new, |share| format!(", {:.0} %", 100.0 * share));
+    format!("{}/{}{share} ({low:.0} to {high:.0} %)", rate.count, rate.of)
+}
+
+/// The rate of those cases of `all` that `is` holds for.
+fn row(
+    name: &'static str,
+    wanted: [&'static str; 2],
+    worlds: &[Vec<Case>; 2],
+    all: impl Fn(&Case) -> bool,
+    is: impl Fn(&Case) -> bool,
+) -> Row {
+    let of_world = |world: &Vec<Case>| Rate::of(world.iter().filter(|case| all(case)), &is);
+    Row { name, rates: worlds.each_ref().map(of_world), wanted }
+}
+
+fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
+    let single = |case: &Case| case.kind == Kind::Single && is_clear(case);
+    let ordinary = |case: &Case| single(case) && !case.foreign_form && !case.beyond_drawn;
+    let strong = |case: &Case| over_limit(case).is_some_and(|ratio| ratio >= STRONG);
+    let named = |case: &Case| hidden(case).right;
+    let null = |case: &Case| case.kind == Kind::Null;
+    let pair = |case: &Case| case.kind == Kind::Pair && case.separable;
+    let all_named = |case: &Case| case.judgement.hidden.iter().all(|own| own.right);
+    let no_name = |case: &Case| ["nothing", "parameter", "outside"].contains(&case.judgement.called.as_str());
+    let much_off = |case: &Case| case.parameter_errors.iter().any(|off| *off > MUCH_OFF);
+    let of_form = |foreign: bool| {
+        let reported = |case: &Case| -> Vec<bool> {
+            let counts = case.kind == Kind::Single && case.foreign_form == foreign;
+            let numbers = hidden_numbers(case).iter().filter(|_| counts);
+            numbers.filter_map(|number| number.covered).collect()
+        };
+        worlds.each_ref().map(|world| Rate::of(world.iter().flat_map(reported), |covered| covered))
+    };
+    vec![
+        row("one effect of the catalogue's form: class named", ["97 %", "88 %"], worlds, ordinary, named),
+        row("the same, 3 to 10 limits", ["", ""], worlds, |case| ordinary(case) && !strong(case), named),
+        row("the same, 10 limits and more", ["", ""], worlds, |case| ordinary(case) && strong(case), named),
+        row(
+            "another form, or beyond the drawn range: class named",
+            ["92 %", "80 %"],
+            worlds,
+            |case| single(case) && !ordinary(case),
+            named,
+        ),
+        row("one effect: name, place, nothing beside", ["92 %", "75 %"], worlds, single, |case| {
+            case.judgement.alone && hidden(case).where_right
+        }),
+        row(
+            "class named: place and element right",
+            ["97 %", "92 %"],
+            worlds,
+            |case| single(case) && named(case),
+            |case| hidden(case).where_right,
+        ),
+        row("nothing hidden: a name, or no report", ["none of 200", "at most 5 %"], worlds, null, |case| {
+            !no_name(case)
+        }),
+        row(
+            "nothing hidden: a parameter off that the file has right",
+            ["at most 2 %", "at most 10 %"],
+            worlds,
+            null,
+            |case| !case.parameter_errors.is_empty(),
+        ),
+        row("the same by more than 2 % of its value", ["", "none"], worlds, null, much_off),
+        row("two effects: both classes named", ["88 %", "70 %"], worlds, pair, all_named),
+        row("two effects: no third", ["95 %", "90 %"], worlds, pair, |case| case.judgement.too_many == 0),
+        row(
+            "three effects: all classes named",
+            ["60 %", "reported"],
+            worlds,
+            |case| case.kind == Kind::Triple && case.separable,
+            all_named,
+        ),
+        Row {
+            name: "numbers within two standard errors, catalogue's form",
+            rates: of_form(false),
+            wanted: ["93 to 97 %", "85 %"],
+        },
+        Row { name: "the same, another form", rates: of_form(true), wanted: ["85 %", "85 %"] },
+    ]
+}
+
+fn hidden_numbers(case: &Case) -> &[NumberJudged] {
+    case.judgement.hidden.first().map_or(&[], |own| &own.numbers)
+}
+
+fn left_out_rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
+    let is = |case: &Case, is: &dyn Fn(&LeftOut) -> bool| case.left_out.as_ref().is_some_and(is);
+    let closed = |case: &Case| case.judgement.claimed_joint_ratio.is_some_and(|ratio| ratio >= STILL_CLOSED);
+    let remembers = |case: &Case| is(case, &|left| left.with_memory);
+    vec![
+        row(
+            "left out: no wrong name",
+            ["94 %", "88 %"],
+            worlds,
+            |_| true,
+            |case| is(case, &|left| left.no_wrong_name),
+        ),
+        row(
+            "left out: balance, and variable among the first two",
+            ["85 %", "75 %"],
+            worlds,
+            |_| true,
+            |case| is(case, &|left| left.balance_right && left.variable_right),
+        ),
+        row(
+            "left out: 60 % of the gap closed, without memory",
+            ["95 %", "reported"],
+            worlds,
+            |case| !remembers(case),
+            closed,
+        ),
+        row("left out: 60 % of the gap closed, with memory", ["70 %", "reported"], worlds, remembers, closed),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::tests::scored;
+
+    #[test]
+    fn a_program_that_tells_the_truth_is_right_in_both_worlds() {
+        let mut score = scored("truth");
+        for (at, case) in score.cases.iter_mut().enumerate() {
+            case.background = at % 2 == 1;
+            case.over_limit = vec![Some(20.0); case.over_limit.len()];
+        }
+        let table = Worlds::of(&score, None, 100);
+        assert_eq!(table.done, [score.cases.len(), 100]);
+        let rate = |name: &str| table.rows.iter().find(|row| row.name == name).unwrap().rates;
+        let [exact, background] = rate("one effect: name, place, nothing beside");
+        assert!(
+            exact.of > 10
+                && background.of > 10
+                && exact.count == exact.of
+                && background.count == background.of
+        );
+        let nulls = rate("nothing hidden: a name, or no report");
+        assert_eq!(nulls.map(|rate| rate.count), [0, 0]);
+        assert_eq!(rate("left out: no wrong name")[0].of, 0);
+        let text = table.markdown();
+        assert!(text.contains("of 100 draws") && text.lines().count() > 20, "{text}");
+    }
+
+    #[test]
+    fn a_wrong_name_counts_in_its_own_world_alone() {
+        let mut score = scored("truth");
+        for case in &mut score.cases {
+            case.over_limit = vec![Some(5.0); case.over_limit.len()];
+            case.background = case.kind == Kind::Single;
+        }
+        let wrong =
+            score.cases.iter_mut().find(|case| case.kind == Kind::Single && !case.foreign_form).unwrap();
+        wrong.judgement.hidden[0].right = false;
+        let table = Worlds::of(&score, None, 100);
+        let [exact, background] = table.rows[0].rates;
+        assert_eq!((exact.of, background.of - background.count), (0, 1));
+    }
+}
