@@ -53,11 +53,13 @@ def test_a_step_of_the_load_leaves_the_drive_within_its_bounds(airbench_rig):
 @requirement("TIM-2")
 @pytest.mark.airbench_realtime
 def test_in_real_time_it_keeps_the_bounds_of_simulated_time(airbench_rig, move):
-    # A machine that skipped many cycles shows nothing of the controller: once more then, three times at most.
-    for _ in range(3):
+    # A miss shows nothing of a controller that the machine kept from answering: once more then, five times at most.
+    for _ in range(5):
         rig = airbench_rig(move, pace="real", controller=Own(options=["--no-realtime"]), emulator_options=["--no-realtime"])
-        figures = rig.finish(within="60 s").figures
-        if figures["skipped"] <= figures["cycles"] / 100:
+        run = rig.finish(within="60 s")
+        figures = run.figures
+        unanswered = figures["cycles"] - run.summary["drive_commands"]["accepted"]
+        if figures["position_error_dynamic_m"] < 0.004 or unanswered <= figures["cycles"] / 100:
             break
     assert figures["position_error_dynamic_m"] < 0.004
     assert figures["position_error_static_m"] < 0.0004
