@@ -29,7 +29,7 @@ mod start_states;
 use crate::calibrate::calibrate;
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::parameters::with_factors;
+use crate::parameters::{COUNT, with_factors};
 use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 pub use decision::NotExplained;
@@ -40,7 +40,7 @@ pub use explanations::{Explanation, ExplanationKind, Features};
 use explanations::{Fits, explanations};
 use gauss_newton::{fit_selected, shrink_parameters};
 use heterogeneity::{
-    Heterogeneity, eliminate_heterogeneous, heterogeneity, prefer_homogeneous, prefer_large,
+    Heterogeneity, eliminate_heterogeneous, heterogeneity, parameter_spread, prefer_homogeneous, prefer_large,
 };
 use model_fit::estimator::RELINEARISED;
 use needed_parameters::with_needed;
@@ -116,6 +116,8 @@ pub struct SelectionResult {
     pub lacks_fit: bool,
     /// How much the windows disagree on each effect of the reported model; empty without one.
     pub(crate) heterogeneity: Vec<Heterogeneity>,
+    /// tau of each parameter between the windows, of the reported model.
+    pub parameter_spread: [f64; COUNT],
     /// Why the effects of the model are not named.
     pub not_explained: Option<NotExplained>,
     /// Whether each effect of the model has a name.
@@ -207,11 +209,13 @@ pub fn name(
     } else {
         explained
     };
+    let at_reported = linearise(here, &reported);
     let heterogeneity = if not_explained.is_none() && !reported.placed.is_empty() {
-        heterogeneity(here, &linearise(here, &reported), &reported).unwrap_or_default()
+        heterogeneity(here, &at_reported, &reported).unwrap_or_default()
     } else {
         Vec::new()
     };
+    let parameter_spread = parameter_spread(here, &at_reported, &reported).unwrap_or([0.0; COUNT]);
     let with_shares = selection.model.placed.iter().zip(&shares);
     let alternatives = with_shares.map(|(placed, share)| selection.alternatives(placed, *share)).collect();
     let Selection { calibrated, model, .. } = selection;
@@ -229,6 +233,7 @@ pub fn name(
         limits,
         lacks_fit,
         heterogeneity,
+        parameter_spread,
         not_explained,
         is_named,
         explanations,

@@ -18,6 +18,8 @@ use super::elimination::Selection;
 use super::null_distribution::MAX_OUTLIER_SHARE;
 use super::{MIN_LOSS_REDUCTION, STEPS, is_large, lacks_fit, leading_key, loss_where_last_acts, relinearise};
 use crate::engine::Engine;
+use crate::fit::Products;
+use crate::parameters::COUNT;
 use crate::refit::{
     Linearisation, Refit, coordinate_columns, linearise, prior_precisions, refit_steps, rig_of,
 };
@@ -124,28 +126,64 @@ pub(super) fn heterogeneity(
     linearisation: &Linearisation,
     model: &Refit,
 ) -> Option<Vec<Heterogeneity>> {
-    let simulated = engine.simulate(&rig_of(engine.rig(), &model.placed, &model.factors)?);
-    let residual = engine.residual(&simulated);
-    let mut columns = linearisation.columns.clone();
-    let mut column = columns.len();
-    columns.extend(coordinate_columns(engine, &model.factors, &model.placed, &simulated)?);
-    let products = engine.products(&residual, &columns);
-    let weights = products.weights(&engine.squares(&residual));
-    let precisions = prior_precisions(&model.placed);
+    let windows = Windows::new(engine, linearisation, model)?;
+    let mut column = linearisation.columns.len();
     model
         .placed
         .iter()
         .map(|placed| {
             let key = leading_key(placed);
-            let all: Option<Vec<Vec<(f64, f64)>>> = (0..placed.coordinates.len())
-                .map(|at| products.window_changes(column + at, &weights, &precisions))
-                .collect();
+            let all: Option<Vec<Vec<(f64, f64)>>> =
+                (0..placed.coordinates.len()).map(|at| windows.changes(column + at)).collect();
             let all = all?;
             column += placed.coordinates.len();
             let spread = all.iter().map(|changes| significant_spread(changes)).collect();
             Some(Heterogeneity { variation: spread_of(&all[key]) / placed.coordinates[key].abs(), spread })
         })
         .collect()
+}
+
+/// tau of each parameter that a model moves from the rig file's value, 0 without high heterogeneity. `None` where no derivative
+/// exists.
+pub(super) fn parameter_spread(
+    engine: &Engine<'_>,
+    linearisation: &Linearisation,
+    model: &Refit,
+) -> Option<[f64; COUNT]> {
+    let mut spread = [0.0; COUNT];
+    let moved: Vec<usize> = (0..COUNT).filter(|at| model.factors[*at] != 1.0).collect();
+    if moved.is_empty() {
+        return Some(spread);
+    }
+    let windows = Windows::new(engine, linearisation, model)?;
+    for at in moved {
+        spread[at] = significant_spread(&windows.changes(at)?);
+    }
+    Some(spread)
+}
+
+/// What each window asks for beside a model: its parameters first, then the coordinates of its effects.
+struct Windows {
+    products: Products,
+    weights: Vec<f64>,
+    precisions: Vec<f64>,
+}
+
+impl Windows {
+    fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
+        let simulated = engine.simulate(&rig_of(engine.rig(), &model.placed, &model.factors)?);
+        let residual = engine.residual(&simulated);
+        let mut columns = linearisation.columns.clone();
+        columns.extend(coordinate_columns(engine, &model.factors, &model.placed, &simulated)?);
+        let products = engine.products(&residual, &columns);
+        let weights = products.weights(&engine.squares(&residual));
+        Some(Windows { products, weights, precisions: prior_precisions(&model.placed) })
+    }
+
+    /// Of one column, with each window's information.
+    fn changes(&self, column: usize) -> Option<Vec<(f64, f64)>> {
+        self.products.window_changes(column, &self.weights, &self.precisions)
+    }
 }
 
 /// tau where I^2 is above [`HIGH_I2`], else 0. Neither uninformative windows count, nor the few that disagree most: there the

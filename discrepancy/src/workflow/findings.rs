@@ -12,7 +12,7 @@ use crate::report::{
 
 pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report {
     let (mut named, mut small) = effects(found);
-    let (parameters, insignificant) = parameters(engine, &found.reported);
+    let (parameters, insignificant) = parameters(engine, found);
     let verdict = if found.not_explained.is_some() {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
@@ -126,11 +126,17 @@ fn named_effect(
 }
 
 /// Parameters that are significantly off, and those that the model moved by less.
-fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantity>) {
-    let is_off = off(engine, model);
+fn parameters(engine: &Engine<'_>, found: &SelectionResult) -> (Vec<Quantity>, Vec<Quantity>) {
+    let mut model = found.reported.clone();
+    let from = model.errors.len() - COUNT;
+    model.errors[from..]
+        .iter_mut()
+        .zip(found.parameter_spread)
+        .for_each(|(error, tau)| *error = error.hypot(tau));
+    let is_off = off(engine, &model);
     let (off, insignificant): (Vec<usize>, Vec<usize>) =
         (0..COUNT).filter(|at| model.factors[*at] != 1.0).partition(|at| is_off[*at]);
-    let quantities = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, model)).collect();
+    let quantities = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, &model)).collect();
     (quantities(off), quantities(insignificant))
 }
 
