@@ -12,6 +12,8 @@ use crate::probability::Reliability;
 use crate::score::tables::{Spread, hidden, is_clear, over_limit};
 use crate::score::{Case, Score};
 use serde::Serialize;
+use statrs::distribution::{Binomial, DiscreteCDF};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Excursion of a parameter from which on it is off by much, as a share of its value.
@@ -29,6 +31,50 @@ pub struct Worlds {
     pub reliability: [Reliability; 2],
     pub wall_s: [Spread; 2],
     pub errors: usize,
+    /// Another program on the same draws.
+    pub other: Option<Paired>,
+}
+
+/// Draws that two programs got right, exactly: name, place, nothing beside; in each world.
+#[derive(Debug, Serialize)]
+pub struct Paired {
+    pub label: String,
+    /// Right by both, by the first alone, by the other alone, by neither.
+    pub counts: [[usize; 4]; 2],
+}
+
+impl Paired {
+    fn of(score: &Score, other: &Score) -> Self {
+        let theirs: BTreeMap<usize, &Case> = other.cases.iter().map(|case| (case.number, case)).collect();
+        let mut counts = [[0; 4]; 2];
+        for case in &score.cases {
+            let Some(other) = theirs.get(&case.number) else { continue };
+            let place = 2 * usize::from(!is_exact(case)) + usize::from(!is_exact(other));
+            counts[usize::from(case.background)][place] += 1;
+        }
+        Paired { label: other.label.clone(), counts }
+    }
+}
+
+/// Whether a case is right, and nothing stands beside.
+fn is_exact(case: &Case) -> bool {
+    let judgement = &case.judgement;
+    match case.kind {
+        Kind::Single => judgement.alone && hidden(case).where_right,
+        Kind::Null => is_no_name(case),
+        Kind::Parameter => judgement.parameter_right,
+        Kind::Pair | Kind::Triple => judgement.hidden.iter().all(|own| own.right) && judgement.too_many == 0,
+    }
+}
+
+fn is_no_name(case: &Case) -> bool {
+    ["nothing", "parameter", "outside"].contains(&case.judgement.called.as_str())
+}
+
+/// Exact McNemar test: two-sided probability of so uneven a split of the draws that one program alone got right.
+fn mcnemar(one: usize, other: usize) -> f64 {
+    let of = (one + other) as u64;
+    Binomial::new(0.5, of).map_or(1.0, |binomial| (2.0 * binomial.cdf(one.min(other) as u64)).min(1.0))
 }
 
 /// A rate in both worlds, and what is wanted of it.
@@ -40,8 +86,8 @@ pub struct Row {
 }
 
 impl Worlds {
-    /// Of a score with the whole catalogue, and of one with the hidden effects left out.
-    pub fn of(score: &Score, left: Option<&Score>, draws: usize) -> Self {
+    /// Of a score with the whole catalogue, of one with the hidden effects left out, and of another program's.
+    pub fn of(score: &Score, left: Option<&Score>, other: Option<&Score>, draws: usize) -> Self {
         let in_world = |score: &Score, background| -> Vec<Case> {
             score.cases.iter().filter(|case| case.background == background).cloned().collect()
         };
@@ -61,6 +107,7 @@ impl Worlds {
             left_out: left.iter().map(Vec::len).sum(),
             reliability,
             wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
+            other: other.map(|other| Paired::of(score, other)),
             errors: cases().filter(|case| case.judgement.error.is_some()).count(),
         }
     }
@@ -88,6 +135,18 @@ impl Worlds {
                 text,
                 "| {name} of the wall time | {} | {} | {} | {} |",
                 told[0], wanted[0], told[1], wanted[1]
+            );
+        }
+        for (label, world, [both, ours, theirs, neither]) in self.other.iter().flat_map(|paired| {
+            let worlds = ["exact world", "background"].into_iter().zip(paired.counts);
+            worlds.map(|(world, counts)| (&paired.label, world, counts))
+        }) {
+            let of = both + ours + theirs + neither;
+            let _ = writeln!(
+                text,
+                "\nThe same draws by *{label}*, {world}: of {of} both get {both} exactly right, this program alone {ours}, *{label}* alone \
+                 {theirs} (exact McNemar test: p = {:.2}).",
+                mcnemar(ours, theirs)
             );
         }
         for (world, reliability) in ["exact world", "background"].into_iter().zip(&self.reliability) {
@@ -140,7 +199,6 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
     let null = |case: &Case| case.kind == Kind::Null;
     let pair = |case: &Case| case.kind == Kind::Pair && case.separable;
     let all_named = |case: &Case| case.judgement.hidden.iter().all(|own| own.right);
-    let no_name = |case: &Case| ["nothing", "parameter", "outside"].contains(&case.judgement.called.as_str());
     let much_off = |case: &Case| case.parameter_errors.iter().any(|off| *off > MUCH_OFF);
     let of_form = |foreign: bool| {
         let reported = |case: &Case| -> Vec<bool> {
@@ -172,7 +230,7 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
             |case| hidden(case).where_right,
         ),
         row("nothing hidden: a name, or no report", ["none of 200", "at most 5 %"], worlds, null, |case| {
-            !no_name(case)
+            !is_no_name(case)
         }),
         row(
             "nothing hidden: a parameter off that the file has right",
@@ -246,7 +304,7 @@ mod tests {
             case.background = at % 2 == 1;
             case.over_limit = vec![Some(20.0); case.over_limit.len()];
         }
-        let table = Worlds::of(&score, None, 100);
+        let table = Worlds::of(&score, None, None, 100);
         assert_eq!(table.done, [score.cases.len(), 100]);
         let rate = |name: &str| table.rows.iter().find(|row| row.name == name).unwrap().rates;
         let [exact, background] = rate("one effect: name, place, nothing beside");
@@ -273,8 +331,26 @@ mod tests {
         let wrong =
             score.cases.iter_mut().find(|case| case.kind == Kind::Single && !case.foreign_form).unwrap();
         wrong.judgement.hidden[0].right = false;
-        let table = Worlds::of(&score, None, 100);
+        wrong.judgement.alone = false;
+        let singles = score.cases.iter().filter(|case| case.kind == Kind::Single).count();
+        let truth = Score { label: "other".to_owned(), ..scored("truth") };
+        let table = Worlds::of(&score, None, Some(&truth), 100);
         let [exact, background] = table.rows[0].rates;
         assert_eq!((exact.of, background.of - background.count), (0, 1));
+        // The other one tells the truth.
+        assert_eq!(table.other.as_ref().unwrap().counts[1], [singles - 1, 0, 1, 0]);
+        assert!(
+            table.markdown().contains("*other* alone 1 (exact McNemar test: p = 1.00)"),
+            "{}",
+            table.markdown()
+        );
+    }
+
+    #[test]
+    fn the_exact_test_is_that_of_the_books() {
+        // McNemar 1947 by the binomial distribution: 1 and 9 of 10 discordant pairs, 2 * 11 / 1024.
+        assert!(
+            (mcnemar(1, 9) - 22.0 / 1024.0).abs() < 1e-12 && mcnemar(3, 3) == 1.0 && mcnemar(0, 0) == 1.0
+        );
     }
 }
