@@ -144,8 +144,8 @@ impl Worlds {
             let of = both + ours + theirs + neither;
             let _ = writeln!(
                 text,
-                "\nThe same draws by *{label}*, {world}: of {of} both get {both} exactly right, this program alone {ours}, *{label}* alone \
-                 {theirs} (exact McNemar test: p = {:.2}).",
+                "\nThe same draws by *{label}*, {world}: of {of} both get {both} exactly right, this program alone {ours}, \
+                 *{label}* alone {theirs} (exact McNemar test: p = {:.2}).",
                 mcnemar(ours, theirs)
             );
         }
