@@ -79,7 +79,8 @@ pub struct Bin {
     /// Weighted means.
     pub said: f64,
     pub right: f64,
-    /// Simultaneous over the bins at 95 %: Wilson's at the Bonferroni level, of the effective number.
+    /// Simultaneous over the bins at 95 %: Wilson's at the Bonferroni level, of the effective number. It takes explanations
+    /// of one report as independent, which they are not: it is too narrow.
     pub band: [f64; 2],
 }
 

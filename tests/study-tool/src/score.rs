@@ -271,7 +271,8 @@ fn case(
 
 fn parameters_off(draw: &Draw, report: &Report) -> Vec<f64> {
     let wrong = |name: &str| draw.recipe.wrong_parameters.iter().any(|(own, _)| own == name);
-    let off = |own: &Parameter| (own.value / own.before.unwrap_or(1.0) - 1.0).abs();
+    // A program that does not tell the file's value has reported it all the same.
+    let off = |own: &Parameter| own.before.map_or(0.0, |before| (own.value / before - 1.0).abs());
     report.parameters.iter().filter(|own| !wrong(&own.name)).map(off).collect()
 }
 

@@ -24,10 +24,11 @@ const STRONG: f64 = 10.0;
 #[derive(Debug, Serialize)]
 pub struct Worlds {
     pub rows: Vec<Row>,
-    /// Draws that have a result, of all that the study has; the same of those left out.
+    /// Draws that have a result, and all that the study has.
     pub done: [usize; 2],
+    /// Draws with a result in which the hidden effects were left out.
     pub left_out: usize,
-    /// Exact world, world with a background.
+    /// Exact world, world with a background; draws with effects left out included.
     pub reliability: [Reliability; 2],
     pub wall_s: [Spread; 2],
     pub errors: usize,
@@ -153,7 +154,8 @@ impl Worlds {
             let [right, of] = reliability.first_right;
             let _ = write!(
                 text,
-                "\nProbabilities, {world}: the most probable explanation is right for {right} of {of}; expected \
+                "\nProbabilities, {world}, draws left out included: \
+                 the most probable explanation is right for {right} of {of}; expected \
                  calibration error {:.1} points.\n\n| said | explanations | mean said | right | band |\n|---|---|---|---|---|\n",
                 100.0 * reliability.calibration_error
             );
