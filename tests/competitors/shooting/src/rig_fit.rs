@@ -24,8 +24,8 @@ const CHANGE: f64 = 0.03;
 const FACTOR_CHANGE: f64 = 0.01;
 /// Largest deviation of a parameter from the rig file.
 const MOST_OFF: f64 = 0.3;
-/// Amplitudes that a candidate is simulated at, in its dimensionless coordinate: of one that vanishes continuously with it, of one
-/// that does not.
+/// Amplitudes that a candidate is simulated at, in its dimensionless coordinate: where it vanishes continuously with it, and
+/// where it does not.
 const SMALL: [f64; 1] = [0.25];
 const LARGE: [f64; 2] = [0.6, 0.85];
 /// Smallest amplitude that a fit starts at.
