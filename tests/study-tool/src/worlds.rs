@@ -32,8 +32,8 @@ pub struct Worlds {
     pub reliability: [Reliability; 2],
     pub wall_s: [Spread; 2],
     pub errors: usize,
-    /// Another program on the same draws.
-    pub other: Option<Paired>,
+    /// Other programs on the same draws.
+    pub others: Vec<Paired>,
 }
 
 /// Draws that two programs got right, exactly: name, place, nothing beside; in each world.
@@ -87,8 +87,8 @@ pub struct Row {
 }
 
 impl Worlds {
-    /// Of a score with the whole catalogue, of one with the hidden effects left out, and of another program's.
-    pub fn of(score: &Score, left: Option<&Score>, other: Option<&Score>, draws: usize) -> Self {
+    /// Of a score with the whole catalogue, of one with the hidden effects left out, and of other programs'.
+    pub fn of(score: &Score, left: Option<&Score>, others: &[Score], draws: usize) -> Self {
         let in_world = |score: &Score, background| -> Vec<Case> {
             score.cases.iter().filter(|case| case.background == background).cloned().collect()
         };
@@ -108,7 +108,7 @@ impl Worlds {
             left_out: left.iter().map(Vec::len).sum(),
             reliability,
             wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
-            other: other.map(|other| Paired::of(score, other)),
+            others: others.iter().map(|other| Paired::of(score, other)).collect(),
             errors: cases().filter(|case| case.judgement.error.is_some()).count(),
         }
     }
@@ -138,7 +138,7 @@ impl Worlds {
                 told[0], wanted[0], told[1], wanted[1]
             );
         }
-        for (label, world, [both, ours, theirs, neither]) in self.other.iter().flat_map(|paired| {
+        for (label, world, [both, ours, theirs, neither]) in self.others.iter().flat_map(|paired| {
             let worlds = ["exact world", "background"].into_iter().zip(paired.counts);
             worlds.map(|(world, counts)| (&paired.label, world, counts))
         }) {
@@ -306,7 +306,7 @@ mod tests {
             case.background = at % 2 == 1;
             case.over_limit = vec![Some(20.0); case.over_limit.len()];
         }
-        let table = Worlds::of(&score, None, None, 100);
+        let table = Worlds::of(&score, None, &[], 100);
         assert_eq!(table.done, [score.cases.len(), 100]);
         let rate = |name: &str| table.rows.iter().find(|row| row.name == name).unwrap().rates;
         let [exact, background] = rate("one effect: name, place, nothing beside");
@@ -336,11 +336,11 @@ mod tests {
         wrong.judgement.alone = false;
         let singles = score.cases.iter().filter(|case| case.kind == Kind::Single).count();
         let truth = Score { label: "other".to_owned(), ..scored("truth") };
-        let table = Worlds::of(&score, None, Some(&truth), 100);
+        let table = Worlds::of(&score, None, &[truth], 100);
         let [exact, background] = table.rows[0].rates;
         assert_eq!((exact.of, background.of - background.count), (0, 1));
         // The other one tells the truth.
-        assert_eq!(table.other.as_ref().unwrap().counts[1], [singles - 1, 0, 1, 0]);
+        assert_eq!(table.others[0].counts[1], [singles - 1, 0, 1, 0]);
         assert!(
             table.markdown().contains("*other* alone 1 (exact McNemar test: p = 1.00)"),
             "{}",

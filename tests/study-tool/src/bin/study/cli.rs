@@ -215,9 +215,9 @@ pub(crate) struct WorldsArguments {
     /// What those are called in which the hidden effects were left out.
     #[arg(long)]
     pub(crate) left_out: Option<String>,
-    /// What those of another program are called.
+    /// What those of another program are called; may be repeated.
     #[arg(long)]
-    pub(crate) other: Option<String>,
+    pub(crate) other: Vec<String>,
     /// Writes the tables into tests/docs/study.md.
     #[arg(long)]
     pub(crate) write: bool,

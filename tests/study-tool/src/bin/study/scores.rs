@@ -31,9 +31,9 @@ pub(crate) fn worlds(arguments: &WorldsArguments) -> Done {
     let WorldsArguments { folders, label, left_out, other, write } = arguments;
     let of_label = |label| scored(folders, label, true);
     let left_out = left_out.as_deref().map(of_label).transpose()?;
-    let other = other.as_deref().map(of_label).transpose()?;
+    let others = other.iter().map(|label| of_label(label)).collect::<Result<Vec<_>, _>>()?;
     let draws = Study::open(&folders[0])?.draws.len();
-    let worlds = Worlds::of(&of_label(label)?, left_out.as_ref(), other.as_ref(), draws);
+    let worlds = Worlds::of(&of_label(label)?, left_out.as_ref(), &others, draws);
     let text = worlds.markdown();
     let path = |extension: &str| folders[0].join(format!("worlds-{label}.{extension}"));
     write_whole(&path("json"), format!("{:#}\n", serde_json::json!(worlds)).as_bytes())?;
