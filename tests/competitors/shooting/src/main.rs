@@ -18,7 +18,7 @@ use discrepancy::parameters::PARAMETERS;
 use discrepancy::report::{Quantity, Verdict, Where};
 use discrepancy::workflow::{RigFile, open};
 use rig_fit::{Fit, RigProblem, Term};
-use selection::{Problem, alternatives, select};
+use selection::{Problem, Selected, select};
 use serde::Serialize;
 use std::error::Error;
 use std::fs;
@@ -86,9 +86,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let engine = Engine::new(&records, &rig);
         let linked = records.iter().any(|record| record.linked);
         let problem = RigProblem::new(&engine, Candidate::all(&rig, measured, linked, &[]));
-        let fit = select(&problem, &mut |fit, criterion| eprintln!("BIC {criterion:.1}: {}", described(fit)));
-        let fit = fit.ok_or("the rig file's own model cannot be simulated")?;
-        report_of(&problem, &fit, |at, factor| {
+        let found =
+            select(&problem, &mut |fit, criterion| eprintln!("BIC {criterion:.1}: {}", described(fit)));
+        let found = found.ok_or("the rig file's own model cannot be simulated")?;
+        report_of(&problem, &found, |at, factor| {
             let (value, unit) = PARAMETERS[at].value(&rig, measured);
             (value, value * factor, unit)
         })
@@ -106,21 +107,20 @@ fn described(fit: &Fit) -> String {
     fit.terms.iter().map(term).collect::<Vec<_>>().join(", ")
 }
 
-/// The report of a fit; `of_parameter` gives a parameter's value in the file, its value times a factor, and its unit.
+/// The report of what was selected; `of_parameter` gives a parameter's value in the file, its value times a factor, and its unit.
 fn report_of(
     problem: &RigProblem<'_>,
-    fit: &Fit,
+    Selected { fit, alternatives }: &Selected<RigProblem<'_>>,
     of_parameter: impl Fn(usize, f64) -> (f64, f64, &'static str),
 ) -> Report {
     let errors = fit.standard_errors(problem.count());
     let mut errors = errors.iter();
     let (mut named, mut parameters) = (Vec::new(), Vec::new());
-    for (place, term) in fit.terms.iter().enumerate() {
+    for (term, others) in fit.terms.iter().zip(alternatives) {
         match term {
             Term::Effect { candidate, coordinates } => {
                 let errors: Vec<f64> = errors.by_ref().take(coordinates.len()).copied().collect();
-                let others = alternatives(problem, fit, place);
-                let others = others.iter().filter_map(|fit| match fit.terms.last()? {
+                let others = others.iter().filter_map(|term| match term {
                     Term::Effect { candidate, coordinates } => {
                         Some(entry(candidate, coordinates, &[], Vec::new()))
                     }

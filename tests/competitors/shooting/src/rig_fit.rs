@@ -67,7 +67,6 @@ impl Term {
 /// A fitted model.
 pub(crate) struct Fit {
     pub(crate) terms: Vec<Term>,
-    simulated: Vec<f64>,
     residual: DVector<f64>,
     squares: f64,
     /// Sensitivities to all numbers of the terms, one column each.
@@ -133,19 +132,20 @@ impl<'a> RigProblem<'a> {
         let residual = DVector::from_vec(self.engine.residual(&simulated));
         let squares = residual.norm_squared();
         let columns = DMatrix::zeros(residual.len(), 0);
-        squares.is_finite().then_some(Fit { terms, simulated, residual, squares, columns })
+        squares.is_finite().then_some(Fit { terms, residual, squares, columns })
     }
 
     /// Sensitivities at a fit by one-sided differences that stay inside the ranges.
     fn columns(&self, fit: &Fit) -> Option<DMatrix<f64>> {
         let mut columns = Vec::new();
+        let coarse = self.engine.simulate_coarsely(&self.rig(&fit.terms)?);
         for (at, term) in fit.terms.iter().enumerate() {
             for (key, (number, [_, most])) in term.numbers().into_iter().enumerate() {
                 let change = if number + term.change() > most { -term.change() } else { term.change() };
                 let mut terms = fit.terms.clone();
                 terms[at].set(key, number + change);
-                let simulated = self.engine.simulate(&self.rig(&terms)?);
-                let column = DVector::from_vec(self.engine.difference(&simulated, &fit.simulated));
+                let simulated = self.engine.simulate_coarsely(&self.rig(&terms)?);
+                let column = DVector::from_vec(self.engine.difference(&simulated, &coarse));
                 columns.push(column / change);
             }
         }

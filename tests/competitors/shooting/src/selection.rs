@@ -74,22 +74,33 @@ fn without<P: Problem>(problem: &P, fit: &P::Fit, at: usize) -> Option<P::Fit> {
     problem.fit_roughly(&terms)
 }
 
+/// A model, and of each of its terms the others that explained the record as well when it was taken, alone at its place.
+pub(crate) struct Selected<P: Problem> {
+    pub(crate) fit: P::Fit,
+    pub(crate) alternatives: Vec<Vec<P::Term>>,
+}
+
 /// The model of least criterion; `None` where not even one without terms can be simulated.
-pub(crate) fn select<P: Problem>(problem: &P, progress: &mut dyn FnMut(&P::Fit, f64)) -> Option<P::Fit> {
+pub(crate) fn select<P: Problem>(problem: &P, progress: &mut dyn FnMut(&P::Fit, f64)) -> Option<Selected<P>> {
     let mut best = problem.fit(&[])?;
     let mut least = criterion(problem, &best);
+    let mut alternatives: Vec<Vec<P::Term>> = Vec::new();
     progress(&best, least);
     while P::terms(&best).len() < MOST_TERMS {
-        let Some((next, fit)) = tried(problem, &best).into_iter().next().filter(|(next, _)| *next < least)
-        else {
-            break;
-        };
+        let tried = tried(problem, &best);
+        let as_good = tried.iter().skip(1).take_while(|(next, _)| tried[0].0 + AS_GOOD > *next);
+        let others = as_good.filter_map(|(_, fit)| P::terms(fit).last().cloned()).collect();
+        let Some((next, fit)) = tried.into_iter().next().filter(|(next, _)| *next < least) else { break };
         (least, best) = (next, fit);
+        alternatives.push(others);
         // What came last is not asked: it was just taken.
         let mut at = 0;
         while at + 1 < P::terms(&best).len() {
             match without(problem, &best, at).map(|fit| (criterion(problem, &fit), fit)) {
-                Some((next, fit)) if next < least => (least, best) = (next, fit),
+                Some((next, fit)) if next < least => {
+                    (least, best) = (next, fit);
+                    alternatives.remove(at);
+                }
                 _ => at += 1,
             }
         }
@@ -97,21 +108,7 @@ pub(crate) fn select<P: Problem>(problem: &P, progress: &mut dyn FnMut(&P::Fit, 
         least = criterion(problem, &best);
         progress(&best, least);
     }
-    Some(best)
-}
-
-/// Terms that explain a record as well in place of one of a model, the best first.
-pub(crate) fn alternatives<P: Problem>(problem: &P, fit: &P::Fit, at: usize) -> Vec<P::Fit> {
-    let least = criterion(problem, fit);
-    let own = &P::terms(fit)[at];
-    let Some(rest) = without(problem, fit, at).and_then(|rest| problem.fit(P::terms(&rest))) else {
-        return Vec::new();
-    };
-    let others = tried(problem, &rest).into_iter().filter(|(next, _)| *next < least + AS_GOOD);
-    others
-        .map(|(_, fit)| fit)
-        .filter(|fit| P::terms(fit).last().is_some_and(|term| !P::is_same(term, own)))
-        .collect()
+    Some(Selected { fit: best, alternatives })
 }
 
 #[cfg(test)]
@@ -190,7 +187,7 @@ mod tests {
     }
 
     fn chosen(amplitudes: &[(usize, f64)]) -> Vec<usize> {
-        let mut terms = select(&problem(amplitudes), &mut |_, _| ()).unwrap().terms;
+        let mut terms = select(&problem(amplitudes), &mut |_, _| ()).unwrap().fit.terms;
         terms.sort_unstable();
         terms
     }
@@ -214,9 +211,8 @@ mod tests {
         let mut twins = problem(&[(5, 1.0)]);
         let twin = twins.columns.column(5) + 0.01 * twins.columns.column(8);
         twins.columns.set_column(3, &twin);
-        let fit = select(&twins, &mut |_, _| ()).unwrap();
+        let Selected { fit, alternatives } = select(&twins, &mut |_, _| ()).unwrap();
         assert_eq!(fit.terms.len(), 1);
-        let others: Vec<usize> = alternatives(&twins, &fit, 0).iter().map(|fit| fit.terms[0]).collect();
-        assert_eq!(others, [if fit.terms[0] == 5 { 3 } else { 5 }]);
+        assert_eq!(alternatives, [[if fit.terms[0] == 5 { 3 } else { 5 }]]);
     }
 }
