@@ -17,7 +17,7 @@ def without_series(report: bytes) -> bytes:
         own = json.loads(report)
     except ValueError:
         return report
-    own["location"] = None
+    own["location"] = {"dependence": (own.get("location") or {}).get("dependence")}
     own["candidates"] = own.get("candidates", [])[:5]
     own["detection_limits"] = []
     if own.get("outside"):
