@@ -130,16 +130,12 @@ impl Scene {
     /// Waits until measurement.csv of the emulator's folder holds so many lines: the run is under way, and recorded.
     pub fn wait_for_rows(&self, folder: &str, least: usize) {
         let path = self.path(folder).join("measurement.csv");
-        let rows =
-            || std::fs::read(&path).map_or(0, |bytes| bytes.iter().filter(|byte| **byte == b'\n').count());
-        wait_until(&format!("{least} rows in {}", path.display()), || rows() >= least);
+        wait_until(&format!("{least} rows in {}", path.display()), || rows(&path) >= least);
     }
 
     /// Waits until the emulator has recorded so many more rows than now: it still runs, and goes on.
     pub fn wait_for_more_rows(&self, folder: &str, more: usize) {
-        let text = std::fs::read(self.path(folder).join("measurement.csv")).unwrap_or_default();
-        let now = text.iter().filter(|byte| **byte == b'\n').count();
-        self.wait_for_rows(folder, now + more);
+        self.wait_for_rows(folder, rows(&self.path(folder).join("measurement.csv")) + more);
     }
 
     pub fn same(&self, one: &Path, other: &Path) -> bool {
@@ -147,4 +143,9 @@ impl Scene {
             |path: &Path| std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         read(one) == read(other)
     }
+}
+
+/// Lines of a file; none of one that cannot be read.
+fn rows(path: &Path) -> usize {
+    std::fs::read(path).map_or(0, |bytes| memchr::memchr_iter(b'\n', &bytes).count())
 }
