@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Packs what a program said in a study, without the series that its pages draw: pack.py STUDY LABEL OUT.tar.xz
+"""Packs what a program said in a study, as far as a score reads it: pack.py STUDY LABEL OUT.tar.xz
 
-The archive is a study's folder again: `tar -C DIR -xJf OUT.tar.xz`; then the same campaign goes on, and `score` reads it.
+The archive is a study's folder again but for draws.json, which `scripts/study draws` writes from the seed:
+`tar -C DIR -xJf OUT.tar.xz`; then the same campaign goes on, and `score` and `worlds` read it.
 """
 
 import io
@@ -11,19 +12,40 @@ import tarfile
 from pathlib import Path
 
 
-def without_series(report: bytes) -> bytes:
-    """The report without what only pictures and long tables need; one that is no JSON as it is."""
+# What no score reads.
+UNREAD = ["checks", "carried", "remaining", "misfit", "small", "insignificant", "inputs"]
+DIGITS = 6
+
+
+def rounded(value: object) -> object:
+    """Numbers to some significant digits."""
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}")
+    if isinstance(value, dict):
+        return {key: rounded(inner) for key, inner in value.items()}
+    return [rounded(inner) for inner in value] if isinstance(value, list) else value
+
+
+def scored(report: bytes) -> bytes:
+    """What a score reads of a report; one that is no JSON as it is."""
     try:
         own = json.loads(report)
     except ValueError:
         return report
-    own["location"] = {"dependence": (own.get("location") or {}).get("dependence")}
-    own["candidates"] = own.get("candidates", [])[:5]
+    for key in UNREAD:
+        own.pop(key, None)
+    dependence = (own.get("location") or {}).get("dependence")
+    if dependence:
+        dependence["variables"] = [{"variable": one["variable"]} for one in dependence["variables"]]
+    own["location"] = {"dependence": dependence}
+    own["candidates"] = []
     own["detection_limits"] = []
+    for explanation in own.get("explanations") or []:
+        explanation.pop("evidence", None)
     if own.get("outside"):
         own["outside"]["curve"] = None
         own["outside"]["surface"] = None
-    return json.dumps(own, separators=(",", ":")).encode()
+    return json.dumps(rounded(own), separators=(",", ":")).encode()
 
 
 def add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
@@ -39,14 +61,13 @@ def main() -> int:
     study, label, out = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
     draws = 0
     with tarfile.open(out, "w:xz", preset=9) as archive:
-        add(archive, "draws.json", (study / "draws.json").read_bytes())
         for result in sorted((study / "runs" / label).glob("*/result.json")):
             draws += 1
             name = f"runs/{label}/{result.parent.name}"
             add(archive, f"{name}/result.json", result.read_bytes())
             report = result.with_name("report.json")
             if report.exists():
-                add(archive, f"{name}/report.json", without_series(report.read_bytes()))
+                add(archive, f"{name}/report.json", scored(report.read_bytes()))
         for own in sorted((study / "classes").glob("*.json")):
             add(archive, f"classes/{own.name}", own.read_bytes())
     print(f"{out}: {draws} draws")
