@@ -83,6 +83,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     } else {
         let measured = records[0].measured;
+        if records.iter().any(|record| record.measured != measured) {
+            return Err("the records do not show the same axes".into());
+        }
         let engine = Engine::new(&records, &rig);
         let linked = records.iter().any(|record| record.linked);
         let problem = RigProblem::new(&engine, Candidate::all(&rig, measured, linked, &[]));

@@ -69,7 +69,7 @@ pub(crate) struct Fit {
     pub(crate) terms: Vec<Term>,
     residual: DVector<f64>,
     squares: f64,
-    /// Sensitivities to all numbers of the terms, one column each.
+    /// Sensitivities to all numbers of the terms, one column each; none of a rough fit.
     columns: DMatrix<f64>,
 }
 
