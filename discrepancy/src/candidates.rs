@@ -22,8 +22,8 @@ use plant::parameters::ParameterError;
 const DECADES: f64 = 30.0;
 /// Neutral values from which on a key counts as neutral at infinity, as a multiple of the largest drawn one.
 const FAR: f64 = 10.0;
-/// Largest coordinate of a fit: half more than the strongest that occurs.
-const FARTHEST: f64 = 1.5;
+/// Largest coordinate of a fit, three times the strongest that is drawn: one standard deviation of the prior.
+const FARTHEST: f64 = 3.0;
 
 /// Effects whose traces are nonlinear in the amplitude.
 const NONLINEAR_IN_AMPLITUDE: [&str; 6] = [
@@ -141,7 +141,7 @@ impl Candidate {
     }
 
     /// An effect at a place, beside what the rig file has there.
-    pub(crate) fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
+    pub fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
         let effect = rig.effects().iter().find(|effect| effect.name == sheet.name && effect.place == place);
         let present = effect.map(|effect| {
             let mut numbers = [0.0; MOST_KEYS];
@@ -224,7 +224,17 @@ impl Candidate {
         self.scale(key).slope(coordinate)
     }
 
-    pub(crate) fn coordinate(&self, key: usize, number: f64) -> f64 {
+    /// Standard error of a key's number: half of the farther end of two standard errors of its coordinate, within the key's
+    /// range. Where a number is not linear in its coordinate, the slope alone is too narrow towards the neutral value.
+    pub fn standard_error(&self, key: usize, coordinate: f64, error: f64) -> f64 {
+        let (scale, sheet_key) = (self.scale(key), &self.sheet.keys[key]);
+        let number = scale.number(coordinate);
+        let ends = [-2.0, 2.0].map(|errors| scale.number(coordinate + errors * error));
+        let away = |end: f64| 0.5 * (end.clamp(sheet_key.min, sheet_key.max) - number).abs();
+        (error * scale.slope(coordinate).abs()).max(away(ends[0])).max(away(ends[1]))
+    }
+
+    pub fn coordinate(&self, key: usize, number: f64) -> f64 {
         self.scale(key).coordinate(number)
     }
 
@@ -301,6 +311,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_standard_error_reaches_the_farther_end_where_a_number_is_not_linear() {
+        let all = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]);
+        let of = |name: &str| *all.iter().find(|candidate| candidate.sheet.name == name).unwrap();
+        let inclination = of("inclination");
+        let slope = inclination.slope(0, 0.5).abs();
+        assert!((inclination.standard_error(0, 0.5, 0.01) - 0.01 * slope).abs() < 1e-9);
+        // An orifice whose neutral size is infinite: two errors up are far off, two errors down are not.
+        let valve = of("check-valve-restriction");
+        let z = valve.coordinate(1, 20.0);
+        let [up, down] = [-0.4, 0.4].map(|share| valve.effect_parameters(&[0.0, z * (1.0 + share)])[1]);
+        let error = valve.standard_error(1, z, 0.2 * z);
+        assert!(
+            (error - 0.5 * (up - 20.0)).abs() < 1e-9 && error > 0.7 * (20.0 - down),
+            "{error} {up} {down}"
+        );
     }
 
     #[test]

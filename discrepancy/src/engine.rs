@@ -44,6 +44,8 @@ pub struct Engine<'a> {
     scaled_dof: Vec<f64>,
     /// Common variance factor of the noise, by the quietest windows.
     variance_factor: f64,
+    /// Whether [`Engine::simulate`] takes longer steps.
+    coarse: bool,
     /// Cache of sensitivities, latest last.
     kept: Mutex<Vec<Sensitivities>>,
 }
@@ -51,6 +53,15 @@ pub struct Engine<'a> {
 impl<'a> Engine<'a> {
     /// An engine of some records of the same axes.
     pub fn new(records: &'a [GriddedRecord], rig: &RigParameters) -> Self {
+        Self::with_steps(records, rig, false)
+    }
+
+    /// An engine to compare models: its steps are twice as long. Where rods are linked, contacts need the short ones.
+    pub(crate) fn for_search(records: &'a [GriddedRecord], rig: &RigParameters) -> Self {
+        Self::with_steps(records, rig, !records.iter().any(|record| record.linked))
+    }
+
+    fn with_steps(records: &'a [GriddedRecord], rig: &RigParameters, coarse: bool) -> Self {
         let windows: Vec<Windows<'a>> = records.par_iter().map(|record| Windows::new(record, rig)).collect();
         let axis_by_axis = windows.iter().all(Windows::axes_are_apart);
         let rows = windows.first().map_or(0, Windows::rows) / if axis_by_axis { 2 } else { 1 };
@@ -62,6 +73,7 @@ impl<'a> Engine<'a> {
             rows,
             scaled_dof,
             variance_factor: 1.0,
+            coarse,
             kept: Mutex::default(),
         };
         let residual = engine.residual(&engine.simulate(rig));
@@ -87,6 +99,7 @@ impl<'a> Engine<'a> {
             rows: self.rows,
             scaled_dof,
             variance_factor: self.variance_factor,
+            coarse: self.coarse,
             kept: Mutex::default(),
         }
     }
@@ -127,14 +140,25 @@ impl<'a> Engine<'a> {
         &self.scaled_dof
     }
 
+    /// Whether [`Engine::simulate`] takes the plant's own steps.
+    pub(crate) fn is_exact(&self) -> bool {
+        !self.coarse
+    }
+
     /// Readings of a rig over their noise, all records.
     pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
+        if self.coarse {
+            return self.simulate_coarsely(rig);
+        }
         self.windows.iter().flat_map(|windows| windows.simulate(rig)).collect()
     }
 
     /// The same with half the step, to estimate the error of integration.
     pub(crate) fn simulate_finely(&self, rig: &RigParameters) -> Vec<f64> {
-        self.windows.iter().flat_map(|windows| windows.simulate_finely(rig)).collect()
+        let simulate = |windows: &Windows<'a>| {
+            if self.coarse { windows.simulate(rig) } else { windows.simulate_finely(rig) }
+        };
+        self.windows.iter().flat_map(simulate).collect()
     }
 
     /// The same with longer steps, for differences.

@@ -43,18 +43,16 @@ use heterogeneity::{
     Heterogeneity, eliminate_heterogeneous, heterogeneity, parameter_spread, prefer_homogeneous, prefer_large,
 };
 use model_fit::estimator::RELINEARISED;
+pub(crate) use needed_parameters::off;
 use needed_parameters::with_needed;
-pub(crate) use needed_parameters::{is_off, off};
 use null_distribution::NullDistribution;
 use plant::effects::sheet::Part;
 use rayon::prelude::*;
 use round::Round;
 use start_states::{RefitWithInitialStates, refit_with_starts};
 
-/// Maximum number of effects.
+/// Maximum number of effects, those below the amplitude floor included.
 const MAX_EFFECTS: usize = 3;
-/// The same where the model leaves more than noise, those below the amplitude floor included.
-const MAX_ROUNDS: usize = 6;
 /// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
 /// Mean log ratio of a window's chi2 to its degrees of freedom above which a model shows lack of fit (is inadequate).
@@ -146,7 +144,7 @@ pub fn name(
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
     let mut any_homogeneous = false;
-    for number in 0..MAX_ROUNDS {
+    for number in 0..MAX_EFFECTS {
         let here = restarted.as_ref().unwrap_or(engine);
         let model = &selection.model;
         let screening =
@@ -170,7 +168,7 @@ pub fn name(
         let Some(best) = round.fits.first_mut() else { break };
         // The null distribution is drawn from the residual of the best model, since explained signal is not noise. No threshold
         // applies here: an effect that turns out unnecessary is eliminated at the end.
-        if !homogeneous && (number >= MAX_EFFECTS || !gains_enough(here, model, best)) {
+        if !homogeneous && !gains_enough(here, model, best) {
             break;
         }
         any_homogeneous |= homogeneous;

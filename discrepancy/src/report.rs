@@ -34,7 +34,8 @@ pub struct Report {
     pub small: Vec<NamedEffect>,
     /// Baseline parameters that were significantly off.
     pub parameters: Vec<Quantity>,
-    /// Parameters that the model moved by an insignificant amount; the extended rig file has them.
+    /// Parameters that the model moved by an insignificant amount, or beside something outside the catalogue; the extended rig
+    /// file has them.
     #[serde(rename = "carried")]
     pub(crate) insignificant: Vec<Quantity>,
     /// Whether the model of the search leaves no more than noise on the searched part of the training records, and the verdict is

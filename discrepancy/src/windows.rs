@@ -24,6 +24,7 @@ mod whiten;
 use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::sensor_inverse::SensorInverse;
 pub(crate) use input_responses::{BLOCK, BLOCKS, InputProducts, UnknownKind};
+use plant::effects::sheet::Part;
 use plant::{Batch, Inputs, Plant, RigParameters};
 pub use reference_run::{ReferenceRun, VariableRanges};
 use starts::START_PASSES;
@@ -135,6 +136,12 @@ impl<'a> Windows<'a> {
     /// Whether the residuals of the axes have nothing to do with each other: both are measured, and their rods are not linked.
     pub(crate) fn axes_are_apart(&self) -> bool {
         self.record.measured == [true, true] && !self.record.linked
+    }
+
+    /// Whether a start state of one axis moves no reading of the other: the same, with nothing that feeds both.
+    fn axes_are_independent(&self) -> bool {
+        let joins = |part: Part| matches!(part, Part::Linkage | Part::Supply);
+        self.axes_are_apart() && !self.rig.effects().iter().any(|effect| joins(effect.place.part))
     }
 
     /// Degrees of freedom of each window, or of each axis in it.

@@ -18,7 +18,7 @@ use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, add_terms, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::locate::{UnknownSeries, locate};
-use crate::name::{SelectionResult, is_off, on_all};
+use crate::name::{SelectionResult, on_all};
 use crate::outside::outside;
 use crate::page::Pictures;
 use crate::parameters::{COUNT, with_factors};
@@ -173,10 +173,10 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     if part.is_some() {
         progress(&format!("searching {:.0} % of the records", 1e2 * inputs.searched_share));
     }
-    let engine = Engine::new(part.as_ref().unwrap_or(&records), rig);
+    let engine = Engine::for_search(part.as_ref().unwrap_or(&records), rig);
     let linked = records.iter().any(|record| record.linked);
     let mut found = searched_for(&engine, &records, task, progress);
-    if part.is_some() {
+    if part.is_some() || !engine.is_exact() {
         progress("fitting what was found on all of the records");
         on_all(&Engine::new(&records, rig), &mut found);
     }
@@ -202,8 +202,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
                     reported.added = true;
                     reported.tables = found.terms;
                     reported.share_explained = Some(found.share_explained);
-                    (report.parameters, report.insignificant) =
-                        found.parameters.into_iter().partition(is_off);
+                    report.insignificant = found.parameters;
                 }
                 Err(why_not) => reported.why_not = Some(why_not),
             }

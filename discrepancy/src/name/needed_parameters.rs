@@ -11,7 +11,6 @@ use super::gauss_newton::fit_selected;
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::refit::{Refit, coordinate_columns, linearise, prior_precisions, rig_of};
-use crate::report::Quantity;
 
 /// Rise of the loss at which a parameter is kept: three and a half standard errors.
 const NEEDED: f64 = 12.0;
@@ -35,12 +34,6 @@ pub(crate) fn off(engine: &Engine<'_>, model: &Refit) -> [bool; COUNT] {
     }
     let shifts = integration_shifts(engine, model).unwrap_or([0.0; COUNT]);
     std::array::from_fn(|at| off[at] && by[at] > OFF_ERRORS * errors[at] + OFF_SHIFTS * shifts[at])
-}
-
-/// Whether a parameter of the rig file is off by as much, the error of integration aside.
-pub(crate) fn is_off(quantity: &Quantity) -> bool {
-    let (Some(before), Some(error)) = (quantity.before, quantity.standard_error) else { return false };
-    is_significant(((quantity.value - before) / before).abs(), error / before.abs())
 }
 
 /// Whether a relative deviation with this standard error makes a parameter off.

@@ -40,6 +40,9 @@ const RELINEARISED: usize = 3;
 const CLOSE: f64 = 0.02;
 /// The backlash of the linkage. Screening underrates it, since the start states were estimated without it.
 const BACKLASH: &str = "coupling-backlash";
+/// Effects of a model from which on no other widths of it are tried: what is left is small by then, and each width has start
+/// states of its own.
+const BACKLASH_BESIDE: usize = 2;
 
 struct Contenders {
     null_loss: f64,
@@ -168,6 +171,7 @@ impl<'a> Round<'a> {
         round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
         let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
         if let Some(backlash) = backlash
+            && model.placed.len() < BACKLASH_BESIDE
             && least > LACK_OF_FIT_PER_DOF * engine.scaled_dof().iter().sum::<f64>()
         {
             progress("trying other gaps");

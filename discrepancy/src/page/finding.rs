@@ -64,9 +64,13 @@ pub(super) fn finding(report: &Report) -> String {
         text += &quantities("Parameters", "parameter", &report.parameters, |_| String::new());
     }
     if !report.insignificant.is_empty() {
-        text += &paragraph(
-            "Moved along with the fit, by too little to call them off; the extended rig file has them as well:",
-        );
+        let why = if report.verdict == Verdict::OutsideCatalogue {
+            "while something is missing, whether they are off cannot be told"
+        } else {
+            "by too little to call them off"
+        };
+        text +=
+            &paragraph(&format!("Moved along with the fit, {why}; the extended rig file has them as well:"));
         text += &quantities("Moved along", "parameter", &report.insignificant, |_| String::new());
     }
     if let Some(doubt) = report.fit.and_then(Convergence::doubt) {

@@ -82,11 +82,12 @@ impl NullPower {
     /// leaves more than noise, since start states are known to micrometres only.
     fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
         let outputs = model.windows.outputs().len();
+        let sensitivities = model.windows.sensitivities();
         let left: Vec<f64> = (0..RECORDS)
             .into_par_iter()
             .map(|draw| {
                 let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw));
-                let windows = model.windows.redrawn(&model.simulated, &mut random);
+                let windows = model.windows.redrawn(&model.simulated, &sensitivities, &mut random);
                 let residual = windows.residual(&windows.simulate(windows.rig()));
                 let power = Power::new(&sums(&residual, outputs), &self.expected, outputs);
                 joint(&power.divided_by_levels(&levels(&power, self)))

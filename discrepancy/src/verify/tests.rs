@@ -154,3 +154,29 @@ fn a_law_over_time_goes_on_in_the_time_of_the_whole_record_where_a_part_is_searc
     // What a window has not forgotten of the one before, against 12 to 24 N.
     assert!(kept < 3.0 && lost > 100.0, "{kept} {lost}");
 }
+
+#[test]
+fn start_states_of_axes_that_do_not_act_on_each_other_are_nudged_together() {
+    let rig = RigParameters::baseline();
+    let mut record = record(&rig, &rig, 6);
+    // The load does what the drive does.
+    record.measured = [true, true];
+    record.noise[1] = record.noise[0];
+    record.inputs.iter_mut().for_each(|inputs| inputs.valve[1] = inputs.valve[0]);
+    record.samples.iter_mut().for_each(|samples| samples[1] = samples[0]);
+    record.points.iter_mut().for_each(|points| points[1] = points[0]);
+    let together = Windows::new(&record, &rig).sensitivities();
+    // A regulator that hardly gives way feeds both axes: each is nudged by itself.
+    let droop = [("droop_bar", 1e-6), ("volume_cm3", 1000.0)];
+    let fed = rig.with_effect("supply-droop", "supply", &droop).unwrap();
+    let alone = Windows::new(&record, &fed).sensitivities();
+    assert_eq!(together.len(), alone.len());
+    let norm = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt();
+    for (together, alone) in together.iter().zip(&alone) {
+        assert_eq!([together.len(), alone.len()], [2 * AxisState::NUDGES.len(); 2]);
+        for (one, other) in together.iter().zip(alone) {
+            let difference: Vec<f64> = one.iter().zip(other).map(|(one, other)| one - other).collect();
+            assert!(norm(&difference) < 0.02 * norm(other), "{} {}", norm(&difference), norm(other));
+        }
+    }
+}

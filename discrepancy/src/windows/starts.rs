@@ -5,7 +5,7 @@ use crate::gridded_record::{AxisState, GriddedRecord};
 use nalgebra::{DMatrix, DVector};
 use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
 use rand_pcg::Pcg64;
-use std::iter::once;
+use std::borrow::Cow;
 
 /// Largest move of a start state in one step where the rods are linked.
 const MOST_STEP: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
@@ -29,22 +29,30 @@ const PRIOR_STD: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 /// Lower bound of a chamber's absolute pressure, Pa.
 const LEAST_PA: f64 = 1e4;
 
+/// By window and number of the start state.
+type Sensitivities<'s> = Cow<'s, [Vec<Vec<f64>>]>;
+
 impl Windows<'_> {
     /// Estimates the start states in `passes` passes (linked records always), then their sensitivities.
     pub(super) fn estimate_starts(mut self, passes: usize) -> Self {
+        self.estimate_starts_by(passes, |windows| Cow::Owned(windows.sensitivities()));
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+        self
+    }
+
+    /// Estimates the start states with these sensitivities in each pass.
+    fn estimate_starts_by<'s>(&mut self, passes: usize, sensitivities: impl Fn(&Self) -> Sensitivities<'s>) {
         self.choose_rates();
         if self.record.linked {
             // A micrometre of the eye in its gap is two newtons, so the record's points are too coarse. A grid search finds the
             // side of the gap, then Gauss-Newton starts there.
             for shifts_m in SHIFTS_M {
                 self.shift_linked(&shifts_m);
-                self.improve_starts(LINKED_PASSES);
+                self.improve_starts(LINKED_PASSES, &sensitivities);
             }
         } else {
-            self.improve_starts(passes);
+            self.improve_starts(passes, &sensitivities);
         }
-        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
-        self
     }
 
     /// Replaces the speed of a start state by an indistinguishable one where the readings fit better.
@@ -78,7 +86,7 @@ impl Windows<'_> {
 
     /// Gauss-Newton on the start state of each window. Steps that raise the squares, as around a break-away, are undone and
     /// shortened.
-    fn improve_starts(&mut self, passes: usize) {
+    fn improve_starts<'s>(&mut self, passes: usize, sensitivities: &impl Fn(&Self) -> Sensitivities<'s>) {
         if passes == 0 {
             return;
         }
@@ -87,7 +95,7 @@ impl Windows<'_> {
         let mut shares = vec![1.0; self.starts.len()];
         for _ in 0..passes {
             let points = self.points.clone();
-            self.move_starts(&left, &shares);
+            self.move_starts(&sensitivities(self), &left, &shares);
             let new = self.raw_residual(&self.simulate(&self.rig));
             let windows = left.chunks_exact_mut(rows).zip(new.chunks_exact(rows));
             for ((left, new), (start, share)) in windows.zip(self.starts.iter().zip(&mut shares)) {
@@ -103,10 +111,10 @@ impl Windows<'_> {
     }
 
     /// Moves the start states by a fraction of the step, one for each window; `left` is the residual.
-    fn move_starts(&mut self, left: &[f64], shares: &[f64]) {
+    fn move_starts(&mut self, sensitivities: &[Vec<Vec<f64>>], left: &[f64], shares: &[f64]) {
         let rows = self.rows();
         let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
-        for (at, columns) in self.sensitivities().iter().enumerate() {
+        for (at, columns) in sensitivities.iter().enumerate() {
             let residual = &left[at * rows..][..rows];
             let count = columns.len();
             // Prior precision, in units of the prior standard deviation.
@@ -173,37 +181,49 @@ impl Windows<'_> {
     }
 
     /// A synthetic record of this rig in the same windows: `simulated` plus drawn noise. Its start states are estimated anew from
-    /// the record's points.
-    pub(crate) fn redrawn(&self, simulated: &[f64], random: &mut Pcg64) -> Self {
+    /// the record's points, by Gauss-Newton with these `sensitivities` of the windows.
+    pub(crate) fn redrawn(
+        &self,
+        simulated: &[f64],
+        sensitivities: &[Vec<Vec<f64>>],
+        random: &mut Pcg64,
+    ) -> Self {
         let noise = self.raw_noise(random);
         let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + noise).collect();
         let points = (0..self.points.len()).map(|window| self.record.points[window * WINDOW]).collect();
-        Windows { points, readings, bases: Vec::new(), ..self.clone() }.estimate_starts(START_PASSES)
+        let mut windows = Windows { points, readings, ..self.clone() };
+        windows.estimate_starts_by(START_PASSES, |_| Cow::Borrowed(sensitivities));
+        windows
     }
 
-    /// Sets the measured axes of a plant to the start state of a window, with one number nudged.
-    fn set_state(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
-        let mut points = self.points[start / WINDOW];
-        if let Some((axis, number)) = nudged {
-            points[axis] = points[axis].nudged(number);
+    /// What one simulation nudges: of which axes, which number of the start state. Axes that do not act on each other are nudged
+    /// together.
+    fn nudges(&self) -> Vec<(Vec<usize>, usize)> {
+        let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
+        let numbers = 0..AxisState::NUDGES.len();
+        if self.axes_are_independent() {
+            return numbers.map(|number| (measured.clone(), number)).collect();
         }
-        set_state(plant, self.record, start, &points);
+        measured.iter().flat_map(|axis| numbers.clone().map(|number| (vec![*axis], number))).collect()
     }
 
-    /// Sensitivities of the readings to each number of the start state, per prior standard deviation.
-    pub(super) fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
+    /// Sensitivities of the readings to each number of the start state, per prior standard deviation, axis by axis.
+    pub(crate) fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
         let mut plant = self.plant(&self.rig).with_substeps(COARSE_SUBSTEPS);
         let rows = self.rows();
-        let nudges: Vec<(usize, usize)> = (0..2)
-            .filter(|axis| self.record.measured[*axis])
-            .flat_map(|axis| (0..AxisState::NUDGES.len()).map(move |number| (axis, number)))
-            .collect();
+        let nudges = self.nudges();
         let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             let judged = self.starts.get(all.len()) == Some(&start);
-            let mut plants = vec![plant; 1 + if judged { nudges.len() } else { 0 }];
-            for (plant, nudged) in plants.iter_mut().zip(once(None).chain(nudges.iter().copied().map(Some))) {
-                self.set_state(plant, start, nudged);
+            let points = self.points[start / WINDOW];
+            set_state(&mut plant, self.record, start, &points);
+            let mut plants = vec![plant];
+            for (axes, number) in nudges.iter().filter(|_| judged) {
+                let mut points = points;
+                axes.iter().for_each(|axis| points[*axis] = points[*axis].nudged(*number));
+                let mut nudged = plants[0].clone();
+                set_state(&mut nudged, self.record, start, &points);
+                plants.push(nudged);
             }
             let mut read = vec![Vec::with_capacity(rows); plants.len()];
             let mut batch = Batch::new(plants);
@@ -215,23 +235,43 @@ impl Windows<'_> {
             if !judged {
                 continue;
             }
-            let valid = &self.valid[all.len() * rows..][..rows];
             let straight = read.remove(0);
-            let columns = read.into_iter().zip(&nudges).map(|(mut column, (_, number))| {
-                for ((value, straight), valid) in column.iter_mut().zip(&straight).zip(valid) {
-                    *value = if *valid { *value - straight } else { 0.0 };
+            let mut columns: Vec<((usize, usize), Vec<f64>)> = Vec::new();
+            for ((axes, number), read) in nudges.iter().zip(&read) {
+                for axis in axes {
+                    let column = self.start_sensitivity(all.len(), *axis, *number, [read, &straight]);
+                    columns.push(((*axis, *number), column));
                 }
-                // Removes jumps that moved by a sample before the difference is scaled up.
-                self.flatten(&mut column, JUMP);
-                let scale = PRIOR_STD[*number] / AxisState::NUDGES[*number];
-                column.iter_mut().for_each(|value| *value *= scale);
-                self.whiten(all.len(), &mut column);
-                column
-            });
-            let columns = columns.collect();
-            all.push(columns);
+            }
+            columns.sort_by_key(|(of, _)| *of);
+            all.push(columns.into_iter().map(|(_, column)| column).collect());
         }
         all
+    }
+
+    /// Sensitivity of a window to a number of an axis' start state, of its readings with that number nudged and without.
+    fn start_sensitivity(
+        &self,
+        window: usize,
+        axis: usize,
+        number: usize,
+        [nudged, straight]: [&Vec<f64>; 2],
+    ) -> Vec<f64> {
+        let valid = &self.valid[window * self.rows()..][..self.rows()];
+        let alone = self.axes_are_independent();
+        let shows = self.outputs.iter().map(|(of, _)| !alone || *of == axis).cycle();
+        let mut column: Vec<f64> = nudged
+            .iter()
+            .zip(straight)
+            .zip(valid.iter().zip(shows))
+            .map(|((nudged, straight), (valid, shows))| if *valid && shows { nudged - straight } else { 0.0 })
+            .collect();
+        // Removes jumps that moved by a sample before the difference is scaled up.
+        self.flatten(&mut column, JUMP);
+        let scale = PRIOR_STD[number] / AxisState::NUDGES[number];
+        column.iter_mut().for_each(|value| *value *= scale);
+        self.whiten(window, &mut column);
+        column
     }
 }
 

@@ -24,7 +24,7 @@ pub fn explained(
     }
     on_shared_axes(&mut records)?;
     let searched = parts(&records, searched_share(&records));
-    let engine = Engine::new(&searched, &rig_file.rig);
+    let engine = Engine::for_search(&searched, &rig_file.rig);
     Ok(findings::explanations(&searched_for(&engine, &records, task, progress)))
 }
 

@@ -12,7 +12,7 @@ use crate::report::{
 
 pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report {
     let (mut named, mut small) = effects(found);
-    let (parameters, insignificant) = parameters(engine, found);
+    let (mut parameters, mut insignificant) = parameters(engine, found);
     let verdict = if found.not_explained.is_some() {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
@@ -34,6 +34,8 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     };
     if verdict == Verdict::OutsideCatalogue {
         small.clear();
+        // A fit without what is missing moves parameters that the file has right: none is called off.
+        insignificant.splice(..0, parameters.drain(..));
     }
     let (not_excited, detection_limits) = limits(found);
     Report {
@@ -110,7 +112,7 @@ fn named_effect(
             name: key.name.to_owned(),
             value: numbers[at],
             unit: key.unit.name().to_owned(),
-            standard_error: Some(errors[at] * candidate.slope(at, placed.coordinates[at]).abs())
+            standard_error: Some(candidate.standard_error(at, placed.coordinates[at], errors[at]))
                 .filter(|error| error.is_finite()),
             before: candidate.baseline(at),
         })
