@@ -16,6 +16,7 @@ use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, axis_of};
 use crate::folder::{FolderError, Plan, read};
 use crate::limits::threshold;
+use crate::nearest::NearestLaw;
 use crate::signature::{Observer, alike, length};
 use crate::trajectory::TrueTrajectory;
 use plant::effects::SHEETS;
@@ -56,6 +57,9 @@ pub struct HiddenClass {
     pub strength: f64,
     /// What is more than 0.8 alike, the most alike first; the first in any case.
     pub members: Vec<Member>,
+    /// The catalogue's law that is nearest to a hidden effect of another form.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearest: Option<NearestLaw>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -134,7 +138,13 @@ pub fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<DrawClasses
         members.truncate(reported.max(1));
         let two_sided = sheet.keys[0].signed;
         let strength = length(&own) / threshold(two_sided);
-        hidden_classes.push(HiddenClass { effect: hidden.name.to_owned(), place, strength, members });
+        hidden_classes.push(HiddenClass {
+            effect: hidden.name.to_owned(),
+            place,
+            strength,
+            members,
+            nearest: None,
+        });
     }
     Ok(DrawClasses { schema_version: SCHEMA_VERSION, number: draw.number, hidden: hidden_classes })
 }

@@ -5,6 +5,7 @@ use crate::classes::{Classes, DrawClasses, classes_of, read_draw};
 use crate::draws::Draw;
 use crate::folder::{FolderError, Study, write_whole};
 use crate::limits::{Limits, Measured, limits_in};
+use crate::nearest::nearest_law;
 use crate::signature::Observer;
 use crate::trajectory::{Point, TrueTrajectory, WINDOW};
 use plant::{Axis, AxisState, Inputs, ParameterError, RigParameters, State};
@@ -120,7 +121,12 @@ fn hiding(study: &Study) -> impl Iterator<Item = &Draw> {
 fn one(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
     let (number, rig) = (draw.number, RigParameters::baseline());
     let record = simulate(&draw.recipe, &rig).map_err(|error| ComputeError::Make { number, error })?;
-    let classes = classes_of(draw, trajectory(&record, &rig))?;
+    let mut classes = classes_of(draw, trajectory(&record, &rig))?;
+    if draw.recipe.foreign_form {
+        for (class, hidden) in classes.hidden.iter_mut().zip(&draw.recipe.hidden) {
+            class.nearest = nearest_law(draw, hidden)?;
+        }
+    }
     write_whole(&study.class(number), format!("{:#}\n", json!(classes)).as_bytes())?;
     Ok(())
 }

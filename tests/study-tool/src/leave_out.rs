@@ -207,7 +207,7 @@ mod tests {
         let classes = DrawClasses {
             schema_version: 1,
             number: draw.number,
-            hidden: vec![HiddenClass { effect, place, strength: 9.0, members }],
+            hidden: vec![HiddenClass { effect, place, strength: 9.0, members, nearest: None }],
         };
         let without = left_out(&draw, Some(&classes));
         assert_eq!(without, ["position-sensor-lag", "time-skew"]);

@@ -47,6 +47,7 @@ pub mod judge;
 pub mod leave_out;
 pub mod ledger;
 pub mod limits;
+pub mod nearest;
 pub mod page;
 pub mod probability;
 pub mod program;

@@ -235,7 +235,7 @@ fn case(
         })
     });
     let clear = over_limit.iter().all(|ratio| ratio.is_some_and(|ratio| ratio >= CLEAR));
-    let judgement = judge(draw, &members, &result.taken, &report);
+    let judgement = judge(&with_nearest_laws(draw, classes), &members, &result.taken, &report);
     let good = report.as_ref().ok().filter(|_| judgement.error.is_none());
     let left_out = if result.program.leave_out {
         let expectations = known.expectations.ok_or(ScoreError::NoExpectations)?;
@@ -267,6 +267,18 @@ fn case(
             "scripts/study one {step} --out {root} --draw {number} --label again --program PROGRAM"
         ),
     })
+}
+
+/// A draw whose effects of another form have the numbers of the nearest law.
+fn with_nearest_laws(draw: &Draw, classes: Option<&DrawClasses>) -> Draw {
+    let mut draw = draw.clone();
+    let classes = classes.map_or(&[][..], |classes| &classes.hidden);
+    for (hidden, class) in draw.recipe.hidden.iter_mut().zip(classes) {
+        if let Some(nearest) = &class.nearest {
+            hidden.numbers.clone_from(&nearest.numbers);
+        }
+    }
+    draw
 }
 
 fn parameters_off(draw: &Draw, report: &Report) -> Vec<f64> {

@@ -33,6 +33,7 @@
 use crate::trajectory::{POINT_NUMBERS, Point, TrueTrajectory, WINDOW};
 use nalgebra::DMatrix;
 use plant::{Inputs, Plant, RigParameters, State, Truth};
+use record_maker::{Record, Row};
 
 /// Readings of an axis: position, force, pressures a and b.
 const CHANNELS: usize = 4;
@@ -55,7 +56,7 @@ pub struct Observer {
 
 /// The whitened readings of a plant, and which of them stand next to an event.
 #[derive(Debug, Default)]
-struct Run {
+pub struct Run {
     readings: Vec<f64>,
     jumps: Vec<bool>,
 }
@@ -90,16 +91,51 @@ impl Observer {
 
     /// M J of a rig against the baseline.
     pub fn signature(&self, rig: &RigParameters) -> Vec<f64> {
+        self.between(&self.readings(rig), &self.baseline)
+    }
+
+    /// The readings of a rig.
+    pub fn readings(&self, rig: &RigParameters) -> Run {
+        self.run(rig).0
+    }
+
+    pub fn baseline(&self) -> &Run {
+        &self.baseline
+    }
+
+    /// The readings of the record that the trajectory is of, without noise.
+    pub fn observed(&self, record: &Record) -> Run {
+        let measured: Vec<usize> = (0..2).filter(|axis| self.trajectory.measured[*axis]).collect();
+        let whole = self.trajectory.windows() * WINDOW;
+        let rows = &record.rows[..whole];
+        let touches = |row: &Row| row.contact_force_n != 0.0;
+        let mut run = Run::default();
+        for (at, row) in rows.iter().enumerate() {
+            for axis in &measured {
+                let of = |row: &Row| (way(row.axes[*axis].rod_velocity_m_per_s), touches(row));
+                let near = [at.saturating_sub(1), (at + 1).min(whole - 1)];
+                let jumps = near.iter().any(|near| of(&rows[*near]) != of(row));
+                run.readings
+                    .extend(row.without_noise[*axis].iter().zip(self.noise).map(|(own, noise)| own / noise));
+                run.jumps.extend((0..CHANNELS).map(|channel| jumps && channel == FORCE));
+            }
+        }
+        run
+    }
+
+    /// M of the difference of two runs.
+    pub fn between(&self, run: &Run, from: &Run) -> Vec<f64> {
         let rows = self.rows();
-        let (Run { mut readings, jumps }, _) = self.run(rig);
-        readings.iter_mut().zip(&self.baseline.readings).for_each(|(own, baseline)| *own -= baseline);
-        readings[..rows].fill(0.0);
+        let mut differences: Vec<f64> =
+            run.readings.iter().zip(&from.readings).map(|(own, from)| own - from).collect();
+        differences[..rows].fill(0.0);
+        let jumps: Vec<bool> = run.jumps.iter().zip(&from.jumps).map(|(own, from)| *own || *from).collect();
         for ((difference, jumps), window) in
-            readings.chunks_exact_mut(rows).zip(jumps.chunks_exact(rows)).zip(&self.windows)
+            differences.chunks_exact_mut(rows).zip(jumps.chunks_exact(rows)).zip(&self.windows)
         {
             window.project(difference, jumps);
         }
-        readings
+        differences
     }
 
     pub fn rig(&self) -> &RigParameters {
@@ -228,9 +264,11 @@ fn basis(columns: &[f64], without: &[bool]) -> Vec<Vec<f64>> {
 
 /// Which way an axis goes, and whether the rods touch.
 fn phase(truth: &Truth, axis: usize) -> (i8, bool) {
-    let velocity = truth.axes[axis].rod_velocity_m_per_s;
-    let way = if velocity.abs() < REST_M_PER_S { 0 } else { velocity.signum() as i8 };
-    (way, truth.contact_force_n != 0.0)
+    (way(truth.axes[axis].rod_velocity_m_per_s), truth.contact_force_n != 0.0)
+}
+
+fn way(velocity_m_per_s: f64) -> i8 {
+    if velocity_m_per_s.abs() < REST_M_PER_S { 0 } else { velocity_m_per_s.signum() as i8 }
 }
 
 /// A plant's state with the mechanical state and the pressures of a record; the rest stays its own.
