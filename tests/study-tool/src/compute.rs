@@ -88,19 +88,23 @@ fn point(axis: &record_maker::TrueAxis) -> Point {
     }
 }
 
-/// Computes the classes of all draws that hide something and have none yet.
+/// Computes the classes of all draws that hide something and have none yet; of those alone that have a result under the label
+/// `done`, if there is one.
 ///
 /// # Errors
 /// [`ComputeError`] with the first draw that failed.
 pub fn classes(
     study: &Study,
+    done: Option<&str>,
     jobs: usize,
     stop: &AtomicBool,
     say: &(dyn Fn(&str) + Sync),
 ) -> Result<(), ComputeError> {
-    let missing: Vec<&Draw> = hiding(study).filter(|draw| !study.class(draw.number).exists()).collect();
+    let is_done = |number| done.is_none_or(|label| study.run(label, number).join("result.json").exists());
+    let is_missing = |draw: &&Draw| !study.class(draw.number).exists() && is_done(draw.number);
+    let missing: Vec<&Draw> = hiding(study).filter(is_missing).collect();
     let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build()?;
-    let done = AtomicUsize::new(0);
+    let computed = AtomicUsize::new(0);
     let all = missing.len();
     pool.install(|| {
         missing.into_par_iter().with_max_len(1).try_for_each(|draw| {
@@ -108,7 +112,7 @@ pub fn classes(
                 return Ok(());
             }
             one(study, draw)?;
-            say(&format!("classes {} of {all}", done.fetch_add(1, Ordering::Relaxed) + 1));
+            say(&format!("classes {} of {all}", computed.fetch_add(1, Ordering::Relaxed) + 1));
             Ok(())
         })
     })

@@ -137,6 +137,9 @@ pub(crate) struct CosinesArguments {
     /// Draws at once.
     #[arg(long, default_value_t = 2)]
     pub(crate) jobs: usize,
+    /// Only of draws that have a result under this label.
+    #[arg(long, conflicts_with = "write")]
+    pub(crate) done: Option<String>,
     /// Writes tests/study/classes.json and the table of tests/docs/study.md.
     #[arg(long)]
     pub(crate) write: bool,

@@ -95,7 +95,7 @@ fn limits(arguments: &LimitsArguments) -> Done {
 
 fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
     let study = Study::open(&arguments.out)?;
-    compute::classes(&study, arguments.jobs, stop, &say)?;
+    compute::classes(&study, arguments.done.as_deref(), arguments.jobs, stop, &say)?;
     if arguments.write && !stop.load(Ordering::Relaxed) {
         let classes = compute::collected(&study)?;
         let text = document::twin_table(&classes);
