@@ -16,6 +16,7 @@ use crate::compute::{ComputeError, trajectory};
 use crate::draws::Draw;
 use crate::signature::{Observer, Run, length};
 use discrepancy::candidates::Candidate;
+use model_fit::estimator::{Estimator, Iterate, JOINT, Options, Step};
 use nalgebra::{DMatrix, DVector};
 use plant::RigParameters;
 use record_maker::{Hidden, Recipe, Record, simulate};
@@ -23,11 +24,10 @@ use serde::{Deserialize, Serialize};
 
 /// Step of finite differences, as a coordinate.
 const CHANGE: f64 = 0.01;
-/// Most steps, and the relative fall of the squares that ends the fit.
+/// Most steps, the fall of the squares that ends the fit, as a share of the squared signature, and the longest step of a
+/// coordinate.
 const STEPS: usize = 12;
-const CONVERGED: f64 = 1e-4;
-/// Fractions of a step, and its largest coordinate.
-const FRACTIONS: [f64; 5] = [1.0, 0.4, 0.16, 0.064, 0.0256];
+const CONVERGED: f64 = 1e-7;
 const LONGEST: f64 = 0.3;
 /// What the fit may leave of an effect of the catalogue's own form, as a share of its squared signature, and by which share a
 /// number may be off there.
@@ -84,8 +84,10 @@ fn fitted(made: &Record, hidden: &Hidden) -> Result<NearestLaw, ComputeError> {
     let start = (0..sheet.keys.len()).map(|key| candidate.coordinate(key, hidden.numbers[key])).collect();
     let whole = length(&observer.between(&observed, observer.baseline())).powi(2);
     let fit = Fit { observer: &observer, observed: &observed, candidate, rig: &rig };
-    let (coordinates, left) = fit.nearest(start);
-    Ok(NearestLaw { numbers: candidate.effect_parameters(&coordinates), left_share: left / whole.max(1e-12) })
+    let start = fit.at(start).expect("a record was made with these numbers");
+    let nearest = fit.nearest(start, whole);
+    let numbers = candidate.effect_parameters(&nearest.coordinates);
+    Ok(NearestLaw { numbers, left_share: nearest.squares / whole.max(1e-12) })
 }
 
 struct Fit<'a> {
@@ -95,42 +97,55 @@ struct Fit<'a> {
     rig: &'a RigParameters,
 }
 
+/// The law at some coordinates.
+struct Simulated {
+    coordinates: Vec<f64>,
+    run: Run,
+    residual: Vec<f64>,
+    squares: f64,
+}
+
+impl Iterate for Simulated {
+    fn loss(&self) -> f64 {
+        self.squares
+    }
+
+    fn is_at_bound(&self) -> bool {
+        false
+    }
+}
+
 impl Fit<'_> {
     fn simulated(&self, coordinates: &[f64]) -> Option<Run> {
         Some(self.observer.readings(&self.candidate.rig(self.rig, coordinates).ok()?))
     }
 
-    /// The coordinates with the least squares, and these.
-    fn nearest(&self, start: Vec<f64>) -> (Vec<f64>, f64) {
-        let Some(mut run) = self.simulated(&start) else { return (start, f64::INFINITY) };
-        let mut best = start;
-        let mut residual = self.observer.between(self.observed, &run);
-        let mut squares = length(&residual).powi(2);
-        for _ in 0..STEPS {
-            let Some(step) = self.step(&best, &run, &residual) else { break };
-            let shorter = FRACTIONS.iter().find_map(|fraction| {
-                let tried: Vec<f64> = best
-                    .iter()
-                    .zip(step.iter())
-                    .enumerate()
+    /// At some coordinates; `None` where no rig can have them.
+    fn at(&self, coordinates: Vec<f64>) -> Option<Simulated> {
+        let run = self.simulated(&coordinates)?;
+        let residual = self.observer.between(self.observed, &run);
+        let squares = length(&residual).powi(2);
+        Some(Simulated { coordinates, run, residual, squares })
+    }
+
+    /// The least squares from a start, to a share of `whole`.
+    fn nearest(&self, start: Simulated, whole: f64) -> Simulated {
+        let options = Options { steps: STEPS, converged: CONVERGED * whole, ..JOINT };
+        let (fitted, _) = Estimator::new(options).descend(start, |estimator, point| {
+            let Some(step) = self.step(&point.coordinates, &point.run, &point.residual) else {
+                return Step::Impossible;
+            };
+            estimator.backtrack(point, 0.0, options.fractions, |fraction| {
+                let moved = point.coordinates.iter().zip(step.iter()).enumerate();
+                self.at(moved
                     .map(|(key, (from, step))| {
                         let [least, most] = self.candidate.fit_bounds(key);
                         (from + fraction * step.clamp(-LONGEST, LONGEST)).clamp(least, most)
                     })
-                    .collect();
-                let run = self.simulated(&tried)?;
-                let residual = self.observer.between(self.observed, &run);
-                let fewer = length(&residual).powi(2);
-                (fewer < squares).then_some((tried, run, residual, fewer))
-            });
-            let Some(next) = shorter else { break };
-            let converged = squares - next.3 < CONVERGED * squares;
-            (best, run, residual, squares) = next;
-            if converged {
-                break;
-            }
-        }
-        (best, squares)
+                    .collect())
+            })
+        });
+        fitted
     }
 
     fn step(&self, from: &[f64], run: &Run, residual: &[f64]) -> Option<DVector<f64>> {
