@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 /// How long anything may take that should take a moment: a protection against hanging, no measure.
 pub const PATIENCE: Duration = Duration::from_secs(300);
 
+/// So many limits a program has that says something in each: on a slow machine it is slow, and does not hang.
+const LIMITS_WHILE_IT_SAYS: u32 = 6;
+
 const POLL: Duration = Duration::from_millis(5);
 
 #[must_use]
@@ -86,6 +89,10 @@ impl Running {
         self.output[1].so_far()
     }
 
+    fn heard_bytes(&self) -> usize {
+        self.output.iter().map(Said::bytes).sum()
+    }
+
     pub fn number(&self) -> u32 {
         self.child.id()
     }
@@ -118,13 +125,21 @@ impl Running {
         self.wait_within(PATIENCE)
     }
 
-    /// Without asking again and again, which would disturb runs in real time beside it.
+    /// Without asking again and again, which would disturb runs in real time beside it. A program hangs that has said nothing in
+    /// a whole `limit`, or has not ended after [`LIMITS_WHILE_IT_SAYS`].
     pub fn wait_within(mut self, limit: Duration) -> Ended {
-        let until = Instant::now() + limit;
+        let last = Instant::now() + limit * LIMITS_WHILE_IT_SAYS;
+        let (mut until, mut heard) = (Instant::now() + limit, self.heard_bytes());
         // Whoever waited for a word may have met its end, and then there is no process any more.
         while self.child.try_wait().expect("a child can be waited for").is_none() {
-            let left = until.saturating_duration_since(Instant::now());
-            assert!(left > Duration::ZERO, "{} hangs; it said:\n{}", self.name, self.stderr());
+            let now = Instant::now();
+            if now >= until {
+                let said = self.heard_bytes();
+                let hangs = said == heard || now >= last;
+                assert!(!hangs, "{} hangs; it said:\n{}\n{}", self.name, self.stdout(), self.stderr());
+                (until, heard) = (now + limit, said);
+            }
+            let left = until.saturating_duration_since(now);
             let left = Timespec::try_from(left).expect("a limit of hours at most");
             let child = pidfd_open(self.pid(), PidfdFlags::empty()).expect("it was not waited for");
             let ended = poll(&mut [PollFd::new(&child, PollFlags::IN)], Some(&left));
@@ -184,6 +199,10 @@ impl Said {
         self.text.lock().expect("only whole lines are added under the lock").clone()
     }
 
+    fn bytes(&self) -> usize {
+        self.text.lock().expect("only whole lines are added under the lock").len()
+    }
+
     fn finish(&mut self) {
         if let Some(reader) = self.reader.take() {
             reader.join().expect("the reader does not panic");
@@ -237,5 +256,17 @@ mod tests {
         running.wait_for_times("word", 1);
         let _ = running.child.wait().expect("it ends");
         assert_eq!(running.wait().expect_code(3).stderr, "word\n");
+    }
+
+    #[test]
+    fn a_slow_one_that_says_something_is_waited_for_and_a_silent_one_hangs() {
+        let start = |script: &str| Running::start("sh", Command::new("sh").args(["-c", script]));
+        let limit = Duration::from_secs(2);
+        let slow = start("for i in 1 2 3 4 5 6; do echo $i; sleep 0.5; done").wait_within(limit);
+        assert_eq!(slow.expect_code(0).stdout.lines().count(), 6);
+        let silent = || start("echo word; exec sleep 1000").wait_within(Duration::from_millis(300));
+        let said = std::panic::catch_unwind(silent).expect_err("it hangs");
+        let said = said.downcast_ref::<String>().expect("a message");
+        assert!(said.contains("sh hangs"), "{said}");
     }
 }

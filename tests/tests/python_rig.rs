@@ -12,7 +12,8 @@ fn pytest() -> Command {
         [Program::Emulator, Program::Controller, Program::Bench, Program::Discrepancy, Program::Campaign];
     let [emulator, ..] = programs.map(|program| executable(program, Build::Shipped));
     let mut pytest = Command::new(of("hil"));
-    pytest.args(["-m", "pytest", "-p", "no:cacheprovider", "--color=no"]);
+    // A line for each test: which one hangs is seen, and that none does.
+    pytest.args(["-m", "pytest", "-v", "-p", "no:cacheprovider", "--color=no"]);
     pytest
         .env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder"))
         .env("PATH", tools_path());
