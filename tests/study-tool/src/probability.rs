@@ -3,7 +3,8 @@
 //! An explanation is *right* when it is what was hidden: nothing, parameters alone, or a set of effects in which each stands
 //! for one hidden effect, itself or a twin at its place. Where none of a report is, or the effect was left out of the
 //! catalogue, *none of these* is right; so it is, beside nothing or parameters, of a record whose background alone is
-//! missing. The weights of the probabilities were fitted by the same rules (`discrepancy/study/explanations.py`).
+//! missing. Two that are right are one event, which has the sum of their probabilities. The weights of the probabilities were
+//! fitted by the same rules (`discrepancy/study/explanations.py`), without that sum.
 
 use crate::classes::Member;
 use crate::draws::{Draw, Kind};
@@ -84,6 +85,13 @@ pub struct Bin {
     pub band: [f64; 2],
 }
 
+/// The explanations of a report as events that exclude each other: those that are right together are one.
+fn events(said: &[Said]) -> impl Iterator<Item = Said> {
+    let wrong = said.iter().copied().filter(|said| !said.right);
+    let right = said.iter().filter(|said| said.right).map(|said| said.probability).sum();
+    wrong.chain([Said { probability: right, right: true }])
+}
+
 /// Reliability of the probabilities of all reports, and the expected calibration error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reliability {
@@ -97,17 +105,17 @@ pub struct Reliability {
 impl Reliability {
     /// Of reports by the kind of their draw; weighted so that a third are of nothing hidden.
     pub fn of(reports: &[(Kind, &[Said])]) -> Self {
-        let told: Vec<_> = reports.iter().filter(|(_, said)| !said.is_empty()).collect();
+        let given: Vec<_> = reports.iter().filter(|(_, said)| !said.is_empty()).collect();
         let is_null = |kind: Kind| matches!(kind, Kind::Null | Kind::Parameter);
-        let nulls = told.iter().filter(|(kind, _)| is_null(*kind)).count();
-        let others = told.len() - nulls;
+        let nulls = given.iter().filter(|(kind, _)| is_null(*kind)).count();
+        let others = given.len() - nulls;
         let weight = |kind| match (nulls, others) {
             (0, _) | (_, 0) => 1.0,
             _ if is_null(kind) => NULL_SHARE / nulls as f64,
             _ => (1.0 - NULL_SHARE) / others as f64,
         };
         let mut all: Vec<(f64, Said)> =
-            told.iter().flat_map(|(kind, said)| said.iter().map(|own| (weight(*kind), *own))).collect();
+            given.iter().flat_map(|(kind, said)| events(said).map(|event| (weight(*kind), event))).collect();
         all.sort_by(|left, right| left.1.probability.total_cmp(&right.1.probability));
         let parts = parts(&all);
         let bins: Vec<Bin> = parts.iter().map(|part| bin(part, parts.len())).collect();
@@ -116,11 +124,11 @@ impl Reliability {
             bins.iter().zip(&parts).map(|(bin, part)| (bin.said - bin.right).abs() * weight_of(part));
         let first =
             |said: &[Said]| said.iter().copied().max_by(|a, b| a.probability.total_cmp(&b.probability));
-        let right = told.iter().filter(|(_, said)| first(said).is_some_and(|said| said.right)).count();
+        let right = given.iter().filter(|(_, said)| first(said).is_some_and(|said| said.right)).count();
         Reliability {
             calibration_error: errors.sum::<f64>() / weight_of(&all),
             bins,
-            first_right: [right, told.len()],
+            first_right: [right, given.len()],
         }
     }
 }
@@ -225,6 +233,15 @@ mod tests {
         assert!((overconfident.calibration_error - 0.5).abs() < 1e-12, "{overconfident:?}");
         // A bin that would hold too few joins its neighbour.
         assert_eq!(reliability(&of(3)[..20]).bins.len(), 1);
+    }
+
+    #[test]
+    fn explanations_that_are_right_together_are_one_event() {
+        let said = |probability, right| Said { probability, right };
+        let background = [said(0.3, true), said(0.1, false), said(0.6, true)];
+        let events: Vec<Said> = events(&background).collect();
+        assert_eq!(events.len(), 2);
+        assert!(!events[0].right && events[1].right && (events[1].probability - 0.9).abs() < 1e-12);
     }
 
     #[test]

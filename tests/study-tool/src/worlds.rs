@@ -152,12 +152,18 @@ impl Worlds {
         }
         for (world, reliability) in ["exact world", "background"].into_iter().zip(&self.reliability) {
             let [right, of] = reliability.first_right;
+            // One event of each report is right: the means of a single bin agree by construction.
+            let error = match reliability.bins.len() {
+                0 | 1 => "too few for a calibration error".to_owned(),
+                _ => {
+                    format!("expected calibration error {:.1} points", 100.0 * reliability.calibration_error)
+                }
+            };
             let _ = write!(
                 text,
                 "\nProbabilities, {world}, draws left out included: \
-                 the most probable explanation is right for {right} of {of}; expected \
-                 calibration error {:.1} points.\n\n| said | explanations | mean said | right | band |\n|---|---|---|---|---|\n",
-                100.0 * reliability.calibration_error
+                 the most probable explanation is right for {right} of {of}; {error}.\n\n\
+                 | said | explanations | mean said | right | band |\n|---|---|---|---|---|\n"
             );
             for bin in &reliability.bins {
                 let [low, high] = bin.between.map(|end| 100.0 * end);
