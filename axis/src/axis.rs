@@ -26,7 +26,7 @@ use crate::chains::main::{MainCause, MainConfig, MainOutput, OwnAxis};
 use crate::chains::settled::ControlError;
 use crate::chains::{AfterStop, Fault};
 use crate::figures::PositionFigures;
-use crate::node::News;
+use crate::node::NodeEvent;
 use crate::program::{Hand, Program};
 use algorithms::guard::AlgorithmFault;
 use average::Average;
@@ -211,7 +211,7 @@ impl AxisController {
     fn answer_with(&mut self, cycle: u64, command: ValveCommand, record: Option<AxisRecord>) -> Answer {
         let status = self.status();
         let due = self.slow.due(cycle, &status);
-        let news = due.other_state.then(|| News::State {
+        let news = due.other_state.then(|| NodeEvent::State {
             axis: self.axis,
             state: status.main_chain,
             cycle,

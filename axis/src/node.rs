@@ -24,11 +24,11 @@ const SILENT_TICKS: u64 = 5;
 /// Cycles after an abort or a fault during which the valve is still commanded shut and the record goes on.
 pub const STOPPED_CYCLES: u64 = 2000;
 /// Frames of a partner that wait for their cycle; a cycle has three at most.
-const MAIL_ROOM: usize = 16;
+const DELAYED_FRAMES: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum News {
+pub enum NodeEvent {
     /// The main chain of an axis went to this state in this cycle, because of this.
     State {
         axis: Axis,
@@ -64,7 +64,7 @@ pub struct Change {
 pub struct Outlets {
     /// A row of an axis each recorded cycle.
     pub records: Sender<AxisRecord>,
-    pub news: Sender<News>,
+    pub news: Sender<NodeEvent>,
     pub changes: Receiver<Change>,
     /// Lockstep waits for the recorder rather than lose a row.
     pub waits: bool,
@@ -72,15 +72,15 @@ pub struct Outlets {
 
 /// Frames between two axes of one process, each heard in the cycle after the one in which it was sent, as over the bus.
 #[derive(Default)]
-struct Mail(VecDeque<(u64, Frame)>);
+struct FrameDelay(VecDeque<(u64, Frame)>);
 
-impl Mail {
+impl FrameDelay {
     fn new() -> Self {
-        Self(VecDeque::with_capacity(MAIL_ROOM))
+        Self(VecDeque::with_capacity(DELAYED_FRAMES))
     }
 
     fn post(&mut self, cycle: u64, frame: Frame) {
-        if self.0.len() == MAIL_ROOM {
+        if self.0.len() == DELAYED_FRAMES {
             self.0.pop_front();
         }
         self.0.push_back((cycle, frame));
@@ -94,7 +94,7 @@ impl Mail {
 struct Member<P> {
     controller: AxisController,
     /// From the partner in this process.
-    mail: Mail,
+    mail: FrameDelay,
     answered: u64,
     stopped_for: u64,
     silent_ticks: u64,
@@ -154,7 +154,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         let member = |controller: AxisController| Member {
             port: port_of(controller.axis()),
             controller,
-            mail: Mail::new(),
+            mail: FrameDelay::new(),
             answered: 0,
             stopped_for: 0,
             silent_ticks: 0,
@@ -192,7 +192,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
                         member.silent_ticks = 0;
                         member.port.iter_mut().for_each(CalibrationPort::restart);
                     });
-                    self.tell(News::RigRestarted);
+                    self.tell(NodeEvent::RigRestarted);
                 }
             },
             Ok(frame) => self.members.iter_mut().for_each(|member| member.controller.hear(&frame)),
@@ -325,7 +325,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// Tells a person something; a full queue loses it, which a person survives.
-    pub fn tell(&mut self, news: News) {
+    pub fn tell(&mut self, news: NodeEvent) {
         let _ = self.outlets.news.try_send(news);
     }
 
@@ -409,7 +409,7 @@ mod tests {
 
     #[test]
     fn mail_is_heard_in_the_cycle_after_it_was_sent() {
-        let mut mail = Mail::new();
+        let mut mail = FrameDelay::new();
         let frame = Frame::DriveChainStatus(ChainStatus::default());
         mail.post(7, frame);
         assert!(mail.received_in(7).is_none());
@@ -420,8 +420,8 @@ mod tests {
 
     #[test]
     fn a_partner_that_is_not_heard_for_long_leaves_the_newest() {
-        let mut mail = Mail::new();
+        let mut mail = FrameDelay::new();
         (0..100).for_each(|cycle| mail.post(cycle, Frame::DriveChainStatus(ChainStatus::default())));
-        assert_eq!((0..200).filter(|_| mail.received_in(1000).is_some()).count(), MAIL_ROOM);
+        assert_eq!((0..200).filter(|_| mail.received_in(1000).is_some()).count(), DELAYED_FRAMES);
     }
 }

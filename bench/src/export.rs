@@ -93,17 +93,17 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
     }
 }
 
-type Told = (String, Exit);
+type Written = (String, Exit);
 
 fn as_signals(
     part: &Path,
     log: &RecordedLog,
     format: Format,
     every_ms: Option<u32>,
-) -> Result<Told, ExportError> {
+) -> Result<Written, ExportError> {
     let signals = signals_of(log, "are left out");
-    let frames: usize = signals.courses.iter().map(|course| course.frames.len()).sum();
-    let channels: usize = signals.courses.iter().map(|course| course.spec.signals.len()).sum();
+    let frames: usize = signals.messages.iter().map(|message| message.frames.len()).sum();
+    let channels: usize = signals.messages.iter().map(|message| message.spec.signals.len()).sum();
     let origin_ns = log.origin_ns();
     let written = |error: &dyn std::fmt::Display| FileError::write(part, error);
     let rows = if format == Format::Csv {
@@ -122,7 +122,7 @@ fn as_signals(
     } else {
         let path = part.to_str().ok_or_else(|| written(&"its name is no UTF-8"))?;
         mdf4::write(path, &signals, origin_ns).map_err(|error| written(&error))?;
-        format!(" in {} groups", signals.courses.len())
+        format!(" in {} groups", signals.messages.len())
     };
     let reported = format!("{channels} signals of {frames} frames{rows}; time counts from {}", origin(log));
     Ok((reported, Exit::Good))
@@ -143,13 +143,13 @@ fn origin(log: &RecordedLog) -> &'static str {
     if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" }
 }
 
-fn as_recording(part: &Path, log: &RecordedLog) -> Result<Told, ExportError> {
+fn as_recording(part: &Path, log: &RecordedLog) -> Result<Written, ExportError> {
     let signals = signals_of(log, "are in /can alone");
     let mcap::Written { channels, messages } = mcap::write(part, log, &signals, run_folder(log))?;
     Ok((format!("{messages} messages of {channels} channels"), Exit::Good))
 }
 
-fn as_trace(part: &Path, log: &RecordedLog) -> Result<Told, ExportError> {
+fn as_trace(part: &Path, log: &RecordedLog) -> Result<Written, ExportError> {
     let trace::Written { frames, cycles, faults } = trace::write(part, log, run_folder(log))?;
     if cycles == 0 {
         warn("no cycles: their timing is recorded in real time, by --full-timing of emulator and controller");
@@ -178,7 +178,7 @@ fn as_frames(
     log: &RecordedLog,
     format: Format,
     python: Option<&Path>,
-) -> Result<Told, ExportError> {
+) -> Result<Written, ExportError> {
     // Whether the place can be written is found out here, in words of our own.
     create(part).map_err(|error| FileError::write(part, error))?;
     let named = std::env::var_os("AIRBENCH_PYTHON").map(PathBuf::from);

@@ -128,10 +128,10 @@ struct Gateway {
     queue_frames: u32,
     read_only: bool,
     began: Instant,
-    last_told: Instant,
-    refused_told: u64,
+    last_report: Instant,
+    refused_reported: u64,
     /// Frames that did not fit the gateway's own queue at the bus.
-    dropped_told: u64,
+    dropped_reported: u64,
     /// Frames may be left from the turn before.
     more: bool,
     text: String,
@@ -175,9 +175,9 @@ impl Gateway {
             queue_frames: arguments.queue_frames,
             read_only: arguments.read_only,
             began: now,
-            last_told: now,
-            refused_told: 0,
-            dropped_told: 0,
+            last_report: now,
+            refused_reported: 0,
+            dropped_reported: 0,
             more: false,
             text: String::with_capacity(LONGEST_FRAME),
             report,
@@ -332,23 +332,23 @@ impl Gateway {
 
     /// Tells, once a second at most, what was lost, at the clients and before them, and who was refused since.
     fn tell(&mut self) {
-        if self.last_told.elapsed() < TELL_EVERY {
+        if self.last_report.elapsed() < TELL_EVERY {
             return;
         }
-        self.last_told = Instant::now();
+        self.last_report = Instant::now();
         for client in &mut self.clients {
             tell_loss(client);
-            client.told_lost = client.report.frames_lost;
+            client.lost_reported = client.report.frames_lost;
         }
         let refused = self.report.connections_refused;
-        if refused > std::mem::replace(&mut self.refused_told, refused) {
+        if refused > std::mem::replace(&mut self.refused_reported, refused) {
             eprintln!(
                 "gateway: {refused} connections refused so far: {} clients are here, --clients N allows more",
                 self.clients.len()
             );
         }
         let dropped = self.bus.counters().dropped_on_receive;
-        if dropped > std::mem::replace(&mut self.dropped_told, dropped) {
+        if dropped > std::mem::replace(&mut self.dropped_reported, dropped) {
             eprintln!(
                 "gateway: {dropped} frames lost to all clients so far: the gateway's own queue at the bus was full"
             );
@@ -369,7 +369,7 @@ impl Gateway {
 
 fn tell_loss(client: &Client) {
     let report = &client.report;
-    if report.frames_lost > client.told_lost {
+    if report.frames_lost > client.lost_reported {
         eprintln!(
             "gateway: client {} reads too slowly: {} frames lost to it so far, {} delivered",
             report.address, report.frames_lost, report.frames_to_client

@@ -24,7 +24,7 @@ use latency::kinds::{PING_PONG, TO_ARRIVAL};
 use line::{Line, OnBus, OnSocket};
 use protocol::bus::{self, BusError, BusUrl, StampClock};
 use protocol::exit::Exit;
-use rally::{Rally, Rhythm};
+use rally::{PingPongResult, Rhythm};
 use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request, write_hlog};
 use runlog::ping_pong::{PingPongFigures, PingPongFile};
 use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
@@ -114,7 +114,7 @@ fn play(
     arguments: &PingPongArguments,
     line: &mut dyn Line,
     interrupt: &Interrupt,
-) -> Result<(Rally, Grants), PingPongError> {
+) -> Result<(PingPongResult, Grants), PingPongError> {
     let grants = grants((!arguments.no_realtime).then_some(arguments.priority), arguments.cpu);
     let interval = Duration::from_micros(arguments.interval_us);
     let pings = (arguments.seconds * 1e6 / arguments.interval_us as f64).round().max(1.0) as u64;
@@ -183,7 +183,7 @@ fn name(arguments: &PingPongArguments) -> String {
     arguments.name.clone().unwrap_or_else(|| usual.to_owned())
 }
 
-fn figures(arguments: &PingPongArguments, rally: &Rally, grants: &Grants) -> PingPongFigures {
+fn figures(arguments: &PingPongArguments, rally: &PingPongResult, grants: &Grants) -> PingPongFigures {
     PingPongFigures {
         round_trip_ns: rally.round_trip_ns.percentiles(),
         to_arrival_ns: arguments.bus.as_ref().map(|_| rally.to_arrival_ns.percentiles()),

@@ -36,7 +36,7 @@ pub mod segment;
 pub mod verdict;
 
 use cli::{SoakArguments, YesNo};
-use keeping::{Keeping, unix_s};
+use keeping::{SoakFolder, unix_s};
 use model::{Segment, Settings};
 use plan::Plan;
 use protocol::bus::BusUrl;
@@ -100,7 +100,7 @@ pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
         rig: arguments.rig.display().to_string(),
         positions_judged: arguments.judge_positions == YesNo::Yes,
     };
-    let mut keeping = Keeping::open(&arguments.out, settings, planned_s, arguments.anyway)?;
+    let mut keeping = SoakFolder::open(&arguments.out, settings, planned_s, arguments.anyway)?;
     keeping.soak.load_missing_because = load_missing_because;
     let soaking = Soaking {
         plan: Plan { experiments: arguments.experiments.clone(), load: load.is_some(), loss },
@@ -160,7 +160,7 @@ struct Soaking<'a> {
 
 impl Soaking<'_> {
     /// Runs segments until the time is up, and tells why it ended.
-    fn run(&self, keeping: &mut Keeping) -> Result<(Exit, String), SoakError> {
+    fn run(&self, keeping: &mut SoakFolder) -> Result<(Exit, String), SoakError> {
         let mut early_in_a_row = 0;
         loop {
             if self.interrupt.came() {
@@ -197,16 +197,16 @@ impl Soaking<'_> {
     }
 
     /// Runs, judges and records one segment; tells how it ended and the exit codes of its programs.
-    fn segment(&self, keeping: &mut Keeping, rig_s: f64) -> Result<(End, Vec<Option<i32>>), SoakError> {
+    fn segment(&self, keeping: &mut SoakFolder, rig_s: f64) -> Result<(End, Vec<Option<i32>>), SoakError> {
         let spec = self.plan.segment(keeping.next_number());
         let folder = keeping.out().join("segments").join(spec.folder());
         let (started_unix_s, began) = (unix_s(), Instant::now());
         let (planned_s, elapsed_s) = (keeping.soak.planned_s, keeping.soak.elapsed_s);
         let failed = keeping.soak.totals.failed;
-        let mut told_s = -PROGRESS_S;
+        let mut reported_s = -PROGRESS_S;
         let mut tell = |at_s: f64| {
-            if at_s - told_s >= PROGRESS_S {
-                told_s = at_s;
+            if at_s - reported_s >= PROGRESS_S {
+                reported_s = at_s;
                 let left_min = (planned_s - elapsed_s - at_s).max(0.0) / 60.0;
                 eprintln!(
                     "soak: segment {} ({}): {at_s:.0} of {rig_s:.0} s; {failed} failed so far; {left_min:.1} min left",

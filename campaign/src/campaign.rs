@@ -12,7 +12,7 @@ use crate::parts::{Parts, hash, usual_runs_per_part};
 use crate::points::{Point, Points, TooMany};
 use crate::processes::{self, ProcessesError, Programs};
 use crate::rehearsed;
-use crate::shelf::{Shelf, ShelfError};
+use crate::shelf::{CampaignInputs, ShelfError};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::io;
@@ -26,7 +26,7 @@ pub struct Campaign {
     /// How they are shared out.
     pub parts: Parts,
     /// The files that it names; none for a command.
-    shelf: Option<Shelf>,
+    shelf: Option<CampaignInputs>,
     programs: Programs,
 }
 
@@ -45,7 +45,7 @@ pub enum CampaignError {
     #[error(transparent)]
     File(#[from] FileError),
     #[error(transparent)]
-    Shelf(#[from] ShelfError),
+    CampaignInputs(#[from] ShelfError),
     #[error("{0}: {1}")]
     TooMany(String, TooMany),
     #[error("{0}: {1}")]
@@ -67,7 +67,7 @@ impl Campaign {
             words[0] = program(&words[0], &folder)?;
         }
         let shelf = match &file.kind {
-            Kind::Experiment(kind) => Some(Shelf::read(&file, kind, &places.shipped)?),
+            Kind::Experiment(kind) => Some(CampaignInputs::read(&file, kind, &places.shipped)?),
             Kind::Command(_) => None,
         };
         let name = || path.display().to_string();
@@ -238,13 +238,13 @@ fn program(word: &str, folder: &Path) -> Result<String, CampaignError> {
 }
 
 /// Tells one campaign from another by all that its results follow from.
-fn which_campaign(file: &CampaignFile, shelf: Option<&Shelf>) -> String {
+fn which_campaign(file: &CampaignFile, shelf: Option<&CampaignInputs>) -> String {
     let mut all = String::new();
     let mut add = |name: &str, hash: &str| {
         let _ = writeln!(all, "{name} {hash}");
     };
     add("campaign", &hash(file.text.as_bytes()));
-    shelf.into_iter().flat_map(Shelf::hashes).for_each(|(name, hash)| add(&name, &hash));
+    shelf.into_iter().flat_map(CampaignInputs::hashes).for_each(|(name, hash)| add(&name, &hash));
     hash(all.as_bytes())[..16].to_owned()
 }
 

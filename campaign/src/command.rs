@@ -158,7 +158,7 @@ mod tests {
     fn ask(script: &str, longest_s: f64) -> Result<Option<Outcome>, CommandError> {
         let factor = Factor {
             name: "hidden".into(),
-            changes: Changes::Told,
+            changes: Changes::Passed,
             values: Values::List(vec![Value::Text("x".into())]),
         };
         let point = Point { run: 3, draw: 1, seed: 7, hidden_seed: 0, values: vec![Value::Text("x".into())] };

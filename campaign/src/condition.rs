@@ -6,9 +6,9 @@
 use crate::edits::{self, EditError};
 use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
 use crate::points::{Point, Points};
-use crate::shelf::{RigFile, Shelf, Text};
+use crate::shelf::{CampaignInputs, RigFile, Text};
 use axis_control::program::file::Source;
-use plant::effects::draw::{Among, Urn};
+use plant::effects::draw::{Among, EffectSampler};
 use plant::effects::sheet;
 use plant::{Axis, RigParameters, Scene};
 use std::fmt::Write as _;
@@ -45,7 +45,7 @@ pub struct ConditionError {
 }
 
 pub fn condition<'s>(
-    shelf: &'s Shelf,
+    shelf: &'s CampaignInputs,
     points: &Points,
     point: &Point,
 ) -> Result<Condition<'s>, ConditionError> {
@@ -91,7 +91,7 @@ pub fn condition<'s>(
 impl Condition<'_> {
     /// The program of an axis that the experiment calls `written`.
     #[must_use]
-    pub fn program(&self, shelf: &Shelf, axis: Axis, written: &str) -> Option<Source> {
+    pub fn program(&self, shelf: &CampaignInputs, axis: Axis, written: &str) -> Option<Source> {
         self.programs[axis.index()].or_else(|| shelf.program(written, self.experiment)).cloned()
     }
 }
@@ -158,10 +158,10 @@ impl<'p> Sorted<'p> {
 /// Paths and numbers of a hidden effect in a rig file; none for no effect.
 fn hidden(name: &str, among: Among, seed: u64) -> Vec<(String, f64)> {
     let Some(sheet) = sheet(name).filter(|_| name != NONE_HIDDEN) else { return Vec::new() };
-    let mut urn = Urn::new(seed);
+    let mut sampler = EffectSampler::new(seed);
     // The file's reader has seen to it that it has a place there.
-    let Some(place) = urn.place(sheet, among) else { return Vec::new() };
-    let numbers = urn.numbers(sheet);
+    let Some(place) = sampler.place(sheet, among) else { return Vec::new() };
+    let numbers = sampler.numbers(sheet);
     let path = |key: &str| format!("effects.{name}.{place}.{key}");
     sheet.keys.iter().zip(numbers).map(|(key, number)| (path(key.name), number)).collect()
 }
@@ -172,11 +172,11 @@ mod tests {
     use crate::file::{CampaignFile, Kind};
     use std::path::Path;
 
-    fn shelf(text: &str) -> (Shelf, Points) {
+    fn shelf(text: &str) -> (CampaignInputs, Points) {
         let file = CampaignFile::from_toml(text, Path::new("c.toml")).unwrap();
         let Kind::Experiment(kind) = &file.kind else { panic!("an experiment") };
         let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller");
-        let shelf = Shelf::read(&file, kind, &shipped).unwrap();
+        let shelf = CampaignInputs::read(&file, kind, &shipped).unwrap();
         (shelf, Points::new(&file.factors, file.draws, file.seed).unwrap())
     }
 

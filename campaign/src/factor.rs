@@ -43,7 +43,7 @@ pub enum Changes {
     /// The effect that the rig has and the controllers do not know, at a place among these.
     Hidden(Among),
     /// Nothing here: it is given to the program that is run.
-    Told,
+    Passed,
 }
 
 /// A number of a fault, and when it acts.
@@ -195,7 +195,7 @@ impl VaryTable {
         let subjects = [&self.rig, &self.experiment, &self.set, &self.fault, &self.choose];
         let one = "needs exactly one of rig, experiment, set, fault, choose";
         match (subjects.iter().filter(|subject| subject.is_some()).count(), &self.name) {
-            (0, Some(name)) => return Ok((name.clone(), Changes::Told)),
+            (0, Some(name)) => return Ok((name.clone(), Changes::Passed)),
             (1, _) => {}
             _ => return Err(one.into()),
         }
@@ -276,7 +276,7 @@ fn check_range(ends: [f64; 2], log: bool) -> Result<Values, String> {
 
 /// Files and effects have names, everything else has numbers.
 fn check_kind(changes: &Changes, values: &Values) -> Result<(), String> {
-    if *changes == Changes::Told {
+    if *changes == Changes::Passed {
         return Ok(());
     }
     let names = matches!(changes, Changes::File(_) | Changes::Hidden(_));

@@ -298,7 +298,7 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
     let Factor { name, changes, .. } = factor;
     if before
         .iter()
-        .any(|other| other.name == *name || (other.changes == *changes && *changes != Changes::Told))
+        .any(|other| other.name == *name || (other.changes == *changes && *changes != Changes::Passed))
     {
         return Err(format!("{name} is varied twice; give one of them another name, or leave one out"));
     }
@@ -307,11 +307,11 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
         return Err(format!("name = \"{name}\": a figure has this name, choose another"));
     }
     match (kind, changes) {
-        (Kind::Command(_), Changes::Told) => Ok(()),
+        (Kind::Command(_), Changes::Passed) => Ok(()),
         (Kind::Command(_), _) => {
             Err("a command is told name and value: leave out what is changed, give a name".into())
         }
-        (Kind::Experiment(_), Changes::Told) => {
+        (Kind::Experiment(_), Changes::Passed) => {
             Err("needs exactly one of rig, experiment, set, fault, choose".into())
         }
         (Kind::Experiment(ExperimentKind { pace: Pace::Rehearsal, .. }), Changes::Fault(_)) => {
@@ -400,7 +400,7 @@ mod tests {
         let text = "title = \"t\"\ncommand = [\"judge\"]\n[collect]\nfigures = [\"named\"]\n\
                     confusion = [[\"hidden\", \"named\"]]\n[[vary]]\nname = \"hidden\"\nlist = [\"a\", \"b\"]\n";
         let file = read(text).unwrap();
-        assert_eq!(file.factors[0].changes, Changes::Told);
+        assert_eq!(file.factors[0].changes, Changes::Passed);
         assert_eq!(file.confusion, [["hidden".to_owned(), "named".to_owned()]]);
     }
 }

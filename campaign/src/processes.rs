@@ -8,7 +8,7 @@ use crate::edits;
 use crate::factor::Value;
 use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
-use crate::shelf::Shelf;
+use crate::shelf::CampaignInputs;
 use axis_control::experiment::Experiment;
 use figures::{SummaryError, join};
 use protocol::exit::Exit;
@@ -45,7 +45,7 @@ pub enum ProcessesError {
 /// [`ProcessesError`]; a rig or controllers that fail are a result.
 pub fn run(
     condition: &Condition<'_>,
-    shelf: &Shelf,
+    shelf: &CampaignInputs,
     (run, seconds): (u64, f64),
     programs: &Programs,
     folder: &Path,
@@ -150,7 +150,7 @@ struct Files {
 impl Files {
     fn write(
         condition: &Condition<'_>,
-        shelf: &Shelf,
+        shelf: &CampaignInputs,
         run: u64,
         folder: &Path,
     ) -> Result<Self, ProcessesError> {

@@ -7,7 +7,7 @@ use crate::condition::{Condition, ConditionError};
 use crate::factor::Value;
 use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
-use crate::shelf::Shelf;
+use crate::shelf::CampaignInputs;
 use axis_control::axis::{AxisController, AxisRecord};
 use axis_control::setup::{Inputs, Mode};
 use figures::record::{MEASURED, Record, TRUE};
@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 /// [`ConditionError`] when experiment, programs and variables do not go together: not a result but a mistake in the campaign.
 pub fn rehearse(
     condition: &Condition<'_>,
-    shelf: &Shelf,
+    shelf: &CampaignInputs,
     run: u64,
     seconds: f64,
 ) -> Result<Outcome, ConditionError> {

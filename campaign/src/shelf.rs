@@ -15,7 +15,7 @@ const SHIPPED: &str = "shipped";
 
 /// What a campaign of experiments reads.
 #[derive(Debug)]
-pub struct Shelf {
+pub struct CampaignInputs {
     /// Experiments by the name that the file gives them.
     experiments: BTreeMap<String, Text>,
     /// Rigs likewise.
@@ -84,7 +84,7 @@ pub struct ShelfError {
     message: String,
 }
 
-impl Shelf {
+impl CampaignInputs {
     /// Reads all files; `shipped` is the folder with the shipped `experiments` and `programs`.
     pub fn read(file: &CampaignFile, kind: &ExperimentKind, shipped: &Path) -> Result<Self, ShelfError> {
         let error = |message: String| ShelfError { campaign: file.path.display().to_string(), message };

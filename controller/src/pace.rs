@@ -5,7 +5,7 @@
 
 use crate::Node;
 use crate::timing::{Stopwatch, StopwatchAccount};
-use axis_control::node::{News, STOPPED_CYCLES};
+use axis_control::node::{NodeEvent, STOPPED_CYCLES};
 use axis_control::rig_view::PerAxis;
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{Bus, BusError, Received};
@@ -94,11 +94,11 @@ pub(crate) fn run_real(
         let went = times_gone != std::mem::replace(&mut disconnects, times_gone);
         if went && ever_up && was_up {
             was_up = false;
-            node.tell(News::BusLost);
+            node.tell(NodeEvent::BusLost);
         }
         if ever_up && bus.is_up() != was_up {
             was_up = bus.is_up();
-            node.tell(if was_up { News::BusBack } else { News::BusLost });
+            node.tell(if was_up { NodeEvent::BusBack } else { NodeEvent::BusLost });
         }
         let quiet = rig.quiet(node);
         if node.stopped_for() > STOPPED_CYCLES {
@@ -165,7 +165,7 @@ impl RigLife {
         if (quiet > SILENCE) != self.silent {
             self.silent = !self.silent;
             if self.silent {
-                node.tell(News::SensorsSilent);
+                node.tell(NodeEvent::SensorsSilent);
             }
         }
         quiet

@@ -6,7 +6,7 @@ use crate::reload::Reloader;
 use crate::timing::queues::TimingQueues;
 use algorithms::guard::Stuck;
 use axis_control::axis::AxisRecord;
-use axis_control::node::News;
+use axis_control::node::NodeEvent;
 use crossbeam_channel::{Receiver, TryRecvError};
 use nominal::Axis;
 use protocol::frames::MainChainState;
@@ -15,7 +15,7 @@ use runlog::timing_recorder::TimingFigures;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
-use xcp::clerk::Clerk;
+use xcp::clerk::ParameterFileWorker;
 
 const POLL_PERIOD: Duration = Duration::from_millis(4);
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
@@ -79,18 +79,18 @@ impl Tables {
 pub(crate) struct Writer {
     pub(crate) tables: Tables,
     pub(crate) records: Receiver<AxisRecord>,
-    pub(crate) news: Receiver<News>,
+    pub(crate) news: Receiver<NodeEvent>,
     /// Who looks at the program files, if anybody does.
     pub(crate) reloader: Option<Reloader>,
     /// Who does what XCP asks for, if it may.
-    pub(crate) clerk: Option<Clerk>,
+    pub(crate) clerk: Option<ParameterFileWorker>,
     /// Stamps of the stopwatch and their recorder, where time is real.
     pub(crate) timing: Option<TimingQueues>,
 }
 
 /// What is left when the queues' senders are gone.
 pub(crate) struct Written {
-    pub(crate) reported: Vec<News>,
+    pub(crate) reported: Vec<NodeEvent>,
     pub(crate) failure: Option<String>,
     pub(crate) timing: Option<TimingFigures>,
 }
@@ -117,10 +117,10 @@ impl Writer {
                 }
             }
             reloader.iter_mut().for_each(Reloader::look);
-            clerk.iter_mut().for_each(Clerk::look);
+            clerk.iter_mut().for_each(ParameterFileWorker::look);
             for item in news.try_iter() {
                 protocol::say!("controller: {}", sentence(item));
-                if let (News::State { state: MainChainState::Fault, cycle, .. }, Some(timing)) =
+                if let (NodeEvent::State { state: MainChainState::Fault, cycle, .. }, Some(timing)) =
                     (item, &mut timing)
                 {
                     timing.fault(cycle);
@@ -159,14 +159,14 @@ fn note(failure: &mut Option<String>, written: io::Result<()>) {
     }
 }
 
-pub(crate) fn sentence(news: News) -> String {
+pub(crate) fn sentence(news: NodeEvent) -> String {
     match news {
-        News::State { axis, state, cycle, cause } => {
+        NodeEvent::State { axis, state, cycle, cause } => {
             format!("cycle {cycle}: {} {state}: {cause}", axis.name())
         }
-        News::RigRestarted => "the rig started anew; starting over".into(),
-        News::BusLost => "the bus is gone; trying to come back".into(),
-        News::BusBack => "the bus is back".into(),
-        News::SensorsSilent => "no sensors for 0.2 s; waiting for the rig".into(),
+        NodeEvent::RigRestarted => "the rig started anew; starting over".into(),
+        NodeEvent::BusLost => "the bus is gone; trying to come back".into(),
+        NodeEvent::BusBack => "the bus is back".into(),
+        NodeEvent::SensorsSilent => "no sensors for 0.2 s; waiting for the rig".into(),
     }
 }

@@ -7,7 +7,7 @@ use crate::recording::{Tables, sentence};
 use crate::report::{self, Report};
 use crate::run::RunError;
 use algorithms::guard::{STUCK, Stuck};
-use axis_control::node::News;
+use axis_control::node::NodeEvent;
 use axis_control::setup::Inputs;
 use nominal::Axis;
 use protocol::bus::BusCounters;
@@ -95,7 +95,7 @@ struct Ended {
     rehearsal: Rehearsal,
     interrupted: bool,
     reported: Vec<serde_json::Value>,
-    news: Vec<News>,
+    news: Vec<NodeEvent>,
     took_s: f64,
 }
 

@@ -5,7 +5,7 @@
 
 use axis_control::node::Change;
 use axis_control::program::Variable;
-use axis_control::program::file::{Makings, ProgramError, Source};
+use axis_control::program::file::{FixedSettings, ProgramError, Source};
 use axis_control::setup::Inputs;
 use crossbeam_channel::Sender;
 use nominal::{Axis, RigParameters};
@@ -19,7 +19,7 @@ struct ProgramFile {
     path: PathBuf,
     changed: Option<SystemTime>,
     text: String,
-    makings: Makings,
+    makings: FixedSettings,
     variables: Vec<Variable>,
     values: Vec<f64>,
 }
@@ -108,12 +108,12 @@ impl ProgramFile {
 }
 
 /// What is said of the first thing that another program is made of.
-fn other_making(old: &Makings, new: &Makings) -> Option<String> {
+fn other_making(old: &FixedSettings, new: &FixedSettings) -> Option<String> {
     let mut keys = new.keys().chain(old.keys());
     let key = keys.find(|key| old.get(*key) != new.get(*key))?;
     let what = if key.ends_with("linearisation") { "linearisation" } else { "algorithm" };
     let reported =
-        |makings: &Makings| makings.get(key).map_or("left out".into(), |text| format!("\"{text}\""));
+        |makings: &FixedSettings| makings.get(key).map_or("left out".into(), |text| format!("\"{text}\""));
     Some(format!("{key} is {} and was {}; another {what} needs another start", reported(new), reported(old)))
 }
 

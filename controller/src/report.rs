@@ -1,7 +1,7 @@
 //! `controller.json`, or `controller-drive.json` and `controller-load.json`, filled from the controllers of a process.
 
 use axis_control::axis::AxisController;
-use axis_control::node::{CalibrationPort, ControllerNode, News};
+use axis_control::node::{CalibrationPort, ControllerNode, NodeEvent};
 use axis_control::setup::Inputs;
 use nominal::Axis;
 use protocol::frames::MainChainState;
@@ -9,7 +9,7 @@ use runlog::controller_report::{self, ControllerReport};
 use std::collections::BTreeMap;
 use xcp::port::PortCounters;
 
-pub(crate) type Report = ControllerReport<News, PortCounters>;
+pub(crate) type Report = ControllerReport<NodeEvent, PortCounters>;
 pub(crate) type AxisReport = controller_report::AxisReport<PortCounters>;
 
 fn of_axis<P: CalibrationPort>(

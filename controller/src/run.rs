@@ -26,7 +26,7 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::time::Duration;
 use xcp::a2l::{self, Described};
-use xcp::clerk::{Book, Clerk};
+use xcp::clerk::{AxisParameters, ParameterFileWorker};
 use xcp::config::XcpConfig;
 use xcp::port::{Port, Queues};
 
@@ -138,10 +138,10 @@ fn open_xcp(
     config: &XcpConfig,
     controllers: &[AxisController],
     changes: &Sender<Change>,
-) -> Result<(Vec<Port>, Option<Clerk>), RunError> {
+) -> Result<(Vec<Port>, Option<ParameterFileWorker>), RunError> {
     let out = &arguments.files.out;
     let (note_sender, notes) = bounded(NOTE_QUEUE);
-    let (mut ports, mut books) = (Vec::new(), Vec::new());
+    let (mut ports, mut axes) = (Vec::new(), Vec::new());
     for controller in controllers {
         let (axis, program) = (controller.axis(), controller.program());
         let (returned_sender, returned) = bounded(RETURNED_QUEUE);
@@ -156,9 +156,9 @@ fn open_xcp(
         let text = a2l::text(&described).map_err(RunError::input)?;
         std::fs::write(&path, text)
             .map_err(|error| RunError::Output(format!("{}: {error}", path.display())))?;
-        books.push(Book { axis, variables, values, returned: returned_sender });
+        axes.push(AxisParameters { axis, variables, values, returned: returned_sender });
     }
-    Ok((ports, Some(Clerk::new(notes, books, changes.clone(), out))))
+    Ok((ports, Some(ParameterFileWorker::new(notes, axes, changes.clone(), out))))
 }
 
 /// Where seeds begin: what the system holds for random.

@@ -163,7 +163,7 @@ impl Proposal {
 }
 
 /// The probability in words, for a number of trials.
-fn told_in_words(probability: Probability, trials: usize) -> String {
+fn probability_in_words(probability: Probability, trials: usize) -> String {
     let Probability { value, low, high } = probability;
     format!("in {:.0} % of {trials} rehearsed records ({:.0} to {:.0} %)", 1e2 * value, 1e2 * low, 1e2 * high)
 }
@@ -182,7 +182,7 @@ fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
     let open = best.pairs(times).into_iter().filter(|pair| pair.2 < WORTH_IT);
     let left: Vec<(usize, usize)> = open.map(|(one, other, _)| (one.min(other), one.max(other))).collect();
     let otherwise = remedies::of_pairs(explanations, &left);
-    let told = told_in_words(probability, best.trials.len());
+    let told = probability_in_words(probability, best.trials.len());
     let divergence = judge(entry, question.baseline, explanations, question.axes_measured)
         .map(|judged| judged.least_in_repetitions(times));
     let found = Next {

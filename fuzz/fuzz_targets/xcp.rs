@@ -5,7 +5,7 @@
 #![no_main]
 
 use xcp::alone::slave;
-use xcp::image::Desk;
+use xcp::image::ParameterActions;
 use xcp::lock;
 use xcp::signals::COUNT;
 use xcp::slave::Slave;
@@ -36,7 +36,7 @@ struct Strict {
     open: bool,
 }
 
-impl Desk for Strict {
+impl ParameterActions for Strict {
     fn set(&mut self, _place: usize, value: f64) {
         assert!(self.open, "written without the key");
         assert!(value.is_finite(), "{value}");
@@ -58,8 +58,8 @@ fuzz_target!(|input: (bool, Vec<(u8, [u8; 8])>)| {
     let mut slave = if open { OPEN.clone() } else { LOCKED.clone() };
     for (cycle, (length, packet)) in (0..).zip(packets) {
         // It stays open no longer than the session that was opened.
-        let mut desk = Strict { open: open && slave.is_unlocked() };
-        let _ = slave.command(&packet[..usize::from(length).min(packet.len())], cycle, &mut desk);
+        let mut actions = Strict { open: open && slave.is_unlocked() };
+        let _ = slave.command(&packet[..usize::from(length).min(packet.len())], cycle, &mut actions);
         let parameters = slave.image().parameters().to_vec();
         slave.cycle(cycle, &[1.0; COUNT], &parameters);
         let mut packets = 0;

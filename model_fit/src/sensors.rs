@@ -7,7 +7,7 @@
 use super::fit::Fitting;
 use super::record::Measured;
 use super::select::Fitted;
-use super::structure::{Advice, Base, Hardly, Seen, TWINS, cosine};
+use super::structure::{Advice, Base, Seen, TWINS, WeakSensor, cosine};
 use crate::stats::mean_and_variance;
 use model::{Model, Part, Program};
 
@@ -53,7 +53,7 @@ pub(super) fn advice(
                 {
                     advice.measure.push(state);
                 }
-                Some(Shown { share, cosine }) => advice.hardly.push(Hardly { state, share, cosine }),
+                Some(Shown { share, cosine }) => advice.hardly.push(WeakSensor { state, share, cosine }),
                 None => {}
             }
         }

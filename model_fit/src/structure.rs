@@ -62,12 +62,12 @@ pub struct Advice {
     /// States, of which a sensor of one would do; empty where none does.
     pub measure: Vec<String>,
     /// States of which a sensor shows or tells them apart a little.
-    pub hardly: Vec<Hardly>,
+    pub hardly: Vec<WeakSensor>,
 }
 
 /// A sensor that is better than none, and a close call.
 #[derive(Clone, Debug, Serialize)]
-pub struct Hardly {
+pub struct WeakSensor {
     pub state: String,
     /// Of what the suspect does there, or that of two which shows less, the part that the model's own numbers cannot do.
     pub share: f64,
@@ -79,7 +79,7 @@ impl Advice {
     /// A line of a report.
     pub(crate) fn in_words(&self) -> String {
         let measure = self.measure.join(" or ");
-        let hardly = |one: &Hardly| match one.cosine {
+        let hardly = |one: &WeakSensor| match one.cosine {
             Some(cosine) => format!("{} (cosine {cosine:.3})", one.state),
             None => format!("{} ({:.0} % of what it does)", one.state, one.share * 100.0),
         };
@@ -332,13 +332,13 @@ impl Beside {
 
 #[cfg(test)]
 mod tests {
-    use super::{Advice, Hardly};
+    use super::{Advice, WeakSensor};
 
     #[test]
     fn a_sensor_that_helps_a_little_is_not_said_to_be_none() {
         let words = |suspects: &[&str], measure: &[&str], cosine: Option<Option<f64>>| {
             let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-            let hardly = |cosine| Hardly { state: "z".into(), share: 0.124, cosine };
+            let hardly = |cosine| WeakSensor { state: "z".into(), share: 0.124, cosine };
             let hardly = cosine.map(hardly).into_iter().collect();
             Advice { suspects: owned(suspects), measure: owned(measure), hardly }.in_words()
         };

@@ -36,17 +36,17 @@ const MOST_TEXT: usize = 1 << 16;
 
 /// Who tries libraries.
 #[derive(Clone, Debug)]
-pub struct Trier {
+pub struct TrialRunner {
     pub program: PathBuf,
     /// How long it may take.
     pub limit: Duration,
 }
 
-impl Trier {
+impl TrialRunner {
     /// This program if it is the controller, else the one in its folder or in the folder around that (as for test programs).
     ///
     /// # Errors
-    /// [`Wrong::NoTrier`] with the places that were looked at.
+    /// [`Wrong::NoTrialRunner`] with the places that were looked at.
     pub fn find() -> Result<Self, Wrong> {
         const NAME: &str = "controller";
         let own = env::current_exe().map_err(Wrong::NoChild)?;
@@ -55,7 +55,7 @@ impl Trier {
             if own.file_name().is_some_and(|name| name == NAME) { vec![own] } else { around.collect() };
         let found = places.iter().find(|place| place.is_file()).cloned();
         let program = found.ok_or_else(|| {
-            Wrong::NoTrier(
+            Wrong::NoTrialRunner(
                 places.iter().map(|place| place.display().to_string()).collect::<Vec<_>>().join(", "),
             )
         })?;
@@ -149,7 +149,7 @@ fn wait(child: &mut Child, limit: Duration) -> io::Result<Option<ExitStatus>> {
 }
 
 /// What the status (None: killed) and the text of a child mean.
-fn judge(trier: &Trier, status: Option<ExitStatus>, text: &str) -> Result<(), Wrong> {
+fn judge(trier: &TrialRunner, status: Option<ExitStatus>, text: &str) -> Result<(), Wrong> {
     let (mut stage, mut verdict, mut last) = (None, None, "");
     for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
         match line.strip_prefix(MARK).map(|reported| reported.split_once(' ').unwrap_or((reported, ""))) {
@@ -176,7 +176,7 @@ mod tests {
     use super::*;
 
     fn judged(status: Option<i32>, text: &str) -> String {
-        let trier = Trier { program: "controller".into(), limit: TRIAL_LIMIT };
+        let trier = TrialRunner { program: "controller".into(), limit: TRIAL_LIMIT };
         let verdict = judge(&trier, status.map(ExitStatus::from_raw), text);
         verdict.map_or_else(|wrong| wrong.to_string(), |()| "good".to_owned())
     }

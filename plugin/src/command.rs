@@ -1,6 +1,6 @@
 //! The commands `check-library` and `probe-library`.
 
-use crate::child::Trier;
+use crate::child::TrialRunner;
 pub use crate::child::run as probe_library;
 use crate::{Description, PluginError, describe};
 use protocol::exit::Exit;
@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// Prints what the library offers.
 pub fn check_library(library: &Path) -> Result<Exit, PluginError> {
-    let description = Trier::find()
+    let description = TrialRunner::find()
         .map_err(|wrong| PluginError { library: library.to_owned(), wrong })
         .and_then(|trier| describe(&trier, library))?;
     // A closed pipe is the reader's wish.

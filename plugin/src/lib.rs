@@ -35,7 +35,7 @@ use settings::parameters::Parameter;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-pub use child::{TRIAL_LIMIT, Trier};
+pub use child::{TRIAL_LIMIT, TrialRunner};
 pub use interface::INTERFACE_VERSION;
 pub use wrong::{PluginError, Wrong};
 
@@ -78,12 +78,12 @@ impl Algorithm for Plugin {
 
 /// Loads the library of `path` for a rig of these nominal numbers, after a trial in a child process.
 pub fn load(path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
-    let trier = Trier::find().map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
+    let trier = TrialRunner::find().map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
     load_tried_by(&trier, path, rig)
 }
 
 /// [`load`] with a trier that is named.
-pub fn load_tried_by(trier: &Trier, path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
+pub fn load_tried_by(trier: &TrialRunner, path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
     let made = || {
         let file = absolute(path)?;
         trier.try_out(&file)?;
@@ -95,7 +95,7 @@ pub fn load_tried_by(trier: &Trier, path: &Path, rig: &RigParameters) -> Result<
 }
 
 /// What the library of `path` offers, after a trial in a child process.
-pub fn describe(trier: &Trier, path: &Path) -> Result<Description, PluginError> {
+pub fn describe(trier: &TrialRunner, path: &Path) -> Result<Description, PluginError> {
     let reported = || {
         let file = absolute(path)?;
         trier.try_out(&file)?;

@@ -86,7 +86,7 @@ pub enum Wrong {
     #[error("{0}")]
     Told(String),
     #[error("no controller program was found to try it, at {0}; build it with cargo build -p controller")]
-    NoTrier(String),
+    NoTrialRunner(String),
     #[error("'{}' cannot try libraries; build it with cargo build -p controller", .0.display())]
     ForeignTrier(PathBuf),
     #[error("the process that tries it cannot be started: {0}")]

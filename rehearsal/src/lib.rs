@@ -16,7 +16,7 @@ mod files;
 pub use files::{PlantTables, RehearsalError, of_inputs, scene};
 
 use axis_control::axis::{AxisController, AxisRecord};
-use axis_control::node::{ControllerNode, News, Outlets, STOPPED_CYCLES};
+use axis_control::node::{ControllerNode, NodeEvent, Outlets, STOPPED_CYCLES};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use plant::scene::Action;
 use plant::tables::CycleRecord;
@@ -45,7 +45,7 @@ pub struct Rehearsal<R = PeopledPlant> {
     node: ControllerNode,
     wire: Wire,
     records: Receiver<AxisRecord>,
-    news: Receiver<News>,
+    news: Receiver<NodeEvent>,
     cycle: u64,
     closing: bool,
     off_the_wire: Option<EncodeError>,
@@ -164,8 +164,8 @@ impl<R: SimulatedRig> Rehearsal<R> {
         self.cycle
     }
 
-    /// News since they were taken last.
-    pub fn take_news(&mut self) -> impl Iterator<Item = News> {
+    /// NodeEvent since they were taken last.
+    pub fn take_news(&mut self) -> impl Iterator<Item = NodeEvent> {
         self.news.try_iter()
     }
 

@@ -237,7 +237,7 @@ fn receive_from(
     let address = sender(socket, &message);
     caller.write(name, &address[..address.len().min(room as usize)])?;
     caller.write(name_length, &(address.len() as i32).to_ne_bytes())?;
-    let length = told_length(socket, flags, bytes.len(), &message);
+    let length = reported_length(socket, flags, bytes.len(), &message);
     taken.push(message);
     Ok(length)
 }
@@ -253,7 +253,7 @@ fn sender(socket: &GuestSocket, message: &Message) -> Vec<u8> {
 
 /// What a call returns that has put so many bytes into the guest's buffer; with `MSG_TRUNC` the transport protocol tells the
 /// whole.
-fn told_length(socket: &GuestSocket, flags: i32, length: usize, message: &Message) -> usize {
+fn reported_length(socket: &GuestSocket, flags: i32, length: usize, message: &Message) -> usize {
     let whole = flags & libc::MSG_TRUNC != 0 && socket.transport().is_some();
     if whole { message.bytes.len() } else { length }
 }
@@ -292,7 +292,7 @@ fn receive_one(
     caller.write(header.control, &control)?;
     caller.write(header_at + 40, &(control.len() as u64).to_ne_bytes())?;
     caller.write(header_at + 48, &told.to_ne_bytes())?;
-    let length = told_length(socket, flags, length, &message);
+    let length = reported_length(socket, flags, length, &message);
     taken.push(message);
     Ok(length)
 }

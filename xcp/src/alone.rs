@@ -1,14 +1,14 @@
 //! A slave without bus and controller: for fuzzers, and for whoever tries packets by hand.
 
 use crate::a2l::{self, Described};
-use crate::image::{Desk, Image};
+use crate::image::{Image, ParameterActions};
 use crate::lock::Lock;
 use crate::slave::{Slave, SlaveParts};
 use axis_control::program::file::Source;
 use nominal::{Axis, RigParameters};
 
 /// Nobody acts on what is written.
-impl Desk for () {
+impl ParameterActions for () {
     fn set(&mut self, _place: usize, _value: f64) {}
 
     fn store(&mut self, _values: &[f64]) -> bool {

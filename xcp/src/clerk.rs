@@ -48,7 +48,7 @@ pub struct Returned {
 }
 
 /// An axis of the clerk.
-pub struct Book {
+pub struct AxisParameters {
     pub axis: Axis,
     pub variables: Vec<Variable>,
     /// Their values at the start.
@@ -58,9 +58,9 @@ pub struct Book {
 }
 
 /// Does what ports ask for.
-pub struct Clerk {
+pub struct ParameterFileWorker {
     notes: Receiver<Note>,
-    books: Vec<Book>,
+    axes: Vec<AxisParameters>,
     changes: Sender<Change>,
     folder: PathBuf,
 }
@@ -70,10 +70,15 @@ pub fn file_name(axis: Axis) -> String {
     format!("controller-{}-parameters.toml", axis.name())
 }
 
-impl Clerk {
+impl ParameterFileWorker {
     /// A clerk for these axes, with the run's folder.
-    pub fn new(notes: Receiver<Note>, books: Vec<Book>, changes: Sender<Change>, folder: &Path) -> Self {
-        Self { notes, books, changes, folder: folder.into() }
+    pub fn new(
+        notes: Receiver<Note>,
+        axes: Vec<AxisParameters>,
+        changes: Sender<Change>,
+        folder: &Path,
+    ) -> Self {
+        Self { notes, axes, changes, folder: folder.into() }
     }
 
     pub fn look(&mut self) {
@@ -81,8 +86,10 @@ impl Clerk {
         for note in notes.try_iter() {
             match note {
                 Note::Changed { axis, cycle, place, value } => {
-                    let name =
-                        self.book(axis).and_then(|book| book.variables.get(place)).map(|found| &found.name);
+                    let name = self
+                        .parameters_of(axis)
+                        .and_then(|axis_parameters| axis_parameters.variables.get(place))
+                        .map(|found| &found.name);
                     let name = name.map_or("?", String::as_str);
                     protocol::say!(
                         "controller: cycle {cycle}: {}.{name} is {value} now, by XCP",
@@ -112,8 +119,8 @@ impl Clerk {
         }
     }
 
-    fn book(&self, axis: Axis) -> Option<&Book> {
-        self.books.iter().find(|book| book.axis == axis)
+    fn parameters_of(&self, axis: Axis) -> Option<&AxisParameters> {
+        self.axes.iter().find(|axis_parameters| axis_parameters.axis == axis)
     }
 
     fn path(&self, axis: Axis) -> PathBuf {
@@ -121,9 +128,9 @@ impl Clerk {
     }
 
     fn store(&self, axis: Axis, values: Vec<f64>) {
-        let Some(book) = self.book(axis) else { return };
+        let Some(axis_parameters) = self.parameters_of(axis) else { return };
         let path = self.path(axis);
-        let text = parameter_set::text(axis, &book.variables, &values);
+        let text = parameter_set::text(axis, &axis_parameters.variables, &values);
         // Written beside it and moved over it: nobody reads half a set.
         let part = path.with_extension("toml.part");
         let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path));
@@ -138,23 +145,23 @@ impl Clerk {
             Err(error) => protocol::say!("controller: cannot write {}: {error}", path.display()),
         }
         // A port that has gone needs nothing back.
-        let _ = book.returned.send(Returned { values, stored: written.is_ok() });
+        let _ = axis_parameters.returned.send(Returned { values, stored: written.is_ok() });
     }
 
     /// Hands all values of the set on, or none and why not.
     fn load(&self, axis: Axis) -> Result<usize, String> {
-        let Some(book) = self.book(axis) else { return Ok(0) };
+        let Some(axis_parameters) = self.parameters_of(axis) else { return Ok(0) };
         let settings = parameter_set::read(&self.path(axis)).map_err(|error| error.to_string())?;
         let mut changes = Vec::new();
         for setting in settings {
             let reported = |problem: String| format!("{}{}.{problem}", setting.place, axis.name());
-            let place = book
+            let place = axis_parameters
                 .variables
                 .iter()
                 .position(|variable| setting.axis == axis && variable.name == setting.name)
                 .ok_or_else(|| reported(format!("{}: no such variable here", setting.name)))?;
-            let parameter = &book.variables[place].parameter;
-            if parameter.at_start_only && setting.value == book.values[place] {
+            let parameter = &axis_parameters.variables[place].parameter;
+            if parameter.at_start_only && setting.value == axis_parameters.values[place] {
                 continue;
             }
             let value = parameter.check_change(setting.value).map_err(|error| reported(error.to_string()))?;

@@ -36,7 +36,7 @@ pub const WIDE: u32 = 8;
 pub const NARROW: u32 = 4;
 
 /// What acts on what was written.
-pub trait Desk {
+pub trait ParameterActions {
     /// A parameter has another value, in its range.
     fn set(&mut self, place: usize, value: f64);
 
@@ -180,13 +180,18 @@ impl Image {
         }
     }
 
-    /// Writes the bytes from `address` on; `desk` gets every value that changed.
+    /// Writes the bytes from `address` on; `actions` gets every value that changed.
     ///
     /// # Errors
     /// [`Refusal::AccessDenied`] where nothing is; [`Refusal::WriteProtected`] for what is only read, or read at the start only;
     /// [`Refusal::OutOfRange`] for a value that its parameter does not allow; [`Refusal::Sequence`] for the rest of a value that
     /// nobody began, and for arming with a pre-trigger as long as the buffer. Nothing of the block is taken then.
-    pub fn write(&mut self, address: u32, bytes: &[u8], desk: &mut dyn Desk) -> Result<(), Refusal> {
+    pub fn write(
+        &mut self,
+        address: u32,
+        bytes: &[u8],
+        actions: &mut dyn ParameterActions,
+    ) -> Result<(), Refusal> {
         let begun = self.begun.take().filter(|begun| begun.next == address);
         let (region, offset) = self.reach(address, bytes.len() as u32)?;
         if !matches!(region, Region::Parameters | Region::Controls) {
@@ -208,7 +213,7 @@ impl Image {
                 // A count has four bytes of its own; the other four of its place are nobody's.
                 if value.count == self.own_bytes(region, place) {
                     if take {
-                        self.take(region, place, value.bytes, desk)?;
+                        self.take(region, place, value.bytes, actions)?;
                     } else {
                         self.check(region, place, value.bytes, &mut controls)?;
                     }
@@ -263,14 +268,14 @@ impl Image {
         region: Region,
         place: usize,
         bytes: [u8; 8],
-        desk: &mut dyn Desk,
+        actions: &mut dyn ParameterActions,
     ) -> Result<(), Refusal> {
         if region == Region::Parameters {
             let value = Format::Double.decode(bytes);
             // An equal value is no change, and is not passed on.
             if value.to_bits() != self.parameters[place].to_bits() {
                 self.parameters[place] = value;
-                desk.set(place, value);
+                actions.set(place, value);
             }
             return Ok(());
         }
@@ -279,7 +284,7 @@ impl Image {
             ARM if value == 0.0 => self.trace.disarm(),
             ARM => self.trace.arm(&self.controls),
             LOAD_SET if value == 0.0 => {}
-            LOAD_SET => return if desk.load() { Ok(()) } else { Err(Refusal::Busy) },
+            LOAD_SET => return if actions.load() { Ok(()) } else { Err(Refusal::Busy) },
             _ => self.controls[place] = value,
         }
         Ok(())
@@ -308,7 +313,7 @@ pub(super) mod tests {
     use super::*;
     use settings::parameters::{Parameter, declare};
 
-    /// A desk that records what it gets.
+    /// A actions that records what it gets.
     #[derive(Default)]
     pub(crate) struct Notes {
         pub(crate) set: Vec<(usize, f64)>,
@@ -316,7 +321,7 @@ pub(super) mod tests {
         pub(crate) loads: usize,
     }
 
-    impl Desk for Notes {
+    impl ParameterActions for Notes {
         fn set(&mut self, place: usize, value: f64) {
             self.set.push((place, value));
         }

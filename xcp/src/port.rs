@@ -9,7 +9,7 @@ use crate::a2l::{self, A2lError, Described};
 use crate::clerk::{Note, Returned};
 use crate::config::XcpConfig;
 use crate::identifiers;
-use crate::image::{Desk, Image};
+use crate::image::{Image, ParameterActions};
 use crate::lock::Lock;
 use crate::packet::{BYTES, Packet};
 use crate::signals::{self, View};
@@ -58,7 +58,7 @@ struct Act<'a> {
     changed: &'a mut u64,
 }
 
-impl Desk for Act<'_> {
+impl ParameterActions for Act<'_> {
     fn set(&mut self, place: usize, value: f64) {
         let Self { axis, cycle, .. } = *self;
         // Checked against its table by the image.

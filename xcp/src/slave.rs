@@ -1,18 +1,18 @@
 //! The XCP slave: packets in, packets out, over a memory and nothing else.
 //!
 //! ```text
-//!   command(packet, cycle, desk) ─► answer or none        any bytes, at any time
+//!   command(packet, cycle, actions) ─► answer or none        any bytes, at any time
 //!   cycle(cycle, signals, parameters)                     after each answer to the rig
 //!   next_daq() ─► packet or none                          what DAQ lists have to send
 //! ```
 //!
-//! It knows no bus, no clock, no controller: what it changes it tells its [`Desk`]. Whatever the bytes are, it answers, refuses
-//! or keeps silent, and a session that is not open answers CONNECT alone. Nothing here allocates, locks, prints or blocks.
+//! It knows no bus, no clock, no controller: what it changes it tells its [`ParameterActions`]. Whatever the bytes are, it
+//! answers, refuses or keeps silent, and a session that is not open answers CONNECT alone. Nothing here allocates, locks, prints or blocks.
 //!
 //! Source: ASAM MCD-1 XCP 1.1, part 2.
 
 use crate::daq::{Daq, Entry, LISTS, LONGEST_ENTRY, ListMode, STAMP_BYTES};
-use crate::image::{DESCRIPTION, Desk, Image};
+use crate::image::{DESCRIPTION, Image, ParameterActions};
 use crate::lock::{Lock, Turned};
 use crate::packet::{BYTES, EVENT, EVENT_STORED, Fields, Packet, Refusal, command, refusal, response};
 use crate::signals::COUNT;
@@ -160,7 +160,12 @@ impl Slave {
     }
 
     /// The answer to a packet of any bytes, received in `cycle`; `None` where none is due.
-    pub fn command(&mut self, packet: &[u8], cycle: u64, desk: &mut dyn Desk) -> Option<Packet> {
+    pub fn command(
+        &mut self,
+        packet: &[u8],
+        cycle: u64,
+        actions: &mut dyn ParameterActions,
+    ) -> Option<Packet> {
         let fields = Fields(&packet[..packet.len().min(BYTES)]);
         let code = fields.byte(0).ok()?;
         if code == command::CONNECT {
@@ -171,7 +176,7 @@ impl Slave {
             return None;
         }
         self.idle = 0;
-        let answer = self.answer(code, fields, cycle, desk);
+        let answer = self.answer(code, fields, cycle, actions);
         match answer {
             Ok(answer) => {
                 self.counters.answered += 1;
@@ -211,10 +216,10 @@ impl Slave {
         code: u8,
         fields: Fields<'_>,
         cycle: u64,
-        desk: &mut dyn Desk,
+        actions: &mut dyn ParameterActions,
     ) -> Result<Option<Packet>, Refusal> {
         if code == command::DOWNLOAD || code == command::DOWNLOAD_NEXT {
-            return self.write(code == command::DOWNLOAD_NEXT, fields, desk);
+            return self.write(code == command::DOWNLOAD_NEXT, fields, actions);
         }
         self.block.whole = 0;
         let answer = match code {
@@ -232,7 +237,7 @@ impl Slave {
                 response(&[0, 0x01, 0, BLOCK_PACKETS, 0, 0, VERSION])
             }
             command::GET_ID => self.identify(fields.byte(1)?),
-            command::SET_REQUEST => self.request(fields.byte(1)?, desk)?,
+            command::SET_REQUEST => self.request(fields.byte(1)?, actions)?,
             command::GET_SEED => self.seed(fields)?,
             command::UNLOCK => self.unlock(fields)?,
             command::SET_MTA => {
@@ -275,12 +280,12 @@ impl Slave {
         response(&[0, 0, 0, a, b, c, d])
     }
 
-    fn request(&mut self, mode: u8, desk: &mut dyn Desk) -> Result<Packet, Refusal> {
+    fn request(&mut self, mode: u8, actions: &mut dyn ParameterActions) -> Result<Packet, Refusal> {
         if mode != STORE_REQUEST {
             return Err(Refusal::OutOfRange);
         }
         self.check_unlocked()?;
-        if self.storing || !desk.store(self.image.parameters()) {
+        if self.storing || !actions.store(self.image.parameters()) {
             return Err(Refusal::Busy);
         }
         self.storing = true;
@@ -353,7 +358,7 @@ impl Slave {
         &mut self,
         goes_on: bool,
         fields: Fields<'_>,
-        desk: &mut dyn Desk,
+        actions: &mut dyn ParameterActions,
     ) -> Result<Option<Packet>, Refusal> {
         let count = usize::from(fields.byte(1)?);
         let left = self.block.whole.saturating_sub(self.block.had);
@@ -380,7 +385,7 @@ impl Slave {
             *whole = all;
             return Ok(None);
         }
-        self.image.write(address, &bytes[..all], desk)?;
+        self.image.write(address, &bytes[..all], actions)?;
         self.address = Some(address + all as u32);
         Ok(Some(response(&[])))
     }

@@ -1,7 +1,7 @@
 //! What an axis hands over in a cycle: to the bus, to a person, to the record.
 
 use super::AxisController;
-use crate::node::News;
+use crate::node::NodeEvent;
 use crate::set_point::{ForceSetPoint, SetPoint};
 use nominal::Axis;
 use protocol::frames::{
@@ -16,7 +16,7 @@ pub struct Answer {
     pub emergency_stop: Option<EmergencyStop>,
     pub status: Option<ChainStatus>,
     pub values: Option<ChainValues>,
-    pub news: Option<News>,
+    pub news: Option<NodeEvent>,
     pub record: Option<AxisRecord>,
 }
 

@@ -44,7 +44,7 @@ pub struct ProgramError(String);
 type Section = BTreeMap<String, Spanned<toml::Value>>;
 
 /// Texts of a program by their full key, such as `algorithm.name`.
-pub type Makings = BTreeMap<String, String>;
+pub type FixedSettings = BTreeMap<String, String>;
 
 const LINEARISATION: &str = "post-controller.linearisation";
 
@@ -93,7 +93,7 @@ impl Source {
     }
 
     /// What the file says besides numbers, by its full key: what a program is made of, and cannot change while it runs.
-    pub fn makings(&self) -> Result<Makings, ProgramError> {
+    pub fn makings(&self) -> Result<FixedSettings, ProgramError> {
         let File { algorithm, post_controller, giving_way, .. } = self.parse()?;
         let giving_way = giving_way.map(Spanned::into_inner).unwrap_or_default();
         let sections = [
@@ -101,7 +101,8 @@ impl Source {
             ("giving-way", giving_way),
             ("post-controller", post_controller),
         ];
-        let mut makings = Makings::from([(LINEARISATION.to_owned(), Law::ChokedExhaust.name().to_owned())]);
+        let mut makings =
+            FixedSettings::from([(LINEARISATION.to_owned(), Law::ChokedExhaust.name().to_owned())]);
         for (name, section) in sections {
             for (key, value) in section {
                 if let toml::Value::String(text) = value.into_inner() {

@@ -13,7 +13,7 @@ use super::ExportError;
 use super::controllers;
 use super::mdf4::comment;
 use super::run_table::{RunTable, holds_words, unit};
-use super::signals::{Course, Signals};
+use super::signals::{MessageFrames, Signals};
 use crate::recorded_log::RecordedLog;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapResult, WriteOptions, Writer};
@@ -57,7 +57,7 @@ enum Source<'a> {
         origin_ns: u64,
     },
     Signals {
-        course: &'a Course,
+        message: &'a MessageFrames,
         /// Place of the next frame.
         next: usize,
     },
@@ -98,8 +98,8 @@ pub(super) fn write(
             sources.push((topic.to_owned(), Source::Table { table, origin_ns: log.origin_ns() }));
         }
     }
-    for course in &signals.courses {
-        sources.push((format!("/can/{}", course.spec.name), Source::Signals { course, next: 0 }));
+    for message in &signals.messages {
+        sources.push((format!("/can/{}", message.spec.name), Source::Signals { message, next: 0 }));
     }
     sources.push(("/can".to_owned(), Source::Frames { log, next: 0 }));
     let mut streams = Vec::new();
@@ -129,7 +129,7 @@ pub(super) fn write(
 fn channel(file: &mut Writer<BufWriter<File>>, topic: &str, source: &Source<'_>) -> McapResult<u16> {
     let (title, about) = match source {
         Source::Table { .. } => (topic.trim_start_matches('/').replace('/', "."), "A row of a run's table."),
-        Source::Signals { course, .. } => (course.spec.name.to_owned(), course.spec.comment),
+        Source::Signals { message, .. } => (message.spec.name.to_owned(), message.spec.comment),
         Source::Frames { .. } => ("frame".to_owned(), "A frame of the bus as it was."),
     };
     let schema = json!({
@@ -164,8 +164,8 @@ impl Source<'_> {
                 };
                 table.names().iter().map(of).collect()
             }
-            Self::Signals { course, .. } => {
-                let signals = course.spec.signals.iter().map(|signal| {
+            Self::Signals { message, .. } => {
+                let signals = message.spec.signals.iter().map(|signal| {
                     let kind = if signal.kind == SignalKind::Physical { "number" } else { "integer" };
                     (signal.field.to_owned(), property(kind, &comment(signal), signal.unit))
                 });
@@ -185,7 +185,7 @@ impl Source<'_> {
     fn next_ns(&mut self) -> Result<Option<u64>, FileError> {
         Ok(match self {
             Self::Table { table, origin_ns } => table.next_ns()?.map(|ns| *origin_ns + ns),
-            Self::Signals { course, next } => course.frames.get(*next).map(|(stamp_ns, _)| *stamp_ns),
+            Self::Signals { message, next } => message.frames.get(*next).map(|(stamp_ns, _)| *stamp_ns),
             Self::Frames { log, next } => log.frames.get(*next).map(|logged| logged.record.stamp_ns),
         })
     }
@@ -203,9 +203,9 @@ impl Source<'_> {
                     key(out, name, &value);
                 }
             }
-            Self::Signals { course, next } => {
-                let (_, word) = course.frames[*next];
-                for signal in course.spec.signals {
+            Self::Signals { message, next } => {
+                let (_, word) = message.frames[*next];
+                for signal in message.spec.signals {
                     let raw = signal.raw(word);
                     let physical = signal.kind == SignalKind::Physical;
                     let value = if physical { Value::from(signal.physical(raw)) } else { Value::from(raw) };

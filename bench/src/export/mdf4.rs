@@ -5,7 +5,7 @@
 //!
 //! Source: ASAM MDF 4.1, by the crate `mdf4-rs`; asammdf reads the same values, units and times (a test holds both together).
 
-use super::signals::{Course, Signals, name, value};
+use super::signals::{MessageFrames, Signals, name, value};
 use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 use protocol::frames::{SignalKind, SignalSpec};
 
@@ -19,10 +19,10 @@ pub(super) fn write(path: &str, signals: &Signals, origin_ns: u64) -> mdf4_rs::R
         // The crate writes 0; a link is 8 bytes in the same order as this number.
         file.update_link(header + START_TIME_OFFSET, origin_ns)?;
     }
-    for course in &signals.courses {
+    for message in &signals.messages {
         let group = file.add_channel_group(None, |_| {})?;
-        file.set_channel_group_name(&group, course.spec.name)?;
-        file.set_channel_group_comment(&group, course.spec.comment)?;
+        file.set_channel_group_name(&group, message.spec.name)?;
+        file.set_channel_group_comment(&group, message.spec.comment)?;
         let time = file.add_channel(&group, None, |channel| {
             channel.data_type = DataType::FloatLE;
             channel.bit_count = 64;
@@ -31,11 +31,11 @@ pub(super) fn write(path: &str, signals: &Signals, origin_ns: u64) -> mdf4_rs::R
         file.set_time_channel(&time)?;
         file.set_channel_unit(&time, "s")?;
         let mut previous = time;
-        for signal in course.spec.signals {
+        for signal in message.spec.signals {
             let channel = file.add_channel(&group, Some(&previous), |channel| {
                 channel.data_type = data_type(signal);
                 channel.bit_count = 64;
-                channel.name = Some(name(course.spec, signal));
+                channel.name = Some(name(message.spec, signal));
             })?;
             if !signal.unit.is_empty() {
                 file.set_channel_unit(&channel, signal.unit)?;
@@ -43,7 +43,7 @@ pub(super) fn write(path: &str, signals: &Signals, origin_ns: u64) -> mdf4_rs::R
             file.set_channel_comment(&channel, &comment(signal))?;
             previous = channel;
         }
-        records(&mut file, &group, course, origin_ns)?;
+        records(&mut file, &group, message, origin_ns)?;
     }
     file.finalize()
 }
@@ -51,15 +51,15 @@ pub(super) fn write(path: &str, signals: &Signals, origin_ns: u64) -> mdf4_rs::R
 fn records<W: mdf4_rs::writer::MdfWrite>(
     file: &mut MdfWriter<W>,
     group: &str,
-    course: &Course,
+    message: &MessageFrames,
     origin_ns: u64,
 ) -> mdf4_rs::Result<()> {
     file.start_data_block_for_cg(group, 0)?;
-    let mut row = Vec::with_capacity(course.spec.signals.len() + 1);
-    for (stamp_ns, word) in &course.frames {
+    let mut row = Vec::with_capacity(message.spec.signals.len() + 1);
+    for (stamp_ns, word) in &message.frames {
         row.clear();
         row.push(DecodedValue::Float(seconds(*stamp_ns, origin_ns)));
-        row.extend(course.spec.signals.iter().map(|signal| match data_type(signal) {
+        row.extend(message.spec.signals.iter().map(|signal| match data_type(signal) {
             DataType::FloatLE => DecodedValue::Float(value(signal, *word)),
             DataType::SignedIntegerLE => DecodedValue::SignedInteger(signal.raw(*word)),
             _ => DecodedValue::UnsignedInteger(signal.raw(*word).cast_unsigned()),

@@ -8,7 +8,7 @@ use protocol::frames::{DecodeError, Frame, MESSAGES, MessageSpec, SignalKind, Si
 
 /// All frames of one message.
 #[derive(Clone, Debug)]
-pub(super) struct Course {
+pub(super) struct MessageFrames {
     pub(super) spec: &'static MessageSpec,
     /// Stamps and data (byte 0 lowest), in the order of the log; at least one.
     pub(super) frames: Vec<(u64, u64)>,
@@ -17,7 +17,7 @@ pub(super) struct Course {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Signals {
     /// Messages that are in it, by identifier.
-    pub(super) courses: Vec<Course>,
+    pub(super) messages: Vec<MessageFrames>,
     /// What is no signal.
     pub(super) left_out: [LeftOut; 2],
 }
@@ -59,8 +59,8 @@ impl Signals {
                 }
             }
         }
-        let courses = MESSAGES.iter().zip(frames).filter(|(_, frames)| !frames.is_empty());
-        Self { courses: courses.map(|(spec, frames)| Course { spec, frames }).collect(), left_out }
+        let messages = MESSAGES.iter().zip(frames).filter(|(_, frames)| !frames.is_empty());
+        Self { messages: messages.map(|(spec, frames)| MessageFrames { spec, frames }).collect(), left_out }
     }
 }
 

@@ -3,7 +3,7 @@
 //! Either a row for each stamp, where what was not sent at it stays empty; or a row every so many milliseconds, holding what was
 //! seen last at or before it. Nothing is interpolated.
 
-use super::signals::{Course, Signals, name, value};
+use super::signals::{MessageFrames, Signals, name, value};
 use std::io::{self, Write};
 
 /// How rows are laid over time.
@@ -18,9 +18,9 @@ pub(super) struct Rows {
 /// Writes the table and tells how many rows it has.
 pub(super) fn write(out: &mut impl Write, signals: &Signals, rows: Rows) -> io::Result<u64> {
     write!(out, "time_s")?;
-    for course in &signals.courses {
-        for signal in course.spec.signals {
-            write!(out, ",{}", name(course.spec, signal))?;
+    for message in &signals.messages {
+        for signal in message.spec.signals {
+            write!(out, ",{}", name(message.spec, signal))?;
         }
     }
     writeln!(out)?;
@@ -32,12 +32,12 @@ pub(super) fn write(out: &mut impl Write, signals: &Signals, rows: Rows) -> io::
 
 /// A row for each stamp; where a message comes twice at one stamp, its second frame makes a second row.
 fn as_stamped(out: &mut impl Write, signals: &Signals, origin_ns: u64) -> io::Result<u64> {
-    let courses = &signals.courses;
+    let messages = &signals.messages;
     // Stamp, how many of the same message and stamp came before, message, data.
     let mut all: Vec<(u64, u32, u32, u64)> = Vec::new();
-    for (place, course) in courses.iter().enumerate() {
+    for (place, message) in messages.iter().enumerate() {
         let begin = all.len();
-        all.extend(course.frames.iter().map(|(stamp_ns, word)| (*stamp_ns, 0, place as u32, *word)));
+        all.extend(message.frames.iter().map(|(stamp_ns, word)| (*stamp_ns, 0, place as u32, *word)));
         // Stable, so that frames of one stamp keep their order.
         all[begin..].sort_by_key(|frame| frame.0);
         for at in begin + 1..all.len() {
@@ -48,11 +48,11 @@ fn as_stamped(out: &mut impl Write, signals: &Signals, origin_ns: u64) -> io::Re
     }
     all.sort_by_key(|frame| (frame.0, frame.1));
     let mut count = 0;
-    let mut cells: Vec<Option<u64>> = vec![None; courses.len()];
+    let mut cells: Vec<Option<u64>> = vec![None; messages.len()];
     for frames in all.chunk_by(|one, other| (one.0, one.1) == (other.0, other.1)) {
         cells.fill(None);
         frames.iter().for_each(|(_, _, place, word)| cells[*place as usize] = Some(*word));
-        row(out, courses, frames[0].0, origin_ns, &cells)?;
+        row(out, messages, frames[0].0, origin_ns, &cells)?;
         count += 1;
     }
     Ok(count)
@@ -60,9 +60,9 @@ fn as_stamped(out: &mut impl Write, signals: &Signals, origin_ns: u64) -> io::Re
 
 /// A row each `every_ns`, from the last multiple before the first stamp.
 fn held(out: &mut impl Write, signals: &Signals, origin_ns: u64, every_ns: u64) -> io::Result<u64> {
-    let mut courses = signals.courses.clone();
-    courses.iter_mut().for_each(|course| course.frames.sort_by_key(|frame| frame.0));
-    let stamps = || courses.iter().flat_map(|course| &course.frames).map(|frame| frame.0);
+    let mut messages = signals.messages.clone();
+    messages.iter_mut().for_each(|message| message.frames.sort_by_key(|frame| frame.0));
+    let stamps = || messages.iter().flat_map(|message| &message.frames).map(|frame| frame.0);
     let (Some(first), Some(last)) = (stamps().min(), stamps().max()) else { return Ok(0) };
     // Back from the origin by whole rows, so that rows stand at multiples of the period.
     let rows_before = origin_ns.saturating_sub(first).div_ceil(every_ns);
@@ -70,18 +70,18 @@ fn held(out: &mut impl Write, signals: &Signals, origin_ns: u64, every_ns: u64) 
         Some(start) => start + (first.max(start) - start) / every_ns * every_ns,
         None => origin_ns,
     };
-    let mut cells: Vec<Option<u64>> = vec![None; courses.len()];
-    let mut next = vec![0; courses.len()];
+    let mut cells: Vec<Option<u64>> = vec![None; messages.len()];
+    let mut next = vec![0; messages.len()];
     let mut count = 0;
     while at_ns <= last.saturating_add(every_ns - 1) {
-        for ((course, cell), next) in courses.iter().zip(&mut cells).zip(&mut next) {
-            while let Some((stamp_ns, word)) = course.frames.get(*next).filter(|frame| frame.0 <= at_ns) {
+        for ((message, cell), next) in messages.iter().zip(&mut cells).zip(&mut next) {
+            while let Some((stamp_ns, word)) = message.frames.get(*next).filter(|frame| frame.0 <= at_ns) {
                 debug_assert!(*stamp_ns <= at_ns);
                 *cell = Some(*word);
                 *next += 1;
             }
         }
-        row(out, &courses, at_ns, origin_ns, &cells)?;
+        row(out, &messages, at_ns, origin_ns, &cells)?;
         count += 1;
         at_ns += every_ns;
     }
@@ -90,14 +90,14 @@ fn held(out: &mut impl Write, signals: &Signals, origin_ns: u64, every_ns: u64) 
 
 fn row(
     out: &mut impl Write,
-    courses: &[Course],
+    messages: &[MessageFrames],
     stamp_ns: u64,
     origin_ns: u64,
     cells: &[Option<u64>],
 ) -> io::Result<()> {
     write_time(out, stamp_ns, origin_ns)?;
-    for (course, cell) in courses.iter().zip(cells) {
-        for signal in course.spec.signals {
+    for (message, cell) in messages.iter().zip(cells) {
+        for signal in message.spec.signals {
             match cell {
                 Some(word) => write!(out, ",{}", value(signal, *word))?,
                 None => write!(out, ",")?,
@@ -131,9 +131,9 @@ mod tests {
     fn signals() -> Signals {
         // RunControl: command 8 bits, number 16 bits or what the table says; Tick: cycle number in the low 32.
         let tick = |ms: u64, cycle: u64| (ms * MS, cycle);
-        let ticks = Course { spec: TICK, frames: vec![tick(10, 1), tick(20, 2), tick(20, 3)] };
-        let control = Course { spec: RUN_CONTROL, frames: vec![(20 * MS, 1)] };
-        Signals { courses: vec![ticks, control], ..Signals::default() }
+        let ticks = MessageFrames { spec: TICK, frames: vec![tick(10, 1), tick(20, 2), tick(20, 3)] };
+        let control = MessageFrames { spec: RUN_CONTROL, frames: vec![(20 * MS, 1)] };
+        Signals { messages: vec![ticks, control], ..Signals::default() }
     }
 
     fn columns(every_ms: Option<u32>, origin_ns: u64) -> Vec<[String; 3]> {

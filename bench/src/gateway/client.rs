@@ -64,7 +64,7 @@ pub(super) struct Client {
     last_progress_ms: u64,
     pub(super) report: ClientReport,
     announced: bool,
-    pub(super) told_lost: u64,
+    pub(super) lost_reported: u64,
 }
 
 impl Client {
@@ -99,7 +99,7 @@ impl Client {
                 ended: None,
             },
             announced: false,
-            told_lost: 0,
+            lost_reported: 0,
         };
         client.reply(GREETING);
         Ok(client)

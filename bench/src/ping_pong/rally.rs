@@ -16,7 +16,7 @@ const FIRST_ANSWER: Duration = Duration::from_secs(5);
 const TRY_PERIOD: Duration = Duration::from_millis(50);
 
 #[derive(Debug, Default)]
-pub(super) struct Rally {
+pub(super) struct PingPongResult {
     pub(super) sent: u64,
     pub(super) answered: u64,
     /// Pings left out because the one before them was not back in time.
@@ -58,8 +58,8 @@ pub(super) fn ask(
     clock: &impl Clock,
     rhythm: Rhythm,
     interrupt: &Interrupt,
-) -> Result<Rally, Gone> {
-    let mut rally = Rally::default();
+) -> Result<PingPongResult, Gone> {
+    let mut rally = PingPongResult::default();
     let start = clock.now() + rhythm.interval;
     let interval_ns = rhythm.interval.as_nanos() as u64;
     let mut beat = 0;

@@ -15,7 +15,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 /// The files of a segment; empty where there is none.
-pub struct Evidence {
+pub struct SegmentFiles {
     pub summary: Summary,
     /// `run.json`; the machine as it stands, which goes into `soak.json`.
     pub run: RunDescription,
@@ -51,7 +51,7 @@ pub fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts {
     counts
 }
 
-impl Evidence {
+impl SegmentFiles {
     pub fn read(spec: &Spec, folder: &Path) -> Self {
         let names: &[&str] =
             if spec.two_processes { &["controller-drive", "controller-load"] } else { &["controller"] };
@@ -199,17 +199,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let spec = Spec::default();
         std::fs::write(folder.path().join("controller.json"), "{}").unwrap();
-        assert!(Evidence::read(&spec, folder.path()).damaged.is_empty());
+        assert!(SegmentFiles::read(&spec, folder.path()).damaged.is_empty());
 
         // A number where a text belongs: bounds would come from a run that nobody has read.
         std::fs::write(folder.path().join("run.json"), r#"{"experiment_toml": 5}"#).unwrap();
-        let damaged = Evidence::read(&spec, folder.path()).damaged;
+        let damaged = SegmentFiles::read(&spec, folder.path()).damaged;
         assert!(!damaged.is_empty() && damaged.iter().all(|why| why.contains("run.json")), "{damaged:?}");
 
         // There, and no file.
         std::fs::remove_file(folder.path().join("run.json")).unwrap();
         std::fs::create_dir(folder.path().join("summary.json")).unwrap();
-        let damaged = Evidence::read(&spec, folder.path()).damaged;
+        let damaged = SegmentFiles::read(&spec, folder.path()).damaged;
         assert!(!damaged.is_empty() && damaged.iter().all(|why| why.contains("summary.json")), "{damaged:?}");
     }
 }

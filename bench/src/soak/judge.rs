@@ -1,7 +1,7 @@
 //! What a finished segment is worth: its files read, its account closed, every check with its result.
 
 use super::account::{self, Account};
-use super::evidence::{Evidence, counts};
+use super::evidence::{SegmentFiles, counts};
 use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
 use super::model::{Check, CheckResult, Figures};
 use super::plan::Spec;
@@ -25,7 +25,7 @@ pub struct Judged {
 }
 
 pub fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: bool) -> Judged {
-    let evidence = Evidence::read(spec, folder);
+    let evidence = SegmentFiles::read(spec, folder);
     let account = evidence.account(outcome);
     let memory: BTreeMap<_, _> =
         outcome.memory.iter().map(|(name, record)| (name.clone(), Memory::of(record))).collect();
@@ -93,7 +93,7 @@ fn in_numbers(account: &Account) -> String {
 }
 
 /// The injected loss was as frequent as asked for; that every lost frame was found is the account's and the gaps' affair.
-fn loss(spec: &Spec, evidence: &Evidence, account: &Account) -> Check {
+fn loss(spec: &Spec, evidence: &SegmentFiles, account: &Account) -> Check {
     let host = evidence.summary.bus_host.as_ref();
     let injected = host.map_or(0, |host| host.injected_loss.total());
     let Some(loss) = spec.loss else {
@@ -132,7 +132,7 @@ fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
 }
 
 /// Every record reached the files, and the log holds every frame that the rig counted.
-fn records(evidence: &Evidence, outcome: &Outcome) -> Check {
+fn records(evidence: &SegmentFiles, outcome: &Outcome) -> Check {
     let mut broken = Vec::new();
     for (name, report) in &evidence.reports {
         match report.records_dropped {
@@ -164,7 +164,7 @@ fn records(evidence: &Evidence, outcome: &Outcome) -> Check {
 const STALL_NS: u64 = 5_000_000;
 
 /// Why broken bounds on position errors do not count, if they do not.
-fn excuse(evidence: &Evidence, judge: bool) -> Option<String> {
+fn excuse(evidence: &SegmentFiles, judge: bool) -> Option<String> {
     let late = |report: &ProcessReport| report.timing.stages.wakeup_ns.max;
     let stall_ns = evidence.reports.values().filter_map(late).max().unwrap_or_default();
     if !judge {
@@ -177,7 +177,7 @@ fn excuse(evidence: &Evidence, judge: bool) -> Option<String> {
 }
 
 /// The position errors against the experiment's bounds on them; what did not come about in the segment's time is not judged.
-fn positions(evidence: &Evidence, judge: bool) -> Check {
+fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
     let drive = evidence.drive();
     let measured: Map<_, _> = [
         ("position_error_dynamic_m", drive.and_then(|drive| drive.position_error_dynamic_m)),
@@ -223,7 +223,7 @@ mod tests {
     use runlog::summary::{RunDescription, Summary};
     use runlog::timing_recorder::TimingFigures;
 
-    fn segment(error_m: f64, rig_late_ns: u64, controller_late_ns: u64) -> Evidence {
+    fn segment(error_m: f64, rig_late_ns: u64, controller_late_ns: u64) -> SegmentFiles {
         let report = |late_ns: u64| ProcessReport {
             timing: TimingFigures {
                 stages: StageFigures {
@@ -237,7 +237,7 @@ mod tests {
         let drive = AxisReport { position_error_dynamic_m: Some(error_m), ..AxisReport::default() };
         let controller =
             ControllerReport { axes: [("drive".into(), drive)].into(), ..ControllerReport::default() };
-        Evidence {
+        SegmentFiles {
             summary: Summary::default(),
             run: RunDescription {
                 experiment_toml: Some("[passed]\nposition_error_dynamic_m = 0.005\n".into()),

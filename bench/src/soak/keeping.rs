@@ -14,7 +14,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-pub struct Keeping {
+pub struct SoakFolder {
     pub soak: Soak,
     pub merged: Merged,
     out: PathBuf,
@@ -22,7 +22,7 @@ pub struct Keeping {
     _lock: File,
 }
 
-impl Keeping {
+impl SoakFolder {
     /// Opens the soak in `out`, a new one or the one that is there.
     ///
     /// # Errors
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn a_soak_goes_on_with_its_numbers_and_its_sums() {
         let out = tempfile::tempdir().unwrap();
-        let mut keeping = Keeping::open(out.path(), settings(10.0), 60.0, false).unwrap();
+        let mut keeping = SoakFolder::open(out.path(), settings(10.0), 60.0, false).unwrap();
         assert_eq!(keeping.next_number(), 1);
         keeping.soak.segments.push(segment(1, &[("account", CheckResult::Passed)]));
         keeping.soak.elapsed_s = 20.0;
@@ -139,7 +139,7 @@ mod tests {
         drop(keeping);
         // Killed while the second one ran.
         std::fs::create_dir(out.path().join("segments/0002-soak")).unwrap();
-        let mut keeping = Keeping::open(out.path(), settings(10.0), 60.0, false).unwrap();
+        let mut keeping = SoakFolder::open(out.path(), settings(10.0), 60.0, false).unwrap();
         assert_eq!(keeping.soak.segments[0], before.segments[0]);
         assert_eq!((keeping.soak.elapsed_s, keeping.next_number()), (20.0, 3));
         keeping.write().unwrap();
@@ -150,14 +150,14 @@ mod tests {
     #[test]
     fn other_settings_and_a_second_soak_are_refused() {
         let out = tempfile::tempdir().unwrap();
-        let mut first = Keeping::open(out.path(), settings(10.0), 60.0, false).unwrap();
+        let mut first = SoakFolder::open(out.path(), settings(10.0), 60.0, false).unwrap();
         first.write().unwrap();
-        let refused = Keeping::open(out.path(), settings(10.0), 60.0, false).err().unwrap().to_string();
+        let refused = SoakFolder::open(out.path(), settings(10.0), 60.0, false).err().unwrap().to_string();
         assert!(refused.contains("another soak"), "{refused}");
         drop(first);
-        let refused = Keeping::open(out.path(), settings(12.0), 60.0, false).err().unwrap().to_string();
+        let refused = SoakFolder::open(out.path(), settings(12.0), 60.0, false).err().unwrap().to_string();
         assert!(refused.contains("segment_s was 10.0, is 12.0") && refused.contains("--anyway"), "{refused}");
-        let again = Keeping::open(out.path(), settings(12.0), 60.0, true).unwrap();
+        let again = SoakFolder::open(out.path(), settings(12.0), 60.0, true).unwrap();
         assert_eq!(again.soak.settings.segment_s, 12.0);
     }
 
@@ -165,7 +165,7 @@ mod tests {
     fn a_file_that_is_no_soak_is_named() {
         let out = tempfile::tempdir().unwrap();
         std::fs::write(out.path().join("soak.json"), "{}").unwrap();
-        let refused = Keeping::open(out.path(), settings(10.0), 60.0, false).err().unwrap().to_string();
+        let refused = SoakFolder::open(out.path(), settings(10.0), 60.0, false).err().unwrap().to_string();
         assert!(refused.contains("soak.json"), "{refused}");
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use plugin::{TRIAL_LIMIT, Trier};
+use plugin::{TRIAL_LIMIT, TrialRunner};
 
 pub(crate) struct Libraries(tempfile::TempDir);
 
@@ -57,10 +57,10 @@ fn compile(compiler: &mut Command, source: &Path, library: &Path) {
 }
 
 /// The controller that was built with these tests.
-pub(crate) fn trier() -> Trier {
+pub(crate) fn trier() -> TrialRunner {
     trier_with(TRIAL_LIMIT)
 }
 
-pub(crate) fn trier_with(limit: Duration) -> Trier {
-    Trier { program: env!("CARGO_BIN_EXE_controller").into(), limit }
+pub(crate) fn trier_with(limit: Duration) -> TrialRunner {
+    TrialRunner { program: env!("CARGO_BIN_EXE_controller").into(), limit }
 }

@@ -104,7 +104,7 @@ fn what_is_no_library_and_what_is_not_there_is_told_so() {
 fn a_trier_that_knows_nothing_of_libraries_refuses_all() {
     let libraries = Libraries::new();
     let library = libraries.hostile(&[]);
-    let other = plugin::Trier { program: "/bin/true".into(), ..trier() };
+    let other = plugin::TrialRunner { program: "/bin/true".into(), ..trier() };
     let reported = load_tried_by(&other, &library, &RigParameters::baseline()).err().unwrap().to_string();
     assert!(reported.contains("'/bin/true' cannot try libraries"), "{reported}");
 }

@@ -75,12 +75,12 @@ pub fn draw(seed: u64, count: usize, among: Among) -> Result<Vec<Switched>, TooM
     if count > left.len() {
         return Err(TooMany { asked: count, most: left.len() });
     }
-    let mut urn = Urn::new(seed);
+    let mut sampler = EffectSampler::new(seed);
     let mut effects: Vec<Switched> = Vec::new();
     for _ in 0..count {
-        let sheet = left.remove(urn.index(left.len()));
-        let place = urn.place(sheet, among).expect("only sheets with a place here are left");
-        effects.push(Switched { name: sheet.name, place, numbers: urn.numbers(sheet) });
+        let sheet = left.remove(sampler.index(left.len()));
+        let place = sampler.place(sheet, among).expect("only sheets with a place here are left");
+        effects.push(Switched { name: sheet.name, place, numbers: sampler.numbers(sheet) });
     }
     effects.sort_by_key(|effect| SHEETS.iter().position(|sheet| sheet.name == effect.name));
     Ok(effects)
@@ -88,15 +88,15 @@ pub fn draw(seed: u64, count: usize, among: Among) -> Result<Vec<Switched>, TooM
 
 /// Where draws come from; for whoever wants another effect, place or number at a time than [`draw`] gives.
 #[derive(Debug, Clone)]
-pub struct Urn {
+pub struct EffectSampler {
     random: Pcg64,
 }
 
-impl Urn {
-    /// An urn of this seed.
+impl EffectSampler {
+    /// A sampler of this seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Urn { random: Pcg64::seed_from_u64(seed ^ DOMAIN) }
+        EffectSampler { random: Pcg64::seed_from_u64(seed ^ DOMAIN) }
     }
 
     /// One of the effect's places here; `None` if it has none.
@@ -244,9 +244,9 @@ mod tests {
 
     #[test]
     fn amplitudes_are_drawn_by_their_order_of_magnitude_and_shapes_are_their_default_half_of_the_time() {
-        let mut urn = Urn::new(1);
+        let mut sampler = EffectSampler::new(1);
         let sheet = super::super::sheet("position-dependent-force").unwrap();
-        let draws: Vec<Vec<f64>> = (0..4000).map(|_| urn.numbers(sheet)).collect();
+        let draws: Vec<Vec<f64>> = (0..4000).map(|_| sampler.numbers(sheet)).collect();
         let share = |of: &dyn Fn(&[f64]) -> bool| {
             draws.iter().filter(|numbers| of(numbers)).count() as f64 / draws.len() as f64
         };

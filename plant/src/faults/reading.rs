@@ -61,9 +61,9 @@ impl Default for SensorFault {
     }
 }
 
-/// One sensor's fault in its course.
+/// One sensor's fault in its state.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Course {
+struct SensorFaultState {
     fault: SensorFault,
     drifted: f64,
     since_spike: u32,
@@ -74,30 +74,30 @@ struct Course {
 #[derive(Debug, Clone)]
 pub(crate) struct SensorFaults {
     any: bool,
-    courses: [[Course; 4]; 2],
+    fault_states: [[SensorFaultState; 4]; 2],
     noise: Pcg64,
 }
 
 impl SensorFaults {
     /// None; what is random in later ones is given by the seed.
     pub(crate) fn new(seed: u64) -> Self {
-        SensorFaults { any: false, courses: Default::default(), noise: Pcg64::seed_from_u64(seed) }
+        SensorFaults { any: false, fault_states: Default::default(), noise: Pcg64::seed_from_u64(seed) }
     }
 
-    /// Takes faults over; one that goes on keeps its course.
+    /// Takes faults over; one that goes on keeps its state.
     pub(crate) fn set(&mut self, faults: &[[SensorFault; 4]; 2]) {
         self.any = *faults != <[[SensorFault; 4]; 2]>::default();
-        for (courses, faults) in self.courses.iter_mut().zip(faults) {
-            for (course, fault) in courses.iter_mut().zip(faults) {
-                course.fault = *fault;
+        for (fault_states, faults) in self.fault_states.iter_mut().zip(faults) {
+            for (state, fault) in fault_states.iter_mut().zip(faults) {
+                state.fault = *fault;
                 if fault.drift_per_s == 0.0 {
-                    course.drifted = 0.0;
+                    state.drifted = 0.0;
                 }
                 if fault.spike == 0.0 {
-                    course.since_spike = 0;
+                    state.since_spike = 0;
                 }
                 if !fault.stuck {
-                    course.held = None;
+                    state.held = None;
                 }
             }
         }
@@ -112,7 +112,7 @@ impl SensorFaults {
     /// The value that a sensor rounds.
     #[cold]
     pub(crate) fn disturb(&mut self, axis: usize, channel: usize, value: f64) -> f64 {
-        let Course { fault, drifted, since_spike, .. } = &mut self.courses[axis][channel];
+        let SensorFaultState { fault, drifted, since_spike, .. } = &mut self.fault_states[axis][channel];
         let mut value = fault.gain * value + fault.offset + *drifted;
         *drifted += fault.drift_per_s / SAMPLES_PER_S;
         if fault.noise > 0.0 {
@@ -130,7 +130,7 @@ impl SensorFaults {
     /// What a sensor shows in the end, given its rounded reading and the low end of its range.
     #[cold]
     pub(crate) fn show(&mut self, axis: usize, channel: usize, reading: Reading, least: f64) -> Reading {
-        let Course { fault, held, .. } = &mut self.courses[axis][channel];
+        let SensorFaultState { fault, held, .. } = &mut self.fault_states[axis][channel];
         let reading = if fault.stuck { *held.get_or_insert(reading) } else { reading };
         if fault.dropout > 0.0 {
             // 53 random bits in [0, 1): a probability of 1 is always met.

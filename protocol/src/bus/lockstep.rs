@@ -65,7 +65,7 @@ struct Member {
 }
 
 /// A foreign controller, one for each of [`BarrierConfig::echo_ids`].
-struct Stranger {
+struct ForeignMember {
     command_id: u16,
     /// Who has echoed a cycle before; `None` until somebody does.
     peer: Option<PeerId>,
@@ -74,7 +74,7 @@ struct Stranger {
     lost: bool,
 }
 
-impl Stranger {
+impl ForeignMember {
     fn answers(&self, sensors: &CanFrame) -> bool {
         ANSWERS.iter().any(|(command, id)| *command == self.command_id && sensors.standard_id() == Some(*id))
     }
@@ -93,21 +93,21 @@ pub(super) struct Barrier {
     cycle: u32,
     rig: Option<PeerId>,
     members: BTreeMap<PeerId, Member>,
-    strangers: Vec<Stranger>,
+    foreign_members: Vec<ForeignMember>,
     from_rig: Vec<Posted>,
     from_others: Vec<Posted>,
 }
 
 impl Barrier {
     pub(super) fn new(config: BarrierConfig) -> Self {
-        let stranger = |command_id| Stranger { command_id, peer: None, done: false, lost: false };
+        let foreign = |command_id| ForeignMember { command_id, peer: None, done: false, lost: false };
         Self {
             expected: config.members,
             phase: Phase::Gathering,
             cycle: 0,
             rig: None,
             members: BTreeMap::new(),
-            strangers: config.echo_ids.into_iter().map(stranger).collect(),
+            foreign_members: config.echo_ids.into_iter().map(foreign).collect(),
             from_rig: Vec::new(),
             from_others: Vec::new(),
         }
@@ -124,7 +124,7 @@ impl Barrier {
 
     /// Members in the barrier, the rig not counted.
     pub(super) fn member_count(&self) -> usize {
-        self.members.len() + self.strangers.len()
+        self.members.len() + self.foreign_members.len()
     }
 
     /// All connections in the barrier.
@@ -177,8 +177,8 @@ impl Barrier {
     }
 
     fn note_echo(&mut self, frame: &CanFrame, from: PeerId) {
-        let Some(stranger) =
-            self.strangers.iter_mut().find(|stranger| frame.standard_id() == Some(stranger.command_id))
+        let Some(foreign) =
+            self.foreign_members.iter_mut().find(|foreign| frame.standard_id() == Some(foreign.command_id))
         else {
             return;
         };
@@ -187,21 +187,21 @@ impl Barrier {
             _ => return,
         };
         if u64::from(echo) == u64::from(self.cycle) % ECHO_RANGE {
-            (stranger.peer, stranger.done, stranger.lost) = (Some(from), true, false);
+            (foreign.peer, foreign.done, foreign.lost) = (Some(from), true, false);
         }
     }
 
     /// A frame of this release was lost: for everyone, or at the queue of one peer. Whoever would have answered it is done
-    /// with this cycle; as long as nobody has answered, a stranger's queue may be that of the one who would.
+    /// with this cycle; as long as nobody has answered, a foreign member's queue may be that of the one who would.
     pub(super) fn lost(&mut self, frame: &CanFrame, at: Option<PeerId>) {
         // What is delivered while the members act is the rig's; everything else answers nothing.
         if self.phase != Phase::MembersAct {
             return;
         }
-        for stranger in self.strangers.iter_mut().filter(|stranger| stranger.answers(frame)) {
-            let reached = at.is_some_and(|at| stranger.peer.is_some_and(|peer| peer != at));
-            stranger.lost |= !reached && !stranger.done;
-            stranger.done |= !reached;
+        for foreign in self.foreign_members.iter_mut().filter(|foreign| foreign.answers(frame)) {
+            let reached = at.is_some_and(|at| foreign.peer.is_some_and(|peer| peer != at));
+            foreign.lost |= !reached && !foreign.done;
+            foreign.done |= !reached;
         }
     }
 
@@ -224,15 +224,15 @@ impl Barrier {
         }
         let joined = self.members.values().find(|member| !member.done).map(|member| member.name.clone());
         joined.or_else(|| {
-            let stranger = self.strangers.iter().find(|stranger| !stranger.done)?;
-            Some(format!("echo on {:#05x}", stranger.command_id))
+            let foreign = self.foreign_members.iter().find(|foreign| !foreign.done)?;
+            Some(format!("echo on {:#05x}", foreign.command_id))
         })
     }
 
     /// Where the members' turn is over: the foreign controllers that had nothing to answer, as far as they are known.
     pub(super) fn unanswering(&self) -> impl Iterator<Item = Option<PeerId>> {
         let over = self.phase == Phase::MembersAct && self.waits_for().is_none();
-        self.strangers.iter().filter(move |stranger| over && stranger.lost).map(|stranger| stranger.peer)
+        self.foreign_members.iter().filter(move |foreign| over && foreign.lost).map(|foreign| foreign.peer)
     }
 
     /// What to do now, if a phase is complete. `connected` is the number of peers, joined or not.
@@ -240,8 +240,8 @@ impl Barrier {
         match self.phase {
             Phase::Gathering => {
                 let rig = self.rig?;
-                let strangers = connected.saturating_sub(self.members.len() + 1);
-                if self.members.len() < self.expected || strangers < self.strangers.len() {
+                let foreign_members = connected.saturating_sub(self.members.len() + 1);
+                if self.members.len() < self.expected || foreign_members < self.foreign_members.len() {
                     return None;
                 }
                 self.phase = Phase::RigActs;
@@ -259,9 +259,9 @@ impl Barrier {
                     return None;
                 }
                 self.members.values_mut().for_each(|member| member.done = false);
-                self.strangers
+                self.foreign_members
                     .iter_mut()
-                    .for_each(|stranger| (stranger.done, stranger.lost) = (false, false));
+                    .for_each(|foreign| (foreign.done, foreign.lost) = (false, false));
                 self.cycle += 1;
                 self.phase = Phase::RigActs;
                 Some(Release { frames: sorted(&mut self.from_others), go: vec![rig], cycle: self.cycle })
@@ -371,7 +371,7 @@ mod tests {
     fn started_with_stranger() -> Barrier {
         let mut barrier = Barrier::new(BarrierConfig { members: 0, echo_ids: vec![DRIVE_VALVE_COMMAND.id] });
         barrier.join(RIG, Role::Rig, "rig".into());
-        assert!(barrier.release(1).is_none(), "released before the stranger connected");
+        assert!(barrier.release(1).is_none(), "released before the foreign member connected");
         barrier.release(2).unwrap();
         sensors_under_way(&mut barrier);
         barrier

@@ -29,7 +29,7 @@ pub(super) struct Watch {
     frames: Vec<FrameBytes>,
     last: Vec<Option<Last>>,
     silent_at: Option<Instant>,
-    told_at: Option<Instant>,
+    reported_at: Option<Instant>,
     held_back_until: Option<Instant>,
 }
 
@@ -59,7 +59,7 @@ impl Watch {
             frames: frames.to_vec(),
             last: vec![None; frames.len().max(1)],
             silent_at: None,
-            told_at: None,
+            reported_at: None,
             held_back_until: None,
         }
     }
@@ -105,7 +105,7 @@ impl Watch {
             if head.interval_1.is_zero() {
                 self.silent_at = None;
             }
-            (self.told_at, self.held_back_until) = (None, None);
+            (self.reported_at, self.held_back_until) = (None, None);
             self.tell_held_back(actions);
         }
         if head.flags & flag::STARTTIMER != 0 && !self.head.interval_1.is_zero() {
@@ -170,24 +170,28 @@ impl Watch {
         if self.held_back_until.is_some() {
             return;
         }
-        match self.told_at.map(|told_at| told_at + self.head.interval_2).filter(|until| now < *until) {
+        match self
+            .reported_at
+            .map(|reported_at| reported_at + self.head.interval_2)
+            .filter(|until| now < *until)
+        {
             Some(until) => self.held_back_until = Some(until),
             None => {
                 self.tell_held_back(actions);
-                self.told_at = Some(now);
+                self.reported_at = Some(now);
             }
         }
     }
 
     /// RX_CHANGED for each frame that was held back; true when there was one.
     fn tell_held_back(&mut self, actions: &mut Vec<Action>) -> bool {
-        let mut told = false;
+        let mut reported = false;
         for last in self.last.iter_mut().flatten().filter(|last| last.is_held_back) {
             last.is_held_back = false;
             actions.push(Action::Tell(self.interface, self.head.with(opcode::RX_CHANGED, &[last.frame])));
-            told = true;
+            reported = true;
         }
-        told
+        reported
     }
 
     pub(super) fn advance(&mut self, now: Instant, actions: &mut Vec<Action>) {
@@ -199,10 +203,10 @@ impl Watch {
             actions.push(Action::Tell(self.interface, self.head.with(opcode::RX_TIMEOUT, &[])));
         }
         if self.held_back_until.is_some_and(|until| until <= now) {
-            let told = self.tell_held_back(actions);
-            self.held_back_until = told.then_some(now + self.head.interval_2);
-            if !told {
-                self.told_at = None;
+            let reported = self.tell_held_back(actions);
+            self.held_back_until = reported.then_some(now + self.head.interval_2);
+            if !reported {
+                self.reported_at = None;
             }
         }
     }
