@@ -7,6 +7,8 @@
 
 use crate::warn;
 use runlog::candump::{LogError, LogLine, LogReader};
+use runlog::run_folder::read_json;
+use runlog::summary::JoinedSummary;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -106,9 +108,8 @@ fn told_zero_ns(file: &Path, first_ns: u64) -> Option<u64> {
     if file.file_name()? != LOG_NAME {
         return None;
     }
-    let text = std::fs::read_to_string(file.parent()?.join("summary.json")).ok()?;
-    let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
-    let zero_s = summary.get("bus_log_cycle_zero_s")?.as_f64()?;
+    let summary: JoinedSummary = read_json(&file.parent()?.join("summary.json")).ok()?;
+    let zero_s = summary.bus_log_cycle_zero_s?;
     // Stamps of a log are whole microseconds, and so is its zero: a number of this size is not exact below them.
     let near = zero_s >= 0.0 && (zero_s - first_ns as f64 * 1e-9).abs() < NEAR_ZERO_S;
     near.then(|| (zero_s * 1e6).round() as u64 * 1000)

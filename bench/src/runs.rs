@@ -1,21 +1,11 @@
 //! Several runs together: their folders read, their experiments held against each other, their figures side by side.
 
 use figures::SummaryError;
-use figures::join::experiment;
+use figures::join;
 use figures::record::{self, Record};
-use figures::{self, position};
-use runlog::run_folder::{FileError, read_json};
-use serde_json::Value;
+use figures::top::TOP;
+use runlog::run_folder::{FileError, in_order};
 use std::path::{Path, PathBuf};
-
-/// Figures at the top of the summary that are compared too, with their units.
-const TOP: &[(&str, &str)] = &[
-    ("position_error_dynamic_m", "m"),
-    ("position_error_static_m", "m"),
-    ("overruns", "1"),
-    ("frames_lost", "1"),
-    ("stale_commands", "1"),
-];
 
 /// Why runs are not laid side by side.
 #[derive(Debug, thiserror::Error)]
@@ -71,24 +61,14 @@ pub fn read(folders: &[PathBuf]) -> Result<Vec<Run>, SummaryError> {
 }
 
 fn read_one(folder: &Path) -> Result<Run, SummaryError> {
-    let summary_path = folder.join("summary.json");
-    if !summary_path.exists() {
-        return Err(SummaryError::NoSummary(folder.into()));
-    }
-    let summary = read_json(&summary_path)?;
-    let run = read_json(&folder.join("run.json"))?;
-    let record = record::read(folder, experiment(&run)?)?;
+    let (mut summary, run) = join::read(folder)?;
+    let record = record::read(folder, join::experiment(&run)?)?;
     // The figures are computed anew: an older summary may know fewer.
     let computed = figures::of(&record);
-    let top = |name: &str| match name {
-        "position_error_dynamic_m" => {
-            summary_figure(&summary, name).or_else(|| position::error_dynamic_m(&record))
-        }
-        "position_error_static_m" => {
-            summary_figure(&summary, name).or_else(|| position::error_static_m(&record))
-        }
-        _ => summary_figure(&summary, name).or_else(|| computed.get(name)),
-    };
+    join::make_up_errors(&mut summary, &record);
+    let summary = in_order(&summary);
+    let top =
+        |name: &str| summary.get(name).and_then(serde_json::Value::as_f64).or_else(|| computed.get(name));
     let figures = rows().filter_map(|(name, _)| Some((name, top(name)?))).collect();
     let real = folder.canonicalize().unwrap_or_else(|_| folder.into());
     let name =
@@ -96,13 +76,10 @@ fn read_one(folder: &Path) -> Result<Run, SummaryError> {
     Ok(Run { folder: folder.into(), name, record, figures })
 }
 
-fn summary_figure(summary: &serde_json::Map<String, Value>, name: &str) -> Option<f64> {
-    summary.get(name).and_then(Value::as_f64)
-}
-
 /// Names and units of all figures that runs are compared by.
 pub fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
-    TOP.iter().copied().chain(figures::definitions().map(|definition| (definition.name, definition.unit)))
+    let top = TOP.iter().filter(|figure| figure.is_compared).map(|figure| (figure.name, figure.unit));
+    top.chain(figures::definitions().map(|definition| (definition.name, definition.unit)))
 }
 
 /// Refuses runs that asked the rig for different things. Programs, their parameters, recording and bounds may differ:

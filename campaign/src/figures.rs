@@ -2,8 +2,8 @@
 
 use figures as of_runs;
 
-/// Figures at the top of a summary.
-pub const TOP: [&str; 2] = ["position_error_dynamic_m", "position_error_static_m"];
+/// Those at the top of a summary.
+pub use of_runs::top::POSITIONS as TOP;
 
 /// Whether there is a figure of this name.
 #[must_use]

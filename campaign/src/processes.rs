@@ -13,7 +13,6 @@ use axis_control::experiment::Experiment;
 use figures::{SummaryError, join};
 use protocol::exit::Exit;
 use runlog::run_folder::FileError;
-use serde_json::Value as Json;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
@@ -110,17 +109,19 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
         Err(error @ SummaryError::File(FileError::Write(..))) => return Err(error),
         Err(error) => return Ok(Outcome::failed(error.to_string())),
     };
-    let number = |key: &str| joined.figure(key).as_f64();
-    let of_table = joined.figure("figures").as_object().into_iter().flatten();
-    let figures = of_table.filter_map(|(name, value)| Some((name.clone(), Value::Number(value.as_f64()?))));
-    let at_top = TOP.into_iter().filter_map(|name| Some((name.to_owned(), Value::Number(number(name)?))));
-    let figures: BTreeMap<_, _> = at_top.chain(figures).collect();
-    let words = |key: &str| joined.figure("controller")[key].as_str().unwrap_or_default().to_owned();
+    let summary = &joined.summary;
+    let of_table = summary.figures.iter().map(|(name, value)| (name.clone(), *value));
+    let errors = [summary.position_error_dynamic_m, summary.position_error_static_m];
+    let at_top = TOP.into_iter().zip(errors).filter_map(|(name, error_m)| Some((name.to_owned(), error_m?)));
+    let figures: BTreeMap<_, _> =
+        at_top.chain(of_table).map(|(name, value)| (name, Value::Number(value))).collect();
+    let controller = summary.by_controllers.as_ref().and_then(|all| all.controller.as_ref());
+    let why = || controller.and_then(|controller| controller.ended_because.clone()).unwrap_or_default();
     let code = |name: &str| codes.iter().find(|(own, _)| *own == name).and_then(|(_, code)| *code);
     let (ended, because) = match (code("emulator"), code("controller")) {
         (Some(0), Some(0)) => (Ended::Done, String::new()),
-        (Some(0), Some(3)) => (Ended::TimeOver, words("ended_because")),
-        (Some(0 | 1), Some(0 | 1)) => (Ended::Stopped, words("ended_because")),
+        (Some(0), Some(3)) => (Ended::TimeOver, why()),
+        (Some(0 | 1), Some(0 | 1)) => (Ended::Stopped, why()),
         (emulator, controller) => {
             let reported =
                 |code: Option<i32>| code.map_or("a signal".to_owned(), |code| format!("code {code}"));
@@ -128,9 +129,9 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
             (Ended::Failed, format!("the emulator ended with {emulator}, the controller with {controller}"))
         }
     };
-    let has_bounds = joined.figure("thresholds").as_object().is_some_and(|bounds| !bounds.is_empty());
-    let passed = has_bounds.then(|| joined.figure("passed") == &Json::Bool(true));
-    Ok(Outcome { ended, because, simulated_s: number("cycles").unwrap_or(0.0) * 1e-3, passed, figures })
+    let passed = (!summary.thresholds.is_empty()).then(|| joined.passed());
+    let simulated_s = summary.cycles.unwrap_or(0) as f64 * 1e-3;
+    Ok(Outcome { ended, because, simulated_s, passed, figures })
 }
 
 fn system(run: u64, what: &str) -> impl FnOnce(io::Error) -> ProcessesError + use<> {

@@ -13,13 +13,12 @@ use axis_control::setup::{Inputs, Mode};
 use figures::record::{MEASURED, Record, TRUE};
 use figures::series::Series;
 use figures::tables_read::{StateSpan, Table, enter};
-use figures::thresholds;
-use figures::{self, position};
+use figures::thresholds::{self, ByRepetition, Found};
+use figures::{self, position, top};
 use plant::tables::{self, CycleRecord};
 use plant::{Axis, Truth};
 use protocol::frames::MainChainState;
 use rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
-use serde_json::{Map, json};
 use std::collections::BTreeMap;
 
 /// Rehearses a run of at most `seconds` of the rig's time.
@@ -82,9 +81,8 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
     let known = TOP.into_iter().zip(top).filter_map(|(name, value)| Some((name, value?)));
     let figures: BTreeMap<_, _> =
         known.chain(computed.iter()).map(|(name, value)| (name.to_owned(), Value::Number(value))).collect();
-    let each: Map<_, _> =
-        computed.by_repetition().map(|(name, values)| (name.to_owned(), json!(values))).collect();
-    let passed = passed(inputs, &figures, each, ended)?;
+    let each = computed.by_repetition().map(|(name, values)| (name.to_owned(), values.to_vec())).collect();
+    let passed = passed(inputs, &figures, &each, ended)?;
     let simulated_s = rehearsal.cycles() as f64 * 1e-3;
     Ok(Outcome { ended, because, simulated_s, passed, figures })
 }
@@ -93,28 +91,20 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
 fn passed(
     inputs: &Inputs,
     figures: &BTreeMap<String, Value>,
-    by_repetition: Map<String, serde_json::Value>,
+    by_repetition: &ByRepetition,
     ended: Ended,
 ) -> Result<Option<bool>, String> {
     let bounds = &inputs.experiment.passed;
     if bounds.is_empty() {
         return Ok(None);
     }
-    let mut summary = Map::new();
-    for name in
-        ["skipped", "overruns", "frames_lost", "frames_malformed", "stale_commands", "records_dropped"]
-    {
-        summary.insert(name.to_owned(), json!(0));
-    }
-    summary.insert("figures".to_owned(), json!({}));
-    summary.insert("figures_by_repetition".to_owned(), by_repetition.into());
-    for (name, value) in figures {
-        let at_top = TOP.contains(&name.as_str());
-        let table = if at_top { Some(&mut summary) } else { summary["figures"].as_object_mut() };
-        table.and_then(|table| table.insert(name.clone(), json!(value.number())));
-    }
-    let judged = thresholds::judge(bounds, &summary).map_err(|error| error.to_string())?;
-    Ok(Some(ended == Ended::Done && judged.values().all(thresholds::is_kept)))
+    let found = |key: &str| {
+        let is_fault = || top::find(key).is_some_and(|figure| figure.kind == top::Kind::Fault);
+        let measured = figures.get(key).and_then(Value::number);
+        measured.or_else(|| is_fault().then_some(0.0)).map(Found::Number)
+    };
+    let judged = thresholds::judge(bounds, found, by_repetition).map_err(|error| error.to_string())?;
+    Ok(Some(ended == Ended::Done && judged.values().all(|bound| bound.kept)))
 }
 
 /// A column of a controller's table.

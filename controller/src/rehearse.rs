@@ -12,12 +12,12 @@ use axis_control::setup::Inputs;
 use nominal::Axis;
 use protocol::bus::BusCounters;
 use protocol::exit::Exit;
-use realtime::{Interrupt, Recorder};
+use realtime::Interrupt;
 use rehearsal::{PlantTables, Rehearsal};
 use runlog::flight_dump;
 use runlog::run_folder::{SCHEMA_VERSION, clear, clear_results, controller_results, write_json};
+use runlog::summary::{REHEARSAL, RehearsalDescription, RehearsalEvent, RehearsalSummary};
 use runlog::timing_recorder::TimingFigures;
-use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
         )));
     }
     let ended = Ended { rehearsal, interrupted, reported, news, took_s: started.elapsed().as_secs_f64() };
-    save(arguments, &inputs, &scene, &ended)
+    save(arguments, &inputs, &scene, ended)
 }
 
 /// Removes what runs in real time left; a rehearsal has no timing.
@@ -94,20 +94,20 @@ fn end_when_stuck() {
 struct Ended {
     rehearsal: Rehearsal,
     interrupted: bool,
-    reported: Vec<serde_json::Value>,
+    reported: Vec<RehearsalEvent>,
     news: Vec<NodeEvent>,
     took_s: f64,
 }
 
-fn event(cycle: u64, outcome: impl std::fmt::Debug) -> serde_json::Value {
-    json!({ "cycle": cycle, "what": format!("{outcome:?}") })
+fn event(cycle: u64, outcome: impl std::fmt::Debug) -> RehearsalEvent {
+    RehearsalEvent { cycle, what: format!("{outcome:?}") }
 }
 
 fn save(
     arguments: &RehearseArguments,
     inputs: &Inputs,
     scene: &impl serde::Serialize,
-    ended: &Ended,
+    ended: Ended,
 ) -> Result<Exit, RunError> {
     let node = ended.rehearsal.node();
     let axes = report::of_node(node, inputs);
@@ -153,43 +153,26 @@ fn save(
         realtime_granted: Vec::new(),
         realtime_refused: Vec::new(),
         axes,
-        news: ended.news.clone(),
+        news: ended.news,
     };
     write_json(&out.join("controller.json"), &report).map_err(RunError::output)?;
-    let run = json!({
-        "schema_version": SCHEMA_VERSION,
-        "pace": "rehearsal",
-        "seed": arguments.seed,
-        "rig_toml": inputs.rig_toml,
-        "experiment_toml": inputs.experiment_toml,
-        "rig_setup": scene,
-    });
+    let run = RehearsalDescription {
+        schema_version: SCHEMA_VERSION,
+        pace: REHEARSAL.into(),
+        seed: arguments.seed,
+        rig_toml: inputs.rig_toml.clone(),
+        experiment_toml: inputs.experiment_toml.clone(),
+        rig_setup: scene,
+    };
     write_json(&out.join("run.json"), &run).map_err(RunError::output)?;
-    write_json(&out.join("summary.json"), &summary(ended, exit, &ended_because)).map_err(RunError::output)?;
+    let summary = RehearsalSummary {
+        schema_version: SCHEMA_VERSION,
+        cycles,
+        ended_because,
+        passed: exit == Exit::Good,
+        events: ended.reported,
+        ..RehearsalSummary::default()
+    };
+    write_json(&out.join("summary.json"), &summary).map_err(RunError::output)?;
     Ok(exit)
-}
-
-/// The keys of `summary.json` that others read; what only a bus or a clock has is 0 or empty.
-fn summary(ended: &Ended, exit: Exit, ended_because: &str) -> serde_json::Value {
-    let none = Recorder::new().percentiles();
-    json!({
-        "schema_version": SCHEMA_VERSION,
-        "position_error_dynamic_m": null,
-        "position_error_static_m": null,
-        "cycles": ended.rehearsal.cycles(),
-        "skipped": 0,
-        "overruns": 0,
-        "frames_sent": 0,
-        "frames_received": 0,
-        "frames_lost": 0,
-        "frames_lost_at_rig": 0,
-        "frames_malformed": 0,
-        "stale_commands": 0,
-        "wakeup_ns": none,
-        "round_trip_ns": none,
-        "records_dropped": 0,
-        "passed": exit == Exit::Good,
-        "ended_because": ended_because,
-        "events": ended.reported,
-    })
 }

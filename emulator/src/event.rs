@@ -1,12 +1,15 @@
 //! What a run has to tell a person, each with its cycle.
+//!
+//! These are the events of the 1 ms path: small copies without allocation. Files and telemetry have them as [`runlog::event`],
+//! which the writer thread makes of them.
 
 use crate::faults::mark::Mark;
 use plant::Axis;
 use plant::scene::{HandForces, Outcome};
-use serde::Serialize;
+use runlog::event as record;
 
 /// Something that happened in a cycle, with its message; no error, which is `thiserror`'s word for it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("cycle {cycle}: {kind}")]
 pub struct Event {
     /// Cycle in which it was noticed.
@@ -14,20 +17,19 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, thiserror::Error)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum EventKind {
     #[error("woke late, {cycles} cycle(s) computed but not sent")]
     Skipped { cycles: u64 },
     #[error("no fresh {} command for 20 cycles, valve shut; is its controller running?", .0.name())]
-    CommandStale(#[serde(serialize_with = "axis_name")] Axis),
+    CommandStale(Axis),
     #[error("fresh {} commands again, valve follows", .0.name())]
-    CommandFresh(#[serde(serialize_with = "axis_name")] Axis),
+    CommandFresh(Axis),
     #[error("fault two-sources: two senders on the {} command, valve shut; stop one of them", .0.name())]
-    TwoSources(#[serde(serialize_with = "axis_name")] Axis),
+    TwoSources(Axis),
     /// The other has been silent for 20 cycles.
     #[error("one sender left on the {} command, valve follows", .0.name())]
-    OneSource(#[serde(serialize_with = "axis_name")] Axis),
+    OneSource(Axis),
     #[error("emergency stop")]
     EmergencyStop,
     #[error("emergency stop released")]
@@ -106,6 +108,87 @@ impl From<HandForces> for EventKind {
     }
 }
 
-fn axis_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(axis.name())
+impl From<Event> for record::Event {
+    fn from(Event { cycle, kind }: Event) -> Self {
+        Self { cycle, kind: kind.into() }
+    }
+}
+
+impl From<EventKind> for record::EventKind {
+    fn from(kind: EventKind) -> Self {
+        match kind {
+            EventKind::Skipped { cycles } => Self::Skipped { cycles },
+            EventKind::CommandStale(axis) => Self::CommandStale(recorded(axis)),
+            EventKind::CommandFresh(axis) => Self::CommandFresh(recorded(axis)),
+            EventKind::TwoSources(axis) => Self::TwoSources(recorded(axis)),
+            EventKind::OneSource(axis) => Self::OneSource(recorded(axis)),
+            EventKind::EmergencyStop => Self::EmergencyStop,
+            EventKind::EmergencyStopReleased => Self::EmergencyStopReleased,
+            EventKind::EmergencyStopStillHeld => Self::EmergencyStopStillHeld,
+            EventKind::Linked => Self::Linked,
+            EventKind::Unlinked => Self::Unlinked,
+            EventKind::LinkRefused => Self::LinkRefused,
+            EventKind::LinkGivenUp => Self::LinkGivenUp,
+            EventKind::Weights { added_mass_kg } => Self::Weights { added_mass_kg },
+            EventKind::WeightsRefused => Self::WeightsRefused,
+            EventKind::ConsoleHand { carriage_n, load_eye_n } => Self::ConsoleHand { carriage_n, load_eye_n },
+            EventKind::Malformed { raw_id } => Self::Malformed { raw_id },
+            EventKind::SecondRig { id } => Self::SecondRig { id },
+            EventKind::Fault(mark) => Self::Fault(mark.into()),
+            EventKind::NotFinite => Self::NotFinite,
+            EventKind::BusLost => Self::BusLost,
+            EventKind::BusBack => Self::BusBack,
+        }
+    }
+}
+
+fn recorded(axis: Axis) -> record::Axis {
+    match axis {
+        Axis::Drive => record::Axis::Drive,
+        Axis::Load => record::Axis::Load,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::faults::Fault;
+    use crate::faults::mark::Cause;
+    use runlog::event::FaultChange;
+
+    #[test]
+    fn each_kind_is_recorded_as_itself() {
+        let kinds = [
+            EventKind::Skipped { cycles: 3 },
+            EventKind::CommandStale(Axis::Drive),
+            EventKind::CommandFresh(Axis::Load),
+            EventKind::TwoSources(Axis::Load),
+            EventKind::OneSource(Axis::Drive),
+            EventKind::EmergencyStop,
+            EventKind::EmergencyStopReleased,
+            EventKind::EmergencyStopStillHeld,
+            EventKind::Linked,
+            EventKind::Unlinked,
+            EventKind::LinkRefused,
+            EventKind::LinkGivenUp,
+            EventKind::Weights { added_mass_kg: 2.5 },
+            EventKind::WeightsRefused,
+            EventKind::ConsoleHand { carriage_n: 1.0, load_eye_n: 2.0 },
+            EventKind::Malformed { raw_id: 7 },
+            EventKind::SecondRig { id: 0x110 },
+            EventKind::NotFinite,
+            EventKind::BusLost,
+            EventKind::BusBack,
+        ];
+        for kind in kinds {
+            // Variants and fields have the same names in both.
+            assert_eq!(format!("{:?}", record::EventKind::from(kind)), format!("{kind:?}"));
+        }
+        let fault = Fault::new("babbling-node", None, &[]).unwrap();
+        let mark = Mark { number: 3, what: FaultChange::Ends, fault, cause: Cause::Console };
+        let json = serde_json::to_string(&record::EventKind::from(EventKind::Fault(mark))).unwrap();
+        let numbers = r#"{"bytes":8.0,"frames_per_ms":3.0,"id":16.0}"#;
+        let expected = r#"{"fault":{"number":3,"what":"ends","fault":"babbling-node","at":"bus","numbers":"#;
+        assert_eq!(json, format!(r#"{expected}{numbers},"cause":"console"}}}}"#));
+    }
 }

@@ -1,14 +1,15 @@
 //! The end of a run: `summary.json` written, the run reported in a few lines, the exit code chosen.
 
 use crate::cli::RunArguments;
-use crate::event::Event;
 use crate::pace::End;
 use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
 use protocol::exit::Exit;
 use realtime::{Percentiles, Recorder as Histogram, allocations};
+use runlog::event::Event;
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use runlog::summary::Summary;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Saves what is left to save, tells the run in a few lines, and says how it went.
@@ -82,7 +83,7 @@ fn summarise(
         frames_received: bus.received,
         frames_lost: Some(lost),
         frames_lost_at_rig: Some(lost),
-        frames_malformed: figures.frames.malformed + bus.malformed,
+        frames_malformed: figures.frames.ignored.malformed + bus.malformed,
         frames_late: both.iter().map(|commands| commands.late).sum(),
         frames_duplicate: both.iter().map(|commands| commands.duplicate).sum(),
         stale_commands: both.iter().map(|commands| commands.refused_stale + commands.expired).sum(),
@@ -106,14 +107,14 @@ fn summarise(
         records_dropped: Some(figures.records_dropped),
         ended_because,
         passed: Some(passed),
-        thresholds: serde_json::Map::new(),
+        thresholds: BTreeMap::new(),
         drive_commands,
         load_commands,
         frames_ignored: figures.frames,
         bus,
         bus_host,
         event_count: Some(event_count),
-        events,
+        events: events.into_iter().map(Event::from).collect(),
     }
 }
 

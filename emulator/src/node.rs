@@ -162,11 +162,11 @@ impl EmulatorNode {
         match Frame::decode(frame) {
             Ok(known) => self.take_known(known, frame, stamp_ns, cycle),
             Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
-                self.frames.unknown += 1;
+                self.frames.ignored.unknown += 1;
             }
             Err(_) => {
-                self.frames.malformed += 1;
-                if self.frames.malformed == 1 {
+                self.frames.ignored.malformed += 1;
+                if self.frames.ignored.malformed == 1 {
                     self.tell(cycle, EventKind::Malformed { raw_id: frame.raw_id() });
                 }
             }

@@ -16,9 +16,9 @@ use crate::console::Console;
 use crate::event::Event;
 use plant::tables::CycleRecord;
 use protocol::socket_file::{SocketFile, SocketFileError, SocketType};
-use runlog::telemetry::{Kind, write_cycle, write_packet};
-use serde::Serialize;
-use serde_json::{Value, json};
+use runlog::telemetry::{
+    Description, DroppedEvents, EventMessage, Kind, write_cycle, write_description, write_packet,
+};
 use std::path::Path;
 use viewer::Viewer;
 
@@ -31,7 +31,7 @@ const MOST_VIEWERS: usize = 8;
 pub struct Telemetry {
     socket: SocketFile,
     /// The first packet of each viewer, save what it is given at its coming.
-    description: Value,
+    description: Description,
     /// Whether cycles show what only a simulation knows.
     with_truth: bool,
     /// Takes the commands of viewers; `None` in a run without a console.
@@ -39,22 +39,6 @@ pub struct Telemetry {
     viewers: Vec<Viewer>,
     /// The packet that is made; kept so that it need not be allocated anew.
     packet: Vec<u8>,
-}
-
-/// Late wake-ups beyond those that are kept for viewers to come.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Untold {
-    pub overruns: u64,
-    /// Cycles that they skipped.
-    pub skipped: u64,
-}
-
-/// An event as viewers get it.
-#[derive(Serialize)]
-struct Told<'a> {
-    #[serde(flatten)]
-    event: &'a Event,
-    text: String,
 }
 
 impl Telemetry {
@@ -97,17 +81,17 @@ impl Telemetry {
         }
     }
 
-    /// Lets viewers in, tells them what the run is and what `happened` so far, as far as it is not `untold`, obeys their
-    /// commands, and writes what their sockets take.
-    pub fn serve(&mut self, happened: &[Event], untold: Untold) {
+    /// Lets viewers in, sends them the description and what `happened` so far, of which the `dropped` events are only counted,
+    /// obeys their commands, and writes what their sockets take.
+    pub fn serve(&mut self, happened: &[Event], dropped: DroppedEvents) {
         while let Some(socket) = self.socket.accept() {
             if self.viewers.len() >= MOST_VIEWERS {
                 continue;
             }
             let mut viewer = Viewer::new(socket.into());
-            self.description["untold"] = json!(untold);
+            self.description.dropped_events = dropped;
             self.packet.clear();
-            write_packet(&mut self.packet, Kind::Description, self.description.to_string().as_bytes());
+            write_description(&mut self.packet, &self.description);
             viewer.offer(&self.packet);
             for event in happened {
                 self.packet.clear();
@@ -122,9 +106,6 @@ impl Telemetry {
 }
 
 fn write_event(out: &mut Vec<u8>, event: &Event) {
-    let reported = Told { event, text: event.kind.to_string() };
-    // A struct of numbers and words has a JSON form.
-    if let Ok(json) = serde_json::to_vec(&reported) {
-        write_packet(out, Kind::Event, &json);
-    }
+    let message = EventMessage::new((*event).into(), event.kind.to_string());
+    runlog::telemetry::write_event(out, &message);
 }

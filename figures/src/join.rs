@@ -12,46 +12,43 @@ use crate::families::{self, Figures, position};
 use crate::record::{self, Record};
 use crate::reports::{self, Reports};
 use crate::{SummaryError, thresholds};
-use runlog::run_folder::{FileError, read_json, write_json};
-use serde_json::{Map, Value, json};
+use runlog::controller_report::{ControllerFigures, reported_of_axis};
+use runlog::run_folder::{FileError, in_order, read_json, write_json};
+use runlog::summary::{JoinedRun, JoinedSummary, ReportedByControllers};
 use std::path::Path;
-
-/// What a controller process tells of itself at the end, and the summary takes.
-const PROCESS_FIGURES: &[&str] = &[
-    "wakeup_ns",
-    "execution_ns",
-    "period_error_ns",
-    "allocations_in_cycle",
-    "records_dropped",
-    "ended_because",
-    "ended_well",
-];
 
 /// A run's summary, joined and judged.
 #[derive(Clone, Debug)]
 pub struct Joined {
     /// `summary.json` as written.
-    pub summary: Map<String, Value>,
+    pub summary: JoinedSummary,
     /// `run.json` as written.
-    pub run: Map<String, Value>,
+    pub run: JoinedRun,
     pub record: Record,
 }
 
 impl Joined {
     /// Whether the run ended well and kept all its bounds.
     pub fn passed(&self) -> bool {
-        self.figure("passed") == &Value::Bool(true)
+        self.summary.passed == Some(true)
     }
 
-    /// The value under a key of the summary; null when it is not there.
-    pub fn figure(&self, key: &str) -> &Value {
-        known(&self.summary, key)
-    }
-
-    /// Whether there was no bus: the rehearsal runs the plant inside the controller.
+    /// Whether there was no bus.
     pub fn is_rehearsal(&self) -> bool {
-        is_rehearsal(&self.run)
+        self.run.is_rehearsal()
     }
+}
+
+/// A run's `summary.json` and `run.json` as they stand, joined or not.
+///
+/// # Errors
+/// [`SummaryError`]: no summary, unreadable files.
+pub fn read(folder: &Path) -> Result<(JoinedSummary, JoinedRun), SummaryError> {
+    let summary_path = folder.join("summary.json");
+    if !summary_path.exists() {
+        return Err(SummaryError::NoSummary(folder.into()));
+    }
+    Ok((read_json(&summary_path)?, read_json(&folder.join("run.json"))?))
 }
 
 /// Joins the files of `folder` and writes them back.
@@ -59,153 +56,113 @@ impl Joined {
 /// # Errors
 /// [`SummaryError`]: no summary, unreadable files, a threshold that makes no sense.
 pub fn join(folder: &Path) -> Result<Joined, SummaryError> {
-    let summary_path = folder.join("summary.json");
-    if !summary_path.exists() {
-        return Err(SummaryError::NoSummary(folder.into()));
-    }
-    let mut summary = read_json(&summary_path)?;
-    let mut run = read_json(&folder.join("run.json"))?;
-    add_controllers(&mut summary, &mut run, folder)?;
-    let experiment = experiment(&run)?;
-    let record = record::read(folder, experiment)?;
-    add_figures(&mut summary, &record, &families::of(&record));
+    let (mut summary, mut run) = read(folder)?;
+    add_controllers(&mut summary, &mut run, reports::read(folder)?);
+    let record = record::read(folder, experiment(&run)?)?;
+    make_up_errors(&mut summary, &record);
+    add_figures(&mut summary, &families::of(&record));
     let passed = record.experiment.get("passed").and_then(toml::Value::as_table).cloned().unwrap_or_default();
-    let judged = thresholds::judge(&passed, &summary)?;
     // `passed` of the emulator speaks of its own end, and is kept apart so that joining again starts from it.
-    let ended_well =
-        summary.get("ended_well").or(summary.get("passed")).cloned().unwrap_or(Value::Bool(false));
-    summary.insert("ended_well".into(), ended_well);
-    let against = against(&summary, &judged, is_rehearsal(&run));
-    summary.insert("passed".into(), json!(against.is_empty()));
-    summary.insert("not_passed_because".into(), json!(against));
-    summary.insert("thresholds".into(), Value::Object(judged));
-    for (name, value) in [("summary.json", &summary), ("run.json", &run)] {
+    summary.ended_well = Some(summary.ended_well.or(summary.passed).unwrap_or(false));
+    summary.thresholds = thresholds::judge_summary(&passed, &summary)?;
+    summary.not_passed_because = against(&summary, run.is_rehearsal());
+    summary.passed = Some(summary.not_passed_because.is_empty());
+    for (name, file) in [("summary.json", in_order(&summary)), ("run.json", in_order(&run))] {
         let path = folder.join(name);
-        write_json(&path, value).map_err(|error| FileError::write(&path, error))?;
+        write_json(&path, &file).map_err(|error| FileError::write(&path, error))?;
     }
     Ok(Joined { summary, run, record })
 }
 
-/// The controllers' files as far as they are there: one for both axes, or one each.
-fn add_controllers(
-    summary: &mut Map<String, Value>,
-    run: &mut Map<String, Value>,
-    folder: &Path,
-) -> Result<(), SummaryError> {
-    let reports = reports::read(folder)?;
-    let split = |reported: &Map<String, Value>| {
-        let figures: Map<_, _> =
-            PROCESS_FIGURES.iter().map(|key| ((*key).to_owned(), known(reported, key).clone())).collect();
-        let apart = |key: &str| key != "axes" && !PROCESS_FIGURES.contains(&key);
-        let used = reported.iter().filter(|(key, _)| apart(key));
-        let used: Map<_, _> = used.map(|(key, value)| (key.clone(), value.clone())).collect();
-        (Value::Object(figures), Value::Object(used))
-    };
-    match &reports {
-        Reports::None => return Ok(()),
+/// The controllers' reports as far as they are there: one for both axes, or one each.
+fn add_controllers(summary: &mut JoinedSummary, run: &mut JoinedRun, reports: Reports) {
+    let axes = reports.axes();
+    let mut by_controllers = ReportedByControllers::default();
+    match reports {
+        Reports::None => return,
         Reports::Both(reported) => {
-            let (figures, used) = split(reported);
-            summary.insert("controller".into(), figures);
-            run.insert("controller".into(), used);
+            by_controllers.controller = Some(reported.figures);
+            run.controller = Some(reported.used);
         }
         Reports::Each(each) => {
-            let (mut figures, mut used) = (Map::new(), Map::new());
-            for (axis, reported) in each {
-                let own = split(reported);
-                figures.insert((*axis).into(), own.0);
-                used.insert((*axis).into(), own.1);
-            }
-            summary.insert("controllers".into(), Value::Object(figures));
-            run.insert("controllers".into(), Value::Object(used));
+            let parted = each.into_iter().map(|(axis, own)| {
+                let named = |axis: &str| axis.to_owned();
+                ((named(axis), own.figures), (named(axis), own.used))
+            });
+            let (figures, used) = parted.unzip();
+            by_controllers.controllers = Some(figures);
+            run.controllers = Some(used);
         }
     }
-    let axes = reports.axes();
-    let lost = axes.values().filter_map(|axis| total(&axis["sensors_lost"]));
-    let at_controller = lost.reduce(|sum, count| sum + count);
-    let at_rig = known(summary, "frames_lost_at_rig").as_u64();
-    let lost = [at_rig, at_controller].into_iter().flatten().reduce(|sum, count| sum + count);
-    summary.insert("frames_lost_at_controller".into(), json!(at_controller));
-    summary.insert("frames_lost".into(), json!(lost));
-    for key in ["position_error_dynamic_m", "position_error_static_m"] {
-        summary.insert(key.into(), known(&axes, "drive")[key].clone());
-    }
-    summary.insert("axes".into(), Value::Object(axes));
-    Ok(())
+    let sum = |counts: &mut dyn Iterator<Item = u64>| counts.reduce(|sum, count| sum + count);
+    by_controllers.frames_lost_at_controller =
+        sum(&mut axes.values().filter_map(|axis| reported_of_axis(axis).sensors_lost));
+    let lost = [summary.frames_lost_at_rig, by_controllers.frames_lost_at_controller];
+    summary.frames_lost = sum(&mut lost.into_iter().flatten());
+    let drive = axes.get("drive").map(reported_of_axis).unwrap_or_default();
+    summary.position_error_dynamic_m = drive.position_error_dynamic_m;
+    summary.position_error_static_m = drive.position_error_static_m;
+    by_controllers.axes = axes;
+    summary.by_controllers = Some(by_controllers);
 }
 
-/// A count, or the sum of an object's counts; `None` when it holds none.
-fn total(counts: &Value) -> Option<u64> {
-    match counts {
-        Value::Object(parts) => parts.values().filter_map(Value::as_u64).reduce(|sum, count| sum + count),
-        count => count.as_u64(),
-    }
+/// The drive's controller reports its errors as it goes; those that it did not are computed from its table.
+pub fn make_up_errors(summary: &mut JoinedSummary, record: &Record) {
+    let JoinedSummary { position_error_dynamic_m, position_error_static_m, .. } = summary;
+    *position_error_dynamic_m = position_error_dynamic_m.or_else(|| position::error_dynamic_m(record));
+    *position_error_static_m = position_error_static_m.or_else(|| position::error_static_m(record));
 }
 
-fn add_figures(summary: &mut Map<String, Value>, record: &Record, figures: &Figures) {
-    // The drive's controller has reported them as it went; one that did not is made up for.
-    let made_up = [
-        ("position_error_dynamic_m", position::error_dynamic_m as fn(&Record) -> _),
-        ("position_error_static_m", position::error_static_m),
-    ];
-    for (key, compute) in made_up {
-        if known(summary, key).is_null() {
-            summary.insert(key.into(), json!(compute(record)));
-        }
-    }
-    let values: Map<_, _> = figures.iter().map(|(name, value)| (name.to_owned(), json!(value))).collect();
-    summary.insert("figures".into(), Value::Object(values));
-    let each: Map<_, _> =
-        figures.by_repetition().map(|(name, values)| (name.to_owned(), json!(values))).collect();
-    summary.insert("figures_by_repetition".into(), Value::Object(each));
+fn add_figures(summary: &mut JoinedSummary, figures: &Figures) {
+    summary.figures = figures.iter().map(|(name, value)| (name.to_owned(), value)).collect();
+    let each = figures.by_repetition();
+    summary.figures_by_repetition = each.map(|(name, values)| (name.to_owned(), values.to_vec())).collect();
 }
 
 /// What stands against the run, in a few words each; empty when it has passed.
-fn against(summary: &Map<String, Value>, judged: &Map<String, Value>, is_rehearsal: bool) -> Vec<String> {
+fn against(summary: &JoinedSummary, is_rehearsal: bool) -> Vec<String> {
     let mut against = Vec::new();
-    if known(summary, "ended_well") != &Value::Bool(true) {
+    if summary.ended_well != Some(true) {
         let who = if is_rehearsal { "rehearsal" } else { "emulator" };
         against.push(format!("the {who} did not end well"));
     }
     // Null: the controller is of an earlier version that does not say, or is not ours.
-    let ended_badly = |who: &str, reported: &Value| {
-        let why = reported["ended_because"].as_str().map_or_else(String::new, |why| format!(": {why}"));
-        (reported["ended_well"] == Value::Bool(false)).then(|| format!("the {who} did not end well{why}"))
+    let ended_badly = |who: &str, reported: &ControllerFigures| {
+        let why = reported.ended_because.as_ref().map_or_else(String::new, |why| format!(": {why}"));
+        (reported.ended_well == Some(false)).then(|| format!("the {who} did not end well{why}"))
     };
-    against.extend(ended_badly("controller", known(summary, "controller")));
-    for (axis, reported) in known(summary, "controllers").as_object().into_iter().flatten() {
-        against.extend(ended_badly(&format!("{axis} controller"), reported));
+    if let Some(by_controllers) = &summary.by_controllers {
+        against.extend(by_controllers.controller.iter().filter_map(|both| ended_badly("controller", both)));
+        let each = by_controllers.controllers.iter().flatten();
+        against.extend(each.filter_map(|(axis, own)| ended_badly(&format!("{axis} controller"), own)));
     }
-    let broken = judged.iter().filter(|(_, entry)| !thresholds::is_kept(entry));
+    let broken = summary.thresholds.iter().filter(|(_, bound)| !bound.kept);
     against.extend(broken.map(|(name, _)| format!("bound broken: {name}")));
-    let dropped = known(summary, "records_dropped");
-    if dropped.as_u64().is_some_and(|count| count > 0) {
+    if let Some(dropped) = summary.records_dropped.filter(|count| *count > 0) {
         against.push(format!("{dropped} records did not reach the files"));
     }
-    let second_rig = &known(summary, "frames_ignored")["second_rig"];
-    if second_rig.as_u64().is_some_and(|count| count > 0) {
+    let second_rig = summary.frames_ignored.map_or(0, |ignored| ignored.second_rig);
+    if second_rig > 0 {
         against.push(format!("{second_rig} frames came from a second rig"));
     }
     against
 }
 
-/// The value under `key`; null when it is not there.
-fn known<'a>(map: &'a Map<String, Value>, key: &str) -> &'a Value {
-    map.get(key).unwrap_or(&Value::Null)
-}
-
-fn is_rehearsal(run: &Map<String, Value>) -> bool {
-    known(run, "pace") == "rehearsal"
-}
-
 /// The experiment that the run used; empty without one.
-pub fn experiment(run: &Map<String, Value>) -> Result<toml::Table, SummaryError> {
-    let text = run.get("experiment_toml").and_then(Value::as_str).unwrap_or_default();
+pub fn experiment(run: &JoinedRun) -> Result<toml::Table, SummaryError> {
+    let text = run.experiment_toml.as_deref().unwrap_or_default();
     Ok(text.parse().map_err(|error| FileError::read(Path::new("run.json: experiment_toml"), error))?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::{Value, json};
+
+    /// `summary.json` of a joined run, as others read it.
+    fn summary_of(joined: &Joined) -> Value {
+        in_order(&joined.summary)
+    }
 
     /// A folder with these files besides what an emulator that ended well leaves.
     fn folder(files: &[(&str, Value)]) -> tempfile::TempDir {
@@ -244,7 +201,7 @@ mod tests {
             std::fs::write(folder.path().join(name), runlog::golden::text(name)).unwrap();
         }
         let joined = join(folder.path()).unwrap();
-        runlog::golden::check("summary.keys", &runlog::golden::keys(&Value::Object(joined.summary)));
+        runlog::golden::check("summary.keys", &runlog::golden::keys(&summary_of(&joined)));
     }
 
     #[test]
@@ -252,10 +209,10 @@ mod tests {
         let folder = folder(&[("controller.json", both(&json!({})))]);
         let joined = join(folder.path()).unwrap();
         assert!(joined.passed());
-        assert_eq!(joined.summary["frames_lost"], 2);
-        assert_eq!(joined.summary["position_error_dynamic_m"], 0.002);
-        assert_eq!(joined.run["controller"], json!({ "title": "position-p" }));
-        assert_eq!(join(folder.path()).unwrap().summary, joined.summary);
+        assert_eq!(summary_of(&joined)["frames_lost"], 2);
+        assert_eq!(summary_of(&joined)["position_error_dynamic_m"], 0.002);
+        assert_eq!(in_order(&joined.run)["controller"], json!({ "title": "position-p" }));
+        assert_eq!(summary_of(&join(folder.path()).unwrap()), summary_of(&joined));
     }
 
     #[test]
@@ -265,11 +222,11 @@ mod tests {
         let load = json!({ "ended_well": false, "axes": { "load": { "sensors_lost": 4 } } });
         let folder = folder(&[("controller-drive.json", drive), ("controller-load.json", load)]);
         let joined = join(folder.path()).unwrap();
-        assert_eq!(joined.summary["frames_lost_at_controller"], 7);
-        assert_eq!(joined.summary["position_error_dynamic_m"], 0.002);
-        assert_eq!(joined.summary["controllers"]["load"]["ended_well"], false);
+        assert_eq!(summary_of(&joined)["frames_lost_at_controller"], 7);
+        assert_eq!(summary_of(&joined)["position_error_dynamic_m"], 0.002);
+        assert_eq!(summary_of(&joined)["controllers"]["load"]["ended_well"], false);
         let against = json!(["the load controller did not end well", "bound broken: frames_lost"]);
-        assert_eq!(joined.summary["not_passed_because"], against);
+        assert_eq!(summary_of(&joined)["not_passed_because"], against);
     }
 
     #[test]
@@ -303,7 +260,7 @@ mod tests {
         ] {
             let folder = folder(&[("summary.json", summary), ("controller.json", both(&controller))]);
             let joined = join(folder.path()).unwrap();
-            assert_eq!(joined.summary["not_passed_because"], against);
+            assert_eq!(summary_of(&joined)["not_passed_because"], against);
             assert_eq!(joined.passed(), against == json!([]), "{against}");
         }
     }
@@ -320,8 +277,8 @@ mod tests {
             let at = format!("{summary} {controller}");
             let files = [("summary.json", summary), ("controller.json", controller), ("run.json", json!({}))];
             let joined = join(folder(&files).path()).unwrap();
-            assert_eq!(joined.figure("frames_lost_at_controller"), &at_controller, "{at}");
-            assert_eq!(joined.figure("frames_lost"), &in_all, "{at}");
+            assert_eq!(summary_of(&joined)["frames_lost_at_controller"], at_controller, "{at}");
+            assert_eq!(summary_of(&joined)["frames_lost"], in_all, "{at}");
             assert!(!joined.passed());
             assert!(crate::table::table(&joined).contains("frames lost"));
         }
@@ -333,7 +290,7 @@ mod tests {
         let rows = "time_s,main_chain,set_position_m,position_m,moving\n0.0,experiment,0.2,0.197,1\n0.001,experiment,0.2,0.2,1\n";
         std::fs::write(folder.path().join("controller-drive.csv"), rows).unwrap();
         let joined = join(folder.path()).unwrap();
-        assert!((joined.figure("position_error_dynamic_m").as_f64().unwrap() - 0.003).abs() < 1e-12);
+        assert!((joined.summary.position_error_dynamic_m.unwrap() - 0.003).abs() < 1e-12);
         assert!(joined.passed());
     }
 
@@ -354,7 +311,7 @@ mod tests {
     fn without_a_controller_a_bound_on_its_figure_is_not_kept() {
         let joined = join(folder(&[]).path()).unwrap();
         assert!(!joined.passed());
-        assert_eq!(joined.summary["thresholds"]["position_error_dynamic_m"]["value"], Value::Null);
+        assert_eq!(summary_of(&joined)["thresholds"]["position_error_dynamic_m"]["value"], Value::Null);
     }
 
     #[test]
@@ -362,7 +319,7 @@ mod tests {
         let run = json!({ "pace": "rehearsal" });
         let summary = json!({ "passed": false, "cycles": 5 });
         let joined = join(folder(&[("run.json", run), ("summary.json", summary)]).path()).unwrap();
-        assert_eq!(joined.figure("not_passed_because"), &json!(["the rehearsal did not end well"]));
+        assert_eq!(summary_of(&joined)["not_passed_because"], json!(["the rehearsal did not end well"]));
         let table = crate::table::table(&joined);
         assert!(table.contains("none: rehearsal, no bus"), "{table}");
     }

@@ -9,6 +9,7 @@
 //! | [`families`] | the figures, one file for each family |
 //! | [`join`](mod@join) | joins what emulator and controllers left in a run's folder into one summary |
 //! | [`thresholds`] | `[passed]` of the experiment file held against the summary |
+//! | [`top`] | the figures at the top of a summary, in one list |
 //! | [`table`] | the summary as a short table |
 //! | [`median`](mod@median) | a median with its interval |
 
@@ -21,6 +22,7 @@ pub mod series;
 pub mod table;
 pub mod tables_read;
 pub mod thresholds;
+pub mod top;
 
 pub use families::{Definition, FAMILIES, Family, Figures, definition, definitions, list, of};
 pub use families::{emergency_stop, position};

@@ -5,6 +5,7 @@
 //! it may be writing. So the reports say which tables are of this run: those of the axes that they name.
 
 use crate::SummaryError;
+use runlog::controller_report::PartedReport;
 use runlog::run_folder::read_json;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -14,9 +15,9 @@ pub enum Reports {
     /// No controller left one.
     None,
     /// One process for both axes.
-    Both(Map<String, Value>),
+    Both(Box<PartedReport>),
     /// A process for each axis, those that left one.
-    Each(Vec<(&'static str, Map<String, Value>)>),
+    Each(Vec<(&'static str, PartedReport)>),
 }
 
 /// Reads the reports in `folder`.
@@ -26,7 +27,7 @@ pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
         path.exists().then(|| read_json(&path)).transpose()
     };
     if let Some(both) = read("controller.json")? {
-        return Ok(Reports::Both(both));
+        return Ok(Reports::Both(Box::new(both)));
     }
     let mut each = Vec::new();
     for axis in ["drive", "load"] {
@@ -38,11 +39,10 @@ pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
 impl Reports {
     /// What they say of each axis that they name.
     pub fn axes(&self) -> Map<String, Value> {
-        let of = |reported: &Map<String, Value>| reported.get("axes").and_then(Value::as_object).cloned();
         match self {
             Self::None => Map::new(),
-            Self::Both(reported) => of(reported).unwrap_or_default(),
-            Self::Each(each) => each.iter().filter_map(|(_, reported)| of(reported)).flatten().collect(),
+            Self::Both(reported) => reported.axes.clone(),
+            Self::Each(each) => each.iter().flat_map(|(_, reported)| reported.axes.clone()).collect(),
         }
     }
 }

@@ -12,41 +12,50 @@
 //! absence is no proof. Of a figure that each repetition has (`figures_by_repetition`) every value must keep them; the one that
 //! keeps them least is judged.
 
+use crate::top;
 use crate::{SummaryError, families};
-use serde_json::{Map, Value, json};
+use runlog::run_folder::in_order;
+use runlog::summary::{JoinedSummary, JudgedBound};
+use serde_json::Value;
+use std::collections::BTreeMap;
 
-/// Figures at the top of the summary, besides those of [`families`](crate::families); a name that ends with a dot has parts of
-/// its own.
-const TOP: &[&str] = &[
-    "position_error_dynamic_m",
-    "position_error_static_m",
-    "cycles",
-    "skipped",
-    "overruns",
-    "late_completions",
-    "frames_sent",
-    "frames_received",
-    "frames_lost",
-    "frames_lost_at_rig",
-    "frames_lost_at_controller",
-    "frames_malformed",
-    "stale_commands",
-    "allocations_in_cycle",
-    "records_dropped",
-    "event_count",
-    "wakeup_ns.",
-    "execution_ns.",
-    "period_error_ns.",
-    "round_trip_ns.",
-    "drive_commands.",
-    "load_commands.",
-    "frames_ignored.",
-    "bus.",
-    "bus_host.",
-    "controller.",
-    "controllers.",
-    "axes.",
+/// Keys at the top of the summary that have parts of their own, such as `wakeup_ns.p99`.
+const WITH_PARTS: &[&str] = &[
+    "wakeup_ns",
+    "execution_ns",
+    "period_error_ns",
+    "round_trip_ns",
+    "drive_commands",
+    "load_commands",
+    "frames_ignored",
+    "bus",
+    "bus_host",
+    "controller",
+    "controllers",
+    "axes",
 ];
+
+/// What a run has under a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Found {
+    Number(f64),
+    /// The key is there, the run had nothing to measure.
+    NotMeasured,
+    /// Something that has no bounds.
+    NoNumber,
+}
+
+impl Found {
+    fn of(value: &Value) -> Self {
+        match value {
+            Value::Null => Self::NotMeasured,
+            value => value.as_f64().map_or(Self::NoNumber, Self::Number),
+        }
+    }
+}
+
+/// Values of each repetition, by figure.
+pub type ByRepetition = BTreeMap<String, Vec<Option<f64>>>;
 
 /// What a figure must keep to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,29 +95,52 @@ impl Bounds {
     }
 }
 
-/// Holds the bounds of `passed` against `summary`: for each figure its bounds, value and whether they were kept.
-pub fn judge(passed: &toml::Table, summary: &Map<String, Value>) -> Result<Map<String, Value>, SummaryError> {
+/// Holds the bounds of `passed` against what is `found` under their keys: for each figure its bounds, value and whether they were
+/// kept.
+///
+/// # Errors
+/// [`SummaryError::Threshold`]: a bound that makes no sense, or of a figure that no run has.
+pub fn judge(
+    passed: &toml::Table,
+    found: impl Fn(&str) -> Option<Found>,
+    by_repetition: &ByRepetition,
+) -> Result<BTreeMap<String, JudgedBound>, SummaryError> {
     let judged = passed.iter().map(|(key, bound)| {
         let refused = |problem: &str| refusal(key, bound, problem);
         let bounds = Bounds::read(bound).map_err(refused)?;
-        let found = figure(summary, key).or(figure(known_figures(summary), key));
-        let value = match found {
+        let value = match found(key) {
             None if !is_known(key) => return Err(refused(NO_SUCH)),
-            None | Some(Value::Null) => None,
-            Some(value) => {
-                Some(value.as_f64().ok_or_else(|| refused("that key of summary.json is no number"))?)
-            }
+            None | Some(Found::NotMeasured) => None,
+            Some(Found::NoNumber) => return Err(refused("that key of summary.json is no number")),
+            Some(Found::Number(value)) => Some(value),
         };
         let value = value.map(|worst| {
-            let each = summary.get("figures_by_repetition").and_then(|each| each.get(key)?.as_array());
-            let values = each.into_iter().flatten().filter_map(Value::as_f64);
-            values.fold(worst, |one, other| if bounds.slack(other) < bounds.slack(one) { other } else { one })
+            let values = by_repetition.get(key).into_iter().flatten().flatten();
+            values
+                .fold(worst, |one, other| if bounds.slack(*other) < bounds.slack(one) { *other } else { one })
         });
         let kept = value.is_some_and(|value| bounds.hold(value));
         let Bounds { least, most } = bounds;
-        Ok((key.clone(), json!({ "least": least, "most": most, "value": value, "kept": kept })))
+        Ok((key.clone(), JudgedBound { least, most, value, kept }))
     });
     judged.collect()
+}
+
+/// As [`judge`], against a summary.
+///
+/// # Errors
+/// As [`judge`].
+pub fn judge_summary(
+    passed: &toml::Table,
+    summary: &JoinedSummary,
+) -> Result<BTreeMap<String, JudgedBound>, SummaryError> {
+    // A bound's key is a path in the file.
+    let written = in_order(summary);
+    let found = |key: &str| {
+        let of_family = || summary.figures.get(key).copied().map(Found::Number);
+        at(&written, key).map(Found::of).or_else(of_family)
+    };
+    judge(passed, found, &summary.figures_by_repetition)
 }
 
 const NO_SUCH: &str =
@@ -131,17 +163,13 @@ fn refusal(key: &str, bound: &toml::Value, problem: &str) -> SummaryError {
 
 /// Whether a run may have a figure of this key.
 fn is_known(key: &str) -> bool {
-    let at_top = |name: &&str| if name.ends_with('.') { key.starts_with(*name) } else { key == *name };
-    TOP.iter().any(at_top) || families::definition(key).is_some()
+    let with_parts = || key.split_once('.').is_some_and(|(first, _)| WITH_PARTS.contains(&first));
+    top::find(key).is_some() || with_parts() || families::definition(key).is_some()
 }
 
-/// Whether a judged bound was kept.
-pub fn is_kept(entry: &Value) -> bool {
-    entry["kept"] == Value::Bool(true)
-}
-
-pub fn in_words(entry: &Value) -> String {
-    match (entry["least"].as_f64(), entry["most"].as_f64()) {
+/// The bounds, for a person.
+pub fn in_words(bound: &JudgedBound) -> String {
+    match (bound.least, bound.most) {
         (Some(least), Some(most)) => format!("from {least} to {most}"),
         (Some(least), None) => format!("at least {least}"),
         (None, Some(most)) => format!("at most {most}"),
@@ -153,30 +181,26 @@ fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64)).filter(|n| n.is_finite())
 }
 
-/// `figures` of the summary; empty when there are none.
-fn known_figures(summary: &Map<String, Value>) -> &Map<String, Value> {
-    static NONE: std::sync::LazyLock<Map<String, Value>> = std::sync::LazyLock::new(Map::new);
-    summary.get("figures").and_then(Value::as_object).unwrap_or(&NONE)
-}
-
-/// The figure under a key such as `frames_lost` or `wakeup_ns.p99`.
-fn figure<'a>(summary: &'a Map<String, Value>, key: &str) -> Option<&'a Value> {
-    let mut parts = key.split('.');
-    let first = summary.get(parts.next()?)?;
-    parts.try_fold(first, |value, part| value.get(part))
+/// The value under a key such as `frames_lost` or `wakeup_ns.p99`.
+fn at<'a>(file: &'a Value, key: &str) -> Option<&'a Value> {
+    key.split('.').try_fold(file, |value, part| value.get(part))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
-    fn judged(passed: &str) -> Result<Map<String, Value>, SummaryError> {
+    fn judged_of(passed: &str, summary: Value) -> Result<BTreeMap<String, JudgedBound>, SummaryError> {
+        judge_summary(&passed.parse().unwrap(), &serde_json::from_value(summary).unwrap())
+    }
+
+    fn judged(passed: &str) -> Result<BTreeMap<String, JudgedBound>, SummaryError> {
         let summary = json!({
-            "frames_lost": 3, "wakeup_ns": { "p99": 1000 }, "position_error_static_m": null,
+            "frames_lost": 3, "wakeup_ns": { "p99": 1000, "count": 5 }, "position_error_static_m": null,
             "figures": { "force_settling_s": 0.1 },
         });
-        let Value::Object(summary) = summary else { unreachable!("the literal above is an object") };
-        judge(&passed.parse().unwrap(), &summary)
+        judged_of(passed, summary)
     }
 
     #[test]
@@ -192,7 +216,7 @@ mod tests {
             ("force_settling_s = { least = 0.11, most = 0.13 }", false),
             ("force_settling_s = { least = 0.07, most = 0.09 }", false),
         ] {
-            assert_eq!(judged(passed).unwrap().values().all(is_kept), kept, "{passed}");
+            assert_eq!(judged(passed).unwrap().values().all(|bound| bound.kept), kept, "{passed}");
         }
     }
 
@@ -202,16 +226,15 @@ mod tests {
             "figures": { "force_settling_s": 0.12 },
             "figures_by_repetition": { "force_settling_s": [0.12, 0.08, null] },
         });
-        let Value::Object(summary) = summary else { unreachable!("the literal above is an object") };
         for (bound, kept, value) in [
             ("{ least = 0.06, most = 0.13 }", true, 0.12),
             ("{ least = 0.075, most = 0.13 }", true, 0.08),
             ("{ least = 0.09, most = 0.13 }", false, 0.08),
             ("0.11", false, 0.12),
         ] {
-            let judged = judge(&format!("force_settling_s = {bound}").parse().unwrap(), &summary).unwrap();
+            let judged = judged_of(&format!("force_settling_s = {bound}"), summary.clone()).unwrap();
             let entry = &judged["force_settling_s"];
-            assert_eq!((is_kept(entry), entry["value"].as_f64()), (kept, Some(value)), "{bound}");
+            assert_eq!((entry.kept, entry.value), (kept, Some(value)), "{bound}");
         }
     }
 
@@ -230,7 +253,7 @@ mod tests {
     fn a_figure_that_was_not_measured_keeps_no_bound() {
         for passed in ["position_error_static_m = 1.0", "force_rise_s = 1.0", "force_rise_s = { least = 0 }"]
         {
-            assert!(!judged(passed).unwrap().values().all(is_kept), "{passed}");
+            assert!(!judged(passed).unwrap().values().all(|bound| bound.kept), "{passed}");
         }
     }
 

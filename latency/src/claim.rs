@@ -8,7 +8,8 @@ use super::controlled::not_controlled;
 use super::files::RunFiles;
 use super::model::{Claim, Conditions};
 use super::reference;
-use realtime::{Grant, Machine};
+use realtime::Grant;
+use realtime::machine::Hypervisor;
 
 /// Cycles for a p99.9 that rests on a hundred samples.
 const CYCLES_FOR_P999: u64 = 100_000;
@@ -25,7 +26,7 @@ pub fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
     let reasons = reasons(runs, conditions);
     let not_controlled = not_controlled(runs, conditions);
     let supported = reasons.is_empty();
-    let sentence = match (supported, virtual_machine(conditions)) {
+    let sentence = match (supported, virtual_machine(runs)) {
         (false, _) => format!("These runs support no latency claim, for {} reason(s).", reasons.len()),
         (true, Some(host)) => format!(
             "These runs support a claim about p50 and p99 beside the reference on this virtual machine ({host}); the largest \
@@ -36,7 +37,7 @@ pub fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
     Claim { supported, sentence, reasons, not_controlled }
 }
 
-/// What is known of runs that still go on.
+/// What is known of a run that still goes on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SoFar {
     /// What speaks against a claim, whatever comes.
@@ -45,14 +46,34 @@ pub struct SoFar {
     pub missing: Vec<String>,
 }
 
-/// Judges runs that still go on by the same rules.
-pub fn so_far(runs: &[RunFiles], conditions: &Conditions) -> SoFar {
-    let against = [not_granted(runs), disturbed(runs, conditions)].concat();
-    SoFar { against, missing: missing(runs, conditions) }
+/// Cycles of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CycleCount {
+    /// Cycles begun, skipped ones included.
+    pub cycles: u64,
+    /// Cycles computed late and not sent.
+    pub skipped: u64,
+}
+
+impl CycleCount {
+    /// From `summary.json`; 0 where it is missing.
+    fn of(run: &RunFiles) -> Self {
+        let summary = run.counted();
+        Self { cycles: summary.cycles.unwrap_or_default(), skipped: summary.skipped.unwrap_or_default() }
+    }
+}
+
+/// Judges a run that still goes on by the same rules, after `count` cycles.
+pub fn so_far(run: &RunFiles, conditions: &Conditions, count: CycleCount) -> SoFar {
+    let (runs, counts) = (std::slice::from_ref(run), [count]);
+    let against = [not_granted(runs), disturbed(runs, conditions, &counts)].concat();
+    SoFar { against, missing: missing(runs, conditions, &counts) }
 }
 
 fn reasons(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
-    [not_granted(runs), missing(runs, conditions), disturbed(runs, conditions)].concat()
+    let counts: Vec<_> = runs.iter().map(CycleCount::of).collect();
+    let (missing, disturbed) = (missing(runs, conditions, &counts), disturbed(runs, conditions, &counts));
+    [not_granted(runs), missing, disturbed].concat()
 }
 
 /// What processes ran without.
@@ -80,7 +101,7 @@ fn not_granted(runs: &[RunFiles]) -> Vec<String> {
 }
 
 /// Evidence that the runs lack.
-fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+fn missing(runs: &[RunFiles], conditions: &Conditions, counts: &[CycleCount]) -> Vec<String> {
     let mut reasons = Vec::new();
     let unknown = runs.iter().filter(|run| run.run.is_null() || run.controllers.is_empty()).count();
     if unknown > 0 {
@@ -95,7 +116,7 @@ fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
             runs.len()
         ));
     }
-    let cycles: u64 = runs.iter().filter_map(|run| run.counted().cycles).sum();
+    let cycles: u64 = counts.iter().map(|count| count.cycles).sum();
     if cycles < CYCLES_FOR_P999 {
         reasons
             .push(format!("{cycles} cycles are too few for p99.9 and beyond: {CYCLES_FOR_P999} at least."));
@@ -104,7 +125,7 @@ fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
 }
 
 /// What was not as it should have been.
-fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+fn disturbed(runs: &[RunFiles], conditions: &Conditions, counts: &[CycleCount]) -> Vec<String> {
     let mut reasons = Vec::new();
     if conditions.probe {
         reasons.push(
@@ -126,10 +147,10 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
             }
         }
     };
-    for run in runs {
+    for (run, count) in runs.iter().zip(counts) {
         add(unlike_reference(run));
         add(shared_cpu(run));
-        add(of_the_run(run));
+        add(of_the_run(run, *count));
     }
     if runs.iter().any(|run| run.description().counts_allocations) {
         reasons.push("The build counts allocations, which costs time.".into());
@@ -190,42 +211,45 @@ fn shared_cpu(run: &RunFiles) -> Vec<String> {
 }
 
 /// What the run itself, its build and its machine forbid.
-fn of_the_run(run: &RunFiles) -> Vec<String> {
+fn of_the_run(run: &RunFiles, count: CycleCount) -> Vec<String> {
     let mut found = Vec::new();
-    let Machine { build, hypervisor, clock_sources_available, processor, .. } = run.description().machine;
-    let profile = &build.profile;
-    if profile.starts_with("debug") || build.debug_assertions {
-        found.push(format!("The emulator is a build for debugging ({profile})."));
+    let machine = run.description().machine;
+    let build = &machine.build;
+    if build.profile.is_for_debugging() || build.debug_assertions {
+        found.push(format!("The emulator is a build for debugging ({}).", build.profile));
     }
-    let summary = run.counted();
-    if summary.passed == Some(false) {
+    if run.counted().passed == Some(false) {
         found.push("The verdict of a run itself is not passed.".into());
     }
-    let (skipped, cycles) =
-        (summary.skipped.unwrap_or_default() as f64, summary.cycles.unwrap_or_default() as f64);
+    let (skipped, cycles) = (count.skipped as f64, count.cycles as f64);
     if skipped > SKIPPED_SHARE * cycles {
         let share = 100.0 * skipped / cycles.max(1.0);
         found.push(format!("A run missed {share:.1} % of its cycles: {} % at most.", 100.0 * SKIPPED_SHARE));
     }
-    let is_kvm = [hypervisor, clock_sources_available].iter().any(|word| word.to_lowercase().contains("kvm"));
-    if processor.contains("TCG") || (processor.contains("QEMU Virtual CPU") && !is_kvm) {
+    if machine.is_emulated_by_qemu() {
         found.push(
             "The machine is emulated by QEMU (TCG): its instructions take what the emulation takes.".into(),
         );
     }
     if run.circumstances().uncommitted_files > Some(0) {
         found.push(
-            "The source tree held changes that nobody committed: the build is not told by its commit.".into(),
+            "The source tree held changes that nobody committed: the commit does not identify the build."
+                .into(),
         );
     }
     found
 }
 
-/// The hypervisor, if the machine has one.
-pub(super) fn virtual_machine(conditions: &Conditions) -> Option<&str> {
-    let fact = conditions.machine.iter().find(|fact| fact.name.to_lowercase().contains("hypervisor"))?;
-    let none = ["none", "no", "unknown", "false", ""];
-    (!none.iter().any(|word| fact.value.eq_ignore_ascii_case(word))).then_some(fact.value.as_str())
+/// The hypervisors below the runs, if there is one.
+pub(super) fn virtual_machine(runs: &[RunFiles]) -> Option<String> {
+    let mut hosts: Vec<String> = Vec::new();
+    for hypervisor in runs.iter().map(RunFiles::hypervisor).filter(Hypervisor::is_present) {
+        let host = hypervisor.to_string();
+        if !hosts.contains(&host) {
+            hosts.push(host);
+        }
+    }
+    (!hosts.is_empty()).then(|| hosts.join("; "))
 }
 
 #[cfg(test)]
@@ -233,6 +257,7 @@ mod tests {
     use super::*;
     use crate::conditions::conditions;
     use crate::made_up;
+    use realtime::machine::{BuildProfile, HypervisorSign};
     use serde_json::json;
 
     const LOCKED: &str = "memory locked, current and future";
@@ -300,6 +325,33 @@ mod tests {
             assert!(!reported.supported && reported.reasons.len() == 1, "{words}: {:?}", reported.reasons);
             assert!(reported.reasons[0].contains(words), "{:?}", reported.reasons);
         }
+    }
+
+    #[test]
+    fn a_claim_of_a_virtual_machine_follows_from_the_hypervisor_of_any_run() {
+        let with = |hypervisor: Hypervisor| {
+            let mut runs = good();
+            runs[1].run["machine"]["hypervisor"] = json!(hypervisor);
+            (virtual_machine(&runs), judged(&runs).sentence.contains("virtual machine"))
+        };
+        let signs = vec![HypervisorSign::CpuFlag, HypervisorSign::ClockSource("kvm-clock".into())];
+        let host = "cpuinfo flag 'hypervisor'; clock source kvm-clock".to_owned();
+        assert_eq!(with(Hypervisor::Present(signs)), (Some(host), true));
+        assert_eq!(with(Hypervisor::Absent), (None, false));
+        assert_eq!(with(Hypervisor::NotRecorded("unknown".into())), (None, false));
+        assert_eq!(virtual_machine(&[RunFiles::default()]), None);
+    }
+
+    #[test]
+    fn a_build_for_debugging_is_a_reason_by_its_profile() {
+        let with = |profile: BuildProfile| {
+            let mut runs = good();
+            runs[0].run["machine"]["build"]["profile"] = json!(profile);
+            judged(&runs).supported
+        };
+        assert!(!with(BuildProfile::Debug { settings: String::new() }));
+        assert!(with(BuildProfile::Release { settings: ", opt-level s".into() }));
+        assert!(with(BuildProfile::default()));
     }
 
     #[test]

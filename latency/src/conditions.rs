@@ -13,7 +13,7 @@ pub fn conditions(runs: &[RunFiles]) -> Conditions {
         runs.iter().filter_map(|run| run.conditions.as_ref()).find_map(of)
     };
     let reference = runs.iter().find_map(|run| run.reference.as_ref());
-    let told_command =
+    let reported_command =
         reference.map(|reported| reported.command_line.clone()).filter(|line| !line.is_empty());
     let with_resolution = |line: String| match reference {
         Some(reported) if reported.whole_us => format!("{line} (whole us, the fraction left out)"),
@@ -25,11 +25,11 @@ pub fn conditions(runs: &[RunFiles]) -> Conditions {
         privileges: privileges(runs),
         load_generator: one_of(|reported| reported.load_generator.clone()),
         reference: reference
-            .and(told_command.or_else(|| one_of(|reported| reported.reference_command.clone())))
+            .and(reported_command.or_else(|| one_of(|reported| reported.reference_command.clone())))
             .map(with_resolution),
         reference_missing_because: reference.is_none().then(|| {
-            let untold = "no run has a cyclictest.json; scripts/latency makes one beside each run";
-            one_of(|reported| reported.reference_missing_because.clone()).unwrap_or_else(|| untold.into())
+            let none_found = "no run has a cyclictest.json; scripts/latency makes one beside each run";
+            one_of(|reported| reported.reference_missing_because.clone()).unwrap_or_else(|| none_found.into())
         }),
         probe: runs.iter().any(|run| run.gaps.is_some() || run.circumstances().probe),
     }
@@ -163,9 +163,9 @@ mod tests {
         assert_eq!(reported.command_lines[0].value, "emulator run");
         assert!(reported.privileges.iter().any(|fact| fact.name == "controller, granted"));
         let mut run = made_up::run(10);
-        let told_of = run.conditions.as_mut().unwrap();
-        told_of.command = Some("scripts/latency --pairs 2".into());
-        told_of.uncommitted_files = Some(3);
+        let circumstances = run.conditions.as_mut().unwrap();
+        circumstances.command = Some("scripts/latency --pairs 2".into());
+        circumstances.uncommitted_files = Some(3);
         let with = conditions(&[run]);
         assert!(with.command_lines.iter().any(|fact| fact.value == "scripts/latency --pairs 2"));
         assert!(with.machine.iter().any(|fact| fact.name == "uncommitted files" && fact.value == "3"));

@@ -7,6 +7,7 @@ use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
 use realtime::Grant;
+use realtime::machine::Hypervisor;
 use runlog::conditions::Conditions;
 use runlog::controller_report::ControllerReport;
 use runlog::flight_dump;
@@ -45,8 +46,8 @@ pub struct RunFiles {
     pub rows: BTreeMap<String, Vec<CycleTiming>>,
     /// Whether the rows are those of the whole run.
     pub whole: bool,
-    /// The flight recorder's word for how late a process was in a cycle, ns: it knows sensors that waited and were overtaken.
-    pub told_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
+    /// Lateness of a process in a cycle as the flight recorder noted it, ns; it counts sensors that waited and were overtaken.
+    pub recorded_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
     /// Gaps that the probe saw; nothing when it did not run.
     pub gaps: Option<Vec<Gap>>,
     pub reference: Option<Reference>,
@@ -173,7 +174,7 @@ impl RunFiles {
             let process = process.to_owned();
             let event = self.parse(&format!("flight/{name}/event.json"), |text| serde_json::from_str(text));
             if let Some(flight_dump::Event { cycle, late_ns, .. }) = event {
-                self.told_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
+                self.recorded_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
             }
             if self.rows.contains_key(&process) {
                 continue;
@@ -240,6 +241,11 @@ impl RunFiles {
     /// `run.json`; empty when missing.
     pub fn description(&self) -> RunDescription {
         typed(&self.run)
+    }
+
+    /// The hypervisor in `run.json`, read by itself: damage elsewhere in the file must not hide it.
+    pub fn hypervisor(&self) -> Hypervisor {
+        typed(&self.run["machine"]["hypervisor"])
     }
 
     /// `conditions.json`; empty when missing.

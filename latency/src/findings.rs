@@ -119,7 +119,7 @@ fn contention(events: &[Event]) -> Option<Finding> {
 
 /// What is known to have been late or missed, and of which there is no row; or that nothing is known.
 fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
-    let (mut skipped, mut worst_ns, mut untold) = (0, 0, 0);
+    let (mut skipped, mut worst_ns, mut unknown) = (0, 0, 0);
     for run in runs {
         let rows = run.rows.get("emulator").map(Vec::as_slice).unwrap_or_default();
         let summary = run.counted();
@@ -136,19 +136,19 @@ fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
             skipped += missing;
             worst_ns = worst_ns.max(longest_ns.unwrap_or_default());
         }
-        untold += u64::from(rows.is_empty() && (counted.is_none() || longest_ns.is_none()));
+        unknown += u64::from(rows.is_empty() && (counted.is_none() || longest_ns.is_none()));
     }
     let mut reported = Vec::new();
     if skipped > 0 || worst_ns > EVENT_OVER_NS {
-        let worst = if worst_ns > 0 { in_words(worst_ns) } else { "not told".into() };
+        let worst = if worst_ns > 0 { in_words(worst_ns) } else { "not recorded".into() };
         reported.push(format!(
-            "{skipped} cycles skipped, worst wake-up {worst}; no rows recorded, the cause cannot be told (run with \
+            "{skipped} cycles skipped, worst wake-up {worst}; no rows recorded, the cause is not known (run with \
              --full-timing)."
         ));
     }
-    if untold > 0 {
+    if unknown > 0 {
         reported.push(format!(
-            "{untold} run(s) hold neither rows nor both counts and wake-ups of the rig: whether a cycle was late is not known."
+            "{unknown} run(s) hold neither rows nor both counts and wake-ups of the rig: whether a cycle was late is not known."
         ));
     }
     (!reported.is_empty()).then(|| Finding {

@@ -221,7 +221,7 @@ fn conditions(report: &Report) -> String {
     let mut lines: Vec<String> = Vec::new();
     // A list, because command lines would make a table of any width.
     let mut line = |name: &str, value: &str| lines.push(format!("{name}: {value}"));
-    line("load generator", reported.load_generator.as_deref().unwrap_or("not told"));
+    line("load generator", reported.load_generator.as_deref().unwrap_or("not reported"));
     line("reference", reported.reference.as_deref().unwrap_or("none"));
     if let Some(why) = &reported.reference_missing_because {
         line("no reference because", why);

@@ -13,10 +13,10 @@ use std::collections::BTreeMap;
 const NO_GROUP: &str = "all";
 
 pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String, PercentilesNs>) -> RunPart {
-    let told_group = run.conditions.as_ref().and_then(|reported| reported.group.as_deref());
+    let reported_group = run.conditions.as_ref().and_then(|reported| reported.group.as_deref());
     RunPart {
         folder: run.folder.display().to_string(),
-        group: group.or(told_group).unwrap_or(NO_GROUP).to_owned(),
+        group: group.or(reported_group).unwrap_or(NO_GROUP).to_owned(),
         started_unix_s: run.started_unix_s().unwrap_or_default(),
         duration_s: run.duration_s(),
         counts: counts(run),

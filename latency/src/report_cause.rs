@@ -1,4 +1,4 @@
-//! The one cause of a whole report: what somebody did to the runs, or nothing.
+//! Selects the single cause that a report names: a disturbance that was applied to the runs, or `nothing`.
 //!
 //! It reads the report and nothing else. A machine that stood still, or a cycle that nothing explains, is what machines do
 //! by themselves: alone, they count as nothing that was done to the runs. What was late and not recorded is `unknown`.

@@ -129,7 +129,7 @@ fn head(report: &Report, made_by: Option<&str>) -> String {
     for fact in FACTS.iter().filter_map(reported) {
         let _ = writeln!(out, "- {fact}");
     }
-    let load = report.conditions.load_generator.as_deref().unwrap_or("not told");
+    let load = report.conditions.load_generator.as_deref().unwrap_or("not reported");
     let _ = writeln!(out, "- load generator: {load}\n\n{}\n", report.claim.sentence);
     out
 }

@@ -1,5 +1,6 @@
 //! Counts that a reader looks for first: how old commands were in cycles, and which frames did not come as they should.
 
+use super::files::PROCESSES;
 use super::model::RunPart;
 use pagekit::grid::Grid;
 use std::collections::BTreeMap;
@@ -31,24 +32,65 @@ pub fn command_ages(runs: &[RunPart]) -> Option<Grid> {
 pub fn frames(runs: &[RunPart]) -> Option<Grid> {
     let mut rows = Vec::new();
     for (place, run) in runs.iter().enumerate() {
-        let rig = ["frames_lost_at_rig", "frames_late", "frames_duplicate", "frames_malformed"];
-        rows.push(row(format!("{place} at the rig"), rig.map(|key| run.counts.get(key).copied())));
-        let controllers = [
-            sum(run, |name| name.contains(".sensors_lost")),
-            sum(run, |name| name.ends_with(".frames_late")),
-            sum(run, |name| name.ends_with(".frames_duplicate")),
-            sum(run, |name| name.ends_with(".frames_ignored.malformed") || name.ends_with(".bus.malformed")),
-        ];
-        rows.push(row(format!("{place} at the controllers"), controllers));
+        for (receiver, words) in
+            [(Receiver::Rig, "at the rig"), (Receiver::Controllers, "at the controllers")]
+        {
+            let counts = FrameFault::ALL.map(|fault| sum(run, receiver, fault));
+            rows.push(row(format!("{place} {words}"), counts));
+        }
     }
     let head = ["run, receiver", "lost", "late", "duplicate", "malformed"];
     (!rows.is_empty()).then(|| Grid::new(head, rows))
 }
 
-/// The sum of the controllers' counts of these names; nothing when there is none.
-fn sum(run: &RunPart, is_wanted: impl Fn(&str) -> bool) -> Option<u64> {
-    let of_controllers = run.counts.iter().filter(|(name, _)| name.starts_with("controller"));
-    of_controllers.filter(|(name, _)| is_wanted(name)).map(|(_, count)| *count).reduce(u64::saturating_add)
+/// Who received frames, or missed them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Receiver {
+    Rig,
+    Controllers,
+}
+
+/// What was wrong with frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum FrameFault {
+    Lost,
+    Late,
+    Duplicate,
+    Malformed,
+}
+
+impl FrameFault {
+    const ALL: [Self; 4] = [Self::Lost, Self::Late, Self::Duplicate, Self::Malformed];
+
+    /// Receiver and fault of a count in [`RunPart::counts`], by its exact path: fields of [`runlog::summary::Summary`], and after
+    /// the name of a process those of [`runlog::controller_report::ControllerReport`].
+    fn of_count(name: &str) -> Option<(Receiver, Self)> {
+        let path: Vec<&str> = name.split('.').collect();
+        match path.as_slice() {
+            ["frames_lost_at_rig"] => Some((Receiver::Rig, Self::Lost)),
+            ["frames_late"] => Some((Receiver::Rig, Self::Late)),
+            ["frames_duplicate"] => Some((Receiver::Rig, Self::Duplicate)),
+            ["frames_malformed"] => Some((Receiver::Rig, Self::Malformed)),
+            [process, fields @ ..] if *process != "emulator" && PROCESSES.contains(process) => {
+                let fault = match fields {
+                    // Earlier versions wrote a count for each axis, whose name stands behind.
+                    ["axes", _, "sensors_lost"] | ["axes", _, "sensors_lost", _] => Self::Lost,
+                    ["frames_late"] => Self::Late,
+                    ["frames_duplicate"] => Self::Duplicate,
+                    ["frames_ignored" | "bus", "malformed"] => Self::Malformed,
+                    _ => return None,
+                };
+                Some((Receiver::Controllers, fault))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The sum of a receiver's counts of a fault; nothing when there is none.
+fn sum(run: &RunPart, receiver: Receiver, fault: FrameFault) -> Option<u64> {
+    let wanted = run.counts.iter().filter(|(name, _)| FrameFault::of_count(name) == Some((receiver, fault)));
+    wanted.map(|(_, count)| *count).reduce(u64::saturating_add)
 }
 
 fn row(name: String, counts: [Option<u64>; 4]) -> Vec<String> {
@@ -60,6 +102,7 @@ fn row(name: String, counts: [Option<u64>; 4]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::{made_up, parts};
+    use runlog::controller_report::ControllerReport;
     use serde_json::json;
 
     #[test]
@@ -78,5 +121,37 @@ mod tests {
         assert_eq!(frames.rows[0], ["0 at the rig", "0", "5", "-", "-"]);
         assert_eq!(frames.rows[3], ["1 at the controllers", "4", "-", "6", "-"]);
         assert!(command_ages(&[]).is_none());
+    }
+
+    #[test]
+    fn only_the_fields_of_the_reports_are_frame_counts() {
+        let controllers = |fault| Some((Receiver::Controllers, fault));
+        for (name, count) in [
+            ("frames_late", Some((Receiver::Rig, FrameFault::Late))),
+            ("controller.frames_late", controllers(FrameFault::Late)),
+            ("controller-load.axes.load.sensors_lost", controllers(FrameFault::Lost)),
+            ("controller.axes.load.sensors_lost.drive", controllers(FrameFault::Lost)),
+            ("controller-drive.bus.malformed", controllers(FrameFault::Malformed)),
+            ("controller.frames_ignored.malformed", controllers(FrameFault::Malformed)),
+            ("controller.axes.drive.sensors_lost_before", None),
+            ("controller.other.frames_late", None),
+            ("bus.malformed", None),
+            ("emulator.frames_late", None),
+        ] {
+            assert_eq!(FrameFault::of_count(name), count, "{name}");
+        }
+    }
+
+    #[test]
+    fn counts_of_a_controllers_report_reach_their_columns() {
+        let mut report: ControllerReport =
+            ControllerReport { frames_late: 1, frames_duplicate: 2, ..ControllerReport::default() };
+        report.frames_ignored.malformed = 3;
+        report.bus.malformed = 4;
+        report.axes.entry("drive".into()).or_default().sensors_lost = Some(5);
+        let mut run = made_up::run(10);
+        run.controllers.insert("controller".into(), json!(report));
+        let frames = frames(&[parts::part(&run, None, BTreeMap::new())]).unwrap();
+        assert_eq!(frames.rows[1], ["0 at the controllers", "5", "1", "2", "7"]);
     }
 }

@@ -4,6 +4,7 @@
 //! the controllers say comes from their ChainValues on the bus. Without telemetry the measured ones come from the bus, and what
 //! only a simulation knows is none.
 
+use runlog::telemetry::Table;
 use std::sync::LazyLock;
 
 /// Columns of `measurement.csv` for one axis, in its order: those that the bus tells too.
@@ -106,21 +107,21 @@ pub struct Layout {
 
 impl Layout {
     /// From the description's columns: table and name of each.
-    pub fn new<'a>(described: impl Iterator<Item = (&'a str, &'a str)>) -> Self {
+    pub fn new<'a>(described: impl Iterator<Item = (Table, &'a str)>) -> Self {
         let described: Vec<_> = described.collect();
-        let place = |table: &str, name: &str| described.iter().position(|known| *known == (table, name));
+        let place = |table: Table, name: &str| described.iter().position(|known| *known == (table, name));
         let measured = std::array::from_fn(|index| {
             let (axis, column) = (AXES[index / MEASURED.len()], MEASURED[index % MEASURED.len()]);
-            place("measurement", &format!("{axis}_{column}"))
+            place(Table::Measurement, &format!("{axis}_{column}"))
         });
         let truth = COLUMNS.iter().map(|column| match &column.source {
             Source::Truth(names, _) => {
-                let places: Option<Vec<_>> = names.iter().map(|name| place("truth", name)).collect();
+                let places: Option<Vec<_>> = names.iter().map(|name| place(Table::Truth, name)).collect();
                 places.unwrap_or_default()
             }
             _ => Vec::new(),
         });
-        Self { measured, truth: truth.collect(), supply: place("truth", "supply_pressure_Pa") }
+        Self { measured, truth: truth.collect(), supply: place(Table::Truth, "supply_pressure_Pa") }
     }
 
     /// The measured values of a cycle.
@@ -165,12 +166,12 @@ mod tests {
         let place = |name: &str| COLUMNS.iter().position(|column| column.name == name).unwrap();
         let friction = place("load_friction_force_n");
         let names = ["load_viscous_friction_N", "load_sliding_friction_N", "load_holding_force_N"];
-        let layout = Layout::new(names.iter().map(|name| ("truth", *name)));
+        let layout = Layout::new(names.iter().map(|name| (Table::Truth, *name)));
         assert_eq!(layout.truth(friction, -1.0, &[1.0, 2.0, 4.0]), Some(-7.0));
-        let without = Layout::new(names[1..].iter().map(|name| ("truth", *name)));
+        let without = Layout::new(names[1..].iter().map(|name| (Table::Truth, *name)));
         assert_eq!(without.truth(friction, -1.0, &[1.0, 2.0]), None);
         assert_eq!(layout.measured(&[1.0; 3]), [None; MEASURED_COUNT]);
-        let measured = Layout::new([("measurement", "load_valve")].into_iter());
+        let measured = Layout::new([(Table::Measurement, "load_valve")].into_iter());
         assert_eq!(measured.measured(&[0.5])[MEASURED.len()], Some(0.5));
     }
 }

@@ -12,7 +12,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`view`] | everything that was heard of the run |
+//! | [`view`], [`state`] | everything that was heard of the run, and what is shown of it |
 //! | `feed`, [`wire`] | what the telemetry and the bus tell |
 //! | [`columns`], [`rows`] | the table of the charts' columns, and their rows |
 //! | [`chains`], [`rhythm`], [`light`], [`minute`] | diagrams of the chains, histograms, the claim's light, what can be saved |
@@ -39,6 +39,7 @@ pub mod minute;
 pub mod rhythm;
 pub mod rows;
 mod server;
+pub mod state;
 pub mod view;
 pub mod wire;
 

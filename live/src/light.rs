@@ -5,11 +5,11 @@
 //! would say so. Missed cycles count as in the report, by their share of the run so far: a light that went out for them may come
 //! back once the share is small again, and the count stands beside it in any case.
 
-use latency::claim;
+use latency::claim::{self, CycleCount};
 use latency::conditions::conditions;
 use latency::files::RunFiles;
 use runlog::run_folder::read_json;
-use serde_json::{Value, json};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// The run as the rules see it.
@@ -19,6 +19,22 @@ pub struct Light {
     run: RunFiles,
 }
 
+/// What the light shows.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Judgement {
+    pub supported: Support,
+    pub reasons: Vec<String>,
+}
+
+/// Whether the run so far supports a latency claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Support {
+    Yes,
+    No,
+    Doubtful,
+}
+
 impl Light {
     /// Of the run in this folder.
     pub fn new(folder: Option<&Path>) -> Self {
@@ -26,7 +42,7 @@ impl Light {
     }
 
     /// Judges anew, after so many cycles of which so many were skipped.
-    pub fn judge(&mut self, cycles: u64, skipped: u64) -> Value {
+    pub fn judge(&mut self, cycles: u64, skipped: u64) -> Judgement {
         if self.run.run.is_null() {
             // The emulator writes it when it has asked for its privileges, which is after it let viewers in.
             let path = self.folder.as_ref().map(|folder| folder.join("run.json"));
@@ -34,26 +50,26 @@ impl Light {
         }
         if self.run.run.is_null() {
             let reason = "What the emulator was granted is not known: its run.json was not found.";
-            return json!({ "supported": "doubtful", "reasons": [reason] });
+            return Judgement { supported: Support::Doubtful, reasons: vec![reason.to_owned()] };
         }
-        self.run.summary = json!({ "cycles": cycles, "skipped": skipped });
-        let runs = std::slice::from_ref(&self.run);
-        let so_far = claim::so_far(runs, &conditions(runs));
+        let conditions = conditions(std::slice::from_ref(&self.run));
+        let so_far = claim::so_far(&self.run, &conditions, CycleCount { cycles, skipped });
         let supported = match (so_far.against.is_empty(), so_far.missing.is_empty()) {
-            (false, _) => "no",
-            (true, false) => "doubtful",
-            (true, true) => "yes",
+            (false, _) => Support::No,
+            (true, false) => Support::Doubtful,
+            (true, true) => Support::Yes,
         };
         let reasons = [so_far.against, so_far.missing].concat();
-        json!({ "supported": supported, "reasons": reasons })
+        Judgement { supported, reasons }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::{Value, json};
 
-    fn judged(run: &Value, skipped: u64) -> Value {
+    fn judged(run: &Value, skipped: u64) -> Judgement {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("run.json"), run.to_string()).unwrap();
         Light::new(Some(folder.path())).judge(10_000, skipped)
@@ -64,11 +80,11 @@ mod tests {
         let granted =
             json!(["SCHED_FIFO priority 80", "memory locked, current and future", "pinned to CPU 0"]);
         let run = json!({ "realtime_granted": granted, "machine": { "build": { "profile": "release" } } });
-        assert_eq!(judged(&run, 10)["supported"], "doubtful");
+        assert_eq!(judged(&run, 10).supported, Support::Doubtful);
         let missed = judged(&run, 11);
-        assert_eq!(missed["supported"], "no");
-        assert!(missed["reasons"][0].as_str().unwrap().contains("missed 0.1 %"), "{missed}");
-        assert_eq!(judged(&json!({ "realtime_granted": [] }), 0)["supported"], "no");
-        assert_eq!(Light::new(None).judge(1, 0)["supported"], "doubtful");
+        assert_eq!(missed.supported, Support::No);
+        assert!(missed.reasons[0].contains("missed 0.1 %"), "{missed:?}");
+        assert_eq!(judged(&json!({ "realtime_granted": [] }), 0).supported, Support::No);
+        assert_eq!(Light::new(None).judge(1, 0).supported, Support::Doubtful);
     }
 }

@@ -1,63 +1,59 @@
 //! The state as Prometheus reads it: text, version 0.0.4. Made of the page's own state, so that both say the same.
 
 use super::columns::COLUMNS;
+use super::light::Support;
+use super::state::State;
 use super::view::{Audience, View};
-use serde_json::Value;
 use std::fmt::{Display, Write as _};
 
 /// The text of `/metrics`.
 pub fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
     let state = view.state(audience);
     let mut text = String::new();
-    let mut one = |name: &str, kind: &str, help: &str, value: &Value| {
-        if let Some(value) = number(value) {
+    let mut one = |name: &str, kind: &str, help: &str, value: Option<f64>| {
+        // What is not known has no line.
+        if let Some(value) = value.filter(|value| value.is_finite()) {
             head(&mut text, name, kind, help);
             let _ = writeln!(text, "airbench_{name} {value}");
         }
     };
-    let (timing, bus) = (&state["timing"], &state["bus"]);
-    one("up", "gauge", "Whether this program runs.", &1.into());
-    one("bus_connected", "gauge", "Whether the bus is there.", &bus_is_up.into());
-    one("telemetry_connected", "gauge", "Whether an emulator tells its cycles.", &view.telemetry.into());
-    one("cycles_total", "counter", "Cycles of the rig.", &state["cycle"]);
-    one("skipped_cycles_total", "counter", "Cycles computed late and not sent.", &timing["skipped"]);
-    one("overruns_total", "counter", "Wake-ups that missed at least one cycle.", &timing["overruns"]);
-    one("frames_lost_total", "counter", "Sensor frames that did not come here.", &bus["lost"]);
-    one("frames_malformed_total", "counter", "Frames that are not as rig.dbc says.", &bus["malformed"]);
+    let count = |count: u64| Some(count as f64);
+    let flag = |flag: bool| Some(f64::from(u8::from(flag)));
+    let State { timing, bus, .. } = &state;
+    one("up", "gauge", "Whether this program runs.", count(1));
+    one("bus_connected", "gauge", "Whether the bus is there.", flag(bus_is_up));
+    one("telemetry_connected", "gauge", "Whether an emulator tells its cycles.", flag(view.telemetry));
+    one("cycles_total", "counter", "Cycles of the rig.", state.cycle.and_then(count));
+    one("skipped_cycles_total", "counter", "Cycles computed late and not sent.", count(timing.skipped));
+    one("overruns_total", "counter", "Wake-ups that missed at least one cycle.", count(timing.overruns));
+    one("frames_lost_total", "counter", "Sensor frames that did not come here.", count(bus.lost));
+    one("frames_malformed_total", "counter", "Frames that are not as rig.dbc says.", count(bus.malformed));
     one(
         "bus_load_percent",
         "gauge",
         "Load of the bus in the last second, worst-case stuffing.",
-        &bus["load_percent"],
+        bus.load_percent,
     );
-    one(
-        "emergency_stop",
-        "gauge",
-        "Whether the emergency stop is tripped.",
-        &state["emergency_stop"]["active"],
-    );
-    one("linked", "gauge", "Whether the rods are linked.", &state["linked"]);
-    one("weights_kg", "gauge", "Weights on the carriage.", &state["weights_kg"]);
-    let faults = state["faults_active"].as_array().map_or(0, Vec::len);
-    one("faults_active", "gauge", "Faults that are put into the run.", &faults.into());
-    let supported = state["claim"]["supported"] == "yes";
-    one("latency_claim_supported", "gauge", "Whether the run supports a latency claim.", &supported.into());
-    one("viewers", "gauge", "Listeners to events.", &audience.viewers.into());
+    let stopped = state.emergency_stop.active.and_then(flag);
+    one("emergency_stop", "gauge", "Whether the emergency stop is tripped.", stopped);
+    one("linked", "gauge", "Whether the rods are linked.", flag(state.linked));
+    one("weights_kg", "gauge", "Weights on the carriage.", Some(state.weights_kg));
+    let faults = state.faults_active.len() as u64;
+    one("faults_active", "gauge", "Faults that are put into the run.", count(faults));
+    let is_supported = state.claim.as_ref().is_some_and(|claim| claim.supported == Support::Yes);
+    one("latency_claim_supported", "gauge", "Whether the run supports a latency claim.", flag(is_supported));
+    one("viewers", "gauge", "Listeners to events.", count(state.viewers as u64));
     one(
         "viewer_events_missed_total",
         "counter",
         "Events that listeners were too slow for.",
-        &audience.missed.into(),
+        count(state.dropped),
     );
-    let lost = &state["telemetry_records_lost"];
+    let lost = count(state.telemetry_records_lost);
     one("telemetry_records_lost_total", "counter", "Records of the emulator that did not come here.", lost);
     for column in COLUMNS.iter() {
-        one(
-            &column.name,
-            "gauge",
-            &format!("Column of the page, in {}.", column.unit),
-            &state["last"][&column.name],
-        );
+        let help = format!("Column of the page, in {}.", column.unit);
+        one(&column.name, "gauge", &help, state.last.get(&column.name).copied().flatten());
     }
     head(&mut text, "frames_total", "counter", "Frames of the bus.");
     for (frame, count) in view.wire.totals() {
@@ -84,11 +80,6 @@ pub fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
 
 fn head(text: &mut String, name: impl Display, kind: &str, help: &str) {
     let _ = writeln!(text, "# HELP airbench_{name} {help}\n# TYPE airbench_{name} {kind}");
-}
-
-/// A number, or a flag as 0 or 1; what is null has no line.
-fn number(value: &Value) -> Option<f64> {
-    value.as_bool().map(|flag| f64::from(u8::from(flag))).or_else(|| value.as_f64())
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
 use runlog::candump::{self, FrameRecord};
 use runlog::run_folder::LineFile;
+use runlog::telemetry::SetUp;
 use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -39,13 +40,6 @@ pub struct Saved {
     frames: Vec<FrameRecord>,
     /// What it has less than was asked for, in words.
     cut: String,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SetUp {
-    pub linked: bool,
-    /// Weights on the carriage, kg.
-    pub added_mass_kg: f64,
 }
 
 impl Minute {

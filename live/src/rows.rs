@@ -5,6 +5,7 @@
 //! sides, it has none: a set-point drawn beside a sensor of another cycle would be an error that nobody made.
 
 use super::columns::{COLUMNS, Said, Source};
+use super::state::NewestRow;
 use protocol::frames::ChainValues;
 use serde_json::{Map, Value, json};
 use std::collections::VecDeque;
@@ -88,9 +89,10 @@ impl Rows {
         table(self.kept.range(self.kept.len().saturating_sub(rows)..))
     }
 
-    pub fn newest(&self) -> Map<String, Value> {
-        let Some(row) = self.kept.back() else { return Map::new() };
-        let values = row.values.iter().map(|value| json!(value.map(short)));
+    /// The newest row by column; empty before the first.
+    pub fn newest(&self) -> NewestRow {
+        let Some(row) = self.kept.back() else { return NewestRow::new() };
+        let values = row.values.iter().map(|value| value.map(short));
         COLUMNS.iter().zip(values).map(|(column, value)| (column.name.clone(), value)).collect()
     }
 }

@@ -16,7 +16,7 @@ use protocol::bus::{self, Bus, BusUrl, Received};
 use protocol::frames::{EmergencyStop, Frame};
 use protocol::periods::EMERGENCY_STOP_CYCLES;
 use runlog::candump::FrameRecord;
-use runlog::telemetry::Packet;
+use runlog::telemetry::{Answer, Packet};
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -209,11 +209,16 @@ impl Server {
     /// Gives the emulator's answer to the client that asked for it.
     fn hand_on(&mut self, text: &str, now_ms: u64) {
         let Some(number) = self.asked.pop_front() else { return };
-        let answer: Value = serde_json::from_str(text).unwrap_or_default();
-        let reported = match (answer["ok"] == true, answer["text"].as_str().unwrap_or_default()) {
-            (true, "") => message_response(Status::Good, "the emulator obeys"),
-            (true, text) => message_response(Status::Good, text),
-            (false, text) => message_response(Status::BadRequest, text),
+        let reported = match serde_json::from_str(text) {
+            Ok(Answer { ok: true, text }) if text.is_empty() => {
+                message_response(Status::Good, "the emulator obeys")
+            }
+            Ok(Answer { ok: true, text }) => message_response(Status::Good, &text),
+            Ok(Answer { ok: false, text }) => message_response(Status::BadRequest, &text),
+            Err(error) => message_response(
+                Status::BadRequest,
+                &format!("the emulator's answer cannot be read: {error}"),
+            ),
         };
         self.answer(number, reported, now_ms);
     }
@@ -228,7 +233,7 @@ impl Server {
     /// Tells listeners what is due.
     fn tell(&mut self, now_ms: u64) {
         for message in self.view.take_messages() {
-            self.broadcast("message", &message, now_ms);
+            self.broadcast("message", &json!(message), now_ms);
         }
         if is_due(&mut self.due.rows, now_ms, ROWS_MS)
             && let Some(rows) = self.view.rows.take_fresh()
@@ -241,7 +246,7 @@ impl Server {
             self.broadcast("histograms", &self.view.rhythm.histograms(), now_ms);
         }
         if is_due(&mut self.due.state, now_ms, STATE_MS) {
-            self.broadcast("state", &self.view.state(self.audience(now_ms)), now_ms);
+            self.broadcast("state", &json!(self.view.state(self.audience(now_ms))), now_ms);
         }
         if is_due(&mut self.due.heartbeat, now_ms, HEARTBEAT_MS) {
             self.offer(&HEARTBEAT.into(), now_ms);
@@ -311,7 +316,7 @@ impl Server {
             }
             "/api/description" => json_response(Status::Good, &self.view.description(self.token.is_some())),
             "/api/state" => {
-                json_response(Status::Good, &self.view.state_with_messages(self.audience(now_ms)))
+                json_response(Status::Good, &json!(self.view.state_with_messages(self.audience(now_ms))))
             }
             "/api/history" => self.history(&request.query),
             "/metrics" => {

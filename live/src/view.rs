@@ -2,14 +2,16 @@
 
 use super::chains;
 use super::columns::{COLUMNS, Layout, Source};
-use super::light::Light;
-use super::minute::{Minute, SetUp};
+use super::light::{Judgement, Light};
+use super::minute::Minute;
 use super::rhythm::Rhythm;
 use super::rows::{Rows, SPACING_CYCLES};
+use super::state::{ActiveFault, Level, Message, State, Timing};
 use super::wire::{News, Wire};
 use protocol::can::CanFrame;
 use runlog::candump::FrameRecord;
-use runlog::telemetry::Packet;
+use runlog::event::{EventKind, FaultChange};
+use runlog::telemetry::{Description, EventMessage, FaultEntry, Packet, SetUp};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -21,16 +23,13 @@ const OVERRUNS_KEPT: u64 = 20;
 /// Seconds for which overruns are counted one by one.
 const OVERRUN_SECONDS: usize = 60;
 const SECOND_CYCLES: u64 = 1000;
-/// Kinds of events that a person has to look at, and those that end or stop something.
-const WARNINGS: [&str; 7] =
-    ["skipped", "command-stale", "link-refused", "link-given-up", "weights-refused", "malformed", "fault"];
-const ERRORS: [&str; 5] = ["emergency-stop", "two-sources", "second-rig", "not-finite", "bus-lost"];
 
 #[derive(Default)]
 pub struct View {
     /// The run's folder, if it was named at the command line.
     folder: Option<PathBuf>,
-    description: Value,
+    /// `None` before the telemetry sends one.
+    description: Option<Description>,
     layout: Layout,
     /// Whether cycles come by telemetry, and not by the bus alone.
     pub telemetry: bool,
@@ -40,16 +39,17 @@ pub struct View {
     pub rhythm: Rhythm,
     pub minute: Minute,
     light: Light,
-    claim: Value,
+    claim: Option<Judgement>,
     overruns: u64,
     recent_overruns: VecDeque<u64>,
     skipped: u64,
     records_lost: u64,
-    faults: BTreeMap<u64, Value>,
+    /// Those that are put into the run, by number.
+    faults: BTreeMap<u16, ActiveFault>,
     /// As the telemetry tells it.
     set_up: SetUp,
-    messages: VecDeque<Value>,
-    fresh: Vec<Value>,
+    messages: VecDeque<Message>,
+    fresh: Vec<Message>,
 }
 
 /// What only the server knows of the state.
@@ -73,17 +73,25 @@ impl View {
         match packet {
             Packet::Description(text) => self.describe(&text),
             Packet::Cycle(cycle, values) => self.take_cycle(cycle, &values),
-            Packet::Event(text) => self.event(&text),
+            Packet::Event(text) => match serde_json::from_str(&text) {
+                Ok(event) => self.event(event),
+                Err(error) => {
+                    self.tell(Level::Warning, &format!("an event of the telemetry cannot be read: {error}"));
+                }
+            },
             Packet::Histogram(line) => {
                 if let Err(error) = self.rhythm.take(&line) {
-                    self.tell("warning", &format!("a histogram of the telemetry cannot be read: {error}"));
+                    self.tell(
+                        Level::Warning,
+                        &format!("a histogram of the telemetry cannot be read: {error}"),
+                    );
                 }
             }
             Packet::Loss(records) => {
                 self.records_lost = records;
                 let text = format!("{records} records of the telemetry did not come here");
                 self.tell(
-                    "warning",
+                    Level::Warning,
                     &format!("{text}: what is broken and how much was skipped may be out of date"),
                 );
             }
@@ -94,28 +102,29 @@ impl View {
     /// A run begins, or is joined. The emulator tells what happened in it before; what was of another run would be taken for this
     /// one's.
     fn describe(&mut self, text: &str) {
-        let description: Value = serde_json::from_str(text).unwrap_or_default();
-        let out = description["out"].as_str().map(PathBuf::from);
-        let folder = self.folder.clone().or(out);
+        let (description, error) = match serde_json::from_str::<Description>(text) {
+            Ok(description) => (Some(description), None),
+            Err(error) => (None, Some(error)),
+        };
+        let known = description.clone().unwrap_or_default();
+        let folder = self.folder.clone().or_else(|| folder_of(&known));
         let mut wire = std::mem::take(&mut self.wire);
         wire.begin_anew();
-        let (setup, untold) = (&description["setup"], &description["untold"]);
-        let columns = description["columns"].as_array().into_iter().flatten();
-        let named = columns.filter_map(|column| Some((column["table"].as_str()?, column["name"].as_str()?)));
+        let named = known.columns.iter().map(|column| (column.table, column.name.as_str()));
         *self = Self {
             layout: Layout::new(named),
             light: Light::new(folder.as_deref()),
-            set_up: SetUp {
-                linked: setup["linked"].as_bool().unwrap_or_default(),
-                added_mass_kg: setup["added_mass_kg"].as_f64().unwrap_or_default(),
-            },
-            overruns: untold["overruns"].as_u64().unwrap_or_default(),
-            skipped: untold["skipped"].as_u64().unwrap_or_default(),
+            set_up: known.setup,
+            overruns: known.dropped_events.overruns,
+            skipped: known.dropped_events.skipped,
             telemetry: true,
             wire,
+            description,
             ..Self::new(self.folder.as_deref())
         };
-        self.description = description;
+        if let Some(error) = error {
+            self.tell(Level::Warning, &format!("the description of the telemetry cannot be read: {error}"));
+        }
     }
 
     fn take_cycle(&mut self, cycle: u64, values: &[f64]) {
@@ -168,45 +177,29 @@ impl View {
         self.wire.status().map(|status| status.supply_pressure_pa)
     }
 
-    fn event(&mut self, text: &str) {
-        let Ok(event) = serde_json::from_str::<Value>(text) else { return };
-        let cycle = event["cycle"].as_u64().unwrap_or_default();
-        let (kind, of) = match &event["kind"] {
-            Value::Object(kind) => kind.iter().next().map_or(("", &Value::Null), |(kind, of)| (kind, of)),
-            kind => (kind.as_str().unwrap_or_default(), &Value::Null),
-        };
+    fn event(&mut self, EventMessage { cycle, kind, text }: EventMessage) {
+        let level = level(&kind);
+        let is_skip = matches!(kind, EventKind::Skipped { .. });
         match kind {
-            "skipped" => {
+            EventKind::Skipped { cycles } => {
                 self.overruns += 1;
-                self.skipped += of["cycles"].as_u64().unwrap_or_default();
+                self.skipped += cycles;
                 self.recent_overruns.push_back(cycle);
             }
-            "linked" => self.change(cycle, SetUp { linked: true, ..self.set_up }),
-            "unlinked" => self.change(cycle, SetUp { linked: false, ..self.set_up }),
-            "weights" => {
-                let added_mass_kg = of["added_mass_kg"].as_f64().unwrap_or(self.set_up.added_mass_kg);
+            EventKind::Linked => self.change(cycle, SetUp { linked: true, ..self.set_up }),
+            EventKind::Unlinked => self.change(cycle, SetUp { linked: false, ..self.set_up }),
+            EventKind::Weights { added_mass_kg } => {
                 self.change(cycle, SetUp { added_mass_kg, ..self.set_up });
             }
-            "fault" => {
-                let number = of["number"].as_u64().unwrap_or_default();
-                if of["what"] == "begins" {
-                    let fault = json!({ "name": of["fault"], "place": of["at"], "values": of["numbers"], "cause": of["cause"] });
-                    self.faults.insert(number, fault);
-                } else {
-                    self.faults.remove(&number);
-                }
+            EventKind::Fault(mark) if mark.what == FaultChange::Begins => {
+                self.faults.insert(mark.number, mark.into());
+            }
+            EventKind::Fault(mark) => {
+                self.faults.remove(&mark.number);
             }
             _ => {}
         }
-        let level = if ERRORS.contains(&kind) {
-            "error"
-        } else if WARNINGS.contains(&kind) {
-            "warning"
-        } else {
-            "info"
-        };
-        let is_kept = kind != "skipped" || self.overruns <= OVERRUNS_KEPT;
-        self.say(cycle, level, event["text"].as_str().unwrap_or(kind), is_kept);
+        self.say(cycle, level, &text, !is_skip || self.overruns <= OVERRUNS_KEPT);
     }
 
     fn change(&mut self, cycle: u64, set_up: SetUp) {
@@ -217,12 +210,12 @@ impl View {
     }
 
     /// A message of the page's own, at the run's newest moment.
-    pub fn tell(&mut self, level: &str, text: &str) {
+    pub fn tell(&mut self, level: Level, text: &str) {
         self.say(self.cycle.unwrap_or_default(), level, text, true);
     }
 
-    fn say(&mut self, cycle: u64, level: &str, text: &str, is_kept: bool) {
-        let message = json!({ "t_s": cycle as f64 / 1000.0, "level": level, "text": text });
+    fn say(&mut self, cycle: u64, level: Level, text: &str, is_kept: bool) {
+        let message = Message { t_s: cycle as f64 / 1000.0, level, text: text.to_owned() };
         if is_kept {
             self.messages.push_back(message.clone());
             if self.messages.len() > MESSAGES_KEPT {
@@ -233,7 +226,7 @@ impl View {
     }
 
     /// Messages that are new since this was asked the last time.
-    pub fn take_messages(&mut self) -> Vec<Value> {
+    pub fn take_messages(&mut self) -> Vec<Message> {
         std::mem::take(&mut self.fresh)
     }
 
@@ -242,11 +235,11 @@ impl View {
         let newest = self.cycle.unwrap_or_default();
         self.recent_overruns
             .retain(|cycle| newest.saturating_sub(*cycle) < OVERRUN_SECONDS as u64 * SECOND_CYCLES);
-        self.claim = self.light.judge(newest, self.skipped);
+        self.claim = Some(self.light.judge(newest, self.skipped));
     }
 
     pub fn run_folder(&self) -> Option<PathBuf> {
-        self.folder.clone().or_else(|| self.description["out"].as_str().map(PathBuf::from))
+        self.folder.clone().or_else(|| self.description.as_ref().and_then(folder_of))
     }
 
     /// How the rig is set up in the newest cycles.
@@ -271,59 +264,55 @@ impl View {
 
     /// What does not change while a run goes on.
     pub fn description(&self, control: bool) -> Value {
-        let described = &self.description;
+        let described = self.description.as_ref();
         let column = |column: &super::columns::Column| json!({ "name": column.name, "unit": column.unit });
         json!({
             "schema_version": runlog::run_folder::SCHEMA_VERSION,
-            "experiment": described["experiment"],
-            "pace": described["pace"],
-            "sealed": described["sealed"],
-            "console": described["console"],
+            "experiment": described.and_then(|run| run.experiment.as_ref()),
+            "pace": described.map(|run| &run.pace),
+            "sealed": described.map(|run| run.sealed),
+            "console": described.map(|run| run.console),
             "run_folder": self.run_folder(),
             "control": control,
             "telemetry": { "connected": self.telemetry },
             "spacing_s": SPACING_CYCLES as f64 / 1000.0,
             "columns": COLUMNS.iter().map(column).collect::<Vec<_>>(),
-            "rig": described["rig"],
+            "rig": described.map(|run| &run.rig),
             "chains": chains::diagrams(),
-            "faults": faults(&described["faults"]),
+            "faults": described.map_or(&[][..], |run| &run.faults).iter().map(fault_form).collect::<Vec<_>>(),
         })
     }
 
-    pub fn state(&self, audience: Audience) -> Value {
+    pub fn state(&self, audience: Audience) -> State {
         let status = self.wire.status();
-        let mut timing = self.rhythm.percentiles();
-        if let Value::Object(timing) = &mut timing {
-            timing.insert("overruns".into(), self.overruns.into());
-            timing.insert("overruns_by_second".into(), self.overruns_by_second().into());
-            timing.insert("skipped".into(), self.skipped.into());
+        State {
+            cycle: self.cycle,
+            t_s: self.cycle.map(|cycle| cycle as f64 / 1000.0),
+            last: self.rows.newest(),
+            emergency_stop: self.wire.emergency_stop(audience.now_ms),
+            linked: status.map_or(self.set_up.linked, |status| status.linked),
+            check_valves_shut: status.map(|status| status.check_valves_shut),
+            weights_kg: self.set_up.added_mass_kg,
+            chains: self.wire.chains(audience.now_ms),
+            faults_active: self.faults.values().cloned().collect(),
+            bus: self.wire.load(),
+            timing: Timing {
+                percentiles: self.rhythm.percentiles(),
+                overruns: self.overruns,
+                overruns_by_second: self.overruns_by_second(),
+                skipped: self.skipped,
+            },
+            claim: self.claim.clone(),
+            viewers: audience.viewers,
+            dropped: audience.missed,
+            telemetry_records_lost: self.records_lost,
+            messages: None,
         }
-        json!({
-            "cycle": self.cycle,
-            "t_s": self.cycle.map(|cycle| cycle as f64 / 1000.0),
-            "last": self.rows.newest(),
-            "emergency_stop": self.wire.emergency_stop(audience.now_ms),
-            "linked": status.map_or(self.set_up.linked, |status| status.linked),
-            "check_valves_shut": status.map(|status| status.check_valves_shut),
-            "weights_kg": self.set_up.added_mass_kg,
-            "chains": self.wire.chains(audience.now_ms),
-            "faults_active": self.faults.values().collect::<Vec<_>>(),
-            "bus": self.wire.load(),
-            "timing": timing,
-            "claim": self.claim,
-            "viewers": audience.viewers,
-            "dropped": audience.missed,
-            "telemetry_records_lost": self.records_lost,
-        })
     }
 
     /// The same, and the last messages, for who comes later.
-    pub fn state_with_messages(&self, audience: Audience) -> Value {
-        let mut state = self.state(audience);
-        if let Value::Object(state) = &mut state {
-            state.insert("messages".into(), json!(self.messages));
-        }
-        state
+    pub fn state_with_messages(&self, audience: Audience) -> State {
+        State { messages: Some(self.messages.iter().cloned().collect()), ..self.state(audience) }
     }
 
     /// A frame that was sent from here.
@@ -332,36 +321,65 @@ impl View {
     }
 }
 
-/// The table of faults in the words of the page.
-fn faults(listed: &Value) -> Value {
-    let number = |key: &Value| {
+/// The run's folder, if the description names one.
+fn folder_of(description: &Description) -> Option<PathBuf> {
+    Some(&description.out).filter(|out| !out.is_empty()).map(PathBuf::from)
+}
+
+/// Warnings are events that a person has to look at, errors those that end or stop something.
+fn level(kind: &EventKind) -> Level {
+    match kind {
+        EventKind::EmergencyStop
+        | EventKind::TwoSources(_)
+        | EventKind::SecondRig { .. }
+        | EventKind::NotFinite
+        | EventKind::BusLost => Level::Error,
+        EventKind::Skipped { .. }
+        | EventKind::CommandStale(_)
+        | EventKind::LinkRefused
+        | EventKind::LinkGivenUp
+        | EventKind::WeightsRefused
+        | EventKind::Malformed { .. }
+        | EventKind::Fault(_) => Level::Warning,
+        EventKind::CommandFresh(_)
+        | EventKind::OneSource(_)
+        | EventKind::EmergencyStopReleased
+        | EventKind::EmergencyStopStillHeld
+        | EventKind::Linked
+        | EventKind::Unlinked
+        | EventKind::Weights { .. }
+        | EventKind::ConsoleHand { .. }
+        | EventKind::BusBack => Level::Info,
+    }
+}
+
+/// A fault of the table in the words of the page, which makes a form of it.
+fn fault_form(fault: &FaultEntry) -> Value {
+    let parameters = fault.keys.iter().map(|key| {
         json!({
-            "name": key["key"], "unit": key["unit"], "low": key["min"], "high": key["max"],
-            "default": key["default"], "whole": key["whole"], "about": key["meaning"],
+            "name": key.name, "unit": key.unit, "low": key.min, "high": key.max,
+            "default": key.default, "whole": key.whole, "about": key.meaning,
         })
-    };
-    let fault = |fault: &Value| {
-        let numbers = fault["keys"].as_array().into_iter().flatten().map(number);
-        json!({
-            "name": fault["fault"],
-            "group": fault["group"],
-            "about": fault["about"],
-            "places": fault["places"],
-            "parameters": numbers.collect::<Vec<_>>(),
-        })
-    };
-    listed.as_array().into_iter().flatten().map(fault).collect()
+    });
+    json!({
+        "name": fault.fault,
+        "group": fault.group,
+        "about": fault.about,
+        "places": fault.places,
+        "parameters": parameters.collect::<Vec<_>>(),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use protocol::frames::{Frame, Tick};
+    use runlog::telemetry::DroppedEvents;
 
-    fn described(view: &mut View, more: &Value) {
-        let mut description = json!({ "columns": [], "setup": { "linked": false, "added_mass_kg": 1.0 } });
-        description["untold"] = more.clone();
-        view.packet(Packet::Description(description.to_string()));
+    fn described(view: &mut View, dropped_events: DroppedEvents) {
+        let setup = SetUp { linked: false, added_mass_kg: 1.0 };
+        let description = Description { setup, dropped_events, ..Description::default() };
+        view.packet(Packet::Description(description.to_json()));
     }
 
     fn event(view: &mut View, cycle: u64, kind: &Value) {
@@ -369,13 +387,13 @@ mod tests {
     }
 
     fn state(view: &View) -> Value {
-        view.state_with_messages(Audience::default())
+        json!(view.state_with_messages(Audience::default()))
     }
 
     #[test]
     fn another_run_begins_with_nothing_of_the_one_before_but_counts_of_frames() {
         let mut view = View::new(None);
-        described(&mut view, &Value::Null);
+        described(&mut view, DroppedEvents::default());
         event(&mut view, 5000, &json!("emergency-stop"));
         event(&mut view, 5000, &json!({ "skipped": { "cycles": 3 } }));
         let tick = Tick { cycle: 5000, skipped: 3, catch_up: false, lockstep: false, ending: false };
@@ -383,7 +401,7 @@ mod tests {
         view.frame(FrameRecord { stamp_ns: 0, frame }, 900);
         view.wire.turn(1000);
         assert_eq!(state(&view)["messages"].as_array().map(Vec::len), Some(2));
-        described(&mut view, &Value::Null);
+        described(&mut view, DroppedEvents::default());
         let state = state(&view);
         assert_eq!((&state["messages"], &state["timing"]["skipped"]), (&json!([]), &json!(0)));
         assert_eq!(state["bus"]["frames_per_s"]["Tick"], 1.0, "the bus is as full as it was");
@@ -393,7 +411,7 @@ mod tests {
     #[test]
     fn who_comes_late_counts_what_the_emulator_kept_no_event_of() {
         let mut view = View::new(None);
-        described(&mut view, &json!({ "overruns": 1500, "skipped": 4000 }));
+        described(&mut view, DroppedEvents { overruns: 1500, skipped: 4000 });
         view.packet(Packet::Cycle(61_500, Vec::new()));
         for cycle in [1000, 2000, 60_900, 61_100, 61_200] {
             event(&mut view, cycle, &json!({ "skipped": { "cycles": 2 } }));
@@ -409,7 +427,7 @@ mod tests {
     #[test]
     fn the_set_up_is_that_of_the_newest_change() {
         let mut view = View::new(None);
-        described(&mut view, &Value::Null);
+        described(&mut view, DroppedEvents::default());
         assert_eq!(view.set_up(), SetUp { linked: false, added_mass_kg: 1.0 });
         event(&mut view, 10, &json!("linked"));
         event(&mut view, 20, &json!({ "weights": { "added_mass_kg": 2.5 } }));
@@ -419,9 +437,40 @@ mod tests {
     }
 
     #[test]
+    fn a_fault_is_shown_from_its_beginning_to_its_end() {
+        let mut view = View::new(None);
+        let mark = |number: u16, what: &str| {
+            json!({ "fault": {
+                "number": number, "what": what, "fault": "leak", "at": "drive.a", "numbers": { "gap_mm2": 0.5 },
+                "cause": "console",
+            } })
+        };
+        event(&mut view, 10, &mark(1, "begins"));
+        event(&mut view, 10, &mark(2, "refused"));
+        let shown =
+            json!([{ "name": "leak", "place": "drive.a", "values": { "gap_mm2": 0.5 }, "cause": "console" }]);
+        assert_eq!(state(&view)["faults_active"], shown);
+        assert_eq!(state(&view)["messages"][0], json!({ "t_s": 0.01, "level": "warning", "text": "so" }));
+        event(&mut view, 20, &mark(1, "ends"));
+        assert_eq!(state(&view)["faults_active"], json!([]));
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_a_warning() {
+        let mut view = View::new(None);
+        event(&mut view, 10, &json!("not-known"));
+        view.packet(Packet::Description("{".into()));
+        let texts: Vec<_> = view.take_messages().into_iter().map(|message| message.text).collect();
+        assert!(matches!(&texts[..], [text] if text.contains("description")), "{texts:?}");
+        event(&mut view, 10, &json!("not-known"));
+        let message = &view.take_messages()[0];
+        assert!(message.level == Level::Warning && message.text.contains("not-known"), "{message:?}");
+    }
+
+    #[test]
     fn lost_records_are_told() {
         let mut view = View::new(None);
-        described(&mut view, &Value::Null);
+        described(&mut view, DroppedEvents::default());
         view.packet(Packet::Loss(7));
         let message = &state(&view)["messages"][0];
         assert_eq!(message["level"], "warning");

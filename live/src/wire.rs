@@ -1,6 +1,7 @@
 //! The bus as the live page sees it: the rig's cycles, what the controllers say, who holds a stop, how full the wire is.
 
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
+use super::state::{BusLoad, EmergencyStopState};
 use protocol::bus_load::worst_case_bits;
 use protocol::can::CanFrame;
 use protocol::frames::{
@@ -203,11 +204,13 @@ impl Wire {
     }
 
     /// The emergency stop: whether it is tripped, and who holds it.
-    pub fn emergency_stop(&self, now_ms: u64) -> Value {
+    pub fn emergency_stop(&self, now_ms: u64) -> EmergencyStopState {
         let holds = |at: &Option<u64>| at.is_some_and(|at_ms| now_ms.saturating_sub(at_ms) < STOP_HOLDS_MS);
         let senders = STOPPERS.iter().zip(&self.stops).filter(|(_, at)| holds(at));
-        let senders: Vec<_> = senders.map(|(name, _)| name).collect();
-        json!({ "active": self.status.map(|status| status.emergency_stop), "senders": senders })
+        EmergencyStopState {
+            active: self.status.map(|status| status.emergency_stop),
+            senders: senders.map(|(name, _)| *name).collect(),
+        }
     }
 
     /// The states of the chains of both axes; null of a controller that is silent.
@@ -230,22 +233,21 @@ impl Wire {
     }
 
     /// How full the bus is, by frame, and what was lost here.
-    pub fn load(&self) -> Value {
+    pub fn load(&self) -> BusLoad {
         let counts = &self.frames;
         let seconds = counts.last_ms as f64 / 1000.0;
         let reported = |(place, count): (usize, &u64)| {
-            (*count > 0)
-                .then(|| (name(place).to_owned(), json!((*count as f64 / seconds * 10.0).round() / 10.0)))
+            (*count > 0).then(|| (name(place), (*count as f64 / seconds * 10.0).round() / 10.0))
         };
         let bits: u64 =
             counts.last.iter().enumerate().map(|(place, count)| count * u64::from(bits(place))).sum();
         let load_percent = (seconds > 0.0).then(|| 100.0 * bits as f64 / seconds / f64::from(BIT_RATE_PER_S));
-        json!({
-            "load_percent": load_percent,
-            "frames_per_s": counts.last.iter().enumerate().filter_map(reported).collect::<Map<_, _>>(),
-            "lost": self.lost,
-            "malformed": self.malformed,
-        })
+        BusLoad {
+            load_percent,
+            frames_per_s: counts.last.iter().enumerate().filter_map(reported).collect(),
+            lost: self.lost,
+            malformed: self.malformed,
+        }
     }
 
     /// Frames so far by name.
@@ -352,14 +354,10 @@ mod tests {
     fn cycles_are_followed_between_ticks_and_over_gaps() {
         let wire = wire(58, &[103, 131, 132], 2);
         assert_eq!(wire.cycle, Some(157));
-        assert_eq!(wire.load()["lost"], 2, "three are missing of each axis, and two of them the rig skipped");
+        assert_eq!(wire.load().lost, 2, "three are missing of each axis, and two of them the rig skipped");
         let gap: Vec<u64> = (125..165).collect();
         let wire = self::wire(80, &gap, 0);
-        assert_eq!(
-            (wire.cycle, &wire.load()["lost"]),
-            (Some(179), &json!(80)),
-            "a gap longer than the counter"
-        );
+        assert_eq!((wire.cycle, wire.load().lost), (Some(179), 80), "a gap longer than the counter");
     }
 
     #[test]
@@ -370,16 +368,16 @@ mod tests {
         assert_eq!(wire.measured()[1].map(|m| (m * 1e3).round()), Some(127.0), "the newest stand");
         go_on(&mut wire, 128..=130);
         assert_eq!(wire.take(&tick(130, 0), 0), Some(News::Cycle(130, false)));
-        assert_eq!(wire.load()["lost"], 0);
+        assert_eq!(wire.load().lost, 0);
         // Told as lost by the tick between, and no reason to overlook the next one.
         go_on(&mut wire, (131..140).filter(|cycle| *cycle != 138));
         wire.take(&tick(140, 0), 0);
         go_on(&mut wire, [138, 140]);
         wire.take(&tick(140, 0), 0);
-        assert_eq!(wire.load()["lost"], 2);
+        assert_eq!(wire.load().lost, 2);
         go_on(&mut wire, (141..150).filter(|cycle| *cycle != 145));
         wire.take(&tick(150, 0), 0);
-        assert_eq!(wire.load()["lost"], 2, "of each axis one is missing still");
+        assert_eq!(wire.load().lost, 2, "of each axis one is missing still");
     }
 
     #[test]
@@ -393,7 +391,7 @@ mod tests {
             }
         }
         wire.take(&tick(130, 0), 0);
-        assert_eq!(wire.load()["lost"], 1);
+        assert_eq!(wire.load().lost, 1);
     }
 
     #[test]
@@ -402,7 +400,7 @@ mod tests {
         wire.take(&tick(133, 12), 0);
         go_on(&mut wire, 133..=140);
         wire.take(&tick(140, 12), 0);
-        assert_eq!((wire.cycle, &wire.load()["lost"]), (Some(140), &json!(0)));
+        assert_eq!((wire.cycle, wire.load().lost), (Some(140), 0));
     }
 
     #[test]
@@ -458,10 +456,10 @@ mod tests {
         };
         let mut wire = Wire::default();
         wire.take(&stop(false), 100);
-        assert_eq!(wire.emergency_stop(200)["senders"], json!(["drive"]));
-        assert_eq!(wire.emergency_stop(100 + STOP_HOLDS_MS)["senders"], json!([]));
+        assert_eq!(wire.emergency_stop(200).senders, ["drive"]);
+        assert_eq!(wire.emergency_stop(100 + STOP_HOLDS_MS).senders, [""; 0]);
         wire.take(&stop(true), 300);
-        assert_eq!(wire.emergency_stop(300)["senders"], json!([]));
+        assert_eq!(wire.emergency_stop(300).senders, [""; 0]);
     }
 
     #[test]
@@ -470,7 +468,7 @@ mod tests {
         go_on(&mut wire, (0..1000).map(|cycle| cycle % 500));
         wire.turn(1000);
         let load = wire.load();
-        assert_eq!(load["frames_per_s"]["DriveSensors"], 1000.0);
-        assert_eq!(load["load_percent"], f64::from(2 * worst_case_bits(8)) / 10.0);
+        assert_eq!(load.frames_per_s["DriveSensors"], 1000.0);
+        assert_eq!(load.load_percent, Some(f64::from(2 * worst_case_bits(8)) / 10.0));
     }
 }

@@ -7,10 +7,15 @@
 //! | file | holds |
 //! |---|---|
 //! | `files` | reading below a root, so that tests bring their own `/proc` and `/sys` |
-//! | `kernel` | release, preemption model, clock source, hypervisor, throttling |
+//! | `kernel` | preemption model |
+//! | `hypervisor` | signs of a hypervisor, QEMU's emulation of the processor |
+//! | `throttling` | the kernel's brake on real-time threads |
 //! | `processors` | model, SMT, frequency, idle states, which CPU takes which interrupt |
+//! | `frequency` | frequency policy and governor of CPUs |
+//! | `sharing` | interrupts of a CPU, CPUs that share a core |
 //! | `memory` | memory, swap, huge pages, limits of the process, load |
 //! | `build` | what this program was built with and from |
+//! | `text` | facts that stand as a text in the files of a run, and are decided on as a type |
 //!
 //! # Source
 //! In the kernel's `Documentation`: `admin-guide/{kernel-parameters,sysctl/kernel}`, `admin-guide/pm/{cpufreq,cpuidle}`,
@@ -18,13 +23,22 @@
 
 mod build;
 mod files;
+mod frequency;
+mod hypervisor;
 mod kernel;
 mod memory;
 mod processors;
+mod sharing;
+mod text;
+mod throttling;
 
-pub use build::Build;
-pub use kernel::{Preemption, Throttling};
+pub use build::{Build, BuildProfile};
+pub use frequency::{FrequencyPolicy, Governor};
+pub use hypervisor::{Hypervisor, HypervisorSign};
+pub use kernel::Preemption;
 pub use memory::{Limits, Memory};
+pub use sharing::{InterruptRoute, SharedCores};
+pub use throttling::{Throttling, ThrottlingState};
 
 use files::Root;
 use serde::{Deserialize, Serialize};
@@ -52,9 +66,9 @@ pub struct Machine {
     /// CPUs that this process may use.
     pub processors_allowed: String,
     /// Simultaneous multithreading: whether, and which CPUs share a core.
-    pub smt: String,
+    pub smt: SharedCores,
     /// Frequency of each group of CPUs: driver, governor, range; or that nobody here sets it.
-    pub frequency_governors: Vec<String>,
+    pub frequency_governors: Vec<FrequencyPolicy>,
     /// Driver and governor of the idle states.
     pub idle_driver: String,
     /// Idle states of the first CPU, with the time to leave each.
@@ -64,7 +78,7 @@ pub struct Machine {
     /// Clock sources that there are.
     pub clock_sources_available: String,
     /// Signs of a hypervisor below this kernel, or `none`. It can stop all CPUs, and no counter in here tells.
-    pub hypervisor: String,
+    pub hypervisor: Hypervisor,
     /// How much of each period real-time threads may have.
     pub rt_throttling: Throttling,
     /// CPUs that the scheduler leaves alone.
@@ -74,7 +88,7 @@ pub struct Machine {
     /// CPUs that an interrupt without a wish of its own may go to.
     pub interrupts_default: String,
     /// Which interrupts may and do go where, by CPU.
-    pub interrupts: BTreeMap<String, String>,
+    pub interrupts: BTreeMap<String, InterruptRoute>,
     /// Memory, swap, huge pages.
     pub memory: Memory,
     /// What this process may ask of the system.
@@ -112,7 +126,7 @@ impl Machine {
             clock_source: root.fact("sys/devices/system/clocksource/clocksource0/current_clocksource"),
             clock_sources_available: root
                 .fact("sys/devices/system/clocksource/clocksource0/available_clocksource"),
-            hypervisor: kernel::hypervisor(&root),
+            hypervisor: Hypervisor::read(&root),
             rt_throttling: Throttling::read(&root),
             isolated: root.list("sys/devices/system/cpu/isolated"),
             nohz_full: root.list("sys/devices/system/cpu/nohz_full"),

@@ -5,8 +5,9 @@
 
 use crate::timing_recorder::TimingFigures;
 use protocol::bus::BusCounters;
+use realtime::Percentiles;
 use serde::{Deserialize, Deserializer, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
 /// The report of a process: `controller.json`, `controller-drive.json` or `controller-load.json`. `N` is an item of the news, `X`
@@ -114,6 +115,56 @@ pub struct IgnoredFrames {
     pub malformed: u64,
     /// Identifiers that `rig.dbc` does not know, extended and remote frames.
     pub unknown: u64,
+}
+
+/// The report of a process taken apart by what becomes of it when a run's files are joined: its figures and its axes go into
+/// `summary.json`, all else into `run.json`. What is no figure stays as it stands, whatever version or foreign controller wrote
+/// it.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct PartedReport {
+    /// How it ended and kept its time.
+    #[serde(flatten)]
+    pub figures: ControllerFigures,
+    /// Each axis, an [`AxisReport`] if the controller is ours; empty when the report does not hold axes.
+    #[serde(deserialize_with = "axes_if_any")]
+    pub axes: Map<String, Value>,
+    /// What it was run with, and its further counters.
+    #[serde(flatten)]
+    pub used: Map<String, Value>,
+}
+
+/// An axis as a controller reported it; empty where it does not use the words of [`AxisReport`].
+#[must_use]
+pub fn reported_of_axis(reported: &Value) -> AxisReport {
+    AxisReport::deserialize(reported).unwrap_or_default()
+}
+
+/// What a controller process reports of itself at the end, and the summary takes; null is not reported.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ControllerFigures {
+    /// As in [`TimingFigures`].
+    pub wakeup_ns: Option<Percentiles>,
+    /// As in [`TimingFigures`].
+    pub execution_ns: Option<Percentiles>,
+    /// As in [`TimingFigures`].
+    pub period_error_ns: Option<Percentiles>,
+    /// As [`ControllerReport::allocations_in_cycle`].
+    pub allocations_in_cycle: Option<u64>,
+    /// As [`ControllerReport::records_dropped`].
+    pub records_dropped: Option<u64>,
+    /// As [`ControllerReport::ended_because`].
+    pub ended_because: Option<String>,
+    /// As [`ControllerReport::ended_well`].
+    pub ended_well: Option<bool>,
+}
+
+fn axes_if_any<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Map<String, Value>, D::Error> {
+    Ok(match Value::deserialize(deserializer)? {
+        Value::Object(axes) => axes,
+        _ => Map::new(),
+    })
 }
 
 /// A count; earlier versions wrote one for each axis.

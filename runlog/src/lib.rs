@@ -5,6 +5,7 @@
 pub mod candump;
 pub mod conditions;
 pub mod controller_report;
+pub mod event;
 pub mod flight_dump;
 pub mod golden;
 pub mod ping_pong;

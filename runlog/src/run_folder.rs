@@ -165,6 +165,15 @@ pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, FileE
     serde_json::from_str(&read_text(path)?).map_err(|error| FileError::read(path, error))
 }
 
+/// A file as JSON with its keys in alphabetical order, whatever the order of its type.
+///
+/// # Panics
+/// For a type that is no JSON, which is a mistake in the type.
+#[must_use]
+pub fn in_order(file: &impl serde::Serialize) -> serde_json::Value {
+    serde_json::to_value(file).expect("the files of a run are JSON")
+}
+
 /// Writes `value` as pretty JSON by [`write_whole`].
 ///
 /// # Errors

@@ -7,19 +7,28 @@
 //!
 //! | kind | payload |
 //! |---|---|
-//! | 0 description | JSON, once, first: see `emulator/src/telemetry/description.rs`, which writes it |
+//! | 0 description | JSON, once, first: a [`Description`] |
 //! | 1 cycle | u64 LE number of the cycle, then an f64 LE for each column of the description |
-//! | 2 event | JSON: `cycle` and `kind` as `summary.json` has them, and `text` for a person |
+//! | 2 event | JSON: an [`EventMessage`], `cycle` and `kind` as `summary.json` has them, and `text` for a person |
 //! | 3 histogram | a line of `emulator.hlog`: one second of one stage, HdrHistogram V2 in base64; of no time in lockstep: none |
 //! | 4 loss | u64 LE: records that this viewer's buffer had no room for, in all |
-//! | 5 answer | JSON, one for each line asked, in their order: `ok`, and `text` for a person |
+//! | 5 answer | JSON, one for each line asked, in their order: an [`Answer`], `ok`, and `text` for a person |
 //!
 //! The stream is lossy: a viewer that reads too slowly misses whole records, never parts of one, and is given how many before the
 //! next that it gets. Events that came before a viewer did follow the description, so that it knows what is broken and loaded:
 //! the first thousand of each kind, and of late wake-ups the description counts the others.
 //! Nothing that a viewer does or leaves undone reaches the run, save commands of a run with `--console`.
 
+mod description;
+
+use crate::event::{Event, EventKind};
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
+
+pub use description::{
+    Column, Description, DroppedEvents, Experiment, FaultEntry, FaultGroup, FaultKey, RigFigures, SetUp,
+    Table,
+};
 
 /// Longest payload: the description, which holds the table of faults with all their places.
 pub const LONGEST_PAYLOAD: usize = 1 << 20;
@@ -51,21 +60,49 @@ pub enum Kind {
 const KINDS: [Kind; 6] =
     [Kind::Description, Kind::Cycle, Kind::Event, Kind::Histogram, Kind::Loss, Kind::Answer];
 
-/// A packet as a viewer reads it.
+/// A packet as a viewer reads it. Texts in JSON stand as they came: a viewer may pass them on, or read them by their type.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Packet {
-    /// The description, JSON.
+    /// A [`Description`], JSON.
     Description(String),
     /// A cycle: its number, and a value for each column.
     Cycle(u64, Vec<f64>),
-    /// An event, JSON.
+    /// An [`EventMessage`], JSON.
     Event(String),
     /// A line of an interval log.
     Histogram(String),
     /// Records missed so far.
     Loss(u64),
-    /// An answer, JSON.
+    /// An [`Answer`], JSON.
     Answer(String),
+}
+
+/// An event as a viewer gets it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EventMessage {
+    /// The rig's cycle in which it was noticed.
+    pub cycle: u64,
+    /// The event.
+    pub kind: EventKind,
+    /// The event in words, for a person.
+    pub text: String,
+}
+
+/// The answer to a command.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Answer {
+    /// Whether the command is obeyed.
+    pub ok: bool,
+    /// Why it is not, or what there is to say; may be empty.
+    pub text: String,
+}
+
+impl EventMessage {
+    /// The event with its words.
+    pub fn new(event: Event, text: String) -> Self {
+        let Event { cycle, kind } = event;
+        Self { cycle, kind, text }
+    }
 }
 
 /// A stream that is none of telemetry; nothing can be read of it any more.
@@ -102,6 +139,31 @@ pub fn write_cycle(out: &mut Vec<u8>, cycle: u64, values: impl IntoIterator<Item
     values.into_iter().for_each(|value| out.extend(value.to_le_bytes()));
     let payload = out.len() - head - HEAD;
     out[head..head + HEAD].copy_from_slice(&head_of(Kind::Cycle, payload));
+}
+
+/// Appends a description.
+///
+/// # Panics
+/// As [`write_packet`].
+pub fn write_description(out: &mut Vec<u8>, description: &Description) {
+    write_packet(out, Kind::Description, description.to_json().as_bytes());
+}
+
+/// Appends an event.
+pub fn write_event(out: &mut Vec<u8>, message: &EventMessage) {
+    write_json(out, Kind::Event, message);
+}
+
+/// Appends an answer.
+pub fn write_answer(out: &mut Vec<u8>, answer: &Answer) {
+    write_json(out, Kind::Answer, answer);
+}
+
+fn write_json(out: &mut Vec<u8>, kind: Kind, payload: &impl Serialize) {
+    // A struct of numbers and words has a JSON form.
+    if let Ok(json) = serde_json::to_vec(payload) {
+        write_packet(out, kind, &json);
+    }
 }
 
 /// Appends how many records a viewer has missed.
@@ -214,6 +276,24 @@ mod tests {
         assert_eq!(packets[2], Packet::Event("{\"text\": \"µ\"}".into()));
         assert_eq!(packets[3], Packet::Histogram("Tag=a,0,1,2,HISTF".into()));
         assert_eq!(packets[4..], [Packet::Loss(u64::MAX), Packet::Answer(String::new())]);
+    }
+
+    #[test]
+    fn events_and_answers_are_json_of_their_types() {
+        let event = Event { cycle: 20, kind: EventKind::Weights { added_mass_kg: 2.5 } };
+        let message = EventMessage::new(event, "weights on the carriage: 2.5 kg".into());
+        let answer = Answer { ok: true, text: String::new() };
+        let mut stream = Vec::new();
+        write_event(&mut stream, &message);
+        write_answer(&mut stream, &answer);
+        let mut decoder = Decoder::default();
+        decoder.take(&stream);
+        let packets = all_of(&mut decoder);
+        let [Packet::Event(event), Packet::Answer(answered)] = &packets[..] else { panic!("{packets:?}") };
+        let expected = r#"{"cycle":20,"kind":{"weights":{"added_mass_kg":2.5}},"text":"weights on the carriage: 2.5 kg"}"#;
+        assert_eq!((event.as_str(), answered.as_str()), (expected, r#"{"ok":true,"text":""}"#));
+        assert_eq!(serde_json::from_str::<EventMessage>(event).unwrap(), message);
+        assert_eq!(serde_json::from_str::<Answer>(answered).unwrap(), answer);
     }
 
     #[test]

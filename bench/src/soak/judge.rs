@@ -6,9 +6,9 @@ use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
 use super::model::{Check, CheckResult, Figures};
 use super::plan::Spec;
 use super::segment::{End, Outcome};
-use figures::thresholds;
-use runlog::summary::ProcessReport;
-use serde_json::{Map, Value, json};
+use figures::thresholds::{self, ByRepetition, Found};
+use runlog::summary::{JudgedBound, ProcessReport};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -179,17 +179,18 @@ fn excuse(evidence: &SegmentFiles, judge: bool) -> Option<String> {
 /// The position errors against the experiment's bounds on them; what did not come about in the segment's time is not judged.
 fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
     let drive = evidence.drive();
-    let measured: Map<_, _> = [
+    let measured: BTreeMap<_, _> = [
         ("position_error_dynamic_m", drive.and_then(|drive| drive.position_error_dynamic_m)),
         ("position_error_static_m", drive.and_then(|drive| drive.position_error_static_m)),
     ]
     .into_iter()
-    .filter_map(|(key, error_m)| Some((key.to_owned(), json!(error_m?))))
+    .filter_map(|(key, error_m)| Some((key, error_m?)))
     .collect();
     let experiment = evidence.run.experiment_toml.as_deref().unwrap_or_default().parse::<toml::Table>();
     let passed =
         experiment.ok().and_then(|table| table.get("passed")?.as_table().cloned()).unwrap_or_default();
-    let bounds: toml::Table = passed.into_iter().filter(|(key, _)| measured.contains_key(key)).collect();
+    let bounds: toml::Table =
+        passed.into_iter().filter(|(key, _)| measured.contains_key(key.as_str())).collect();
     if bounds.is_empty() {
         return Check::new(
             "positions",
@@ -197,14 +198,15 @@ fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
             &format!("no bound to judge: {}", json!(measured)),
         );
     }
-    match thresholds::judge(&bounds, &measured) {
+    let found = |key: &str| measured.get(key).copied().map(Found::Number);
+    match thresholds::judge(&bounds, found, &ByRepetition::new()) {
         Err(error) => Check::new("positions", CheckResult::Failed, &error.to_string()),
         Ok(judged) => {
-            let words = |key: &String, entry: &Value| {
-                format!("{key} = {}, {}", measured[key], thresholds::in_words(entry))
+            let words = |key: &String, bound: &JudgedBound| {
+                format!("{key} = {}, {}", json!(bound.value), thresholds::in_words(bound))
             };
-            let mut reported: Vec<_> = judged.iter().map(|(key, entry)| words(key, entry)).collect();
-            if judged.values().all(thresholds::is_kept) {
+            let mut reported: Vec<_> = judged.iter().map(|(key, bound)| words(key, bound)).collect();
+            if judged.values().all(|bound| bound.kept) {
                 return Check::new("positions", CheckResult::Passed, &reported.join("; "));
             }
             let excuse = excuse(evidence, judge);

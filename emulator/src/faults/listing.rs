@@ -6,6 +6,7 @@ use crate::cli::FaultsArguments;
 use crate::run::RunError;
 use protocol::exit::Exit;
 use runlog::run_folder::SCHEMA_VERSION;
+use runlog::telemetry;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -60,18 +61,31 @@ fn as_json() -> Value {
 }
 
 /// Every fault, as programs read it.
-pub fn faults() -> Vec<Value> {
+pub fn faults() -> Vec<telemetry::FaultEntry> {
     all().map(fault).collect()
 }
 
-fn fault(spec: &FaultSpec) -> Value {
-    json!({
-        "fault": spec.name,
-        "group": spec.group,
-        "about": spec.about,
-        "places": spec.places.names(),
-        "keys": spec.keys,
-    })
+fn fault(spec: &FaultSpec) -> telemetry::FaultEntry {
+    telemetry::FaultEntry {
+        fault: spec.name.to_owned(),
+        group: spec.group,
+        about: spec.about.to_owned(),
+        places: spec.places.names(),
+        keys: spec.keys.iter().map(number).collect(),
+    }
+}
+
+fn number(key: &FaultKey) -> telemetry::FaultKey {
+    let FaultKey { name, unit, min, max, default, whole, meaning } = *key;
+    telemetry::FaultKey {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        min,
+        max,
+        default,
+        whole,
+        meaning: meaning.to_owned(),
+    }
 }
 
 /// The table of the page.

@@ -1,9 +1,7 @@
 //! That a fault began or ended, as every log of a run has it.
 
 use super::Fault;
-use serde::ser::SerializeStruct;
-use serde::{Serialize, Serializer};
-use std::collections::BTreeMap;
+use runlog::event::{FaultChange, FaultMark};
 use std::fmt;
 use std::io::{self, Write};
 
@@ -19,37 +17,15 @@ pub enum Cause {
     Console,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum What {
-    Begins,
-    Ends,
-    /// Its time passed, and its condition never held.
-    NeverBegan,
-    /// It could not be put into the run: too many at once, or the bus's host takes no order.
-    Refused,
-}
-
 /// A fault that began, ended, or did not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
     /// Its number in this run; the script's are those of the file, from 1.
     pub number: u16,
-    pub what: What,
+    pub what: FaultChange,
     pub fault: Fault,
     /// Who asked for it.
     pub cause: Cause,
-}
-
-impl What {
-    /// As in `faults.csv`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Begins => "begins",
-            Self::Ends => "ends",
-            Self::NeverBegan => "never-began",
-            Self::Refused => "refused",
-        }
-    }
 }
 
 impl fmt::Display for Cause {
@@ -92,15 +68,15 @@ impl fmt::Display for Mark {
     }
 }
 
-impl Serialize for Mark {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut mark = serializer.serialize_struct("Mark", 6)?;
-        mark.serialize_field("number", &self.number)?;
-        mark.serialize_field("what", self.what.name())?;
-        mark.serialize_field("fault", self.fault.spec.name)?;
-        mark.serialize_field("at", &self.fault.place())?;
-        mark.serialize_field("numbers", &self.fault.numbers().collect::<BTreeMap<_, _>>())?;
-        mark.serialize_field("cause", &self.cause.to_string())?;
-        mark.end()
+impl From<Mark> for FaultMark {
+    fn from(Mark { number, what, fault, cause }: Mark) -> Self {
+        Self {
+            number,
+            what,
+            fault: fault.spec.name.to_owned(),
+            at: fault.place(),
+            numbers: fault.numbers().map(|(key, value)| (key.to_owned(), value)).collect(),
+            cause: cause.to_string(),
+        }
     }
 }

@@ -8,13 +8,14 @@
 //! Nothing here allocates after construction, and while nothing waits and nothing is active a cycle costs one comparison.
 
 use super::Fault;
-use super::mark::{Cause, Mark, What};
+use super::mark::{Cause, Mark};
 use super::overlay::{Overlay, on_wire};
 use super::script::{Condition, FaultScript, Until};
 use super::table::Kind;
 use plant::scene::HandForces;
 use plant::{Axis, Inputs, Plant, Sensors};
 use protocol::bus::{WireOrder, WireOrders};
+use runlog::event::FaultChange;
 use std::collections::VecDeque;
 
 /// Faults that people may have put in by hand and not mended, at once.
@@ -135,7 +136,7 @@ impl FaultSchedule {
                 State::Waiting { from, .. } if cycle < from => {}
                 State::Waiting { until: Some(Until::Cycle(to)), .. } if cycle >= to => {
                     self.entries[place].state = State::Over;
-                    self.tell(place, What::NeverBegan, &mut tell);
+                    self.tell(place, FaultChange::NeverBegan, &mut tell);
                 }
                 State::Waiting { when, until, .. } => {
                     let met = when.is_none_or(|when| {
@@ -172,7 +173,7 @@ impl FaultSchedule {
         self.entries.retain(|entry| entry.state != State::Over || entry.cause != Cause::Console);
         let wire = on_wire(&fault).is_none() || self.orders.is_some();
         if self.entries.len() >= self.room || number == u16::MAX || !wire {
-            tell(Mark { number, what: What::Refused, fault, cause });
+            tell(Mark { number, what: FaultChange::Refused, fault, cause });
             return;
         }
         self.next_number += 1;
@@ -210,7 +211,7 @@ impl FaultSchedule {
             !self.orders.as_ref().is_some_and(|orders| orders.give(order))
         });
         self.entries[place].state = if refused { State::Over } else { state };
-        self.tell(place, if refused { What::Refused } else { What::Begins }, tell);
+        self.tell(place, if refused { FaultChange::Refused } else { FaultChange::Begins }, tell);
     }
 
     fn stop(&mut self, place: usize, tell: &mut impl FnMut(Mark)) {
@@ -224,15 +225,15 @@ impl FaultSchedule {
             return;
         }
         self.entries[place].state = State::Over;
-        self.tell(place, What::Ends, tell);
+        self.tell(place, FaultChange::Ends, tell);
     }
 
-    fn tell(&mut self, place: usize, what: What, tell: &mut impl FnMut(Mark)) {
+    fn tell(&mut self, place: usize, what: FaultChange, tell: &mut impl FnMut(Mark)) {
         let Entry { number, fault, cause, .. } = self.entries[place];
         tell(Mark { number, what, fault, cause });
-        let happened = matches!(what, What::Begins | What::Ends);
+        let happened = matches!(what, FaultChange::Begins | FaultChange::Ends);
         if happened && self.to_tell.len() < self.to_tell.capacity() {
-            self.to_tell.push_back((number, what == What::Begins));
+            self.to_tell.push_back((number, what == FaultChange::Begins));
         }
     }
 

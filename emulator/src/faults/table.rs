@@ -9,7 +9,7 @@ mod rows;
 use plant::faults::SensorFault;
 use protocol::bus::WireNode;
 use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_SENSORS, LOAD_VALVE_COMMAND, MESSAGES};
-use serde::Serialize;
+use runlog::telemetry::FaultGroup;
 
 /// Most numbers that a fault has.
 pub const MOST_KEYS: usize = 3;
@@ -19,7 +19,7 @@ pub const MOST_KEYS: usize = 3;
 pub struct FaultSpec {
     /// Name, as in scripts and at the console.
     pub name: &'static str,
-    pub group: Group,
+    pub group: FaultGroup,
     pub places: Places,
     pub keys: &'static [FaultKey],
     /// What happens, in a sentence.
@@ -28,10 +28,9 @@ pub struct FaultSpec {
 }
 
 /// A number of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultKey {
     /// Ending in its unit.
-    #[serde(rename = "key")]
     pub name: &'static str,
     /// Unit; `1` for a plain number.
     pub unit: &'static str,
@@ -41,19 +40,6 @@ pub struct FaultKey {
     pub default: Option<f64>,
     pub whole: bool,
     pub meaning: &'static str,
-}
-
-/// What a fault concerns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Group {
-    Sensor,
-    Valve,
-    Supply,
-    /// A chamber or its hose.
-    Air,
-    Mechanics,
-    Bus,
 }
 
 /// Where faults of a kind can be.

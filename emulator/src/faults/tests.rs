@@ -1,10 +1,12 @@
 //! The table is whole: every row can be read, put in and reported, and names agree with what the wire counts.
 
-use super::mark::{Cause, Mark, What};
+use super::mark::{Cause, Mark};
 use super::overlay::{Overlay, on_wire};
-use super::table::{Group, Kind, all};
+use super::table::{Kind, all};
 use super::*;
 use plant::RigParameters;
+use runlog::event::{FaultChange, FaultMark};
+use runlog::telemetry::FaultGroup;
 
 /// The fault of a row at one of its places, with numbers that mean something where there is no default.
 fn some(spec: &'static FaultSpec, at: &str) -> Fault {
@@ -49,7 +51,7 @@ fn every_fault_at_every_place_does_something_of_its_own() {
             let mut overlay = Overlay::default();
             overlay.put(&fault, &rig);
             let wire = on_wire(&fault);
-            assert_eq!(wire.is_some(), spec.group == Group::Bus, "{}", spec.name);
+            assert_eq!(wire.is_some(), spec.group == FaultGroup::Bus, "{}", spec.name);
             if let Some((wire, _)) = wire {
                 assert_eq!(wire.name(), spec.name, "the wire counts it by the same name");
             } else if spec.kind != Kind::Unlink {
@@ -65,7 +67,7 @@ fn every_fault_at_every_place_does_something_of_its_own() {
 #[test]
 fn a_mark_is_a_row_a_sentence_and_an_object() {
     let fault = Fault::new("babbling-node", None, &[]).unwrap();
-    let mark = Mark { number: 3, what: What::Begins, fault, cause: Cause::Script { line: 7 } };
+    let mark = Mark { number: 3, what: FaultChange::Begins, fault, cause: Cause::Script { line: 7 } };
     let mut row = Vec::new();
     mark.write(&mut row, 1005).unwrap();
     let row = String::from_utf8(row).unwrap();
@@ -75,6 +77,6 @@ fn a_mark_is_a_row_a_sentence_and_an_object() {
         mark.to_string(),
         "fault 3 begins: babbling-node at bus, id=16, frames_per_ms=3, bytes=8 (script line 7)"
     );
-    let json = serde_json::to_value(mark).unwrap();
+    let json = serde_json::to_value(FaultMark::from(mark)).unwrap();
     assert_eq!((&json["fault"], &json["numbers"]["id"]), (&"babbling-node".into(), &16.0.into()));
 }

@@ -9,11 +9,12 @@ use super::{Records, a_turn};
 use crate::event::{Event, EventKind};
 use crate::faults::mark;
 use crate::pace::Shared;
-use crate::telemetry::{Telemetry, Untold};
+use crate::telemetry::Telemetry;
 use plant::tables;
 use realtime::{Clock, MonotonicClock};
 use runlog::candump::{self, FrameRecord};
 use runlog::run_folder::{FAULTS_CSV, LineFile};
+use runlog::telemetry::DroppedEvents;
 use runlog::timing_recorder::TimingSetup;
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -82,7 +83,7 @@ pub struct Writer {
     timing: Option<RigTiming>,
     pending: Vec<FrameRecord>,
     reported: HashMap<Discriminant<EventKind>, usize>,
-    untold: Untold,
+    dropped_events: DroppedEvents,
     report: WriterReport,
 }
 
@@ -108,7 +109,7 @@ impl Writer {
             timing,
             pending: Vec::new(),
             reported: HashMap::new(),
-            untold: Untold::default(),
+            dropped_events: DroppedEvents::default(),
             report: WriterReport::default(),
         })
     }
@@ -191,7 +192,7 @@ impl Writer {
         if let Some(timing) = &mut self.timing {
             telemetry.histograms(&timing.new_lines());
         }
-        telemetry.serve(&self.report.events, self.untold);
+        telemetry.serve(&self.report.events, self.dropped_events);
     }
 
     fn finish_timing(&mut self) -> io::Result<()> {
@@ -238,8 +239,8 @@ impl Writer {
         if *reported <= EVENTS_KEPT {
             self.report.events.push(event);
         } else if let EventKind::Skipped { cycles } = event.kind {
-            self.untold.overruns += 1;
-            self.untold.skipped += cycles;
+            self.dropped_events.overruns += 1;
+            self.dropped_events.skipped += cycles;
         }
         if *reported < most_told {
             protocol::say!("emulator: {event}");
@@ -350,6 +351,10 @@ mod tests {
             (writer.report.events.len(), writer.report.events.last()),
             (2 * EVENTS_KEPT + 1, Some(&rare))
         );
-        assert_eq!(writer.untold, Untold { overruns: 10, skipped: 30 }, "counted for who comes late");
+        assert_eq!(
+            writer.dropped_events,
+            DroppedEvents { overruns: 10, skipped: 30 },
+            "counted for who comes late"
+        );
     }
 }

@@ -1,25 +1,13 @@
 //! What a viewer has to know before the first cycle: the run, the rig's numbers, the columns, what can be broken.
 //!
-//! | key | holds |
-//! |---|---|
-//! | `schema_version` | [`SCHEMA_VERSION`] |
-//! | `pace`, `bus`, `seed`, `started_unix_s`, `out` | as in `run.json`; `out` is the run's folder, absolute |
-//! | `experiment` | `name` of the file and `title` in it; null without one |
-//! | `console` | whether commands are obeyed |
-//! | `sealed` | whether effects are on that nobody shall know: then cycles have the columns of `measurement.csv` alone |
-//! | `columns` | of each cycle, in order: `table` (`measurement` or `truth`, the file it is a column of), `name` there, `unit` |
-//! | `rig` | numbers that a drawing needs, in SI, the unit in the name |
-//! | `setup` | linkage and weights at the start |
-//! | `faults` | as `emulator faults --json` lists them |
-//! | `untold` | what [`Untold`] has when the viewer comes: the events that follow are the first ones of each kind |
+//! Its form is [`runlog::telemetry::Description`].
 
 use crate::cli::RunArguments;
 use crate::faults::listing;
 use crate::inputs::Inputs;
-use crate::telemetry::Untold;
 use plant::{Truth, tables};
 use runlog::run_folder::SCHEMA_VERSION;
-use serde_json::{Value, json};
+use runlog::telemetry::{Column, Description, DroppedEvents, Experiment, RigFigures, SetUp, Table};
 use std::path::Path;
 
 pub struct Described<'a> {
@@ -38,57 +26,58 @@ impl Described<'_> {
         !self.inputs.sealed
     }
 
-    fn columns(&self) -> Vec<Value> {
-        let of = |table: &str, name: &str| json!({ "table": table, "name": name, "unit": unit(name) });
-        let measured = tables::measurement_columns().map(|name| of("measurement", &name));
+    fn columns(&self) -> Vec<Column> {
+        let of = |table, name: &str| Column { table, name: name.to_owned(), unit: unit(name).to_owned() };
+        let measured = tables::measurement_columns().map(|name| of(Table::Measurement, &name));
         let truth = Truth::COLUMNS.into_iter().chain(self.terms.iter().map(String::as_str));
-        let truth = truth.filter(|_| self.with_truth()).map(|name| of("truth", name));
+        let truth = truth.filter(|_| self.with_truth()).map(|name| of(Table::Truth, name));
         measured.chain(truth).collect()
     }
 }
 
-pub fn description(run: &Described<'_>) -> Value {
+pub fn description(run: &Described<'_>) -> Description {
     let Described { arguments, inputs, started_unix_s, .. } = run;
     let (cylinder, supply, mass) = (inputs.rig.cylinder(), inputs.rig.supply(), inputs.rig.mass());
-    json!({
-        "schema_version": SCHEMA_VERSION,
-        "pace": arguments.pace.to_string(),
-        "bus": arguments.bus.to_string(),
-        "seed": arguments.seed,
-        "started_unix_s": started_unix_s,
-        "out": std::path::absolute(&arguments.out).unwrap_or_else(|_| arguments.out.clone()),
-        "experiment": arguments.experiment.as_deref().map(|file| experiment(file, inputs)),
-        "console": arguments.console,
-        "sealed": inputs.sealed,
-        "columns": run.columns(),
-        "rig": {
-            "stroke_m": cylinder.stroke_m,
-            "piston_area_m2": cylinder.piston_area_m2,
-            "annulus_area_m2": cylinder.annulus_area_m2,
-            "supply_pressure_pa": supply.pressure_pa,
-            "exhaust_pressure_pa": supply.exhaust_pressure_pa,
-            "atmospheric_pressure_pa": supply.atmospheric_pressure_pa,
-            "drive_mass_kg": mass.drive_kg,
-            "carriage_mass_kg": mass.carriage_kg,
-            "load_mass_kg": mass.load_kg,
-            "added_mass_limit_kg": mass.added_limit_kg,
-            "gap_m": inputs.rig.linkage().gap_m,
-            "force_range_n": inputs.rig.sensors().force_range_n,
+    let out = std::path::absolute(&arguments.out).unwrap_or_else(|_| arguments.out.clone());
+    Description {
+        schema_version: SCHEMA_VERSION,
+        pace: arguments.pace.to_string(),
+        bus: arguments.bus.to_string(),
+        seed: arguments.seed,
+        started_unix_s: *started_unix_s,
+        out: out.to_string_lossy().into_owned(),
+        experiment: arguments.experiment.as_deref().map(|file| experiment(file, inputs)),
+        console: arguments.console,
+        sealed: inputs.sealed,
+        columns: run.columns(),
+        rig: RigFigures {
+            stroke_m: cylinder.stroke_m,
+            piston_area_m2: cylinder.piston_area_m2,
+            annulus_area_m2: cylinder.annulus_area_m2,
+            supply_pressure_pa: supply.pressure_pa,
+            exhaust_pressure_pa: supply.exhaust_pressure_pa,
+            atmospheric_pressure_pa: supply.atmospheric_pressure_pa,
+            drive_mass_kg: mass.drive_kg,
+            carriage_mass_kg: mass.carriage_kg,
+            load_mass_kg: mass.load_kg,
+            added_mass_limit_kg: mass.added_limit_kg,
+            gap_m: inputs.rig.linkage().gap_m,
+            force_range_n: inputs.rig.sensors().force_range_n,
         },
-        "setup": {
-            "linked": inputs.scene.linked,
-            "added_mass_kg": inputs.scene.added_mass_kg,
-        },
-        "faults": listing::faults(),
-        "untold": Untold::default(),
-    })
+        setup: SetUp { linked: inputs.scene.linked, added_mass_kg: inputs.scene.added_mass_kg },
+        faults: listing::faults(),
+        dropped_events: DroppedEvents::default(),
+    }
 }
 
-fn experiment(file: &Path, inputs: &Inputs) -> Value {
+fn experiment(file: &Path, inputs: &Inputs) -> Experiment {
     // Only `[rig]` of the file is the emulator's; what else is in it is the controllers' to check.
     let table: Option<toml::Table> = inputs.experiment_toml.as_deref().and_then(|text| text.parse().ok());
     let title = table.as_ref().and_then(|table| table.get("title")?.as_str());
-    json!({ "name": file.file_stem().map(|name| name.to_string_lossy()), "title": title })
+    Experiment {
+        name: file.file_stem().map(|name| name.to_string_lossy().into_owned()),
+        title: title.map(str::to_owned),
+    }
 }
 
 /// Ends of a column's name, the longer ones first, and the unit that each stands for.

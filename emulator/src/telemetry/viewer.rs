@@ -1,8 +1,7 @@
 //! A viewer: its socket, its bounded buffer, and the lines that it asks.
 
 use crate::console::{self, Console};
-use runlog::telemetry::{Kind, LONGEST_LINE, write_loss, write_packet};
-use serde_json::json;
+use runlog::telemetry::{Answer, LONGEST_LINE, write_answer, write_loss};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -107,7 +106,7 @@ impl Viewer {
             return;
         }
         let mut packet = Vec::new();
-        write_packet(&mut packet, Kind::Answer, json!({ "ok": ok, "text": text }).to_string().as_bytes());
+        write_answer(&mut packet, &Answer { ok, text });
         self.outgoing.extend(packet);
     }
 }

@@ -51,7 +51,7 @@ fn the_flight_recorder_knows_how_long_sensors_waited() {
     run.summary["frames_lost_at_rig"] = 9.into();
     let quiet = events(0, &run);
     assert!(quiet.iter().all(|event| event.skipped == 0), "a single cycle may have been lost: {quiet:#?}");
-    run.told_late_ns.insert("controller".into(), BTreeMap::from([(201, 1_310_000)]));
+    run.recorded_late_ns.insert("controller".into(), BTreeMap::from([(201, 1_310_000)]));
     let event = one(&run);
     assert_eq!((event.cause, event.cycle, event.skipped), (Cause::ControllerStopped, 200, 1));
     assert_eq!(event.late_ns, 1_310_000);

@@ -9,7 +9,7 @@ use pagekit::page::escaped;
 pub(super) fn conditions(conditions: &Conditions) -> String {
     let fact = |name: &str, value: &str| Fact { name: name.into(), value: value.into() };
     let load =
-        conditions.load_generator.as_deref().unwrap_or("none was told of: the machine was taken as it was");
+        conditions.load_generator.as_deref().unwrap_or("none was reported: the machine was taken as it was");
     let reference = match (&conditions.reference, &conditions.reference_missing_because) {
         (Some(reference), _) => reference.clone(),
         (None, Some(reason)) => format!("none: {reason}"),

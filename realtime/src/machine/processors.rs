@@ -1,6 +1,8 @@
 //! Processors: what they are, how fast they may run, how deep they may sleep, which interrupts they take.
 
 use super::files::{Root, field, listed, number_in};
+use super::frequency::{FrequencyPolicy, Governor};
+use super::sharing::{InterruptRoute, SharedCores};
 use std::collections::BTreeMap;
 
 const CPUS: &str = "sys/devices/system/cpu";
@@ -19,24 +21,25 @@ pub(super) fn count(root: &Root) -> usize {
     crate::privileges::parse_cpu_list(&online).map_or(0, |cpus| cpus.len())
 }
 
-pub(super) fn smt(root: &Root) -> String {
+pub(super) fn smt(root: &Root) -> SharedCores {
     let siblings = |cpu: &String| root.text(&format!("{CPUS}/{cpu}/topology/thread_siblings_list"));
     let mut cores: Vec<String> =
         cpus(root).iter().filter_map(siblings).filter(|list| list.contains([',', '-'])).collect();
     cores.sort();
     cores.dedup();
     let control = root.text(&format!("{CPUS}/smt/control")).unwrap_or_else(|| "not told".to_owned());
+    let control = Some(control);
     if cores.is_empty() {
-        format!("no CPUs share a core (control: {control})")
+        SharedCores::NoneShared { control }
     } else {
-        format!("CPUs that share a core: {} (control: {control})", cores.join("; "))
+        SharedCores::Shared { cores, control }
     }
 }
 
-pub(super) fn frequency(root: &Root) -> Vec<String> {
+pub(super) fn frequency(root: &Root) -> Vec<FrequencyPolicy> {
     let policies: Vec<_> = root.names(&format!("{CPUS}/cpufreq"));
     let policies = policies.iter().filter(|name| name.starts_with("policy"));
-    let reported: Vec<String> = policies
+    let reported: Vec<_> = policies
         .map(|policy| {
             let get = |name: &str| root.text(&format!("{CPUS}/cpufreq/{policy}/{name}"));
             let known = |name: &str| get(name).unwrap_or_else(|| "unknown".to_owned());
@@ -44,20 +47,16 @@ pub(super) fn frequency(root: &Root) -> Vec<String> {
                 let khz: Option<u64> = get(name).and_then(|text| text.parse().ok());
                 khz.map_or_else(|| "unknown".to_owned(), |khz| (khz / 1000).to_string())
             };
-            format!(
-                "CPUs {}: governor {}, driver {}, {} to {} MHz",
-                known("affected_cpus").replace(' ', ","),
-                known("scaling_governor"),
-                known("scaling_driver"),
-                mhz("scaling_min_freq"),
-                mhz("scaling_max_freq"),
-            )
+            let (driver, lowest, highest) =
+                (known("scaling_driver"), mhz("scaling_min_freq"), mhz("scaling_max_freq"));
+            FrequencyPolicy::Policy {
+                cpus: format!("CPUs {}", known("affected_cpus").replace(' ', ",")),
+                governor: Governor::from(known("scaling_governor").as_str()),
+                range: format!(", driver {driver}, {lowest} to {highest} MHz"),
+            }
         })
         .collect();
-    if reported.is_empty() {
-        return vec!["no cpufreq: whoever sets the frequency is not in this kernel".to_owned()];
-    }
-    reported
+    if reported.is_empty() { vec![FrequencyPolicy::no_cpufreq()] } else { reported }
 }
 
 pub(super) fn idle_driver(root: &Root) -> String {
@@ -96,7 +95,7 @@ pub(super) fn default_affinity(root: &Root) -> String {
 }
 
 /// By CPU: numbers of the interrupts that may come to it, and those that the kernel sends to it now, with their names.
-pub(super) fn interrupts(root: &Root) -> BTreeMap<String, String> {
+pub(super) fn interrupts(root: &Root) -> BTreeMap<String, InterruptRoute> {
     let names = interrupt_names(root);
     let mut may: BTreeMap<u64, Vec<u64>> =
         cpus(root).iter().filter_map(|cpu| Some((number_in(cpu)?, Vec::new()))).collect();
@@ -120,8 +119,9 @@ pub(super) fn interrupts(root: &Root) -> BTreeMap<String, String> {
         }
     }
     let of_cpu = |(cpu, numbers): (u64, Vec<u64>)| {
-        let come = does.remove(&cpu).map_or_else(|| "none".to_owned(), |names| names.join(", "));
-        (format!("CPU {cpu}"), format!("may come: {}; do come: {come}", listed(&numbers)))
+        let allowed = (!numbers.is_empty()).then(|| listed(&numbers));
+        let routed = does.remove(&cpu).map(|names| names.join(", "));
+        (format!("CPU {cpu}"), InterruptRoute::Known { allowed, routed })
     };
     may.into_iter().map(of_cpu).collect()
 }

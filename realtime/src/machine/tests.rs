@@ -117,10 +117,13 @@ fn processors_are_read_with_their_frequency_idle_states_and_interrupts() {
     assert_eq!((machine.processors_online.as_str(), machine.processors_allowed.as_str()), ("0-3", "1-2"));
     assert_eq!(machine.processors, 4);
     assert_eq!((machine.isolated.as_str(), machine.nohz_full.as_str()), ("none", "none"));
-    assert_eq!(machine.smt, "CPUs that share a core: 0-1 (control: on)");
+    assert_eq!(machine.smt.to_string(), "CPUs that share a core: 0-1 (control: on)");
     assert_eq!(
         machine.frequency_governors,
-        ["CPUs 0,1: governor powersave, driver intel_pstate, 800 to 4200 MHz"]
+        ["CPUs 0,1: governor powersave, driver intel_pstate, 800 to 4200 MHz"].map(FrequencyPolicy::from)
+    );
+    assert!(
+        matches!(&machine.frequency_governors[0], FrequencyPolicy::Policy { cpus, .. } if cpus == "CPUs 0,1")
     );
     assert_eq!(machine.idle_driver, "driver intel_idle, governor menu");
     assert_eq!(machine.idle_states, ["POLL: 0 us to leave", "C6: 133 us to leave, disabled"]);
@@ -130,10 +133,9 @@ fn processors_are_read_with_their_frequency_idle_states_and_interrupts() {
         ("CPU 1", "may come: 9; do come: 9 ttyS0"),
         ("CPU 10", "may come: none; do come: none"),
     ];
-    assert!(
-        machine.interrupts.iter().map(|(cpu, reported)| (cpu.as_str(), reported.as_str())).eq(interrupts)
-    );
-    assert_eq!(machine.hypervisor, "none");
+    let reported = machine.interrupts.iter().map(|(cpu, route)| (cpu.as_str(), route.to_string()));
+    assert!(reported.eq(interrupts.map(|(cpu, route)| (cpu, route.to_owned()))));
+    assert_eq!(machine.hypervisor, Hypervisor::Absent);
 }
 
 #[test]
@@ -158,7 +160,7 @@ fn memory_limits_and_load_are_read() {
     let Limits { rtprio, memlock, nofile } = &machine.limits;
     assert_eq!([rtprio, memlock, nofile], ["99", "8388608", "1024"]);
     assert_eq!(machine.load_average, "0.50 0.40 0.30");
-    assert_eq!(machine.rt_throttling.about, "on: 950000 us of each 1000000 us");
+    assert_eq!(machine.rt_throttling.about.to_string(), "on: 950000 us of each 1000000 us");
 }
 
 #[test]
@@ -171,10 +173,11 @@ fn every_sign_of_a_hypervisor_counts() {
         ("sys/class/dmi/id/sys_vendor", "QEMU\n", "QEMU"),
     ] {
         let found = machine_of(&[(path, text)]).1.hypervisor;
-        assert!(found.contains(sign), "{found}");
+        assert!(found.is_present() && found.to_string().contains(sign), "{found}");
     }
     let bare = machine_of(&[("sys/class/dmi/id/sys_vendor", "LENOVO\n"), (clock_sources, "tsc hpet\n")]).1;
-    assert_eq!(bare.hypervisor, "none");
+    assert_eq!(bare.hypervisor, Hypervisor::Absent);
+    assert_eq!(bare.hypervisor.to_string(), "none");
 }
 
 #[test]
@@ -184,7 +187,9 @@ fn what_is_missing_says_so_with_its_file() {
         machine.clock_source,
         "unknown: /sys/devices/system/clocksource/clocksource0/current_clocksource: No such file or directory"
     );
-    assert_eq!(machine.frequency_governors, ["no cpufreq: whoever sets the frequency is not in this kernel"]);
+    let no_cpufreq = "no cpufreq: whoever sets the frequency is not in this kernel";
+    assert_eq!(machine.frequency_governors, [no_cpufreq].map(FrequencyPolicy::from));
+    assert_eq!(machine.frequency_governors[0].to_string(), no_cpufreq);
     assert_eq!(machine.idle_driver, "no cpuidle");
     assert_eq!(machine.rt_throttling.runtime_us, None);
     for text in [&machine.processor, &machine.load_average, &machine.limits.rtprio, &machine.preemption.model]

@@ -39,7 +39,7 @@ impl Bench {
     fn by_hand(
         &mut self,
         act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
-    ) -> Vec<What> {
+    ) -> Vec<FaultChange> {
         let mut reported = Vec::new();
         let Self { schedule, plant, sensors, inputs } = self;
         act(schedule, Broken { plant, sensors, inputs }, &mut |mark| reported.push(mark.what));
@@ -103,24 +103,24 @@ fn people_break_and_mend_and_are_told_when_they_cannot() {
     let lost = Fault::new("bus-loss", None, &[]).unwrap();
     assert_eq!(
         bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(lost, broken, tell)),
-        [What::Refused]
+        [FaultChange::Refused]
     );
     assert_eq!(
         bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell)),
-        [What::Begins]
+        [FaultChange::Begins]
     );
     assert_eq!(bench.schedule.active(), 1);
     assert_eq!(bench.by_hand(|schedule, broken, tell| schedule.mend(Some(&lost), broken, tell)), []);
     assert_eq!(
         bench.by_hand(|schedule, broken, tell| schedule.mend(Some(&stuck), broken, tell)),
-        [What::Ends]
+        [FaultChange::Ends]
     );
     for _ in 0..MOST_BY_HAND {
         bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell));
     }
     assert_eq!(
         bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell)),
-        [What::Refused]
+        [FaultChange::Refused]
     );
     assert_eq!(bench.by_hand(|schedule, broken, tell| schedule.mend(None, broken, tell)).len(), MOST_BY_HAND);
     assert_eq!(bench.schedule.overlay, Overlay::default());

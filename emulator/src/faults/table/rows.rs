@@ -1,6 +1,7 @@
 //! The rows of the table, group by group.
 
-use super::{BusKind, Channel, FaultKey, FaultSpec, Group, Kind, Places, SensorKind};
+use super::{BusKind, Channel, FaultKey, FaultSpec, Kind, Places, SensorKind};
+use runlog::telemetry::FaultGroup;
 
 /// The table, group by group.
 pub const TABLE: &[&[FaultSpec]] = &[POSITION, FORCE, PRESSURE, VALVE, SUPPLY, AIR, MECHANICS, BUS];
@@ -33,7 +34,7 @@ macro_rules! rows {
     ($group:ident { $($name:expr, $places:ident, $kind:expr, $about:literal, [$($key:expr),*];)* }) => {
         &[$(FaultSpec {
             name: $name,
-            group: Group::$group,
+            group: FaultGroup::$group,
             places: Places::$places,
             keys: &[$($key),*],
             about: $about,

@@ -1,0 +1,187 @@
+//! Events of a run, as `summary.json` lists them and the telemetry sends them.
+//!
+//! The emulator writes them and `bench watch` reads them by these types. In JSON a kind without details is its name in kebab
+//! case, another one an object of its name and its details: `"linked"`, `{"weights":{"added_mass_kg":2.5}}`.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// An event and its cycle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// The rig's cycle in which it was noticed.
+    pub cycle: u64,
+    /// The event.
+    pub kind: EventKind,
+}
+
+/// An axis of the rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Axis {
+    /// The axis whose rod moves the carriage.
+    Drive,
+    /// The axis whose rod ends in the load eye.
+    Load,
+}
+
+/// The kinds of events.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EventKind {
+    /// A late wake-up.
+    Skipped {
+        /// Cycles that were computed and not sent.
+        cycles: u64,
+    },
+    /// No fresh command of the axis for 20 cycles; its valve is shut.
+    CommandStale(Axis),
+    /// Fresh commands of the axis after stale ones.
+    CommandFresh(Axis),
+    /// Two senders on the command of the axis; its valve is shut.
+    TwoSources(Axis),
+    /// One of two senders has been silent for 20 cycles.
+    OneSource(Axis),
+    /// The emergency stop tripped.
+    EmergencyStop,
+    /// The emergency stop was released.
+    EmergencyStopReleased,
+    /// The rig released its emergency stop, and another node still holds it.
+    EmergencyStopStillHeld,
+    /// The rods were linked.
+    Linked,
+    /// The rods were parted.
+    Unlinked,
+    /// The load eye was not within the gap of the carriage.
+    LinkRefused,
+    /// No attempt to link succeeded in the time that the experiment gives it.
+    LinkGivenUp,
+    /// Weights were put on the carriage or taken off.
+    Weights {
+        /// Mass of all weights on the carriage, kg.
+        added_mass_kg: f64,
+    },
+    /// More weights than the rig file allows.
+    WeightsRefused,
+    /// The hand of the console pushes otherwise than before.
+    ConsoleHand {
+        /// Force on the carriage in +x, N.
+        carriage_n: f64,
+        /// Force on the load eye in +x, N.
+        load_eye_n: f64,
+    },
+    /// The first frame with this identifier that is not as `rig.dbc` says.
+    Malformed {
+        /// Identifier with the kernel's flags.
+        raw_id: u32,
+    },
+    /// The first frame with this identifier, which only the rig sends, from elsewhere.
+    SecondRig {
+        /// Identifier of the frame.
+        id: u16,
+    },
+    /// A fault began, ended, or did not begin.
+    Fault(FaultMark),
+    /// The plant's state is no longer finite; the run ends in silence.
+    NotFinite,
+    /// The bus is gone.
+    BusLost,
+    /// The bus is back.
+    BusBack,
+}
+
+/// A fault on purpose that began, ended, or did not begin.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FaultMark {
+    /// Number of the fault in this run; those of the script are first, from 1.
+    pub number: u16,
+    /// Change of the fault.
+    pub what: FaultChange,
+    /// Name in the table of faults.
+    pub fault: String,
+    /// Place, one of those that the table lists for the fault.
+    pub at: String,
+    /// Numbers of the fault by key, in the units of the table.
+    pub numbers: BTreeMap<String, f64>,
+    /// Line of the script or console, for a person.
+    pub cause: String,
+}
+
+/// Change of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FaultChange {
+    /// It acts from this cycle on.
+    Begins,
+    /// It acts no more.
+    Ends,
+    /// Its time passed, and its condition never held.
+    NeverBegan,
+    /// It could not be put into the run.
+    Refused,
+}
+
+impl FaultChange {
+    /// As in `faults.csv`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Begins => "begins",
+            Self::Ends => "ends",
+            Self::NeverBegan => "never-began",
+            Self::Refused => "refused",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_is_read_from_the_json_that_it_is_written_as() {
+        let mark = FaultMark {
+            number: 3,
+            what: FaultChange::NeverBegan,
+            fault: "sensor-offset".into(),
+            at: "drive.a".into(),
+            numbers: [("offset_pa".into(), -2e4), ("after_s".into(), 0.1)].into(),
+            cause: "script line 7".into(),
+        };
+        let fault = r#"{"fault":{"number":3,"what":"never-began","fault":"sensor-offset","at":"drive.a","#
+            .to_owned()
+            + r#""numbers":{"after_s":0.1,"offset_pa":-20000.0},"cause":"script line 7"}}"#;
+        let kinds = [
+            (EventKind::Skipped { cycles: 3 }, r#"{"skipped":{"cycles":3}}"#),
+            (EventKind::CommandStale(Axis::Drive), r#"{"command-stale":"drive"}"#),
+            (EventKind::CommandFresh(Axis::Load), r#"{"command-fresh":"load"}"#),
+            (EventKind::TwoSources(Axis::Drive), r#"{"two-sources":"drive"}"#),
+            (EventKind::OneSource(Axis::Load), r#"{"one-source":"load"}"#),
+            (EventKind::EmergencyStop, r#""emergency-stop""#),
+            (EventKind::EmergencyStopReleased, r#""emergency-stop-released""#),
+            (EventKind::EmergencyStopStillHeld, r#""emergency-stop-still-held""#),
+            (EventKind::Linked, r#""linked""#),
+            (EventKind::Unlinked, r#""unlinked""#),
+            (EventKind::LinkRefused, r#""link-refused""#),
+            (EventKind::LinkGivenUp, r#""link-given-up""#),
+            (EventKind::Weights { added_mass_kg: 2.5 }, r#"{"weights":{"added_mass_kg":2.5}}"#),
+            (EventKind::WeightsRefused, r#""weights-refused""#),
+            (
+                EventKind::ConsoleHand { carriage_n: 10.0, load_eye_n: -0.5 },
+                r#"{"console-hand":{"carriage_n":10.0,"load_eye_n":-0.5}}"#,
+            ),
+            (EventKind::Malformed { raw_id: 0x8000_0001 }, r#"{"malformed":{"raw_id":2147483649}}"#),
+            (EventKind::SecondRig { id: 0x110 }, r#"{"second-rig":{"id":272}}"#),
+            (EventKind::Fault(mark), &fault),
+            (EventKind::NotFinite, r#""not-finite""#),
+            (EventKind::BusLost, r#""bus-lost""#),
+            (EventKind::BusBack, r#""bus-back""#),
+        ];
+        assert_eq!(FaultChange::NeverBegan.name(), "never-began");
+        for (kind, json) in kinds {
+            let event = Event { cycle: 1005, kind };
+            let text = format!("{{\"cycle\":1005,\"kind\":{json}}}");
+            assert_eq!(serde_json::to_string(&event).unwrap(), text);
+            assert_eq!(serde_json::from_str::<Event>(&text).unwrap(), event);
+        }
+    }
+}
