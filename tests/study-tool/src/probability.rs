@@ -88,8 +88,8 @@ pub struct Bin {
 /// The explanations of a report as events that exclude each other: those that are right together are one.
 fn events(said: &[Said]) -> impl Iterator<Item = Said> {
     let wrong = said.iter().copied().filter(|said| !said.right);
-    let right = said.iter().filter(|said| said.right).map(|said| said.probability).sum();
-    wrong.chain([Said { probability: right, right: true }])
+    let right = said.iter().filter(|said| said.right).map(|said| said.probability);
+    wrong.chain(right.reduce(|one, other| one + other).map(|probability| Said { probability, right: true }))
 }
 
 /// Reliability of the probabilities of all reports, and the expected calibration error.
