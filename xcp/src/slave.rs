@@ -1,13 +1,14 @@
 //! The XCP slave: packets in, packets out, over a memory and nothing else.
 //!
 //! ```text
-//!   command(packet, cycle, actions) ─► answer or none        any bytes, at any time
+//!   command(packet, cycle, actions) ─► answer or none     any bytes, at any time
 //!   cycle(cycle, signals, parameters)                     after each answer to the rig
 //!   next_daq() ─► packet or none                          what DAQ lists have to send
 //! ```
 //!
 //! It knows no bus, no clock, no controller: what it changes it tells its [`ParameterActions`]. Whatever the bytes are, it
-//! answers, refuses or keeps silent, and a session that is not open answers CONNECT alone. Nothing here allocates, locks, prints or blocks.
+//! answers, refuses or keeps silent, and a session that is not open answers CONNECT alone. Nothing here allocates, locks,
+//! prints or blocks.
 //!
 //! Source: ASAM MCD-1 XCP 1.1, part 2.
 
