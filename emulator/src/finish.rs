@@ -1,12 +1,12 @@
 //! The end of a run: `summary.json` written, the run reported in a few lines, the exit code chosen.
 
 use crate::cli::RunArguments;
+use crate::event::Event;
 use crate::pace::End;
 use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
 use protocol::exit::Exit;
 use realtime::{Percentiles, Recorder as Histogram, allocations};
-use runlog::event::Event;
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use runlog::summary::Summary;
 use std::collections::BTreeMap;
@@ -114,7 +114,7 @@ fn summarise(
         bus,
         bus_host,
         event_count: Some(event_count),
-        events: events.into_iter().map(Event::from).collect(),
+        events,
     }
 }
 

@@ -10,7 +10,7 @@
 //! which inputs there are and never the physics. Nothing here allocates, locks, prints or blocks.
 
 use crate::console::Command;
-use crate::event::{Event, EventKind};
+use crate::event::{Event, EventKind, axis_of, of_hand};
 use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
 use crate::faults::mark::Mark;
 use crate::faults::schedule::{Broken, FaultSchedule};
@@ -279,7 +279,7 @@ impl EmulatorNode {
             Command::Hand { on, force_n } => {
                 let hand = self.node.rig_mut().hand(Hand::Console);
                 *hand.on(on) = force_n;
-                let kind = (*hand).into();
+                let kind = of_hand(*hand);
                 self.tell(cycle, kind);
             }
             Command::Break(fault) => self.break_or_mend(cycle, |faults, broken, tell| {
@@ -361,6 +361,7 @@ fn send(frame: &Frame, bus: &mut dyn Bus, recorder: &mut Recorder) -> Option<u64
 }
 
 fn change_event(change: Change, axis: Axis) -> EventKind {
+    let axis = axis_of(axis);
     match change {
         Change::Expired => EventKind::CommandStale(axis),
         Change::Fresh => EventKind::CommandFresh(axis),

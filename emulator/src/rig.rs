@@ -1,9 +1,9 @@
 //! The rig of the emulator: the plant with people around it, and what breaks on purpose.
 
-use crate::event::EventKind;
+use crate::event::{EventKind, of_outcome};
 use crate::faults::mark::Mark;
 use crate::faults::schedule::{Broken, FaultSchedule};
-use plant::scene::{Action, HandForces, Holder, Outcome, RigCall};
+use plant::scene::{Action, HandForces, Holder, RigCall};
 use plant::tables::CycleRecord;
 use plant::{AxisReadings, People, Plant, Sensors};
 use rig_node::{Hand, PeopledPlant, SimulatedRig, Standing};
@@ -33,7 +33,7 @@ impl BreakableRig {
     }
 
     pub(crate) fn act(&mut self, action: Action, mut tell: impl FnMut(EventKind)) {
-        self.peopled.act(action, |outcome| tell(outcome.into()));
+        self.peopled.act(action, |outcome| tell(of_outcome(outcome)));
     }
 
     /// Lets a person do something to what is broken.
@@ -58,7 +58,7 @@ impl SimulatedRig for BreakableRig {
     type Event = EventKind;
 
     fn sample(&mut self, cycle: u64, tell: &mut dyn FnMut(EventKind)) -> [AxisReadings; 2] {
-        self.peopled.let_people_act(cycle, |outcome| tell(outcome.into()));
+        self.peopled.let_people_act(cycle, |outcome| tell(of_outcome(outcome)));
         let (plant, sensors, inputs) = self.peopled.parts();
         let broken = Broken { plant, sensors, inputs };
         self.faults.begin_cycle(cycle, broken, |mark| tell(EventKind::Fault(mark)));
@@ -70,8 +70,8 @@ impl SimulatedRig for BreakableRig {
         self.peopled.rig_call(cycle)
     }
 
-    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Outcome> {
-        self.peopled.emergency_stop(holder, release)
+    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<EventKind> {
+        self.peopled.emergency_stop(holder, release).map(of_outcome)
     }
 
     fn standing(&self) -> Standing {

@@ -106,6 +106,6 @@ impl Telemetry {
 }
 
 fn write_event(out: &mut Vec<u8>, event: &Event) {
-    let message = EventMessage::new((*event).into(), event.kind.to_string());
+    let message = EventMessage::new(*event, event.kind.to_string());
     runlog::telemetry::write_event(out, &message);
 }

@@ -141,8 +141,8 @@ impl<R: SimulatedRig> RigNode<R> {
     }
 
     fn obey(&mut self, holder: Holder, stop: EmergencyStop, tell: &mut dyn FnMut(R::Event)) -> Taken {
-        if let Some(outcome) = self.rig.emergency_stop(holder, stop.release) {
-            tell(outcome.into());
+        if let Some(event) = self.rig.emergency_stop(holder, stop.release) {
+            tell(event);
         }
         Taken::Done
     }

@@ -9,7 +9,7 @@ pub trait SimulatedRig {
     /// What a cycle leaves: what the rig shows, and what only a simulation knows.
     type Cycle;
     /// What happened to the rig.
-    type Event: From<Outcome>;
+    type Event;
 
     /// The valve openings of drive and load over the coming cycle, unless an emergency stop comes in it: for a rig that has to
     /// know them when its sensors are sampled, from a caller that does.
@@ -22,7 +22,7 @@ pub trait SimulatedRig {
     fn rig_call(&mut self, cycle: u64) -> Option<RigCall>;
 
     /// Takes note of a stop or a release by a controller or the console.
-    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Outcome>;
+    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Self::Event>;
 
     /// What the rig reports of itself beside its sensors.
     fn standing(&self) -> Standing;

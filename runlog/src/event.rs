@@ -1,18 +1,20 @@
-//! Events of a run, as `summary.json` lists them and the telemetry sends them.
+//! Events of a run: as the 1 ms path of the emulator notes them, as `summary.json` lists them and as the telemetry sends them.
 //!
-//! The emulator writes them and `bench watch` reads them by these types. In JSON a kind without details is its name in kebab
-//! case, another one an object of its name and its details: `"linked"`, `{"weights":{"added_mass_kg":2.5}}`.
+//! In the emulator the mark of a fault is a small copy (`Event<M>`); its text is made when the event is written. Files and viewers
+//! read [`FaultMark`]. In JSON a kind without details is its name in kebab case, another one an object of its name and its
+//! details: `"linked"`, `{"weights":{"added_mass_kg":2.5}}`.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// An event and its cycle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Event {
+/// An event with its message; no error, which is `thiserror`'s word for it. `M` is the mark of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[error("cycle {cycle}: {kind}")]
+pub struct Event<M = FaultMark> {
     /// The rig's cycle in which it was noticed.
     pub cycle: u64,
     /// The event.
-    pub kind: EventKind,
+    pub kind: EventKind<M>,
 }
 
 /// An axis of the rig.
@@ -26,44 +28,59 @@ pub enum Axis {
 }
 
 /// The kinds of events.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "kebab-case")]
-pub enum EventKind {
+pub enum EventKind<M = FaultMark> {
     /// A late wake-up.
+    #[error("woke late, {cycles} cycle(s) computed but not sent")]
     Skipped {
         /// Cycles that were computed and not sent.
         cycles: u64,
     },
     /// No fresh command of the axis for 20 cycles; its valve is shut.
+    #[error("no fresh {} command for 20 cycles, valve shut; is its controller running?", .0.name())]
     CommandStale(Axis),
     /// Fresh commands of the axis after stale ones.
+    #[error("fresh {} commands again, valve follows", .0.name())]
     CommandFresh(Axis),
     /// Two senders on the command of the axis; its valve is shut.
+    #[error("fault two-sources: two senders on the {} command, valve shut; stop one of them", .0.name())]
     TwoSources(Axis),
     /// One of two senders has been silent for 20 cycles.
+    #[error("one sender left on the {} command, valve follows", .0.name())]
     OneSource(Axis),
     /// The emergency stop tripped.
+    #[error("emergency stop")]
     EmergencyStop,
     /// The emergency stop was released.
+    #[error("emergency stop released")]
     EmergencyStopReleased,
     /// The rig released its emergency stop, and another node still holds it.
+    #[error("the rig released its emergency stop; another still holds it")]
     EmergencyStopStillHeld,
     /// The rods were linked.
+    #[error("rods linked")]
     Linked,
     /// The rods were parted.
+    #[error("rods parted")]
     Unlinked,
     /// The load eye was not within the gap of the carriage.
+    #[error("link refused: the load eye is not within the gap of the carriage")]
     LinkRefused,
     /// No attempt to link succeeded in the time that the experiment gives it.
+    #[error("link given up: the load eye never came within the gap of the carriage")]
     LinkGivenUp,
     /// Weights were put on the carriage or taken off.
+    #[error("weights on the carriage: {added_mass_kg} kg")]
     Weights {
         /// Mass of all weights on the carriage, kg.
         added_mass_kg: f64,
     },
     /// More weights than the rig file allows.
+    #[error("weights refused: more than mass.added_limit_kg of the rig file")]
     WeightsRefused,
     /// The hand of the console pushes otherwise than before.
+    #[error("the console's hand pushes the carriage with {carriage_n} N, the load eye with {load_eye_n} N")]
     ConsoleHand {
         /// Force on the carriage in +x, N.
         carriage_n: f64,
@@ -71,23 +88,55 @@ pub enum EventKind {
         load_eye_n: f64,
     },
     /// The first frame with this identifier that is not as `rig.dbc` says.
+    #[error(
+        "a frame with identifier {raw_id:#05x} is not as rig.dbc says and was ignored; more are counted silently"
+    )]
     Malformed {
         /// Identifier with the kernel's flags.
         raw_id: u32,
     },
     /// The first frame with this identifier, which only the rig sends, from elsewhere.
+    #[error("frame {id:#05x} came from elsewhere: another rig is on this bus; stop one of them")]
     SecondRig {
         /// Identifier of the frame.
         id: u16,
     },
     /// A fault began, ended, or did not begin.
-    Fault(FaultMark),
+    #[error("{0}")]
+    Fault(M),
     /// The plant's state is no longer finite; the run ends in silence.
+    #[error("fault not-finite: the plant's state is no longer finite")]
     NotFinite,
     /// The bus is gone.
+    #[error("the bus is gone; trying to come back")]
     BusLost,
     /// The bus is back.
+    #[error("the bus is back")]
     BusBack,
+}
+
+impl Axis {
+    /// `drive` or `load`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Drive => "drive",
+            Self::Load => "load",
+        }
+    }
+}
+
+impl<M> EventKind<M> {
+    /// Whether the flight recorder saves the seconds before it.
+    pub fn is_fault(&self) -> bool {
+        matches!(
+            self,
+            Self::TwoSources(_)
+                | Self::CommandStale(_)
+                | Self::NotFinite
+                | Self::BusLost
+                | Self::EmergencyStop
+        )
+    }
 }
 
 /// A fault on purpose that began, ended, or did not begin.

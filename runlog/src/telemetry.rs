@@ -21,7 +21,7 @@
 
 mod description;
 
-use crate::event::{Event, EventKind};
+use crate::event::{Event, EventKind, FaultMark};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -79,11 +79,11 @@ pub enum Packet {
 
 /// An event as a viewer gets it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EventMessage {
+pub struct EventMessage<M = FaultMark> {
     /// The rig's cycle in which it was noticed.
     pub cycle: u64,
     /// The event.
-    pub kind: EventKind,
+    pub kind: EventKind<M>,
     /// The event in words, for a person.
     pub text: String,
 }
@@ -97,9 +97,9 @@ pub struct Answer {
     pub text: String,
 }
 
-impl EventMessage {
+impl<M> EventMessage<M> {
     /// The event with its words.
-    pub fn new(event: Event, text: String) -> Self {
+    pub fn new(event: Event<M>, text: String) -> Self {
         let Event { cycle, kind } = event;
         Self { cycle, kind, text }
     }
@@ -150,7 +150,7 @@ pub fn write_description(out: &mut Vec<u8>, description: &Description) {
 }
 
 /// Appends an event.
-pub fn write_event(out: &mut Vec<u8>, message: &EventMessage) {
+pub fn write_event(out: &mut Vec<u8>, message: &EventMessage<impl Serialize>) {
     write_json(out, Kind::Event, message);
 }
 

@@ -280,7 +280,8 @@ mod tests {
     use super::*;
     use crate::recording::queues;
     use plant::tables::CycleRecord;
-    use plant::{Axis, Inputs, Plant, RigParameters, Scene, Sensors};
+    use plant::{Inputs, Plant, RigParameters, Scene, Sensors};
+    use runlog::event::Axis;
     use std::path::Path;
 
     fn writer_into(folder: &Path) -> Writer {
