@@ -58,12 +58,6 @@ impl Law {
             Self::PressureCompensated => "pressure-compensated",
         }
     }
-
-    /// The law called `name`.
-    #[must_use]
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|law| law.name() == name)
-    }
 }
 
 /// The inverse valve characteristic of one axis, from nominal numbers.

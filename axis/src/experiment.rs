@@ -106,14 +106,14 @@ impl Experiment {
         let about = root.text("about")?.map_or_else(String::new, |about| about.text);
         // Within 1 to 255 by its range.
         let number = root.whole_or_default(&NUMBER)? as u8;
-        let run = RunSection::read(root.section("run")?)?;
+        let run = RunSection::read(root.section_or_empty("run")?)?;
         let mut axis = |key, usual| {
             let section = root.section(key)?;
             section.map(|section| AxisExperiment::read(section, usual, stroke_m)).transpose()
         };
         let drive = axis("drive", algorithms::algorithm::Quantity::Position)?;
         let load = axis("load", algorithms::algorithm::Quantity::Force)?;
-        let recording = Recording::read(root.section("recording")?)?;
+        let recording = Recording::read(root.section_or_empty("recording")?)?;
         let [rig, passed] = [root.opaque("rig")?, root.opaque("passed")?];
         root.finish()?;
         if drive.is_none() && load.is_none() {
@@ -130,8 +130,7 @@ impl Experiment {
 }
 
 impl RunSection {
-    fn read(section: Option<Section<'_>>) -> Result<Self, SettingsError> {
-        let Some(mut section) = section else { return Ok(Self::default()) };
+    fn read(mut section: Section<'_>) -> Result<Self, SettingsError> {
         let run = Self {
             repetitions: section.whole_or_default(&REPETITIONS)?,
             settling_s: section.number_or_default(&SETTLING)?,
@@ -155,21 +154,8 @@ impl RunSection {
     }
 }
 
-impl Default for RunSection {
-    fn default() -> Self {
-        Self {
-            repetitions: 1,
-            settling_s: SETTLING.default,
-            settling_timeout_s: SETTLING_TIMEOUT.default,
-            start: Start::ByItself,
-            after_emergency_stop: AfterStop::End,
-        }
-    }
-}
-
 impl Recording {
-    fn read(section: Option<Section<'_>>) -> Result<Self, SettingsError> {
-        let Some(mut section) = section else { return Ok(Self { every_cycles: 1 }) };
+    fn read(mut section: Section<'_>) -> Result<Self, SettingsError> {
         let every_cycles = section.whole_or_default(&EVERY)?;
         section.finish()?;
         Ok(Self { every_cycles })

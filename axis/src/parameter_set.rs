@@ -13,15 +13,9 @@
 
 use crate::program::Variable;
 use nominal::Axis;
-use std::collections::BTreeMap;
+use settings::{SettingsError, Source};
 use std::fmt::Write;
 use std::path::Path;
-use toml::Spanned;
-
-/// A set that cannot be used: file, line, key, value and what is allowed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct ParameterSetError(String);
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
@@ -34,37 +28,29 @@ pub struct Setting {
     pub place: String,
 }
 
-type Sections = BTreeMap<String, BTreeMap<String, BTreeMap<String, Spanned<toml::Value>>>>;
-
-pub fn read(path: &Path) -> Result<Vec<Setting>, ParameterSetError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| ParameterSetError(format!("cannot read {}: {error}", path.display())))?;
-    parse(&text, &path.display().to_string())
+pub fn read(path: &Path) -> Result<Vec<Setting>, SettingsError> {
+    let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
+    parse(&text, path)
 }
 
 /// The set in a text; `file` is for messages.
-pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, ParameterSetError> {
-    let sections: Sections = toml::from_str(text).map_err(|error| {
-        ParameterSetError(format!("{file}: {error}expected are tables such as [drive.algorithm]"))
-    })?;
+pub fn parse(text: &str, file: &Path) -> Result<Vec<Setting>, SettingsError> {
+    let source = Source::parse(text, file)?;
+    let mut root = source.root();
     let mut settings = Vec::new();
-    for (axis_name, tasks) in sections {
-        let axis = Axis::ALL.into_iter().find(|axis| axis.name() == axis_name).ok_or_else(|| {
-            ParameterSetError(format!("{file}: [{axis_name}]: no such axis; there are drive and load"))
-        })?;
-        for (task, values) in tasks {
-            for (key, value) in values {
-                let line = settings::line_of(text, value.span().start);
-                let place = format!("{file}:{line}: ");
-                let name = format!("{task}.{key}");
-                let number = settings::number_of(value.as_ref());
-                let value = number.ok_or_else(|| {
-                    ParameterSetError(format!("{place}{axis_name}.{name} = {}: not a number", value.as_ref()))
-                })?;
-                settings.push(Setting { axis, name, value, place });
+    for axis in Axis::ALL {
+        let mut tasks = root.section_or_empty(axis.name())?;
+        for task in tasks.keys() {
+            let example = Some("[drive.algorithm]");
+            let Some(mut values) = tasks.section_as(&task, example)? else { continue };
+            for key in values.keys() {
+                let Some(value) = values.finite(&key)? else { continue };
+                let place = format!("{}:{}: ", file.display(), settings::line_of(text, values.at(&key)));
+                settings.push(Setting { axis, name: format!("{task}.{key}"), value, place });
             }
         }
     }
+    root.finish()?;
     Ok(settings)
 }
 
@@ -95,17 +81,17 @@ pub fn text(axis: Axis, variables: &[Variable], values: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::program::file::Source;
+    use crate::program::file;
     use nominal::RigParameters;
 
     #[test]
     fn what_is_written_is_read_to_the_bit() {
-        let program = Source::shut().program(Axis::Load, &RigParameters::baseline(), false).unwrap();
+        let program = file::Source::shut().program(Axis::Load, &RigParameters::baseline(), false).unwrap();
         let mut values = program.values().to_vec();
         values[0] = 1.0 / 3.0;
         values[1] = 1e-7;
         let text = text(Axis::Load, program.variables(), &values);
-        let read = parse(&text, "set.toml").unwrap();
+        let read = parse(&text, Path::new("set.toml")).unwrap();
         assert_eq!(read.len(), values.len());
         for setting in read {
             let place = program.place(&setting.name).unwrap();
@@ -119,12 +105,12 @@ mod tests {
         for (text, words) in [
             (
                 "[drive.algorithm]\ngain_per_s = \"5\"\n",
-                ["set.toml:2", "drive.algorithm.gain_per_s", "not a number"],
+                ["set.toml:2", "drive.algorithm.gain_per_s = \"5\"", "allowed is a finite number"],
             ),
-            ("[middle.algorithm]\ngain_per_s = 5\n", ["set.toml", "[middle]", "drive and load"]),
-            ("[drive]\ngain_per_s = 5\n", ["set.toml", "gain_per_s", "[drive.algorithm]"]),
+            ("[middle.algorithm]\ngain_per_s = 5\n", ["set.toml:1", "unknown key middle;", "drive, load"]),
+            ("[drive]\ngain_per_s = 5\n", ["set.toml:2", "drive.gain_per_s = 5", "[drive.algorithm]"]),
         ] {
-            let problem = parse(text, "set.toml").unwrap_err().to_string();
+            let problem = parse(text, Path::new("set.toml")).unwrap_err().to_string();
             for word in words {
                 assert!(problem.contains(word), "'{word}' is missing in: {problem}");
             }

@@ -5,10 +5,11 @@
 
 use axis_control::node::Change;
 use axis_control::program::Variable;
-use axis_control::program::file::{FixedSettings, ProgramError, Source};
+use axis_control::program::file::{FixedSettings, Source};
 use axis_control::setup::Inputs;
 use crossbeam_channel::Sender;
 use nominal::{Axis, RigParameters};
+use settings::SettingsError;
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -60,7 +61,7 @@ impl Reloader {
 }
 
 impl ProgramFile {
-    fn new(source: &Source, axis: Axis, rig: &RigParameters) -> Result<Self, ProgramError> {
+    fn new(source: &Source, axis: Axis, rig: &RigParameters) -> Result<Self, SettingsError> {
         let makings = source.makings()?;
         let program = source.program(axis, rig, false)?;
         let (variables, values) = (program.variables().to_vec(), program.values().to_vec());

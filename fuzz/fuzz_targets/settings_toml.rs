@@ -6,13 +6,14 @@ use axis_control::program::file::Source;
 use xcp::config::XcpConfig;
 use libfuzzer_sys::fuzz_target;
 use plant::{Axis, RigParameters};
+use std::path::Path;
 use std::sync::OnceLock;
 
 fuzz_target!(|text: &str| {
     static RIG: OnceLock<RigParameters> = OnceLock::new();
     let rig = RIG.get_or_init(RigParameters::baseline);
     let lines = text.matches('\n').count() + 1;
-    match parameter_set::parse(text, "set.toml") {
+    match parameter_set::parse(text, Path::new("set.toml")) {
         Ok(settings) => {
             let program = Source::shut().program(Axis::Drive, rig, false);
             let mut program = program.expect("it holds a valve shut");

@@ -14,6 +14,14 @@ use toml::de::{DeTable, DeValue};
 #[error("{0}")]
 pub struct SettingsError(String);
 
+impl SettingsError {
+    /// A file that cannot be opened or read.
+    #[must_use]
+    pub fn unreadable(file: &Path, error: &std::io::Error) -> Self {
+        Self(format!("cannot read {}: {error}", file.display()))
+    }
+}
+
 /// What a file says, or its place and what is wrong there.
 pub type Result<T, E = SettingsError> = core::result::Result<T, E>;
 
@@ -22,6 +30,8 @@ pub struct Source<'a> {
     text: &'a str,
     file: &'a Path,
     root: Spanned<DeTable<'a>>,
+    /// In place of a table that is left out.
+    empty: DeTable<'a>,
     columns: bool,
 }
 
@@ -33,7 +43,7 @@ impl<'a> Source<'a> {
     pub fn parse(text: &'a str, file: &'a Path) -> Result<Self> {
         let root =
             DeTable::parse(text).map_err(|error| SettingsError(format!("{}: {error}", file.display())))?;
-        Ok(Self { text, file, root, columns: false })
+        Ok(Self { text, file, root, empty: DeTable::new(), columns: false })
     }
 
     /// The same, with messages that name the column after the line.
@@ -125,6 +135,16 @@ impl<'a> Section<'a> {
         all.ok_or_else(|| self.not_allowed(value, key, "a finite number, or a list of them"))
     }
 
+    /// The finite number under `key`, of any range; `None` when it is absent.
+    ///
+    /// # Errors
+    /// No finite number.
+    pub fn finite(&mut self, key: &str) -> Result<Option<f64>> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let finite = number(value.get_ref()).filter(|number| number.is_finite());
+        finite.map(Some).ok_or_else(|| self.not_allowed(value, key, "a finite number"))
+    }
+
     /// Whether `key` is set to true; false when it is absent.
     ///
     /// # Errors
@@ -166,6 +186,12 @@ impl<'a> Section<'a> {
             .iter()
             .find(|(name, _)| name.get_ref() == key)
             .and_then(|(_, value)| value.get_ref().as_str())
+    }
+
+    /// Its name with those of the tables around it, such as `drive.change[1]`; empty for the whole file.
+    #[must_use]
+    pub fn path(&self) -> &str {
+        &self.path
     }
 
     /// Line in which the table begins, from 1.
@@ -292,6 +318,28 @@ impl<'a> Section<'a> {
     pub fn section_as(&mut self, key: &str, example: Option<&str>) -> Result<Option<Self>> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.inner(self.path_of(key), value, example).map(Some)
+    }
+
+    /// The table under `key`; one without keys when it is absent.
+    ///
+    /// # Errors
+    /// No table.
+    pub fn section_or_empty(&mut self, key: &str) -> Result<Self> {
+        Ok(self.section(key)?.unwrap_or_else(|| Self {
+            source: self.source,
+            path: self.path_of(key),
+            table: &self.source.empty,
+            at: self.at,
+            asked: Vec::new(),
+        }))
+    }
+
+    /// The table under `key`, which must be there; `meaning` is for the message when it is not.
+    ///
+    /// # Errors
+    /// Missing, or no table.
+    pub fn needed_section(&mut self, key: &str, meaning: &str) -> Result<Self> {
+        self.section(key)?.ok_or_else(|| self.lacks(&format!("[{key}] is missing: {meaning}")))
     }
 
     /// The tables of the list under `key`, each called by its place from 1 on; none when it is absent.
@@ -435,53 +483,4 @@ fn edits(from: &str, to: &str) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_column_is_that_of_the_character_within_the_text() {
-        let text = "a = 1\n\"ä\" = \"x + y\"\nc = \"\"\"\n  z\"\"\"\nd = [1, 2.5]\ne = [1, inf]";
-        let source = Source::parse(text, Path::new("f.toml")).map(Source::with_columns).expect("TOML");
-        let mut section = source.root();
-        assert_eq!(section.keys(), ["a", "ä", "c", "d", "e"]);
-        let place = |text: Text, offset: usize| source.wrong_from(text.at + offset, "no").to_string();
-        let first = section.text("ä").expect("a text").expect("there");
-        assert_eq!(place(first, 4), "f.toml:2:12: no");
-        let second = section.text("c").expect("a text").expect("there");
-        assert_eq!(place(second, 2), "f.toml:4:3: no");
-        assert_eq!(section.numbers("d"), Ok(vec![1.0, 2.5]));
-        assert_eq!((section.numbers("a"), section.numbers("none")), (Ok(vec![1.0]), Ok(vec![])));
-        let message = section.numbers("e").unwrap_err().to_string();
-        assert!(message.starts_with("f.toml:6:5: e = [1, inf]; allowed is a finite number"), "{message}");
-    }
-
-    #[test]
-    fn an_unknown_key_is_refused_with_the_one_that_is_written_alike() {
-        let source = Source::parse("[paramters]\na = 1", Path::new("f.toml")).expect("TOML");
-        let known = ["parameters", "outputs", "rows"];
-        let message = source.root().allow(&known).unwrap_err().to_string();
-        let expected =
-            "f.toml:1: unknown key paramters; allowed is parameters, outputs, rows: did you mean parameters?";
-        assert_eq!(message, expected);
-        for (name, meant) in
-            [("output", Some("outputs")), ("row", Some("rows")), ("rowing", None), ("x", None)]
-        {
-            assert_eq!(nearest(name, &known), meant, "{name}");
-        }
-        assert_eq!([edits("kitten", "sitting"), edits("", "ab"), edits("ab", "ba")], [3, 2, 2]);
-    }
-
-    #[test]
-    fn a_whole_number_has_no_fraction_and_no_sign() {
-        let source = Source::parse("a = 3\nb = 2.5\nc = -1", Path::new("file.toml")).expect("TOML");
-        let mut section = source.root();
-        let mut read =
-            |name| section.whole_or_default(&Parameter::new((name, ""), [-10.0, 10.0], 1.0, "count"));
-        assert_eq!(read("a"), Ok(3));
-        for (name, line) in [("b", 2), ("c", 3)] {
-            let message = read(name).unwrap_err().to_string();
-            assert!(message.starts_with(&format!("file.toml:{line}: {name} = ")), "{message}");
-            assert!(message.contains("allowed is a whole number"), "{message}");
-        }
-    }
-}
+mod tests;

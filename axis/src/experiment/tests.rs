@@ -38,6 +38,15 @@ every_cycles = 10
 anything = { least = 1 }
 "#;
 
+/// `[run]` when nothing is said.
+const USUAL: RunSection = RunSection {
+    repetitions: 1,
+    settling_s: 0.5,
+    settling_timeout_s: 10.0,
+    start: Start::ByItself,
+    after_emergency_stop: AfterStop::End,
+};
+
 fn read(text: &str) -> Result<Experiment, String> {
     Experiment::from_toml(text, Path::new("folder/e.toml"), 0.5).map_err(|error| error.to_string())
 }
@@ -50,7 +59,7 @@ fn a_good_file_is_read() {
         repetitions: 3,
         start: Start::OnStart,
         after_emergency_stop: AfterStop::Restart,
-        ..RunSection::default()
+        ..USUAL
     };
     assert_eq!(experiment.run, expected);
     assert_eq!(experiment.recording.every_cycles, 10);
@@ -82,7 +91,7 @@ fn a_program_is_a_name_beside_the_experiments_or_a_path_from_them() {
 #[test]
 fn a_file_with_little_in_it_has_its_defaults() {
     let experiment = read("title = \"t\"\n[drive]\nprogram = \"p\"\nstart_m = 0.1\n").unwrap();
-    assert_eq!((experiment.run, experiment.recording.every_cycles), (RunSection::default(), 1));
+    assert_eq!((experiment.run, experiment.recording.every_cycles), (USUAL, 1));
     assert!(experiment.load.is_none() && experiment.rig.is_empty());
     assert_eq!((experiment.number, experiment.duration_s()), (1, 0.0));
 }

@@ -29,42 +29,28 @@ use algorithms::guard::Guarded;
 use algorithms::linearisation::{Law, Linearisation};
 use nominal::{Axis, RigParameters};
 use realtime::MonotonicClock;
-use serde::Deserialize;
 use settings::parameters::Parameter;
+use settings::{Section, SettingsError};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use toml::Spanned;
-
-/// A program file that cannot be used: file, line, key, value and what is allowed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct ProgramError(String);
-
-type Section = BTreeMap<String, Spanned<toml::Value>>;
 
 /// Texts of a program by their full key, such as `algorithm.name`.
 pub type FixedSettings = BTreeMap<String, String>;
 
 const LINEARISATION: &str = "post-controller.linearisation";
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-struct File {
-    title: String,
-    #[serde(default)]
-    pre_controller: Section,
-    algorithm: Spanned<Section>,
-    #[serde(default)]
-    post_controller: Section,
-    giving_way: Option<Spanned<Section>>,
-    #[serde(default)]
-    force_chain: Section,
-    #[serde(default)]
-    matching_chain: Section,
-    #[serde(default)]
-    settled: Section,
-}
+/// Keys of the file itself.
+const KEYS: [&str; 8] = [
+    "title",
+    "pre-controller",
+    "algorithm",
+    "post-controller",
+    "giving-way",
+    force::TABLE,
+    matching::TABLE,
+    settled::TABLE,
+];
 
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Source {
@@ -74,12 +60,12 @@ pub struct Source {
 }
 
 impl Source {
-    pub fn read(path: &Path) -> Result<Self, ProgramError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| ProgramError(format!("cannot read {}: {error}", path.display())))?;
-        let mut source = Self { path: path.into(), title: String::new(), text };
-        source.title = source.parse()?.title;
-        Ok(source)
+    /// Reads the file and its title.
+    pub fn read(path: &Path) -> Result<Self, SettingsError> {
+        let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
+        let title =
+            root(&settings::Source::parse(&text, path)?)?.needed_text("title", "what it is called")?;
+        Ok(Self { path: path.into(), title: title.text, text })
     }
 
     /// The program of an axis of which nothing is asked.
@@ -88,25 +74,17 @@ impl Source {
         Self { path: "(none)".into(), title: "valve held shut".into(), text: text.into() }
     }
 
-    fn parse(&self) -> Result<File, ProgramError> {
-        toml::from_str(&self.text).map_err(|error| ProgramError(format!("{}: {error}", self.path.display())))
-    }
-
     /// What the file says besides numbers, by its full key: what a program is made of, and cannot change while it runs.
-    pub fn makings(&self) -> Result<FixedSettings, ProgramError> {
-        let File { algorithm, post_controller, giving_way, .. } = self.parse()?;
-        let giving_way = giving_way.map(Spanned::into_inner).unwrap_or_default();
-        let sections = [
-            ("algorithm", algorithm.into_inner()),
-            ("giving-way", giving_way),
-            ("post-controller", post_controller),
-        ];
+    pub fn makings(&self) -> Result<FixedSettings, SettingsError> {
+        let source = settings::Source::parse(&self.text, &self.path)?;
+        let mut root = root(&source)?;
         let mut makings =
             FixedSettings::from([(LINEARISATION.to_owned(), Law::ChokedExhaust.name().to_owned())]);
-        for (name, section) in sections {
-            for (key, value) in section {
-                if let toml::Value::String(text) = value.into_inner() {
-                    makings.insert(format!("{name}.{key}"), text);
+        for name in ["algorithm", "giving-way", "post-controller"] {
+            let section = root.section_or_empty(name)?;
+            for key in section.keys() {
+                if let Some(text) = section.peek(&key) {
+                    makings.insert(format!("{name}.{key}"), text.to_owned());
                 }
             }
         }
@@ -115,23 +93,31 @@ impl Source {
 
     /// The program of `axis` that the file describes, for a rig of these nominal numbers. The time that an algorithm takes is
     /// watched where it is `real_time`.
-    pub fn program(&self, axis: Axis, rig: &RigParameters, real_time: bool) -> Result<Program, ProgramError> {
-        let file = self.parse()?;
-        let mut reader = Reader { source: self, rig, real_time, variables: Vec::new(), values: Vec::new() };
-        let pre = reader.section("pre-controller", file.pre_controller, pre_controller::Parameters::TABLE)?;
-        let user = reader.slot("algorithm", file.algorithm)?;
-        let mut section = file.post_controller;
-        let linearisation = reader.linearisation(section.remove("linearisation"))?;
-        let post = reader.section("post-controller", section, post_controller::Parameters::TABLE)?;
-        let giving_way = file.giving_way.map(|section| reader.giving_way(section)).transpose()?;
-        let force_chain = reader.section(force::TABLE, file.force_chain, force::Parameters::TABLE)?;
+    pub fn program(
+        &self,
+        axis: Axis,
+        rig: &RigParameters,
+        real_time: bool,
+    ) -> Result<Program, SettingsError> {
+        let source = settings::Source::parse(&self.text, &self.path)?;
+        let mut root = root(&source)?;
+        let _ = root.needed_text("title", "what it is called")?;
+        let mut reader = Reader { rig, real_time, variables: Vec::new(), values: Vec::new() };
+        let pre =
+            reader.section(root.section_or_empty("pre-controller")?, pre_controller::Parameters::TABLE)?;
+        let user = reader.slot(root.needed_section("algorithm", "its name and its numbers")?)?;
+        let mut section = root.section_or_empty("post-controller")?;
+        let law = section.choice("linearisation", &Law::ALL.map(|law| (law.name(), law)))?;
+        let post = reader.section(section, post_controller::Parameters::TABLE)?;
+        let giving_way = root.section("giving-way")?.map(|section| reader.giving_way(section)).transpose()?;
+        let force_chain = reader.section(root.section_or_empty(force::TABLE)?, force::Parameters::TABLE)?;
         let matching_chain =
-            reader.section(matching::TABLE, file.matching_chain, matching::Parameters::TABLE)?;
-        let settled = reader.section(settled::TABLE, file.settled, settled::Bounds::TABLE)?;
+            reader.section(root.section_or_empty(matching::TABLE)?, matching::Parameters::TABLE)?;
+        let settled = reader.section(root.section_or_empty(settled::TABLE)?, settled::Bounds::TABLE)?;
         let Reader { variables, values, .. } = reader;
         Ok(Program {
             pre: PreController::new(Geometry::new(axis, rig.cylinder().stroke_m)),
-            post: PostController::new(linearisation),
+            post: PostController::new(Linearisation::new(rig, law)),
             user,
             giving_way,
             variables,
@@ -145,9 +131,15 @@ impl Source {
     }
 }
 
+/// The whole file, if it has no other keys.
+fn root<'a>(source: &'a settings::Source<'a>) -> Result<Section<'a>, SettingsError> {
+    let root = source.root();
+    root.allow(&KEYS)?;
+    Ok(root)
+}
+
 /// Collects variables and their values, section by section.
 struct Reader<'a> {
-    source: &'a Source,
     rig: &'a RigParameters,
     real_time: bool,
     variables: Vec<Variable>,
@@ -155,121 +147,67 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn error(&self, place: usize, problem: &str) -> ProgramError {
-        let line = settings::line_of(&self.source.text, place);
-        ProgramError(format!("{}:{line}: {problem}", self.source.path.display()))
-    }
-
-    /// Takes the values of `table` out of the section called `name`; what is left in it is nobody's.
+    /// Reads the values of `table`, the rest of the section.
     fn section(
         &mut self,
-        name: &str,
-        mut section: Section,
+        mut section: Section<'_>,
         table: &[Parameter],
-    ) -> Result<Range<usize>, ProgramError> {
+    ) -> Result<Range<usize>, SettingsError> {
         let first = self.values.len();
         for parameter in table {
-            let value = match section.remove(parameter.name.as_ref()) {
-                None => parameter.default,
-                Some(entry) => {
-                    let place = entry.span().start;
-                    let value = settings::number_of(entry.as_ref()).ok_or_else(|| {
-                        self.error(
-                            place,
-                            &format!("{name}.{} = {}: not a number", parameter.name, entry.as_ref()),
-                        )
-                    })?;
-                    parameter.check(value).map_err(|error| self.error(place, &format!("{name}.{error}")))?
-                }
-            };
-            self.values.push(value);
-            self.variables
-                .push(Variable { name: format!("{name}.{}", parameter.name), parameter: parameter.clone() });
+            self.values.push(section.number_or_default(parameter)?);
+            let name = format!("{}.{}", section.path(), parameter.name);
+            self.variables.push(Variable { name, parameter: parameter.clone() });
         }
-        if let Some((key, entry)) = section.first_key_value() {
-            let known: Vec<_> = table.iter().map(|parameter| parameter.name.as_ref()).collect();
-            let problem = format!("{name}.{key}: no such parameter; there are {}", known.join(", "));
-            return Err(self.error(entry.span().start, &problem));
-        }
+        section.finish()?;
         Ok(first..self.values.len())
     }
 
-    fn slot(&mut self, name: &str, section: Spanned<Section>) -> Result<Slot, ProgramError> {
-        let place = section.span().start;
-        let mut section = section.into_inner();
-        let asked = self.take_text(&format!("{name}.name"), section.remove("name"))?;
-        let library = self.take_text(&format!("{name}.library"), section.remove("library"))?;
+    fn slot(&mut self, mut section: Section<'_>) -> Result<Slot, SettingsError> {
+        let (asked, library) = (section.text("name")?, section.text("library")?);
         let (algorithm, controls, parameters): (Box<dyn Algorithm>, _, _) = match (asked, library) {
             (Some(asked), None) => {
-                let kind = algorithms::by_name(asked.as_ref()).ok_or_else(|| {
-                    let problem = format!("{name}.name = \"{}\"; there are {}", asked.as_ref(), names());
-                    self.error(asked.span().start, &problem)
+                let kind = algorithms::by_name(&asked.text).ok_or_else(|| {
+                    let problem = format!("name = \"{}\"; allowed is {}", asked.text, names());
+                    section.wrong_at("name", &problem)
                 })?;
                 ((kind.make)(self.rig), kind.controls, kind.parameters.to_vec())
             }
             (None, Some(library)) => {
-                let folder = self.source.path.parent().unwrap_or(Path::new(""));
-                let plugin = plugin::load(&folder.join(library.as_ref()), self.rig)
-                    .map_err(|error| self.error(library.span().start, &format!("{name}.library: {error}")))?;
+                let plugin = plugin::load(&section.beside(&library.text), self.rig)
+                    .map_err(|error| section.wrong_at("library", &format!("library: {error}")))?;
                 let description = plugin.description().clone();
                 (Box::new(plugin), description.controls, description.parameters)
             }
             _ => {
-                let problem = format!("[{name}] has one of name and library; names are {}", names());
-                return Err(self.error(place, &problem));
+                let problem = format!("name or library, one of both, is needed; names are {}", names());
+                return Err(section.wrong(&problem));
             }
         };
         let table: Vec<_> =
             std::iter::once(Parameter::declared("every_cycles", EVERY_CYCLES)).chain(parameters).collect();
-        let values = self.section(name, section, &table)?;
+        let values = self.section(section, &table)?;
         let clock = self.real_time.then(|| Box::new(MonotonicClock) as _);
         let algorithm = Guarded::new(algorithm, clock);
         Ok(Slot { algorithm, controls, values, stepped: None, wanted_m_per_s: 0.0 })
     }
 
-    fn giving_way(&mut self, section: Spanned<Section>) -> Result<GivingWay, ProgramError> {
-        let place = section.span().start;
-        let slot = self.slot("giving-way", section)?;
+    fn giving_way(&mut self, section: Section<'_>) -> Result<GivingWay, SettingsError> {
+        let unfit = section.wrong(
+            "name: an algorithm of force with the parameters moving and limit_m_per_s is needed, such as force-manual",
+        );
+        let slot = self.slot(section)?;
         let find = |name: &str| {
             let name = format!("giving-way.{name}");
             self.variables[slot.values.clone()].iter().position(|variable| variable.name == name)
         };
-        match (slot.controls, find("moving"), find("limit_m_per_s")) {
-            (Quantity::Force, Some(moving), Some(limit_m_per_s)) => {
-                let effective = self.values[slot.values.clone()].to_vec();
-                Ok(GivingWay { slot, moving, limit_m_per_s, decided: (false, None), effective })
-            }
-            _ => Err(self.error(
-                place,
-                "[giving-way] needs an algorithm of force with the parameters moving and limit_m_per_s, such as force-manual",
-            )),
-        }
-    }
-
-    fn linearisation(&self, asked: Option<Spanned<toml::Value>>) -> Result<Linearisation, ProgramError> {
-        let asked = self.take_text(LINEARISATION, asked)?;
-        let law = match &asked {
-            None => Law::ChokedExhaust,
-            Some(asked) => Law::by_name(asked.as_ref()).ok_or_else(|| {
-                let names = Law::ALL.map(Law::name).join(", ");
-                let problem = format!("{LINEARISATION} = \"{}\"; there are {names}", asked.as_ref());
-                self.error(asked.span().start, &problem)
-            })?,
+        let (Quantity::Force, Some(moving), Some(limit_m_per_s)) =
+            (slot.controls, find("moving"), find("limit_m_per_s"))
+        else {
+            return Err(unfit);
         };
-        Ok(Linearisation::new(self.rig, law))
-    }
-
-    fn take_text(
-        &self,
-        key: &str,
-        entry: Option<Spanned<toml::Value>>,
-    ) -> Result<Option<Spanned<String>>, ProgramError> {
-        let Some(entry) = entry else { return Ok(None) };
-        let span = entry.span();
-        match entry.into_inner() {
-            toml::Value::String(text) => Ok(Some(Spanned::new(span, text))),
-            other => Err(self.error(span.start, &format!("{key} = {other}: not a text in quotes"))),
-        }
+        let effective = self.values[slot.values.clone()].to_vec();
+        Ok(GivingWay { slot, moving, limit_m_per_s, decided: (false, None), effective })
     }
 }
 
@@ -300,7 +238,7 @@ opening_limit = 0.5
         Source { path: "p.toml".into(), title: "t".into(), text: text.into() }
     }
 
-    fn program(text: &str) -> Result<Program, ProgramError> {
+    fn program(text: &str) -> Result<Program, SettingsError> {
         source(text).program(Axis::Drive, &RigParameters::baseline(), false)
     }
 
@@ -325,14 +263,18 @@ opening_limit = 0.5
             ),
             ("every_cycles = 2", "every_cycles = 2.5", ["p.toml:6", "every_cycles = 2.5", "a whole number"]),
             ("gain_per_s = 20", "gain_per_s = nan", ["p.toml:7", "NaN", "0 to 200"]),
-            ("gain_per_s = 20", "gain = 20", ["p.toml:7", "algorithm.gain: no such", "gain_per_s"]),
-            ("gain_per_s = 20", "gain_per_s = \"20\"", ["p.toml:7", "gain_per_s", "not a number"]),
+            ("gain_per_s = 20", "gain = 20", ["p.toml:7", "unknown key algorithm.gain;", "gain_per_s"]),
+            (
+                "gain_per_s = 20",
+                "gain_per_s = \"20\"",
+                ["p.toml:7", "algorithm.gain_per_s = \"20\"", "allowed is a number"],
+            ),
             ("\"position-p\"", "\"position-q\"", ["p.toml:5", "position-q", "position-p"]),
             ("\"choked-exhaust\"", "\"magic\"", ["p.toml:9", "magic", "choked-exhaust"]),
             (
                 "name = \"position-p\"\n",
                 "",
-                ["p.toml:4", "[algorithm] has one of name and library", "position-p"],
+                ["p.toml:4", "algorithm.name or library, one of both", "position-p"],
             ),
             ("[post-controller]", "[past-controller]", ["p.toml", "past-controller", "post-controller"]),
         ] {

@@ -2,7 +2,7 @@
 
 use crate::{corners, mark, nominal};
 use axis_control::program::Program;
-use axis_control::program::file::{ProgramError, Source};
+use axis_control::program::file::Source;
 use plant::{Axis, RigParameters};
 use std::error::Error;
 use std::path::Path;
@@ -41,7 +41,7 @@ struct Shipped {
 }
 
 impl Shipped {
-    fn program(&self, gain: Option<f64>) -> Result<Program, ProgramError> {
+    fn program(&self, gain: Option<f64>) -> Result<Program, Box<dyn Error>> {
         let mut program = self.source.program(Axis::Drive, &self.rig, false)?;
         if let (Some(place), Some(gain)) = (program.place(GAIN), gain) {
             program.set(place, gain).expect("the ladder is within the range");
