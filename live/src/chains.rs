@@ -4,8 +4,9 @@
 //! What may happen in any state (a fault, an emergency stop, another phase of the main chain) is drawn from the state in which
 //! it is reported at most places, where the drawing says "any": a page cannot show arrows from everywhere.
 
+use super::state::ChainStates;
 use protocol::frames::{ChainStatus, DRIVE_CHAIN_STATUS, Frame};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 /// A chain: its name, its signal in the status of an axis, and its edges.
 struct Chain {
@@ -93,15 +94,15 @@ pub fn diagrams() -> Value {
 }
 
 /// The states of an axis by chain.
-pub fn active(status: ChainStatus) -> Value {
-    let mut by_chain = Map::new();
+pub fn active(status: ChainStatus) -> ChainStates {
+    let mut by_chain = ChainStates::new();
     // Both axes' statuses have one layout.
     Frame::DriveChainStatus(status).for_each_signal(|signal, value| {
         if let Some(chain) = CHAINS.iter().find(|chain| chain.signal == signal.name) {
-            by_chain.insert(chain.name.to_owned(), signal.values.get(value as usize).copied().into());
+            by_chain.insert(chain.name, signal.values.get(value as usize).copied());
         }
     });
-    by_chain.into()
+    by_chain
 }
 
 #[cfg(test)]
@@ -128,9 +129,9 @@ mod tests {
         let frame = Frame::from_values(DRIVE_CHAIN_STATUS.id, &[5.0, 2.0, 3.0, 0.0, 1.0, 9.0, 0.0]);
         let Some(Frame::DriveChainStatus(status)) = frame else { panic!("{frame:?}") };
         let reported = active(status);
-        assert_eq!(reported["main"], "experiment");
-        assert_eq!(reported["force"], "standstill");
-        assert_eq!(reported["matching"], "matched");
-        assert_eq!(reported["emergency_stop"], "ready");
+        assert_eq!(reported["main"], Some("experiment"));
+        assert_eq!(reported["force"], Some("standstill"));
+        assert_eq!(reported["matching"], Some("matched"));
+        assert_eq!(reported["emergency_stop"], Some("ready"));
     }
 }

@@ -1,9 +1,10 @@
 //! The loop's heartbeat out of the telemetry's histograms: wake-ups and round trips, of all that was heard and of the last 10 s.
 
+use super::state::StagePercentiles;
 use latency::hlog;
 use latency::samples::Samples;
 use serde_json::{Value, json};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// Seconds that count as the last ones.
 const RECENT_S: usize = 10;
@@ -46,20 +47,19 @@ impl Rhythm {
     }
 
     /// Percentiles of all that was heard, us; null where there are too few samples for one.
-    pub fn percentiles(&self) -> Value {
+    pub fn percentiles(&self) -> BTreeMap<&'static str, StagePercentiles> {
         let us = |ns: Option<u64>| ns.map(|ns| ns as f64 / 1e3);
-        let reported = |distribution: &Distribution| {
+        self.each(|distribution| {
             let reported = distribution.whole.percentiles_ns();
-            json!({
-                "p50": us(reported.p50),
-                "p90": us(reported.p90),
-                "p99": us(reported.p99),
-                "p999": us(reported.p999),
-                "max": us(reported.max),
-                "count": reported.count,
-            })
-        };
-        self.each(reported)
+            StagePercentiles {
+                p50_us: us(reported.p50),
+                p90_us: us(reported.p90),
+                p99_us: us(reported.p99),
+                p999_us: us(reported.p999),
+                max_us: us(reported.max),
+                count: reported.count,
+            }
+        })
     }
 
     /// Bins on a logarithmic axis: upper end in us, and samples.
@@ -67,11 +67,12 @@ impl Rhythm {
         let bins = |samples: &Samples| -> Value {
             samples.bins().iter().map(|bin| json!([bin.to_ns as f64 / 1e3, bin.count])).collect()
         };
-        self.each(|distribution| {
+        let reported = self.each(|distribution| {
             let mut recent = Samples::default();
             distribution.recent.iter().for_each(|(_, samples)| recent.add(samples));
             json!({ "whole": bins(&distribution.whole), "last_10_s": bins(&recent) })
-        })
+        });
+        json!(reported)
     }
 
     /// The samples of all that was heard, by name.
@@ -79,12 +80,12 @@ impl Rhythm {
         SHOWN.iter().zip(&self.distributions).map(|((name, _), distribution)| (*name, &distribution.whole))
     }
 
-    fn each(&self, tell: impl Fn(&Distribution) -> Value) -> Value {
-        let reported = SHOWN.iter().zip(&self.distributions);
-        reported
-            .map(|((name, _), distribution)| ((*name).to_owned(), tell(distribution)))
-            .collect::<serde_json::Map<_, _>>()
-            .into()
+    fn each<T>(&self, of: impl Fn(&Distribution) -> T) -> BTreeMap<&'static str, T> {
+        SHOWN
+            .iter()
+            .zip(&self.distributions)
+            .map(|((name, _), distribution)| (*name, of(distribution)))
+            .collect()
     }
 }
 
@@ -116,8 +117,8 @@ mod tests {
         };
         assert_eq!((count("whole"), count("last_10_s")), (1500, 1000));
         assert_eq!(reported["wake_up"]["last_10_s"].as_array().unwrap().len(), 1, "all of one length");
-        assert_eq!(rhythm.percentiles()["wake_up"]["count"], 1500);
-        assert_eq!(rhythm.percentiles()["round_trip"]["p50"], Value::Null);
+        assert_eq!(rhythm.percentiles()["wake_up"].count, 1500);
+        assert_eq!(rhythm.percentiles()["round_trip"].p50_us, None);
     }
 
     #[test]
@@ -126,7 +127,7 @@ mod tests {
         for tag in ["drive-round-trip", "load-round-trip", "emulator-step"] {
             lines(tag, 0.0, 20_000).iter().for_each(|line| rhythm.take(line).unwrap());
         }
-        assert_eq!(rhythm.percentiles()["round_trip"]["count"], 200);
+        assert_eq!(rhythm.percentiles()["round_trip"].count, 200);
         assert!(rhythm.take("Tag=a,0,1,2,nothing").is_err());
     }
 }

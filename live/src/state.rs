@@ -5,11 +5,13 @@
 use super::light::Judgement;
 use runlog::event::FaultMark;
 use serde::Serialize;
-use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Values by column, each in the unit of its column.
 pub type NewestRow = BTreeMap<String, Option<f64>>;
+
+/// The state of each chain of an axis by its name; `None` of a number that `rig.dbc` does not name.
+pub type ChainStates = BTreeMap<&'static str, Option<&'static str>>;
 
 /// The state of the run that goes on.
 #[derive(Clone, Debug, Serialize)]
@@ -22,8 +24,8 @@ pub struct State {
     pub linked: bool,
     pub check_valves_shut: Option<bool>,
     pub weights_kg: f64,
-    /// States of the chains by axis and chain; null of a controller that is silent.
-    pub chains: Value,
+    /// By axis; `None` of a controller that is silent.
+    pub chains: BTreeMap<&'static str, Option<ChainStates>>,
     pub faults_active: Vec<ActiveFault>,
     pub bus: BusLoad,
     pub timing: Timing,
@@ -73,12 +75,29 @@ pub struct BusLoad {
 pub struct Timing {
     /// Percentiles of each stage by its name.
     #[serde(flatten)]
-    pub percentiles: Value,
+    pub percentiles: BTreeMap<&'static str, StagePercentiles>,
     pub overruns: u64,
     /// In each of the last seconds, the one that goes on last.
     pub overruns_by_second: Vec<u64>,
     /// Cycles that overruns skipped.
     pub skipped: u64,
+}
+
+/// Percentiles of a stage, us; `None` where there are too few samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct StagePercentiles {
+    #[serde(rename = "p50")]
+    pub p50_us: Option<f64>,
+    #[serde(rename = "p90")]
+    pub p90_us: Option<f64>,
+    #[serde(rename = "p99")]
+    pub p99_us: Option<f64>,
+    #[serde(rename = "p999")]
+    pub p999_us: Option<f64>,
+    #[serde(rename = "max")]
+    pub max_us: Option<f64>,
+    /// Samples.
+    pub count: u64,
 }
 
 /// A message of the page.

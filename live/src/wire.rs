@@ -1,14 +1,14 @@
 //! The bus as the live page sees it: the rig's cycles, what the controllers say, who holds a stop, how full the wire is.
 
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
-use super::state::{BusLoad, EmergencyStopState};
+use super::state::{BusLoad, ChainStates, EmergencyStopState};
 use protocol::bus_load::worst_case_bits;
 use protocol::can::CanFrame;
 use protocol::frames::{
     ALIVE_RANGE, BIT_RATE_PER_S, ChainStatus, ChainValues, DecodeError, ECHO_RANGE, EmergencyStop, Frame,
     HandSetPoint, HandSetPointAxis, MESSAGES, RigStatus, Sensors, Tick,
 };
-use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 
 /// Who stopped or failed to is known by a frame every 100 ms; one that is silent for so long holds nothing any more.
 const STOP_HOLDS_MS: u64 = 500;
@@ -214,17 +214,13 @@ impl Wire {
     }
 
     /// The states of the chains of both axes; null of a controller that is silent.
-    pub fn chains(&self, now_ms: u64) -> Value {
+    pub fn chains(&self, now_ms: u64) -> BTreeMap<&'static str, Option<ChainStates>> {
         let fresh = self.chains.map(|received| {
             received
                 .filter(|(at_ms, _)| now_ms.saturating_sub(*at_ms) < STATUS_HOLDS_MS)
                 .map(|(_, status)| status)
         });
-        let states = AXES.iter().zip(fresh);
-        states
-            .map(|(axis, status)| ((*axis).to_owned(), json!(status.map(super::chains::active))))
-            .collect::<Map<_, _>>()
-            .into()
+        AXES.into_iter().zip(fresh.map(|status| status.map(super::chains::active))).collect()
     }
 
     /// A second is over, perhaps.
