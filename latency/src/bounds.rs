@@ -18,6 +18,7 @@ use super::kinds;
 use super::model::{BoundResult, Cause, Distribution, PercentilesNs, Ratio, Report};
 use super::ratios;
 use super::resolution::{self, Verdict};
+use serde::Deserialize;
 use serde_json::Value;
 
 /// Figures that a message names.
@@ -36,6 +37,20 @@ pub enum BoundsError {
     Unknown { figure: String, known: String },
 }
 
+/// A bound as it is written: at least one of both.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Bound {
+    min: Option<f64>,
+    max: Option<f64>,
+}
+
+/// The most that the text of a threshold file allows of a figure.
+pub(crate) fn most(text: &str, figure: &str) -> Option<f64> {
+    let file: toml::Table = text.parse().ok()?;
+    file.get("bounds")?.get(figure)?.clone().try_into::<Bound>().ok()?.max
+}
+
 /// Judges a report by the text of a threshold file.
 pub fn judge(text: &str, report: &Report) -> Result<Vec<BoundResult>, BoundsError> {
     let file: toml::Table =
@@ -46,19 +61,13 @@ pub fn judge(text: &str, report: &Report) -> Result<Vec<BoundResult>, BoundsErro
 }
 
 fn one(figure: &str, bound: &toml::Value, report: &Report) -> Result<BoundResult, BoundsError> {
-    let shape = || BoundsError::Shape { figure: figure.to_owned() };
-    let bound = bound.as_table().filter(|bound| !bound.is_empty()).ok_or_else(shape)?;
-    if bound.keys().any(|key| key != "min" && key != "max") {
-        return Err(shape());
-    }
-    let side = |key: &str| {
-        let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
-        bound
-            .get(key)
-            .map(|value| number(value).filter(|value| value.is_finite()).ok_or_else(shape))
-            .transpose()
+    let bound: Option<Bound> = bound.clone().try_into().ok();
+    let written = |bound: &Bound| {
+        let mut sides = bound.min.iter().chain(&bound.max).peekable();
+        sides.peek().is_some() && sides.all(|side| side.is_finite())
     };
-    let (min, max) = (side("min")?, side("max")?);
+    let Bound { min, max } =
+        bound.filter(written).ok_or_else(|| BoundsError::Shape { figure: figure.to_owned() })?;
     let value = value(figure, report).ok_or_else(|| unknown(figure, report))?;
     let ratio = figure.strip_prefix("ratio.").and_then(|name| ratio(name, report));
     let verdict = match ratio {

@@ -9,6 +9,7 @@
 //! Medians and intervals are those of [`ratios`], over the pairs; what is claimed stands in `latency/bounds*.toml`, and
 //! [`resolution`] says whether it is kept.
 
+use crate::bounds;
 use crate::model::{Ratio, Report, RunPart};
 use crate::ratios;
 use crate::resolution::{self, Verdict};
@@ -53,12 +54,7 @@ pub fn table(arguments: &LatencyTableArguments) -> Result<String, FileError> {
 }
 
 fn claimed(figure: &str) -> Option<f64> {
-    let of = |text: &str| {
-        let file: toml::Table = text.parse().ok()?;
-        let max = file.get("bounds")?.get(figure)?.get("max")?.clone();
-        max.as_float().or_else(|| max.as_integer().map(|max| max as f64))
-    };
-    CLAIMS.iter().find_map(|text| of(text))
+    CLAIMS.iter().find_map(|text| bounds::most(text, figure))
 }
 
 fn spinning(runs: &[RunPart]) -> Option<Ratio> {
