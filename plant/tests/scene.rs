@@ -90,25 +90,31 @@ fn a_bad_scene_is_refused_with_file_line_key_value_and_range() {
     let whole: [(&str, &[&str]); 7] = [
         ("[rig]\ncarriage_position_m = 0.6", &["e.toml:2: rig.carriage_position_m = 0.6", "0 to 0.5 m"]),
         ("[rig]\nadded_mass_kg = nan", &["e.toml:2: rig.added_mass_kg = NaN", "0 to 20 kg"]),
-        ("[rig]\nlinkd = true", &["e.toml:2: ", "unknown field `linkd`", "carriage_position_m"]),
-        ("[rig]\nlinked = 1", &["e.toml:2: ", "boolean"]),
-        ("[rig\n", &["e.toml:1: "]),
-        ("[[rig.hand]]\non = \"elbow\"", &["e.toml:2: ", "elbow", "carriage", "load-eye"]),
-        ("[[rig.event]]\nat_s = 1\ndo = \"jump\"", &["e.toml:3: ", "jump", "emergency-stop", "weights"]),
+        (
+            "[rig]\nlinkd = true",
+            &["e.toml:2: ", "unknown key rig.linkd", "carriage_position_m", "did you mean linked?"],
+        ),
+        ("[rig]\nlinked = 1", &["e.toml:2: rig.linked = 1", "true or false"]),
+        ("[rig\n", &["e.toml:1: not TOML: "]),
+        ("[[rig.hand]]\non = \"elbow\"", &["e.toml:2: rig.hand[1].on", "elbow", "carriage", "load-eye"]),
+        (
+            "[[rig.event]]\nat_s = 1\ndo = \"jump\"",
+            &["e.toml:3: rig.event[1].do", "jump", "emergency-stop", "weights"],
+        ),
     ];
     let of_a_hand: [(&str, &[&str]); 8] = [
-        ("to_s = 1\nforce_n = 5", &["e.toml:4: rig.hand.to_s = 1", "after rig.hand.from_s = 1"]),
-        ("to_s = 2\nforce_n = 2001", &["e.toml:5: rig.hand.force_n = 2001", "-2000 to 2000 N"]),
-        ("to_s = 2\nforce_n = nan", &["e.toml:5: rig.hand.force_n = NaN"]),
+        ("to_s = 1\nforce_n = 5", &["e.toml:4: rig.hand[1].to_s = 1", "after from_s = 1"]),
+        ("to_s = 2\nforce_n = 2001", &["e.toml:5: rig.hand[1].force_n = 2001", "-2000 to 2000 N"]),
+        ("to_s = 2\nforce_n = nan", &["e.toml:5: rig.hand[1].force_n = NaN", "-2000 to 2000 N"]),
         ("to_s = 2", &["e.toml:2: rig.hand", "force_n, guide_to_m"]),
         ("to_s = 2\nforce_n = 5\nguide_to_m = 0.1", &["e.toml:2: rig.hand", "one of"]),
-        ("to_s = 2\nforce_n = 5\nmost_n = 9", &["e.toml:6: rig.hand.most_n = 9", "guide_to_m"]),
-        ("to_s = 2\nguide_to_m = 0.1\nramp_s = 1", &["e.toml:6: rig.hand.ramp_s = 1", "force_n"]),
-        ("to_s = 2\nguide_to_m = -0.1", &["e.toml:5: rig.hand.guide_to_m = -0.1", "0 to 0.5 m"]),
+        ("to_s = 2\nforce_n = 5\nmost_n = 9", &["e.toml:6: rig.hand[1].most_n = 9", "guide_to_m"]),
+        ("to_s = 2\nguide_to_m = 0.1\nramp_s = 1", &["e.toml:6: rig.hand[1].ramp_s = 1", "force_n"]),
+        ("to_s = 2\nguide_to_m = -0.1", &["e.toml:5: rig.hand[1].guide_to_m = -0.1", "0 to 0.5 m"]),
     ];
     let of_an_event: [(&str, &[&str]); 2] = [
-        ("\"weights\"", &["e.toml:3: ", "needs added_mass_kg, 0 to 20 kg"]),
-        ("\"unlink\"\nuntil_s = 3", &["e.toml:4: rig.event.until_s = 3", "\"link\" alone"]),
+        ("\"weights\"", &["e.toml:1: rig.event[1].added_mass_kg is missing", "0 to 20 kg"]),
+        ("\"unlink\"\nuntil_s = 3", &["e.toml:4: rig.event[1].until_s = 3", "\"link\" alone"]),
     ];
     let hand = |text| format!("[[rig.hand]]\non = \"load-eye\"\nfrom_s = 1\n{text}");
     let event = |text| format!("[[rig.event]]\nat_s = 1\ndo = {text}");

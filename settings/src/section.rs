@@ -41,8 +41,10 @@ impl<'a> Source<'a> {
     /// # Errors
     /// [`SettingsError`] for what is no TOML.
     pub fn parse(text: &'a str, file: &'a Path) -> Result<Self> {
-        let root =
-            DeTable::parse(text).map_err(|error| SettingsError(format!("{}: {error}", file.display())))?;
+        let root = DeTable::parse(text).map_err(|error| {
+            let line = line_of(text, error.span().map_or(0, |span| span.start));
+            SettingsError(format!("{}:{line}: not TOML: {}", file.display(), error.to_string().trim_end()))
+        })?;
         Ok(Self { text, file, root, empty: DeTable::new(), columns: false })
     }
 
@@ -132,7 +134,7 @@ impl<'a> Section<'a> {
             Some(list) => list.iter().map(finite).collect(),
             None => finite(value).map(|number| vec![number]),
         };
-        all.ok_or_else(|| self.not_allowed(value, key, "a finite number, or a list of them"))
+        all.ok_or_else(|| self.refused(key, "allowed is a finite number, or a list of them"))
     }
 
     /// The finite number under `key`, of any range; `None` when it is absent.
@@ -142,7 +144,7 @@ impl<'a> Section<'a> {
     pub fn finite(&mut self, key: &str) -> Result<Option<f64>> {
         let Some(value) = self.value(key) else { return Ok(None) };
         let finite = number(value.get_ref()).filter(|number| number.is_finite());
-        finite.map(Some).ok_or_else(|| self.not_allowed(value, key, "a finite number"))
+        finite.map(Some).ok_or_else(|| self.refused(key, "allowed is a finite number"))
     }
 
     /// Whether `key` is set to true; false when it is absent.
@@ -151,7 +153,7 @@ impl<'a> Section<'a> {
     /// Neither true nor false.
     pub fn flag(&mut self, key: &str) -> Result<bool> {
         let Some(value) = self.value(key) else { return Ok(false) };
-        value.get_ref().as_bool().ok_or_else(|| self.not_allowed(value, key, "true or false"))
+        value.get_ref().as_bool().ok_or_else(|| self.refused(key, "allowed is true or false"))
     }
 
     /// The texts listed under `key`; none when it is absent.
@@ -163,29 +165,25 @@ impl<'a> Section<'a> {
         let list = value.get_ref().as_array();
         let texts =
             list.and_then(|list| list.iter().map(|item| item.get_ref().as_str().map(String::from)).collect());
-        texts.ok_or_else(|| self.not_allowed(value, key, "a list of texts"))
+        texts.ok_or_else(|| self.refused(key, "allowed is a list of texts"))
     }
 
     /// Byte of the file at which the value under `key` begins; that of the table when it is absent.
     #[must_use]
     pub fn at(&self, key: &str) -> usize {
-        let found = self.table.iter().find(|(name, _)| name.get_ref() == key);
-        found.map_or(self.at, |(_, value)| value.span().start)
+        self.entry(key).map_or(self.at, |value| value.span().start)
     }
 
     /// Whether the key is there. To ask is not to allow it.
     #[must_use]
     pub fn has(&self, key: &str) -> bool {
-        self.table.keys().any(|name| name.get_ref() == key)
+        self.entry(key).is_some()
     }
 
     /// The text under `key`, if it is there and one. To look is not to allow it.
     #[must_use]
     pub fn peek(&self, key: &str) -> Option<&str> {
-        self.table
-            .iter()
-            .find(|(name, _)| name.get_ref() == key)
-            .and_then(|(_, value)| value.get_ref().as_str())
+        self.entry(key).and_then(|value| value.get_ref().as_str())
     }
 
     /// Its name with those of the tables around it, such as `drive.change[1]`; empty for the whole file.
@@ -212,8 +210,8 @@ impl<'a> Section<'a> {
             }
             None => {
                 let Parameter { name, unit, least, most, .. } = parameter;
-                let allowed = format!("a number, {least} to {most} {unit}");
-                Err(self.not_allowed(value, name, allowed.trim_end()))
+                let allowed = format!("allowed is a number, {least} to {most} {unit}");
+                Err(self.refused(name, allowed.trim_end()))
             }
         }
     }
@@ -261,7 +259,7 @@ impl<'a> Section<'a> {
                 line: self.source.line(value.span().start),
                 at: self.source.start_of_text(value, text),
             })),
-            None => Err(self.not_allowed(value, key, "a text in quotes")),
+            None => Err(self.refused(key, "allowed is a text in quotes")),
         }
     }
 
@@ -282,6 +280,16 @@ impl<'a> Section<'a> {
         self.chosen(key, &written.text, choices)
     }
 
+    /// The same of a key that must be there.
+    ///
+    /// # Errors
+    /// Missing, or none of them.
+    pub fn needed_choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T> {
+        let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
+        let written = self.needed_text(key, &format!("one of {}", names.join(", ")))?;
+        self.chosen(key, &written.text, choices)
+    }
+
     /// The named choices listed under `key`; none when it is absent.
     ///
     /// # Errors
@@ -291,7 +299,7 @@ impl<'a> Section<'a> {
         let list = value.get_ref().as_array();
         let texts = list.and_then(|list| list.iter().map(|item| item.get_ref().as_str()).collect());
         let Some(texts): Option<Vec<&str>> = texts else {
-            return Err(self.not_allowed(value, key, "a list of texts"));
+            return Err(self.refused(key, "allowed is a list of texts"));
         };
         texts.into_iter().map(|text| self.chosen(key, text, choices)).collect()
     }
@@ -412,21 +420,21 @@ impl<'a> Section<'a> {
     /// An error of the value under `key`, which begins with that key.
     #[must_use]
     pub fn wrong_at(&self, key: &str, message: &str) -> SettingsError {
-        match self.table.iter().find(|(name, _)| name.get_ref() == key) {
-            Some((_, value)) => self.reported(value, message),
-            None => self.wrong(message),
-        }
+        self.entry(key).map_or_else(|| self.wrong(message), |value| self.reported(value, message))
+    }
+
+    /// An error of the value under `key`, which it repeats as it is written before it says what is wrong.
+    #[must_use]
+    pub fn refused(&self, key: &str, problem: &str) -> SettingsError {
+        let Some(value) = self.entry(key) else { return self.wrong(&format!("{key}: {problem}")) };
+        let written = written(self.source.text, value.span());
+        self.reported(value, &format!("{key} = {written}; {problem}"))
     }
 
     /// A missing key, with those that are there: it may be one of them, misspelt.
     fn lacks(&self, message: &str) -> SettingsError {
         let keys: Vec<&str> = self.table.keys().map(|name| name.get_ref().as_ref()).collect();
         self.wrong(&format!("{message}; the keys here are {}", keys.join(", ")))
-    }
-
-    fn not_allowed(&self, value: &Spanned<DeValue<'_>>, key: &str, allowed: &str) -> SettingsError {
-        let written = written(self.source.text, value.span());
-        self.reported(value, &format!("{key} = {written}; allowed is {allowed}"))
     }
 
     fn reported(&self, value: &Spanned<DeValue<'_>>, message: &str) -> SettingsError {
@@ -441,7 +449,11 @@ impl<'a> Section<'a> {
         if !self.asked.iter().any(|asked| asked == key) {
             self.asked.push(key.into());
         }
-        self.table.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+        self.entry(key)
+    }
+
+    fn entry(&self, key: &str) -> Option<&'a Spanned<DeValue<'a>>> {
+        self.table.get(key)
     }
 
     fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>, example: Option<&str>) -> Result<Self> {

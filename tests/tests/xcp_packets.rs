@@ -236,7 +236,11 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
             "gain = 33.5",
             ["drive.algorithm.gain: no such variable", "algorithm.gain_per_s"],
         ),
-        ("gain_per_s = 33.5", "gain_per_s = \"33\"", ["drive.algorithm.gain_per_s = \"33\"", "a finite number"]),
+        (
+            "gain_per_s = 33.5",
+            "gain_per_s = \"33\"",
+            ["drive.algorithm.gain_per_s = \"33\"", "a finite number"],
+        ),
     ] {
         assert!(printed.contains(from));
         let _ = scene.write("set.toml", &printed.replacen(from, to, 1));

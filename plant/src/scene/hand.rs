@@ -14,7 +14,7 @@
 use std::f64::consts::TAU;
 use std::ops::Add;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::cycle_of;
 use crate::plant::Plant;
@@ -32,7 +32,7 @@ pub const DEFAULT_DAMPING_N_S_PER_M: f64 = 60.0;
 pub const DEFAULT_MOST_N: f64 = 150.0;
 
 /// What a hand can be put on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
     /// Carriage on the rod of the drive.
