@@ -11,9 +11,9 @@ use plotters::style::RGBColor;
 use runlog::run_folder::FileError;
 use std::path::Path;
 
-const METRE_IN_MM: f64 = 1e3;
+pub(crate) const METRE_IN_MM: f64 = 1e3;
 const PASCAL_IN_BAR: f64 = 1e-5;
-const PER_CENT: f64 = 100.0;
+pub(crate) const PER_CENT: f64 = 100.0;
 /// What a zoom shows before and after its instant.
 const BEFORE_S: f64 = 0.2;
 const AFTER_S: f64 = 0.6;

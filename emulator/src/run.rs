@@ -237,7 +237,7 @@ impl RigWork<'_> {
 
 fn loop_config(arguments: &RunArguments) -> Result<PeriodicConfig, RunError> {
     let spin = arguments.spin_us.map(Duration::from_micros);
-    let config = PeriodicConfig { period: pace::CYCLE, policy: arguments.overrun, spin };
+    let config = PeriodicConfig { period: protocol::periods::CYCLE, policy: arguments.overrun, spin };
     config.check().map_err(|error| RunError::Input(format!("--spin-us: {error}")))?;
     Ok(config)
 }

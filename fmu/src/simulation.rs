@@ -13,14 +13,12 @@ mod refusal;
 
 use crate::variables::{self, Causality, Kind, Role, Variable};
 use plant::parameters::table::KEYS;
-use plant::{AxisReadings, Inputs, Plant, RigParameters, Sensors, Setup, SetupError};
+use plant::{AxisReadings, Inputs, PERIOD_S, Plant, RigParameters, Sensors, Setup, SetupError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use refusal::Refusal;
 
-/// The plant's period, s.
-const PERIOD_S: f64 = 1e-3;
 /// How far a communication point may be off by its importer's rounding, s.
 const TOLERANCE_S: f64 = 1e-6;
 /// Most periods of one step, some 11 days.

@@ -16,9 +16,9 @@ pub mod rules;
 
 use super::files::RunFiles;
 use super::findings::lost_by_gaps;
-use super::joined::PERIOD_NS;
 use super::model::{AroundRow, Event, ProbeGap};
 use super::probe::{self, Gap};
+use protocol::periods::CYCLE_NS;
 use rules::{Known, Seen};
 use runlog::timing::CycleTiming;
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ const CONTINUED_WITHIN_CYCLES: u64 = 5;
 /// Cycles in a row that were sent and not answered, from which on a controller is taken as not having read them.
 const OVERTAKEN_CYCLES: usize = 2;
 /// Time on each side of an event from which gaps of the probe are shown, ns.
-const GAPS_WITHIN_NS: u64 = 2 * PERIOD_NS;
+const GAPS_WITHIN_NS: u64 = 2 * CYCLE_NS;
 /// Gaps shown for an event, the longest.
 const GAPS_SHOWN: usize = 20;
 
@@ -79,8 +79,8 @@ pub fn sort_by_severity(events: &mut [Event]) {
 /// Wants the worst first.
 pub fn one_of_each_moment(events: Vec<Event>) -> Vec<Event> {
     let severity_ns = |event: &Event| event.late_ns.max(event.slow_ns);
-    let from_ns = |event: &Event| event.cycle * PERIOD_NS;
-    let to_ns = |event: &Event| from_ns(event) + severity_ns(event).max(PERIOD_NS);
+    let from_ns = |event: &Event| event.cycle * CYCLE_NS;
+    let to_ns = |event: &Event| from_ns(event) + severity_ns(event).max(CYCLE_NS);
     let mut kept: Vec<Event> = Vec::new();
     for event in events {
         let same = kept.iter_mut().find(|other| {
@@ -109,7 +109,7 @@ fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<Late> {
     let with_late = |place: usize| {
         let row = &rows[place];
         let (missed, due_ns) = match process {
-            "emulator" => (row.skipped, row.due_ns.saturating_sub(row.skipped * PERIOD_NS)),
+            "emulator" => (row.skipped, row.due_ns.saturating_sub(row.skipped * CYCLE_NS)),
             _ => missed_by_controller(place, process, run, lost),
         };
         let late_ns = row.woke_ns.saturating_sub(due_ns);
@@ -142,7 +142,7 @@ fn missed_by_controller(place: usize, process: &str, run: &RunFiles, lost: u64) 
     });
     let (missed, first_ns) = match came_ns {
         // Sent a moment before they came.
-        Some(came_ns) => (sent_ns.filter(|ns| ns + PERIOD_NS / 2 >= came_ns).count() as u64, came_ns),
+        Some(came_ns) => (sent_ns.filter(|ns| ns + CYCLE_NS / 2 >= came_ns).count() as u64, came_ns),
         None => {
             let sent_ns: Vec<_> = sent_ns.collect();
             let overtaken = lost == 0 && sent_ns.len() >= OVERTAKEN_CYCLES;

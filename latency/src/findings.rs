@@ -7,8 +7,8 @@
 use super::explain::EVENT_OVER_NS;
 use super::explain::rules::in_words;
 use super::files::RunFiles;
-use super::joined::PERIOD_NS;
 use super::model::{Cause, Event, Finding};
+use protocol::periods::CYCLE_NS;
 use runlog::controller_report::ControllerReport;
 use runlog::timing::CycleTiming;
 use std::collections::BTreeMap;
@@ -127,7 +127,7 @@ fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
         let logged = run.logged.get("emulator-wakeup").and_then(|series| series.samples.max_ns());
         let longest_ns = logged.or(summary.wakeup_ns.max);
         let missing = counted.unwrap_or_default().saturating_sub(rows.iter().map(|row| row.skipped).sum());
-        let late_ns = |row: &CycleTiming| (row.woke_ns + row.skipped * PERIOD_NS).saturating_sub(row.due_ns);
+        let late_ns = |row: &CycleTiming| (row.woke_ns + row.skipped * CYCLE_NS).saturating_sub(row.due_ns);
         let of_rows_ns = rows.iter().map(late_ns).max().unwrap_or_default();
         let max_ns =
             longest_ns.filter(|ns| of_rows_ns as f64 / (*ns as f64) < SAME_MAXIMUM).unwrap_or_default();

@@ -10,11 +10,9 @@
 
 use super::files::{PROCESSES, RunFiles};
 use super::samples::Samples;
+use protocol::periods::CYCLE_NS;
 use runlog::timing::{CycleTiming, Exchange};
 use std::collections::{BTreeMap, HashMap};
-
-/// Length of a cycle, ns.
-pub const PERIOD_NS: u64 = 1_000_000;
 
 /// Samples, and the largest of each second.
 #[derive(Clone, Debug, Default)]
@@ -28,7 +26,7 @@ impl Series {
     /// Counts one sample of a cycle of the rig.
     pub fn record(&mut self, cycle: u64, ns: u64) {
         self.samples.record(ns, 1);
-        let largest = self.maxima_ns.entry(cycle * PERIOD_NS / 1_000_000_000).or_default();
+        let largest = self.maxima_ns.entry(cycle * CYCLE_NS / 1_000_000_000).or_default();
         *largest = ns.max(*largest);
     }
 }
@@ -107,8 +105,8 @@ pub fn of_rows(process: &str, rows: &[CycleTiming]) -> BTreeMap<String, Series> 
         if process == "emulator" {
             // Each missed cycle was late too, against its own scheduled time, and done when this one was.
             for n in 1..=row.skipped.min(row.cycle) {
-                record("wakeup", row.cycle, late_ns + n * PERIOD_NS);
-                record("completion", row.cycle, completion_ns + n * PERIOD_NS);
+                record("wakeup", row.cycle, late_ns + n * CYCLE_NS);
+                record("completion", row.cycle, completion_ns + n * CYCLE_NS);
             }
         }
         record("wakeup", row.cycle, late_ns);

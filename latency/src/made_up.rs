@@ -1,8 +1,8 @@
 //! Runs that never were, for tests: regular rows of a rig and a controller, and what is done to them.
 
 use super::files::RunFiles;
-use super::joined::PERIOD_NS;
 use super::samples::Samples;
+use protocol::periods::CYCLE_NS;
 use realtime::VitalCounts;
 use runlog::conditions::Conditions;
 use runlog::timing::{CycleTiming, Exchange};
@@ -59,14 +59,14 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
 }
 
 fn both(cycle: u64) -> (CycleTiming, CycleTiming) {
-    let due_ns = START_NS + cycle * PERIOD_NS;
+    let due_ns = START_NS + cycle * CYCLE_NS;
     let quiet = |cpu| VitalCounts { voluntary_switches: 1, run_delay_ns: 800, cpu, ..VitalCounts::default() };
     // Some spread, so that percentiles differ.
     let woke_ns = due_ns + 10_000 + cycle * 37 % 5_000;
     let sent_ns = woke_ns + 4_000;
     let answer_ns = sent_ns + TO_CONTROLLER_NS + 12_000;
     // The command that acts now answers the cycle before.
-    let arrived_ns = answer_ns - PERIOD_NS + TO_RIG_NS;
+    let arrived_ns = answer_ns - CYCLE_NS + TO_RIG_NS;
     let answered = Exchange { sensors_ns: sent_ns, command_ns: arrived_ns, answers: cycle.wrapping_sub(1) };
     let answered = if cycle == 0 { Exchange { command_ns: 0, answers: 0, ..answered } } else { answered };
     let rig = CycleTiming {
@@ -113,7 +113,7 @@ pub(crate) fn stall<'a>(
     cycle: u64,
     late_ns: u64,
 ) -> &'a mut CycleTiming {
-    let missed = late_ns / PERIOD_NS;
+    let missed = late_ns / CYCLE_NS;
     let at_rig = process == "emulator";
     for (name, rows) in &mut run.rows {
         if at_rig || name == process {
@@ -126,7 +126,7 @@ pub(crate) fn stall<'a>(
     }
     let rows = run.rows.get_mut(process).expect("a process with rows");
     let row = rows.iter_mut().find(|row| row.cycle == cycle + missed).expect("cycles after the stall");
-    let by_ns = (late_ns - missed * PERIOD_NS).saturating_sub(row.woke_ns - row.due_ns);
+    let by_ns = (late_ns - missed * CYCLE_NS).saturating_sub(row.woke_ns - row.due_ns);
     row.woke_ns += by_ns;
     row.done_ns += by_ns;
     row

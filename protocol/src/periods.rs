@@ -1,4 +1,4 @@
-//! How often and when cyclic frames are sent, in cycles of the rig: `rig.dbc`'s periods, and the places within them.
+//! The cycle of the rig, and how often and when cyclic frames are sent, in cycles of the rig: `rig.dbc`'s periods, and the places within them.
 //!
 //! Tick and status of the rig are half a period apart, so that no millisecond carries both. Whoever sends or awaits one of
 //! these frames counts by what stands here.
@@ -8,6 +8,14 @@ use crate::frames::{
     LOAD_CHAIN_STATUS, LOAD_CHAIN_VALUES, LOAD_EMERGENCY_STOP, MessageSpec, RIG_EMERGENCY_STOP, RIG_STATUS,
     TICK,
 };
+use std::time::Duration;
+
+/// A cycle of the rig (bus.md, Time): sensors are sent once in it.
+pub const CYCLE: Duration = Duration::from_millis(DRIVE_SENSORS.cycle_time_ms as u64);
+/// The same, ns.
+pub const CYCLE_NS: u64 = CYCLE.as_nanos() as u64;
+/// The same, s.
+pub const CYCLE_S: f64 = DRIVE_SENSORS.cycle_time_ms as f64 / 1000.0;
 
 /// From one tick of the rig to the next.
 pub const TICK_CYCLES: u64 = cycles(TICK);
@@ -36,7 +44,6 @@ pub const fn status_is_due(cycle: u64) -> bool {
 }
 
 const fn cycles(message: &MessageSpec) -> u64 {
-    // A cycle is what sensors are sent once in.
     (message.cycle_time_ms / DRIVE_SENSORS.cycle_time_ms) as u64
 }
 

@@ -4,6 +4,7 @@
 //! read [`FaultMark`]. In JSON a kind without details is its name in kebab case, another one an object of its name and its
 //! details: `"linked"`, `{"weights":{"added_mass_kg":2.5}}`.
 
+use protocol::commands::STALE_AFTER_CYCLES;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -38,7 +39,7 @@ pub enum EventKind<M = FaultMark> {
         cycles: u64,
     },
     /// No fresh command of the axis for 20 cycles; its valve is shut.
-    #[error("no fresh {} command for 20 cycles, valve shut; is its controller running?", .0.name())]
+    #[error("no fresh {} command for {STALE_AFTER_CYCLES} cycles, valve shut; is its controller running?", .0.name())]
     CommandStale(Axis),
     /// Fresh commands of the axis after stale ones.
     #[error("fresh {} commands again, valve follows", .0.name())]

@@ -14,6 +14,7 @@ use crate::flight_dump::{self, Event, Log};
 use crate::run_folder::LineFile;
 use crate::timing::{self, CycleTiming};
 use protocol::frames::{Frame, MessageSpec};
+use protocol::periods::CYCLE;
 use realtime::flight::{Dump, Lateness, MOST_DUMPS, keep_first};
 use realtime::stages::Further;
 use realtime::{
@@ -26,10 +27,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Time from one cycle to the next.
-const PERIOD: Duration = Duration::from_millis(1);
-/// Start of a run that the totals of the kernel's counters leave out: memory is touched for the first time.
-const WARM_UP_CYCLES: u64 = 1000;
+/// Start of a run that the totals of counters leave out: first touches of memory, first frames of each kind.
+pub const WARM_UP_CYCLES: u64 = 1000;
 /// The same for a process without a schedule.
 const WARM_UP_NS: u64 = 1_000_000_000;
 /// Longest time from a wake-up to a row that answers after it; beyond, no answer follows, such as before the first tick.
@@ -155,7 +154,7 @@ impl TimingRecorder {
     /// What the system says, with the file's name.
     pub fn create(setup: TimingSetup) -> io::Result<Self> {
         let TimingSetup { folder, process, due, log, .. } = setup;
-        let mut account = StageAccount::new(&process, PERIOD);
+        let mut account = StageAccount::new(&process, CYCLE);
         let hlog = folder.join(format!("{process}.hlog"));
         let hlog = IntervalLog::create(&hlog, setup.started_unix_s, setup.started)?;
         account.log_to(if setup.copies_lines { hlog.with_copy() } else { hlog });
@@ -164,7 +163,7 @@ impl TimingRecorder {
             timing::write_head(table.lines())?;
             Ok::<_, io::Error>(table)
         });
-        let period = if due == Due::EveryPeriod { PERIOD } else { Duration::ZERO };
+        let period = if due == Due::EveryPeriod { CYCLE } else { Duration::ZERO };
         let flight = setup.flight_late.map(|limit| (Ring::default(), Lateness { limit, period }));
         Ok(Self {
             folder,

@@ -1,14 +1,12 @@
 //! The curves of several runs on the same axes: over the whole experiment, and around its step.
 
 use crate::drawing::{COLOURS, Curve, Panel, Picture};
-use crate::picture;
+use crate::picture::{self, METRE_IN_MM, PER_CENT};
 use crate::runs::Run;
 use figures::record::Record;
 use figures::series::{Series, Span};
 use plotters::style::BLACK;
 
-const METRE_IN_MM: f64 = 1e3;
-const PER_CENT: f64 = 100.0;
 /// What the picture around a step shows before and after it.
 const AROUND: Span = Span { from_s: -0.2, to_s: 0.6 };
 

@@ -7,6 +7,7 @@ use super::cli::{CheckPace, ConformanceArguments};
 use super::watch::{Received, What, Wrong};
 use crate::junit::Case;
 use crate::soak::model::{Check, CheckResult};
+use protocol::commands::STALE_AFTER_CYCLES;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -14,8 +15,6 @@ use std::ops::Range;
 const STOP_WITHIN_CYCLES: u64 = 20;
 /// Cycles without sensors after which a valve must be shut: the 50 ms of the contract, and two ticks for those who count by them.
 const LOSS_WITHIN_CYCLES: u64 = 70;
-/// Age beyond which the rig refuses a command (protocol: `STALE_AFTER_CYCLES`).
-const STALE_AFTER_CYCLES: u64 = protocol::commands::STALE_AFTER_CYCLES;
 /// Age of most commands at most: sensors are answered before the next ones come, or one cycle late.
 const USUAL_AGE_CYCLES: u64 = 1;
 /// Quantile of what is judged by most of it.

@@ -14,13 +14,13 @@ use protocol::bus::host::Host;
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{self, Bus, BusError, BusUrl, HostedRig, Received, StampClock};
 use protocol::can::CanFrame;
+use protocol::periods::CYCLE;
 use realtime::{Clock, Instant, MonotonicClock};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-const CYCLE: Duration = Duration::from_millis(1);
 /// Lateness of this process that spoils a cycle's times.
 const DISTURBED: Duration = Duration::from_micros(100);
 /// How long members of the barrier may take to join.

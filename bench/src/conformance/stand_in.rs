@@ -16,12 +16,11 @@ use protocol::can::CanFrame;
 use protocol::frames::{
     ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors, TICK, Tick,
 };
-use protocol::periods;
+use protocol::periods::{self, CYCLE_S};
 
 const DEAD_BAND: f64 = 0.03;
 const SPEED_M_PER_S: f64 = 1.15;
 const LAG_S: f64 = 0.03;
-const CYCLE_S: f64 = 1e-3;
 const STROKE_M: f64 = 0.5;
 /// An identifier that rig.dbc does not know.
 const UNKNOWN_ID: u16 = 0x5A5;

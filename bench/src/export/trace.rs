@@ -18,6 +18,7 @@ use super::run_table::RunTable;
 use crate::recorded_log::RecordedLog;
 use crate::warn;
 use protocol::frames::MESSAGES;
+use protocol::periods::CYCLE_NS;
 use runlog::candump::FrameRecord;
 use runlog::run_folder::{FAULTS_CSV, FileError, read_text};
 use runlog::timing::{self, CycleTiming};
@@ -28,8 +29,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Length of a cycle, ns.
-const PERIOD_NS: i128 = 1_000_000;
 const RIG_TABLE: &str = "emulator-timing.csv";
 const CONTROLLER_TABLES: [&str; 3] =
     ["controller-timing.csv", "controller-drive-timing.csv", "controller-load-timing.csv"];
@@ -104,7 +103,7 @@ pub(super) fn write(part: &Path, log: &RecordedLog, folder: Option<&Path>) -> Re
     trace.begin(&about).and_then(|()| trace.frames(log)).map_err(unwritten)?;
     let rig = processes.iter().find(|process| process.pid == RIG);
     if let Some(first) = rig.and_then(|rig| rig.rows.first()) {
-        let zero_ns = i128::from(first.due_ns) - i128::from(first.cycle) * PERIOD_NS;
+        let zero_ns = i128::from(first.due_ns) - i128::from(first.cycle) * i128::from(CYCLE_NS);
         let offset_ns = i128::from(log.origin_ns()) - zero_ns - i128::from(start_ns);
         for process in &processes {
             trace.cycles(process, offset_ns).map_err(unwritten)?;

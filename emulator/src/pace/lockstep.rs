@@ -1,18 +1,15 @@
 //! The rig as the barrier's rig: as fast as all members allow, in simulated time.
 
-use super::{End, RunContext, RunOutcome};
+use super::{End, FAREWELL, RunContext, RunOutcome};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{BusError, Received};
 use protocol::can::CanFrame;
+use protocol::periods::CYCLE_NS;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long the members may take for their last words.
-const FAREWELL: Duration = Duration::from_millis(30);
 /// How long an interrupted rig still waits for the members' turn.
 const LAST_TURN: Duration = Duration::from_millis(500);
-/// Nanoseconds of simulated time in a cycle.
-const CYCLE_NS: u64 = 1_000_000;
 
 /// Runs the rig in the barrier; `simulated_ns` is the clock that stamps its frames.
 pub fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Result<RunOutcome, BusError> {

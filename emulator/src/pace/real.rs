@@ -1,21 +1,19 @@
 //! The rig on the machine's clock: one cycle each millisecond.
 
-use super::{CYCLE, End, RunContext, RunOutcome};
+use super::{End, FAREWELL, RunContext, RunOutcome};
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
 use protocol::commands::STALE_AFTER_CYCLES;
+use protocol::periods::CYCLE;
 use realtime::{Clock, PeriodicConfig, PeriodicLoop, VitalsReader};
 use runlog::timing::CycleTiming;
-use std::time::{Duration, Instant};
+use runlog::timing_recorder::WARM_UP_CYCLES;
+use std::time::Instant;
 
-/// How long after the farewell the answers to the last cycles may still come in.
-const FAREWELL: Duration = Duration::from_millis(30);
 /// How often the farewell is said in that time: a frame may be lost.
 const FAREWELLS: u32 = 3;
 /// Frames that may arrive between a cycle's start and a late loop's reading; they belong to the next cycle.
 const EARLY_FRAMES: usize = 256;
-/// Cycles that a watched section leaves out at the start: first touches of memory, first frames of each kind.
-const WARM_UP_CYCLES: u64 = 1000;
 /// Cycles within which a rig that meets another one on its bus knows that it is the later one.
 const NEWCOMER_CYCLES: u64 = 10 * STALE_AFTER_CYCLES;
 

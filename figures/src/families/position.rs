@@ -13,7 +13,7 @@ const STILL_S: f64 = 0.5;
 /// A rest must be longer than that part by so much, for the motion before it to settle.
 const SETTLE_S: f64 = 0.25;
 /// Removes the sensor's noise of 20 um to some 6 um.
-const NOISE_S: f64 = 0.01;
+pub(super) const NOISE_S: f64 = 0.01;
 /// Over which the error is smoothed before its maxima are counted.
 const MAXIMUM_S: f64 = 0.02;
 /// Share of the largest error that a maximum reaches, and share by which the error falls between two maxima.

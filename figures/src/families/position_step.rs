@@ -2,6 +2,7 @@
 //!
 //! Source: the paper, Fig. 7 (the manipulated variable is in its limit at first; settling without lasting oscillation).
 
+use super::position::NOISE_S;
 use super::{Family, Figures};
 use crate::record::{Record, largest_step};
 use crate::series::{Series, Span};
@@ -17,7 +18,6 @@ const SATURATED: f64 = 0.99;
 const ANSWER_S: f64 = 0.02;
 /// After settling, what is left of the approach is waited for so long before an oscillation is looked for.
 const CALM_S: f64 = 0.2;
-const NOISE_S: f64 = 0.01;
 
 pub(super) const FAMILY: Family = Family {
     title: "step of the position (the largest in the experiment, 2 mm at least)",

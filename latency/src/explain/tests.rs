@@ -11,7 +11,7 @@ fn one(run: &RunFiles) -> Event {
 }
 
 fn gap(cpu: u64, from_cycle: u64, length_ns: u64, another_ran: bool) -> Gap {
-    let from_ns = START_NS + from_cycle * PERIOD_NS;
+    let from_ns = START_NS + from_cycle * CYCLE_NS;
     Gap { cpu, from_ns, to_ns: from_ns + length_ns, another_ran }
 }
 

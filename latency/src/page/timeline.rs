@@ -15,6 +15,7 @@ use pagekit::number;
 use pagekit::svg::{
     Drawing, Look, Place, Scale, bar, legend_entry, line, stroke, text, time_axis, whole_decades,
 };
+use protocol::periods::CYCLE_NS;
 use std::collections::BTreeSet;
 
 const WIDTH: f64 = 960.0;
@@ -28,7 +29,7 @@ const LANE: f64 = 26.0;
 const BEFORE_US: f64 = 3000.0;
 const AFTER_US: f64 = 5000.0;
 /// The rig's cycle, us.
-const PERIOD_US: f64 = 1000.0;
+const CYCLE_US: f64 = CYCLE_NS as f64 / 1000.0;
 const MOST_LANES: usize = 8;
 /// Cycles whose markers do not touch each other.
 const MOST_MARKERS: usize = 90;
@@ -66,7 +67,7 @@ fn missed(event: &Event) -> Vec<(f64, f64)> {
     }
     let late_us = event.late_ns as f64 * 1e-3;
     let step = event.skipped as usize / MOST_MARKERS + 1;
-    let dues = (0..=event.skipped).step_by(step).map(|cycle| cycle as f64 * PERIOD_US);
+    let dues = (0..=event.skipped).step_by(step).map(|cycle| cycle as f64 * CYCLE_US);
     dues.map(|due_us| (due_us, late_us - due_us)).take_while(|(_, late_us)| *late_us > 0.0).collect()
 }
 
@@ -278,7 +279,7 @@ mod tests {
     fn event(skipped: u64, cycles: &[u64]) -> Event {
         let row = |cycle: &u64| AroundRow {
             cycle: *cycle,
-            due_us: (*cycle as f64 - 100.0) * PERIOD_US,
+            due_us: (*cycle as f64 - 100.0) * CYCLE_US,
             late_us: 9.0,
             execution_us: 20.0,
             ..AroundRow::default()

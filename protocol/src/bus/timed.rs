@@ -27,8 +27,6 @@ use std::collections::BTreeMap;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 
 const NS_PER_S: u64 = 1_000_000_000;
-/// Nanoseconds of simulated time in a cycle of the barrier.
-pub(super) const CYCLE_NS: u64 = 1_000_000;
 
 /// Receiver of the wire's reports on a node.
 #[derive(Clone, Copy, Debug)]

@@ -5,9 +5,10 @@
 
 use super::{BABBLER, Host};
 use crate::bus::lockstep::PeerId;
-use crate::bus::timed::{CYCLE_NS, Reported};
+use crate::bus::timed::Reported;
 use crate::bus::wire::{Fate, WireOrders};
 use crate::can::CanFrame;
+use crate::periods::CYCLE_NS;
 use rustix::time::Timespec;
 
 impl Host {

@@ -2,8 +2,9 @@
 
 use super::{ForRig, GONE, Host, RIG_HERE, Sent};
 use crate::bus::lockstep::{PeerId, Release};
-use crate::bus::timed::{CYCLE_NS, TimedWire};
+use crate::bus::timed::TimedWire;
 use crate::can::{CanFrame, ERROR_FLAG};
+use crate::periods::CYCLE_NS;
 use crate::wire_time::WireEvent;
 use std::io;
 
