@@ -16,6 +16,8 @@ use super::{Channel, Form, LoggedBy, ReadError, Record, RigSetup, Signal};
 use plant::{Axis, PERIOD_S};
 use protocol::frames::{DecodeError, Frame, RigStatus, Sensors};
 use runlog::candump;
+use runlog::run_folder::read_json;
+use runlog::summary::JoinedSummary;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -118,10 +120,8 @@ impl Begins {
 
 /// Start of cycle 0, from `summary.json` beside a run's `bus.log`.
 fn reported_zero_ns(file: &Path) -> Option<u64> {
-    let text = std::fs::read_to_string(file.parent()?.join("summary.json")).ok()?;
-    let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
-    let zero_s = summary.get("bus_log_cycle_zero_s")?.as_f64()?;
-    Some((zero_s * 1e9).round() as u64)
+    let summary: JoinedSummary = read_json(&file.parent()?.join("summary.json")).ok()?;
+    Some((summary.bus_log_cycle_zero_s? * 1e9).round() as u64)
 }
 
 fn expect_no_long_hole(file: &Path, log: &[Logged], cycles: &Cycles) -> Result<(), ReadError> {
