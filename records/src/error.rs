@@ -1,6 +1,6 @@
 //! Errors of reading a record, with file, line, column, value and what is allowed.
 
-use crate::description_error::DescriptionError;
+use settings::SettingsError;
 use std::path::{Path, PathBuf};
 
 /// Why a record cannot be read.
@@ -15,7 +15,7 @@ pub enum ReadError {
     #[error("{}: no frame of sensors (0x120, 0x121) in {frames} frames: was the rig on this bus?", file.display())]
     NoSensors { file: PathBuf, frames: usize },
     #[error(transparent)]
-    Mapping(#[from] DescriptionError),
+    Mapping(#[from] SettingsError),
 }
 
 impl ReadError {

@@ -12,7 +12,6 @@
 //! Forms and keys: `discrepancy/docs/records.md`. Sources: rig-model.md, Measurement file; bus.md, Time and Frames.
 
 pub mod channel;
-pub mod description_error;
 pub mod error;
 pub mod mapping;
 
@@ -33,7 +32,6 @@ pub use mapping::Mapping;
 pub use table::cells;
 
 use plant::Axis;
-use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// How a record is read; the default reads everything that rig and rehearsal write.
@@ -77,8 +75,7 @@ pub enum Form {
     Foreign,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigSetup {
     /// Whether the load's eye sat in the carriage.
     pub linked: bool,

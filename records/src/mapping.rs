@@ -8,9 +8,7 @@
 
 use super::table::{Layout, Separator};
 use super::{Channel, Quantity, RigSetup};
-use crate::description_error::DescriptionError;
-use serde::Deserialize;
-use std::collections::BTreeMap;
+use settings::{Section, SettingsError, Source};
 use std::path::Path;
 
 #[derive(Clone, Debug)]
@@ -48,77 +46,23 @@ pub(super) struct MappedChannel {
     pub(super) optional: bool,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    #[serde(default = "comma")]
-    separator: String,
-    #[serde(default = "point")]
-    decimal: String,
-    #[serde(default)]
-    comment: Option<String>,
-    #[serde(default)]
-    skip_lines: u64,
-    #[serde(default = "yes")]
-    head: bool,
-    #[serde(default)]
-    absent: Vec<String>,
-    #[serde(default)]
-    ignore: Vec<String>,
-    #[serde(default = "atmosphere")]
-    #[serde(rename = "atmospheric_pressure_Pa")]
-    atmospheric_pressure_pa: f64,
-    #[serde(default)]
-    setup: RigSetup,
-    time: FileTime,
-    channels: BTreeMap<String, FileChannel>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileTime {
-    column: Option<String>,
-    unit: Option<String>,
-    period_s: Option<f64>,
-    nominal_period_s: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileChannel {
-    column: String,
-    unit: String,
-    #[serde(default = "one")]
-    sign: f64,
-    #[serde(default = "one")]
-    scale: f64,
-    #[serde(default)]
-    offset: f64,
-    pressure: Option<String>,
-    #[serde(default)]
-    optional: bool,
-}
-
-fn comma() -> String {
-    ",".into()
-}
-
-fn point() -> String {
-    ".".into()
-}
-
-const fn yes() -> bool {
-    true
-}
-
-const fn one() -> f64 {
-    1.0
-}
-
 /// Standard atmosphere, Pa [ISO 2533].
-const fn atmosphere() -> f64 {
-    101_325.0
-}
+const ATMOSPHERE_PA: f64 = 101_325.0;
+
+/// Keys of the file itself.
+const KEYS: [&str; 11] = [
+    "separator",
+    "decimal",
+    "comment",
+    "skip_lines",
+    "head",
+    "absent",
+    "ignore",
+    "atmospheric_pressure_Pa",
+    "setup",
+    "time",
+    "channels",
+];
 
 /// Units of time, in s.
 const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0)];
@@ -145,40 +89,36 @@ impl Mapping {
     /// Reads a mapping file.
     ///
     /// # Errors
-    /// [`DescriptionError`] with file, key, value and what is allowed.
-    pub fn read(file: &Path) -> Result<Self, DescriptionError> {
-        Self::from_toml(&DescriptionError::read("mapping", file)?, file)
+    /// [`SettingsError`] with file, line, key, value and what is allowed.
+    pub fn read(file: &Path) -> Result<Self, SettingsError> {
+        let text = std::fs::read_to_string(file).map_err(|error| SettingsError::unreadable(file, &error))?;
+        Self::from_toml(&text, file)
     }
 
     /// The same from a text; `file` is only its name for messages.
     ///
     /// # Errors
     /// As [`Mapping::read`].
-    pub fn from_toml(text: &str, file: &Path) -> Result<Self, DescriptionError> {
-        let syntax = |error: toml::de::Error| DescriptionError::Syntax {
-            file: file.into(),
-            reason: error.to_string(),
-        };
-        let read: File = toml::from_str(text).map_err(syntax)?;
-        let check = Check { file };
-        let layout = check.layout(&read)?;
-        let decimal_comma = check.decimal_comma(&read, layout.separator)?;
-        let key = "atmospheric_pressure_Pa";
-        let atmosphere_pa = check.above(key, read.atmospheric_pressure_pa, 5e4, "more than 50000")?;
-        let mass_kg = read.setup.added_mass_kg;
-        check.above("setup.added_mass_kg", mass_kg, -f64::MIN_POSITIVE, "0 or more")?;
-        let (time, nominal_period_s) = check.time(read.time)?;
-        let channels = read.channels.into_iter();
-        let channels = channels.map(|(name, channel)| check.channel(&name, channel, atmosphere_pa));
-        let channels = channels.collect::<Result<_, _>>()?;
-        let mut absent = read.absent;
+    pub fn from_toml(text: &str, file: &Path) -> Result<Self, SettingsError> {
+        let source = Source::parse(text, file)?;
+        let mut root = source.root();
+        root.allow(&KEYS)?;
+        let layout = layout(&mut root)?;
+        let decimal_comma = decimal_comma(&mut root, layout.separator)?;
+        let atmosphere_pa = fitting(&mut root, "atmospheric_pressure_Pa", "more than 50000", |pa| pa > 5e4)?;
+        let (time, nominal_period_s) = time(root.needed_section("time", "a column, or period_s")?)?;
+        let channels = channels(
+            root.needed_section("channels", "a table for each")?,
+            atmosphere_pa.unwrap_or(ATMOSPHERE_PA),
+        )?;
+        let mut absent = root.texts("absent")?;
         absent.push(String::new());
         Ok(Self {
             layout,
             decimal_comma,
             absent,
-            ignore: read.ignore,
-            setup: read.setup,
+            ignore: root.texts("ignore")?,
+            setup: setup(root.section_or_empty("setup")?)?,
             time,
             nominal_period_s,
             channels,
@@ -186,115 +126,108 @@ impl Mapping {
     }
 }
 
-/// Checks what a file says, part by part.
-struct Check<'a> {
-    file: &'a Path,
-}
-
-impl Check<'_> {
-    fn refuse(&self, key: &str, value: &dyn std::fmt::Debug, allowed: &str) -> DescriptionError {
-        let (key, value, allowed) = (key.into(), format!("{value:?}"), allowed.into());
-        DescriptionError::Value { file: self.file.into(), key, value, allowed }
-    }
-
-    fn above(&self, key: &str, value: f64, least: f64, allowed: &str) -> Result<f64, DescriptionError> {
-        if value.is_finite() && value > least { Ok(value) } else { Err(self.refuse(key, &value, allowed)) }
-    }
-
-    fn layout(&self, read: &File) -> Result<Layout, DescriptionError> {
-        let separator = match read.separator.as_bytes() {
-            [character] if character.is_ascii() && *character != b' ' => Separator::Character(*character),
-            _ if read.separator == "whitespace" => Separator::Whitespace,
-            _ => {
-                let allowed = "one character such as \",\", \";\", \"\\t\", or \"whitespace\"";
-                return Err(self.refuse("separator", &read.separator, allowed));
-            }
-        };
-        let (comment, skip_lines, head) = (read.comment.clone(), read.skip_lines, read.head);
-        Ok(Layout { separator, comment, skip_lines, head })
-    }
-
-    fn decimal_comma(&self, read: &File, separator: Separator) -> Result<bool, DescriptionError> {
-        match read.decimal.as_str() {
-            "." => Ok(false),
-            "," if separator != Separator::Character(b',') => Ok(true),
-            _ => Err(self.refuse("decimal", &read.decimal, "\".\", or \",\" when the separator is another")),
-        }
-    }
-
-    /// Where the time comes from, and the period that was meant.
-    fn time(&self, read: FileTime) -> Result<(Time, Option<f64>), DescriptionError> {
-        let nominal_period_s = read.nominal_period_s;
-        let nominal_period_s = nominal_period_s
-            .map(|period_s| self.above("time.nominal_period_s", period_s, 0.0, "more than 0"))
-            .transpose()?;
-        match (read.column, read.unit, read.period_s) {
-            (Some(column), unit, None) => {
-                let unit = unit.unwrap_or_else(|| "s".into());
-                let factor = factor(TIMES, &unit);
-                let factor = factor.ok_or_else(|| self.refuse("time.unit", &unit, &names(TIMES)))?;
-                Ok((Time::Column { column, factor }, nominal_period_s))
-            }
-            (None, None, Some(period_s)) => {
-                let period_s = self.above("time.period_s", period_s, 0.0, "more than 0")?;
-                Ok((Time::Counted { period_s }, Some(nominal_period_s.unwrap_or(period_s))))
-            }
-            (column, ..) => {
-                let allowed = "a column with its unit, or period_s alone for rows without time";
-                Err(self.refuse("time.column", &column, allowed))
-            }
-        }
-    }
-
-    fn channel(
-        &self,
-        name: &str,
-        read: FileChannel,
-        atmosphere_pa: f64,
-    ) -> Result<MappedChannel, DescriptionError> {
-        let key = |field: &str| format!("channels.{name}{field}");
-        let channel = Channel::of_mapping(name).ok_or_else(|| {
-            let known: Vec<_> = Channel::ALL.into_iter().map(Channel::column).collect();
-            self.refuse(&key(""), &read.column, &format!("one of the channels {}", known.join(", ")))
-        })?;
-        let units = units(channel.quantity());
-        let unit = factor(units, &read.unit);
-        let unit = unit.ok_or_else(|| self.refuse(&key(".unit"), &read.unit, &names(units)))?;
-        if read.sign.abs() != 1.0 {
-            return Err(self.refuse(&key(".sign"), &read.sign, "1 or -1"));
-        }
-        if !read.scale.is_finite() || read.scale == 0.0 || !read.offset.is_finite() {
-            let allowed = "finite numbers, scale not 0";
-            return Err(self.refuse(&key(".scale, offset"), &(read.scale, read.offset), allowed));
-        }
-        let above_pa = match (channel.quantity(), read.pressure.as_deref()) {
-            (Quantity::Pressure, Some("absolute")) => 0.0,
-            (Quantity::Pressure, Some("gauge")) => atmosphere_pa,
-            (Quantity::Pressure, other) => {
-                return Err(self.refuse(&key(".pressure"), &other, "\"absolute\" or \"gauge\""));
-            }
-            (_, None) => 0.0,
-            (_, other) => {
-                return Err(self.refuse(&key(".pressure"), &other, "nothing: the channel is no pressure"));
-            }
-        };
-        Ok(MappedChannel {
-            channel,
-            column: read.column,
-            slope: read.sign * unit * read.scale,
-            intercept: read.sign * unit * read.offset + above_pa,
-            optional: read.optional,
-        })
+/// The finite number under `key`, which must fit.
+fn fitting(
+    section: &mut Section<'_>,
+    key: &str,
+    allowed: &str,
+    fits: fn(f64) -> bool,
+) -> Result<Option<f64>, SettingsError> {
+    let number = section.finite(key)?;
+    if number.is_none_or(fits) {
+        Ok(number)
+    } else {
+        Err(section.refused(key, &format!("allowed is {allowed}")))
     }
 }
 
-fn factor(units: &[(&str, f64)], name: &str) -> Option<f64> {
-    units.iter().find(|(unit, _)| *unit == name).map(|(_, factor)| *factor)
+fn layout(root: &mut Section<'_>) -> Result<Layout, SettingsError> {
+    let separator = root.text("separator")?.map_or_else(|| ",".into(), |separator| separator.text);
+    let separator = match separator.as_bytes() {
+        [character] if character.is_ascii() && *character != b' ' => Separator::Character(*character),
+        _ if separator == "whitespace" => Separator::Whitespace,
+        _ => {
+            let allowed = "allowed is one character such as \",\", \";\", \"\\t\", or \"whitespace\"";
+            return Err(root.refused("separator", allowed));
+        }
+    };
+    Ok(Layout {
+        separator,
+        comment: root.text("comment")?.map(|comment| comment.text),
+        skip_lines: root.whole("skip_lines", [0, u64::MAX])?.unwrap_or(0),
+        head: root.flag("head")? || !root.has("head"),
+    })
 }
 
-fn names(units: &[(&str, f64)]) -> String {
-    let names: Vec<_> = units.iter().map(|(name, _)| *name).collect();
-    format!("one of {}", names.join(", "))
+fn decimal_comma(root: &mut Section<'_>, separator: Separator) -> Result<bool, SettingsError> {
+    match root.text("decimal")?.as_ref().map(|decimal| decimal.text.as_str()) {
+        None | Some(".") => Ok(false),
+        Some(",") if separator != Separator::Character(b',') => Ok(true),
+        _ => Err(root.refused("decimal", "allowed is \".\", or \",\" when the separator is another")),
+    }
+}
+
+fn setup(mut section: Section<'_>) -> Result<RigSetup, SettingsError> {
+    let added_mass_kg = fitting(&mut section, "added_mass_kg", "0 or more", |kg| kg >= 0.0)?;
+    let setup = RigSetup { linked: section.flag("linked")?, added_mass_kg: added_mass_kg.unwrap_or(0.0) };
+    section.finish()?;
+    Ok(setup)
+}
+
+/// Where the time comes from, and the period that was meant.
+fn time(mut section: Section<'_>) -> Result<(Time, Option<f64>), SettingsError> {
+    let mut period = |key| fitting(&mut section, key, "more than 0", |period_s| period_s > 0.0);
+    let (nominal_period_s, period_s) = (period("nominal_period_s")?, period("period_s")?);
+    let column = section.text("column")?.map(|column| column.text);
+    let factor = section.choice("unit", TIMES)?;
+    section.finish()?;
+    match (column, period_s) {
+        (Some(column), None) => Ok((Time::Column { column, factor }, nominal_period_s)),
+        (None, Some(period_s)) if !section.has("unit") => {
+            Ok((Time::Counted { period_s }, Some(nominal_period_s.unwrap_or(period_s))))
+        }
+        _ => {
+            let allowed = "allowed is a column with its unit, or period_s alone for rows without time";
+            Err(section.refused("column", allowed))
+        }
+    }
+}
+
+/// The channels of the file, in the order of their names.
+fn channels(mut section: Section<'_>, atmosphere_pa: f64) -> Result<Vec<MappedChannel>, SettingsError> {
+    let mut names = Channel::ALL.map(|channel| (channel.to_string(), channel));
+    names.sort_by(|(one, _), (other, _)| one.cmp(other));
+    let mut channels = Vec::new();
+    for (name, channel) in names {
+        if let Some(section) = section.section(&name)? {
+            channels.push(mapped(section, channel, atmosphere_pa)?);
+        }
+    }
+    section.finish()?;
+    Ok(channels)
+}
+
+fn mapped(
+    mut section: Section<'_>,
+    channel: Channel,
+    atmosphere_pa: f64,
+) -> Result<MappedChannel, SettingsError> {
+    let column = section.needed_text("column", "column of the channel")?.text;
+    let unit = section.needed_choice("unit", units(channel.quantity()))?;
+    let sign = fitting(&mut section, "sign", "1 or -1", |sign| sign.abs() == 1.0)?.unwrap_or(1.0);
+    let scale = fitting(&mut section, "scale", "any number but 0", |scale| scale != 0.0)?.unwrap_or(1.0);
+    let offset = section.finite("offset")?.unwrap_or(0.0);
+    let above_pa = if channel.quantity() == Quantity::Pressure {
+        section.needed_choice("pressure", &[("absolute", 0.0), ("gauge", atmosphere_pa)])?
+    } else if section.has("pressure") {
+        return Err(section.refused("pressure", "allowed is nothing: the channel is no pressure"));
+    } else {
+        0.0
+    };
+    let (slope, intercept) = (sign * unit * scale, sign * unit * offset + above_pa);
+    let optional = section.flag("optional")?;
+    section.finish()?;
+    Ok(MappedChannel { channel, column, slope, intercept, optional })
 }
 
 #[cfg(test)]
@@ -345,30 +278,38 @@ mod tests {
             (
                 "\"mm\"",
                 "\"bar\"",
-                "channels.drive_position_m.unit = \"bar\"; allowed is one of m, cm, mm, um, in",
+                "m.toml:5: channels.drive_position_m.unit = \"bar\"; allowed is m, cm, mm, um, in",
             ),
             (
                 "drive_position_m",
                 "rod",
-                "channels.rod = \"x\"; allowed is one of the channels drive_valve, drive_position_m",
+                "m.toml:3: unknown key channels.rod; allowed is drive_applied_force_N, drive_force_N, drive_position_m",
             ),
-            ("column = \"t\"", "", "time.column = None"),
-            ("column = \"t\"", "column = \"t\"\nunit = \"h\"", "time.unit = \"h\"; allowed is one of s, ms"),
+            (
+                "column = \"t\"",
+                "",
+                "m.toml:1: time.column: allowed is a column with its unit, or period_s alone",
+            ),
+            ("column = \"t\"", "column = \"t\"\nunit = \"h\"", "time.unit = \"h\"; allowed is s, ms"),
             (
                 "unit = \"mm\"",
                 "unit = \"mm\"\nsign = 2",
-                "channels.drive_position_m.sign = 2.0; allowed is 1 or -1",
+                "channels.drive_position_m.sign = 2; allowed is 1 or -1",
             ),
-            ("unit = \"mm\"", "unit = \"mm\"\nscale = nan", "finite numbers"),
+            (
+                "unit = \"mm\"",
+                "unit = \"mm\"\nscale = nan",
+                "channels.drive_position_m.scale = nan; allowed is a finite number",
+            ),
             ("unit = \"mm\"", "unit = \"mm\"\npressure = \"gauge\"", "the channel is no pressure"),
             (
                 "drive_position_m]\ncolumn = \"x\"\nunit = \"mm\"",
                 "supply_pressure_Pa]\ncolumn = \"x\"\nunit = \"bar\"",
-                "\"absolute\" or \"gauge\"",
+                "channels.supply_pressure_Pa.pressure is missing: one of absolute, gauge",
             ),
             ("[time]", "decimal = \",\"\n[time]", "decimal = \",\"; allowed is"),
             ("[time]", "separator = \"ab\"\n[time]", "separator = \"ab\"; allowed is one character"),
-            ("[time]", "[tyme]", "unknown field `tyme`"),
+            ("[time]", "[tyme]", "m.toml:1: unknown key tyme; allowed is separator, decimal"),
         ] {
             let message = refused(&GOOD.replace(from, to));
             assert!(message.contains(hint), "{message}");

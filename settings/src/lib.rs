@@ -6,6 +6,7 @@
 
 pub mod parameters;
 mod section;
+mod spelling;
 
 pub use section::{Result, Section, SettingsError, Source, Text};
 

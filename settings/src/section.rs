@@ -4,6 +4,7 @@
 //! those that were asked for.
 
 use crate::parameters::Parameter;
+use crate::spelling::nearest;
 use crate::{column_of, line_of, number, written};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -145,6 +146,20 @@ impl<'a> Section<'a> {
         let Some(value) = self.value(key) else { return Ok(None) };
         let finite = number(value.get_ref()).filter(|number| number.is_finite());
         finite.map(Some).ok_or_else(|| self.refused(key, "allowed is a finite number"))
+    }
+
+    /// The whole number under `key`, from the least to the most; `None` when it is absent.
+    ///
+    /// # Errors
+    /// No integer, or out of range.
+    pub fn whole(&mut self, key: &str, [least, most]: [u64; 2]) -> Result<Option<u64>> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let digits = value.get_ref().as_integer();
+        let whole = digits.and_then(|digits| u64::from_str_radix(digits.as_str(), digits.radix()).ok());
+        whole
+            .filter(|whole| (least..=most).contains(whole))
+            .map(Some)
+            .ok_or_else(|| self.refused(key, &format!("allowed is a whole number, {least} to {most}")))
     }
 
     /// Whether `key` is set to true; false when it is absent.
@@ -470,28 +485,6 @@ impl<'a> Section<'a> {
         };
         Ok(Self { source: self.source, path, table, at: value.span().start, asked: Vec::new() })
     }
-}
-
-/// The one of these that is written most alike: at most a third of its letters are others.
-fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
-    let distances = known.iter().map(|known| (edits(name, known), *known));
-    let (edits, known) = distances.min_by_key(|(edits, _)| *edits)?;
-    (3 * edits <= known.chars().count()).then_some(known)
-}
-
-/// Letters that are to be put in, left out or changed to get from one word to another [Levenshtein 1966].
-fn edits(from: &str, to: &str) -> usize {
-    let to: Vec<char> = to.chars().collect();
-    let mut row: Vec<usize> = (0..=to.len()).collect();
-    for (above, letter) in from.chars().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], above + 1);
-        for (place, other) in to.iter().enumerate() {
-            let changed = diagonal + usize::from(letter != *other);
-            diagonal = row[place + 1];
-            row[place + 1] = changed.min(diagonal + 1).min(row[place] + 1);
-        }
-    }
-    row[to.len()]
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Tests of the reader of sections.
 
 use super::*;
+use crate::spelling::edits;
 
 #[test]
 fn a_column_is_that_of_the_character_within_the_text() {
@@ -31,6 +32,30 @@ fn an_unknown_key_is_refused_with_the_one_that_is_written_alike() {
         assert_eq!(nearest(name, &known), meant, "{name}");
     }
     assert_eq!([edits("kitten", "sitting"), edits("", "ab"), edits("ab", "ba")], [3, 2, 2]);
+}
+
+#[test]
+fn a_whole_number_is_exact_beyond_what_a_float_holds() {
+    let source = Source::parse("a = 9007199254740993\nb = 0x10\nc = 2.0", Path::new("f.toml")).expect("TOML");
+    let mut section = source.root();
+    assert_eq!(section.whole("a", [0, u64::MAX]), Ok(Some(9_007_199_254_740_993)));
+    assert_eq!((section.whole("b", [1, 16]), section.whole("none", [1, 16])), (Ok(Some(16)), Ok(None)));
+    for (key, place, written) in [("b", 2, "b = 0x10"), ("c", 3, "c = 2.0")] {
+        let message = section.whole(key, [1, 15]).unwrap_err().to_string();
+        assert_eq!(message, format!("f.toml:{place}: {written}; allowed is a whole number, 1 to 15"));
+    }
+}
+
+#[test]
+fn a_table_that_is_left_out_has_no_keys_and_its_errors_the_line_of_the_table_around_it() {
+    let source = Source::parse("x = 1\n[a]\nb = 1", Path::new("f.toml")).expect("TOML");
+    let mut outer = source.root().needed_section("a", "one").expect("there");
+    let mut inner = outer.section_or_empty("none").expect("empty");
+    assert_eq!((inner.path(), inner.keys().len(), inner.finish()), ("a.none", 0, Ok(())));
+    let message = inner.needed_text("c", "a name").unwrap_err().to_string();
+    assert!(message.starts_with("f.toml:2: a.none.c is missing: a name"), "{message}");
+    let message = source.root().needed_section("d", "another").map(|_| ()).unwrap_err().to_string();
+    assert!(message.starts_with("f.toml:1: [d] is missing: another; the keys here are"), "{message}");
 }
 
 #[test]
