@@ -42,19 +42,7 @@ impl Case {
     }
 }
 
-/// A text as it may stand in an attribute or between tags; characters that XML 1.0 does not know are replaced.
+/// A text on one line, as it may stand in an attribute or between tags.
 fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' | '\t' | '\r' => out.push(' '),
-            c if c < ' ' || ('\u{FFFE}'..='\u{FFFF}').contains(&c) => out.push('\u{FFFD}'),
-            c => out.push(c),
-        }
-    }
-    out
+    pagekit::page::escaped(&text.replace(['\n', '\t', '\r'], " "))
 }

@@ -10,12 +10,13 @@
 //! A leak of 64 KiB a minute is 90 MiB a day, of a process of some 20 MB. Shorter records than two minutes judge the quarters
 //! only: the kernel counts resident pages in batches, and a batch on a minute is more than the bound.
 
+use figures::median::median;
 use serde::{Deserialize, Serialize};
 
 /// Steepest slope that counts as flat, KiB an hour: 64 a minute.
-pub const SLOPE_LIMIT_KIB_PER_H: f64 = 64.0 * 60.0;
+pub(super) const SLOPE_LIMIT_KIB_PER_H: f64 = 64.0 * 60.0;
 /// Largest growth from the second quarter to the last that counts as flat.
-pub const GROWTH_LIMIT_PERCENT: f64 = 1.0;
+pub(super) const GROWTH_LIMIT_PERCENT: f64 = 1.0;
 /// Growth that a record without a slope may have all the same, KiB: lists that grow to their bound, and the kernel's batches.
 const SHORT_GROWTH_KIB: f64 = 512.0;
 /// What is left out at most, s.
@@ -29,7 +30,7 @@ const PAIRED_SAMPLES: usize = 600;
 
 /// Memory of a process at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Since the segment's start.
     pub at_s: f64,
     pub rss_kib: u64,
@@ -41,7 +42,7 @@ pub struct Sample {
 
 /// What a process's memory did.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Memory {
+pub(crate) struct Memory {
     pub samples: usize,
     /// Resident memory, first sample.
     pub rss_first_kib: u64,
@@ -59,7 +60,7 @@ pub struct Memory {
 
 impl Memory {
     /// Of a record in the order of time.
-    pub fn of(record: &[Sample]) -> Self {
+    pub(crate) fn of(record: &[Sample]) -> Self {
         let Some((first, last)) = record.first().zip(record.last()) else { return Self::default() };
         let start_s = first.at_s + START_S.min((last.at_s - first.at_s) / 4.0);
         let settled: Vec<_> = record.iter().filter(|sample| sample.at_s >= start_s).collect();
@@ -67,7 +68,7 @@ impl Memory {
         let points: Vec<_> = settled.iter().map(|sample| (sample.at_s, sample.rss_kib as f64)).collect();
         let quarter = settled.len() / 4;
         let median_of =
-            |from: usize, to: usize| median(points[from..to].iter().map(|(_, rss_kib)| *rss_kib).collect());
+            |from: usize, to: usize| middle(points[from..to].iter().map(|(_, rss_kib)| *rss_kib).collect());
         Self {
             samples: record.len(),
             rss_first_kib: first.rss_kib,
@@ -83,7 +84,7 @@ impl Memory {
     }
 
     /// Whether it is flat; `None` when the record is too short to tell.
-    pub fn is_flat(&self) -> Option<bool> {
+    pub(crate) fn is_flat(&self) -> Option<bool> {
         let slope_kept = self.slope_kib_per_h.is_none_or(|slope| slope < SLOPE_LIMIT_KIB_PER_H);
         let small = |growth_percent: f64| {
             self.slope_kib_per_h.is_none()
@@ -101,13 +102,12 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     for (place, (from, low)) in points.iter().enumerate() {
         slopes.extend(points[place + 1..].iter().map(|(to, high)| (high - low) / (to - from)));
     }
-    median(slopes)
+    middle(slopes)
 }
 
-/// The middle value, the upper one of two; 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+/// The median; 0 of none.
+fn middle(values: Vec<f64>) -> f64 {
+    median(values).map_or(0.0, |median| median.value)
 }
 
 #[cfg(test)]
