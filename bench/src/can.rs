@@ -3,7 +3,7 @@
 //! How its system calls are answered is the crate `socketcan-guest`; here are the command line, the bus of a pair of programs
 //! that have no rig, and the exit code, which is the program's own.
 
-pub mod cli;
+pub(crate) mod cli;
 
 use crate::warn;
 use cli::{CanArguments, InterfaceArgument};

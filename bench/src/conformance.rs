@@ -17,7 +17,7 @@
 //! | `judge` | the checks |
 //! | [`cli`] | the command line |
 
-pub mod cli;
+pub(crate) mod cli;
 mod judge;
 mod line;
 mod stand_in;

@@ -11,7 +11,7 @@
 //! The file appears when it is whole: it is written beside its place as `FILE.part` and renamed. How each format looks:
 //! `bench/docs/logs.md`.
 
-pub mod cli;
+pub(crate) mod cli;
 mod controllers;
 mod foreign;
 mod mcap;

@@ -18,10 +18,10 @@
 //! | `client` | a socket, its session and its queue |
 //! | [`cli`] | the command line |
 
-pub mod cli;
+pub(crate) mod cli;
 mod client;
-pub mod parser;
-pub mod session;
+mod parser;
+mod session;
 
 use crate::say;
 use cli::GatewayArguments;

@@ -14,7 +14,7 @@
 //! - *To arrival*: to the answer's arrival at our queue, by the kernel's stamp. That is what the rig's round trip ends with,
 //!   which does not wait for the answer but finds it at its next cycle.
 
-pub mod cli;
+pub(crate) mod cli;
 mod line;
 mod rally;
 

@@ -20,8 +20,8 @@
 //! The idea is that of `hwlat_detector` (kernel's tree, `Documentation/trace/hwlat_detector.rst`) and of `sysjitter`, from
 //! user space and without switching interrupts off.
 
-pub mod cli;
-pub mod gaps;
+pub(crate) mod cli;
+mod gaps;
 
 use crate::say;
 use cli::ProbeArguments;

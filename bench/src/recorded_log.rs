@@ -41,7 +41,7 @@ pub enum RecordedLogError {
 }
 
 #[derive(Clone, Debug)]
-pub struct RecordedLog {
+pub(crate) struct RecordedLog {
     pub file: PathBuf,
     /// Its frames in the order of the file; at least one.
     pub frames: Vec<LogLine>,
@@ -57,7 +57,7 @@ pub struct RecordedLog {
 
 impl RecordedLog {
     /// Reads `path`, a run's folder or a log; with `interface`, what was seen there alone.
-    pub fn read(path: &Path, interface: Option<&str>) -> Result<Self, RecordedLogError> {
+    pub(crate) fn read(path: &Path, interface: Option<&str>) -> Result<Self, RecordedLogError> {
         let file = if path.is_dir() { path.join(LOG_NAME) } else { path.to_owned() };
         let opened = File::open(&file).map_err(|error| {
             let (file, reason) = (file.clone(), error.to_string());
@@ -90,12 +90,12 @@ impl RecordedLog {
     }
 
     /// The stamp from which times count, ns of the log's epoch: cycle 0, or the first frame.
-    pub fn origin_ns(&self) -> u64 {
+    pub(crate) fn origin_ns(&self) -> u64 {
         self.cycle_zero_ns.unwrap_or_else(|| self.frames[0].record.stamp_ns)
     }
 
     /// Tells on standard error what was left out.
-    pub fn tell_cut_line(&self) {
+    pub(crate) fn tell_cut_line(&self) {
         if let Some(line) = self.cut_line {
             let file = self.file.display();
             warn(&format!("{file}:{line}: the last line is cut, and left out: its writer was killed"));

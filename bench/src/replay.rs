@@ -10,8 +10,8 @@
 //!
 //! Nothing is sent of a log that is not right to its last line.
 
-pub mod cli;
-pub mod kind;
+pub(crate) mod cli;
+mod kind;
 mod play;
 mod schedule;
 

@@ -18,22 +18,22 @@
 //!
 //! It knows emulator and controller as programs and by their files; it talks to neither.
 
-pub mod account;
-pub mod cli;
-pub mod evidence;
-pub mod frame_log;
-pub mod judge;
-pub mod junit;
-pub mod keeping;
-pub mod memory;
-pub mod merged;
-pub mod model;
-pub mod plan;
+mod account;
+pub(crate) mod cli;
+mod evidence;
+mod frame_log;
+mod judge;
+mod junit;
+mod keeping;
+mod memory;
+mod merged;
+pub(crate) mod model;
+mod plan;
 pub mod processes;
-pub mod procfs;
-pub mod rotate;
-pub mod segment;
-pub mod verdict;
+mod procfs;
+mod rotate;
+mod segment;
+mod verdict;
 
 use cli::{SoakArguments, YesNo};
 use keeping::{SoakFolder, unix_s};

@@ -17,7 +17,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`RunError::Input`] when the run's summary cannot be read, or is of a bus that took no time.
-pub fn print(arguments: &BusLoadArguments) -> Result<Exit, RunError> {
+pub(crate) fn print(arguments: &BusLoadArguments) -> Result<Exit, RunError> {
     let analysis = RigAnalysis::worst_case(BIT_RATE_PER_S);
     let text = match &arguments.markdown {
         None => format!("{}\n\n{analysis}", BusLoad::of_rig()),

@@ -16,7 +16,7 @@ use std::io::Write as _;
 const WIDTH: usize = 100;
 
 /// Prints the catalogue.
-pub fn print(arguments: &EffectsArguments) -> Result<Exit, RunError> {
+pub(crate) fn print(arguments: &EffectsArguments) -> Result<Exit, RunError> {
     let text = if arguments.json {
         serde_json::to_string_pretty(&as_json()).unwrap_or_default()
     } else {

@@ -10,7 +10,7 @@ use runlog::run_folder;
 use std::path::PathBuf;
 
 /// FIFO priority of the rig loop; above most of the system, below the kernel's own threads at 99.
-pub const DEFAULT_FIFO_PRIORITY: u8 = 80;
+pub(crate) const DEFAULT_FIFO_PRIORITY: u8 = 80;
 
 /// Lateness that freezes the flight recorder: half a cycle.
 const DEFAULT_FLIGHT_LATE_US: u64 = 500;
@@ -21,12 +21,12 @@ const DEFAULT_FLIGHT_LATE_US: u64 = 500;
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
 }
 
 /// What the emulator can do.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Run the rig: simulate both axes, send sensor frames, obey valve commands, record everything.
     Run(Box<RunArguments>),
     /// Host an embedded bus alone, without a rig.
@@ -44,7 +44,7 @@ pub enum Command {
 
 /// What to print of the bus's load.
 #[derive(Args, Debug)]
-pub struct BusLoadArguments {
+pub(crate) struct BusLoadArguments {
     /// Print a Markdown table instead: each frame's worst-case bound, the modelled response at its critical instant, and the
     /// response measured in the run of SUMMARY (a bus with a bit rate).
     #[arg(long, value_name = "SUMMARY")]
@@ -53,7 +53,7 @@ pub struct BusLoadArguments {
 
 /// How to run the rig.
 #[derive(Args, Debug)]
-pub struct RunArguments {
+pub(crate) struct RunArguments {
     /// Bus: can://IFACE (SocketCAN) or unix:///PATH[?loss=P&seed=N&bitrate=1000000&…] (embedded, hosted here; all options:
     /// protocol/docs/bus-that-keeps-time.md).
     #[arg(long, default_value_t = BusUrl::default_embedded())]
@@ -137,7 +137,7 @@ pub struct RunArguments {
 
 /// What to draw.
 #[derive(Args, Debug)]
-pub struct SealArguments {
+pub(crate) struct SealArguments {
     /// Seed of the draw; whoever knows it can draw the same again.
     #[arg(long)]
     pub seed: u64,
@@ -154,7 +154,7 @@ pub struct SealArguments {
 
 /// Axes that an effect is drawn for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SealedAxis {
+pub(crate) enum SealedAxis {
     /// The drive axis, and the supply that feeds it.
     Drive,
     /// The load axis, and the supply that feeds it.
@@ -165,7 +165,7 @@ pub enum SealedAxis {
 
 /// How to list the effects.
 #[derive(Args, Debug)]
-pub struct EffectsArguments {
+pub(crate) struct EffectsArguments {
     /// Print JSON instead of text.
     #[arg(long)]
     pub json: bool,
@@ -187,7 +187,7 @@ pub struct FaultsArguments {
 
 /// How to host a bus.
 #[derive(Args, Debug)]
-pub struct BusArguments {
+pub(crate) struct BusArguments {
     /// The embedded bus: unix:///PATH[?loss=P&seed=N&bitrate=1000000&…].
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
@@ -198,7 +198,7 @@ pub struct BusArguments {
 
 /// An axis whose foreign controller joins the barrier by its echo.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum EchoAxis {
+pub(crate) enum EchoAxis {
     /// Commands of the drive axis.
     Drive,
     /// Commands of the load axis.
@@ -207,7 +207,7 @@ pub enum EchoAxis {
 
 impl EchoAxis {
     /// Identifier of the axis's command frame.
-    pub fn command_id(self) -> u16 {
+    pub(crate) fn command_id(self) -> u16 {
         match self {
             Self::Drive => DRIVE_VALVE_COMMAND.id,
             Self::Load => LOAD_VALVE_COMMAND.id,

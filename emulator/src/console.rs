@@ -22,7 +22,7 @@ use std::io::{self, BufRead, Read};
 const QUEUE: usize = 16;
 
 /// What a person may type.
-pub const HELP: &str = "stop | release        the rig's own emergency stop; others release theirs
+pub(crate) const HELP: &str = "stop | release        the rig's own emergency stop; others release theirs
 link | unlink         the load's eye in the carriage
 weights KG            weights on the carriage, in all
 hand carriage N       a hand pushes in +x until the next such command; 0 lets go
@@ -34,7 +34,7 @@ quit                  ends the run; everything is saved";
 
 /// What the console asks of the rig loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
+pub(crate) enum Command {
     /// Something that a person does to the rig.
     Act(Action),
     /// A hand pushes in +x from now on.
@@ -50,7 +50,7 @@ pub enum Command {
 
 /// What the rig can be asked for.
 #[derive(Clone, Copy, Debug)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// Most weights on the carriage, kg.
     pub added_limit_kg: f64,
     /// Whether this emulator hosts the bus, so that faults can be on it.
@@ -59,21 +59,21 @@ pub struct Limits {
 
 /// The way to the rig loop.
 #[derive(Clone)]
-pub struct Console {
+pub(crate) struct Console {
     limits: Limits,
     queue: Sender<Command>,
 }
 
 /// Opens the console; the rig loop takes its commands.
 #[must_use]
-pub fn open(limits: Limits) -> (Console, Receiver<Command>) {
+pub(crate) fn open(limits: Limits) -> (Console, Receiver<Command>) {
     let (queue, receiver) = bounded(QUEUE);
     (Console { limits, queue }, receiver)
 }
 
 impl Console {
     /// Obeys what is typed at standard input, and says there what there is to say.
-    pub fn listen(self) {
+    pub(crate) fn listen(self) {
         let answer = |text: &str| text.lines().for_each(|line| protocol::say!("emulator: console: {line}"));
         // It ends with its input, with the loop, or with the process: nobody can wait for a thread that reads a terminal.
         std::thread::spawn(move || {
@@ -83,7 +83,7 @@ impl Console {
     }
 
     /// Obeys a line without waiting for the loop, and gives what there is to say.
-    pub fn obey(&self, line: &str) -> Result<&'static str, String> {
+    pub(crate) fn obey(&self, line: &str) -> Result<&'static str, String> {
         match parse(line, self.limits)? {
             None => Ok(""),
             Some(Line::Help) => Ok(HELP),
@@ -124,7 +124,7 @@ fn next_line(input: &mut impl BufRead) -> io::Result<Option<Result<String, Strin
 }
 
 /// What is said to a line that is longer than any command.
-pub fn too_long() -> String {
+pub(crate) fn too_long() -> String {
     format!("a line of more than {LONGEST_LINE} bytes is no command")
 }
 

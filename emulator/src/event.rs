@@ -6,9 +6,9 @@ use runlog::event::{self, Axis, FaultMark};
 use serde::{Serialize, Serializer};
 
 /// An event of the run.
-pub type Event = event::Event<Mark>;
+pub(crate) type Event = event::Event<Mark>;
 /// The kind of an event.
-pub type EventKind = event::EventKind<Mark>;
+pub(crate) type EventKind = event::EventKind<Mark>;
 
 /// Written as the [`FaultMark`] that others read.
 impl Serialize for Mark {

@@ -13,7 +13,7 @@ use runlog::timing::{CycleTiming, Exchange};
 
 /// What a cycle's exchange was, and how old the command is that acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AxisCycle {
+pub(crate) struct AxisCycle {
     /// Stamps of the timing table.
     pub exchange: Exchange,
     /// When the sensors that the newly acting command answers were handed over; meaningless without such a command.
@@ -28,7 +28,7 @@ pub struct AxisCycle {
     clippy::large_enum_variant,
     reason = "nearly all are the large one, and a box would allocate in the 1 ms path"
 )]
-pub enum TimingRecord {
+pub(crate) enum TimingRecord {
     Cycle {
         row: CycleTiming,
         /// Its exchange, drive and load.
@@ -40,7 +40,7 @@ pub enum TimingRecord {
 
 /// A command that came.
 #[derive(Clone, Copy, Debug)]
-pub struct RoundTrip {
+pub(crate) struct RoundTrip {
     /// 0 for drive, 1 for load.
     pub axis: usize,
     /// The cycle in which it was taken.
@@ -50,7 +50,7 @@ pub struct RoundTrip {
 }
 
 /// Exchange of one axis. Allocates nothing after the start.
-pub struct ExchangeWatch {
+pub(crate) struct ExchangeWatch {
     /// When the sensors of a cycle were handed over, by the cycle's low bits; 0 where they were not.
     sent_ns: Box<[u64; ECHO_RANGE as usize]>,
     /// The last command taken in this cycle: arrival, and the cycle that it answers.
@@ -60,7 +60,7 @@ pub struct ExchangeWatch {
 
 impl ExchangeWatch {
     /// Begins `cycle`, whose sensors were handed over at `stamp_ns`, or not.
-    pub fn begin(&mut self, cycle: u64, stamp_ns: Option<u64>) {
+    pub(crate) fn begin(&mut self, cycle: u64, stamp_ns: Option<u64>) {
         let sensors_ns = stamp_ns.unwrap_or(0);
         self.sent_ns[slot(cycle)] = sensors_ns;
         self.taken = None;
@@ -70,7 +70,7 @@ impl ExchangeWatch {
 
     /// Takes note of an accepted command that arrived at `stamp_ns`, `cycle` being the newest one; tells its round trip, if its
     /// sensors were handed over.
-    pub fn taken(&mut self, echo: u16, stamp_ns: u64, cycle: u64) -> Option<u64> {
+    pub(crate) fn taken(&mut self, echo: u16, stamp_ns: u64, cycle: u64) -> Option<u64> {
         let behind = cycle.wrapping_sub(u64::from(echo)) % ECHO_RANGE;
         self.taken = Some((stamp_ns, cycle.saturating_sub(behind)));
         let sent_ns = self.sent_ns[usize::from(echo)];
@@ -78,7 +78,7 @@ impl ExchangeWatch {
     }
 
     /// The command that acts over this cycle has this age, if one acts; a command taken in this cycle is the one.
-    pub fn latched(&mut self, age_cycles: Option<u64>) {
+    pub(crate) fn latched(&mut self, age_cycles: Option<u64>) {
         let Some(age_cycles) = age_cycles else { return };
         self.now.age_cycles = age_cycles;
         if let Some((stamp_ns, answers)) = self.taken.take() {
@@ -88,7 +88,7 @@ impl ExchangeWatch {
         }
     }
 
-    pub fn cycle(&self) -> AxisCycle {
+    pub(crate) fn cycle(&self) -> AxisCycle {
         self.now
     }
 }
@@ -101,7 +101,7 @@ impl Default for ExchangeWatch {
 
 impl AxisCycle {
     /// Age in ns at the start of the first cycle in which the command acts, `due_ns`; `None` when none newly acts.
-    pub fn age_ns(&self, due_ns: u64) -> Option<u64> {
+    pub(crate) fn age_ns(&self, due_ns: u64) -> Option<u64> {
         let known = self.exchange.command_ns != 0 && self.answered_sensors_ns != 0;
         known.then(|| due_ns.saturating_sub(self.answered_sensors_ns))
     }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 /// A host that serves in the background.
-pub struct HostThread {
+pub(crate) struct HostThread {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<std::io::Result<HostReport>>,
 }
@@ -15,7 +15,7 @@ pub struct HostThread {
 impl HostThread {
     /// Starts serving, with FIFO priority when `fifo_priority` names one and the machine grants it.
     #[must_use]
-    pub fn start(host: Host, fifo_priority: Option<u8>) -> Self {
+    pub(crate) fn start(host: Host, fifo_priority: Option<u8>) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
@@ -29,7 +29,7 @@ impl HostThread {
 
     /// Stops serving and tells what the host counted; `None` when it failed, which it has reported.
     #[must_use]
-    pub fn stop(self) -> Option<HostReport> {
+    pub(crate) fn stop(self) -> Option<HostReport> {
         self.stop.store(true, Ordering::Relaxed);
         match self.thread.join() {
             Ok(Ok(report)) => Some(report),

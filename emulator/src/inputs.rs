@@ -12,7 +12,7 @@ use plant::{Plant, RigParameters, Scene};
 use std::path::{Path, PathBuf};
 
 /// Everything that was read.
-pub struct Inputs {
+pub(crate) struct Inputs {
     /// The rig file as it stands.
     pub rig_toml: String,
     /// The experiment file as it stands.
@@ -29,7 +29,11 @@ pub struct Inputs {
 
 impl Inputs {
     /// Reads and checks the files; `sealed` takes the place of the file that the experiment names.
-    pub fn read(rig: &Path, experiment: Option<&Path>, sealed: Option<&Path>) -> Result<Self, RunError> {
+    pub(crate) fn read(
+        rig: &Path,
+        experiment: Option<&Path>,
+        sealed: Option<&Path>,
+    ) -> Result<Self, RunError> {
         let rig_toml = read(rig)?;
         let parameters = RigParameters::from_toml(&rig_toml, &rig.display().to_string())
             .map_err(|error| RunError::Input(error.to_string()))?;
@@ -60,7 +64,7 @@ impl Inputs {
 }
 
 /// A script of faults as read.
-pub struct Script {
+pub(crate) struct Script {
     /// The file as it stands.
     pub toml: String,
     /// The same, checked.
@@ -70,7 +74,7 @@ pub struct Script {
 
 impl Script {
     /// Reads and checks the file.
-    pub fn read(path: &Path) -> Result<Self, RunError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, RunError> {
         let (toml, file) = (read(path)?, path.display().to_string());
         let script =
             FaultScript::from_toml(&toml, &file).map_err(|error| RunError::Input(error.to_string()))?;
@@ -78,7 +82,7 @@ impl Script {
     }
 
     /// Refuses faults of the bus where nobody could carry them out.
-    pub fn check_host(&self, hosts_bus: bool) -> Result<(), RunError> {
+    pub(crate) fn check_host(&self, hosts_bus: bool) -> Result<(), RunError> {
         let planned = self.script.faults.iter().find(|planned| on_wire(&planned.fault).is_some());
         match planned.filter(|_| !hosts_bus) {
             Some(planned) => Err(RunError::Input(format!(

@@ -17,22 +17,22 @@
 //! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
 //! | [`run`], [`inputs`], [`host_thread`], [`cli`], [`program`] | around it |
 
-pub mod bus_load;
-pub mod catalogue;
+mod bus_load;
+mod catalogue;
 pub mod cli;
-pub mod console;
-pub mod event;
-pub mod exchange;
+mod console;
+mod event;
+mod exchange;
 pub mod faults;
 mod finish;
-pub mod host_thread;
-pub mod inputs;
-pub mod node;
-pub mod pace;
+mod host_thread;
+mod inputs;
+mod node;
+mod pace;
 pub mod program;
-pub mod recording;
+mod recording;
 mod rig;
-pub mod run;
-pub mod seal;
-pub mod telemetry;
-pub mod wire_limits;
+mod run;
+mod seal;
+mod telemetry;
+mod wire_limits;

@@ -33,7 +33,7 @@ use std::time::Duration;
 /// Longest wait for room in the recorder's queue after a stall, in ms; a writer that is slower than this has failed.
 const LONGEST_WAIT_MS: u32 = 2000;
 
-pub struct NodeParts {
+pub(crate) struct NodeParts {
     /// The plant in its initial state.
     pub plant: Plant,
     pub sensors: Sensors,
@@ -51,7 +51,7 @@ pub struct NodeParts {
 }
 
 /// What the node counted.
-pub struct NodeFigures {
+pub(crate) struct NodeFigures {
     /// Frames by what became of them.
     pub frames: FrameCounters,
     /// Commands of drive and load by what became of them.
@@ -63,7 +63,7 @@ pub struct NodeFigures {
 }
 
 /// The rig on its bus, with console and records.
-pub struct EmulatorNode {
+pub(crate) struct EmulatorNode {
     node: RigNode<BreakableRig>,
     console: Option<Receiver<Command>>,
     quit_asked: bool,
@@ -79,7 +79,7 @@ pub struct EmulatorNode {
 
 impl EmulatorNode {
     /// Puts the rig on its bus, before cycle 0.
-    pub fn new(parts: NodeParts) -> Self {
+    pub(crate) fn new(parts: NodeParts) -> Self {
         let NodeParts { plant, sensors, people, faults, console, recorder, bench_frames, lockstep } = parts;
         Self {
             node: RigNode::new(BreakableRig::new(plant, sensors, people, faults), lockstep),
@@ -97,7 +97,7 @@ impl EmulatorNode {
     }
 
     /// Computes `count` cycles from `first` on that the loop missed, with the commands that acted before.
-    pub fn miss(&mut self, first: u64, count: u64) {
+    pub(crate) fn miss(&mut self, first: u64, count: u64) {
         if count == 0 {
             return;
         }
@@ -121,7 +121,7 @@ impl EmulatorNode {
 
     /// Samples the sensors of `cycle` and sends what is due. `after_miss` sends the tick first, so that receivers know
     /// which cycle the sensors are of.
-    pub fn publish(&mut self, cycle: u64, after_miss: bool, bus: &mut dyn Bus) {
+    pub(crate) fn publish(&mut self, cycle: u64, after_miss: bool, bus: &mut dyn Bus) {
         self.take_typed(cycle);
         let readings = self.begin(cycle);
         let Self { node, recorder, exchange, .. } = self;
@@ -152,12 +152,12 @@ impl EmulatorNode {
     }
 
     /// Says farewell: a tick that tells the controllers that no more sensors come after `cycle`.
-    pub fn publish_end(&mut self, cycle: u64, bus: &mut dyn Bus) {
+    pub(crate) fn publish_end(&mut self, cycle: u64, bus: &mut dyn Bus) {
         send(&self.node.tick(TickCause::Farewell, cycle), bus, &mut self.recorder);
     }
 
     /// Takes a frame that arrived before `cycle`.
-    pub fn take(&mut self, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
+    pub(crate) fn take(&mut self, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
         self.recorder.frame(FrameRecord { stamp_ns, frame: *frame });
         match Frame::decode(frame) {
             Ok(known) => self.take_known(known, frame, stamp_ns, cycle),
@@ -210,7 +210,7 @@ impl EmulatorNode {
     }
 
     /// Withdraws stale or disputed commands in `cycle`, records it, and steps the plant to the start of the next.
-    pub fn act(&mut self, cycle: u64) {
+    pub(crate) fn act(&mut self, cycle: u64) {
         for axis in Axis::ALL {
             let Latched { change, age_cycles } = self.node.latch(axis);
             self.exchange[axis as usize].latched(age_cycles);
@@ -222,14 +222,14 @@ impl EmulatorNode {
     }
 
     /// Hands over when everything of this cycle happened: `row` without the exchange, which the node knows.
-    pub fn tell_timing(&mut self, row: CycleTiming) {
+    pub(crate) fn tell_timing(&mut self, row: CycleTiming) {
         let axes = self.exchange.each_ref().map(ExchangeWatch::cycle);
         let [AxisCycle { exchange: drive, .. }, AxisCycle { exchange: load, .. }] = axes;
         self.recorder.timing(TimingRecord::Cycle { row: CycleTiming { drive, load, ..row }, axes });
     }
 
     /// Hands over the overrun that ends the run.
-    pub fn tell_overrun(&mut self, overrun: &Overrun, woke_ns: u64) {
+    pub(crate) fn tell_overrun(&mut self, overrun: &Overrun, woke_ns: u64) {
         let Overrun { index: first, skipped, late_by } = *overrun;
         let late_ns = late_by.as_nanos() as u64;
         self.recorder.timing(TimingRecord::Stopped { first, skipped, late_ns, woke_ns });
@@ -306,12 +306,12 @@ impl EmulatorNode {
     }
 
     /// Whether every controller that was heard says that its chain is done.
-    pub fn controllers_done(&self) -> bool {
+    pub(crate) fn controllers_done(&self) -> bool {
         self.chains_done.iter().flatten().count() > 0 && self.chains_done.iter().flatten().all(|done| *done)
     }
 
     /// Whether the plant's state is finite; when not, which is reported, the run must end with silence on the bus.
-    pub fn is_finite(&mut self, cycle: u64) -> bool {
+    pub(crate) fn is_finite(&mut self, cycle: u64) -> bool {
         let finite = self.node.rig().plant().state().is_finite();
         if !finite {
             self.tell(cycle, EventKind::NotFinite);
@@ -319,25 +319,25 @@ impl EmulatorNode {
         finite
     }
 
-    pub fn frame_counters(&self) -> FrameCounters {
+    pub(crate) fn frame_counters(&self) -> FrameCounters {
         self.frames
     }
 
-    pub fn quit_asked(&self) -> bool {
+    pub(crate) fn quit_asked(&self) -> bool {
         self.quit_asked
     }
 
     /// Whether any valve command was accepted.
-    pub fn controller_received(&self) -> bool {
+    pub(crate) fn controller_received(&self) -> bool {
         self.node.commands().iter().any(|intake| intake.counters().accepted > 0)
     }
 
-    pub fn skipped(&self) -> u64 {
+    pub(crate) fn skipped(&self) -> u64 {
         self.node.skipped()
     }
 
     /// The figures of the run; the node goes, and with it the recorder's sending ends.
-    pub fn into_figures(self) -> NodeFigures {
+    pub(crate) fn into_figures(self) -> NodeFigures {
         NodeFigures {
             frames: self.frames,
             commands: self.node.commands().each_ref().map(|intake| *intake.counters()),

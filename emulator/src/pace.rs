@@ -1,7 +1,7 @@
 //! What moves the rig from cycle to cycle: the real clock, or the lockstep barrier.
 
-pub mod lockstep;
-pub mod real;
+pub(crate) mod lockstep;
+pub(crate) mod real;
 
 use crate::node::EmulatorNode;
 use protocol::bus::Bus;
@@ -16,7 +16,7 @@ const FAREWELL: Duration = Duration::from_millis(30);
 
 /// How time passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub(crate) enum Pace {
     /// One cycle each millisecond of the machine's clock.
     Real,
     /// As fast as all members of the barrier allow; time is simulated.
@@ -46,7 +46,7 @@ impl fmt::Display for Pace {
 
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
-pub enum End {
+pub(crate) enum End {
     ControllersDone,
     /// The time that was asked for has passed.
     TimeUp,
@@ -72,7 +72,7 @@ pub enum End {
 
 /// What both paces share with the rest of the program.
 #[derive(Default)]
-pub struct Shared {
+pub(crate) struct Shared {
     /// Set by a signal.
     pub interrupt: Interrupt,
     /// Set by the signal that freezes the flight recorder.
@@ -91,7 +91,7 @@ pub struct Shared {
 
 /// When a run ends by itself.
 #[derive(Clone, Copy, Debug)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// Cycles to run; `None` runs until the controllers are done.
     pub cycles: Option<u64>,
     /// How long the bus may be gone.
@@ -103,7 +103,7 @@ pub struct Limits {
 }
 
 /// A rig on its bus, and what may end its run.
-pub struct RunContext<'a> {
+pub(crate) struct RunContext<'a> {
     pub node: &'a mut EmulatorNode,
     pub bus: &'a mut dyn Bus,
     pub limits: &'a Limits,
@@ -112,7 +112,7 @@ pub struct RunContext<'a> {
 }
 
 /// What a pace leaves behind.
-pub struct RunOutcome {
+pub(crate) struct RunOutcome {
     pub end: End,
     /// Cycles begun, skipped ones included.
     pub cycles: u64,

@@ -11,8 +11,8 @@
 //! The queues are allocated before the start; sending takes no lock and wakes nobody, because the writer polls
 //! (facts: 0.2 us against 9 us with a blocked receiver). A full queue loses the record and counts it.
 
-pub mod rig_timing;
-pub mod writer;
+pub(crate) mod rig_timing;
+pub(crate) mod writer;
 
 use crate::event::Event;
 use crate::exchange::{RoundTrip, TimingRecord};
@@ -30,7 +30,7 @@ const TRIP_QUEUE: usize = 2 * CYCLE_QUEUE;
 const EVENT_QUEUE: usize = 4096;
 
 /// The sending ends, held by the rig loop.
-pub struct Recorder {
+pub(crate) struct Recorder {
     cycles: Sender<CycleRecord>,
     frames: Sender<FrameRecord>,
     events: Sender<Event>,
@@ -44,7 +44,7 @@ pub struct Recorder {
 }
 
 /// The receiving ends, held by the writer.
-pub struct Records {
+pub(crate) struct Records {
     pub(crate) cycles: Receiver<CycleRecord>,
     frames: Receiver<FrameRecord>,
     pub(crate) events: Receiver<Event>,
@@ -56,7 +56,7 @@ pub struct Records {
 
 /// Makes the queues. With `waits`, a full queue holds the sender up instead of losing the record.
 #[must_use]
-pub fn queues(waits: bool) -> (Recorder, Records) {
+pub(crate) fn queues(waits: bool) -> (Recorder, Records) {
     let (cycle_sender, cycles) = bounded(CYCLE_QUEUE);
     let (frame_sender, frames) = bounded(FRAME_QUEUE);
     let (event_sender, events) = bounded(EVENT_QUEUE);
@@ -103,33 +103,33 @@ fn a_turn<T>(queue: &Receiver<T>) -> impl Iterator<Item = T> {
 }
 
 impl Recorder {
-    pub fn cycle(&mut self, record: CycleRecord) {
+    pub(crate) fn cycle(&mut self, record: CycleRecord) {
         self.dropped += hand_over(&self.cycles, record, self.waits);
     }
 
-    pub fn frame(&mut self, record: FrameRecord) {
+    pub(crate) fn frame(&mut self, record: FrameRecord) {
         self.dropped += hand_over(&self.frames, record, self.waits);
     }
 
-    pub fn event(&mut self, event: Event) {
+    pub(crate) fn event(&mut self, event: Event) {
         self.dropped += hand_over(&self.events, event, self.waits);
     }
 
     /// Hands over when everything of a cycle happened.
-    pub fn timing(&mut self, record: TimingRecord) {
+    pub(crate) fn timing(&mut self, record: TimingRecord) {
         self.dropped += hand_over(&self.timings, record, self.waits);
     }
 
-    pub fn round_trip(&mut self, record: RoundTrip) {
+    pub(crate) fn round_trip(&mut self, record: RoundTrip) {
         self.dropped += hand_over(&self.round_trips, record, self.waits);
     }
 
     /// Whether there is no room for a cycle, and a writer who will make some.
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.cycles.is_full() && self.writer_alive.strong_count() > 0
     }
 
-    pub fn dropped(&self) -> u64 {
+    pub(crate) fn dropped(&self) -> u64 {
         self.dropped
     }
 }

@@ -79,7 +79,7 @@ impl RunError {
 ///
 /// # Errors
 /// [`RunError`] when the run cannot start; how a run that started went is the exit code.
-pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
+pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let lockstep = arguments.pace == Pace::Lockstep;
     if lockstep && matches!(arguments.bus, BusUrl::Can { .. }) {
         return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
@@ -146,7 +146,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
 }
 
 /// Watches for Ctrl-C and SIGTERM.
-pub fn watch_interrupt() -> Result<Interrupt, RunError> {
+pub(crate) fn watch_interrupt() -> Result<Interrupt, RunError> {
     Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }
 

@@ -21,7 +21,7 @@ const MODE: u32 = 0o600;
 /// # Errors
 /// [`RunError::Input`] when so many effects do not exist, or the file does already; [`RunError::Output`] when it cannot be
 /// written.
-pub fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
+pub(crate) fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
     let SealArguments { seed, effects, axis, out } = arguments;
     let drawn = draw(*seed, usize::from(*effects), among(*axis))
         .map_err(|error| RunError::Input(format!("--effects {effects}: {error}")))?;

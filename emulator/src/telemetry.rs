@@ -22,13 +22,13 @@ use runlog::telemetry::{
 use std::path::Path;
 use viewer::Viewer;
 
-pub use description::{Described, description};
+pub(crate) use description::{Described, description};
 
 /// Viewers at a time; one more is parted with at once.
 const MOST_VIEWERS: usize = 8;
 
 /// The socket and its viewers.
-pub struct Telemetry {
+pub(crate) struct Telemetry {
     socket: SocketFile,
     /// The first packet of each viewer, save what it is given at its coming.
     description: Description,
@@ -43,13 +43,17 @@ pub struct Telemetry {
 
 impl Telemetry {
     /// Opens the socket at `path`, readable and writable by this user alone.
-    pub fn open(path: &Path, run: &Described<'_>, console: Option<Console>) -> Result<Self, SocketFileError> {
+    pub(crate) fn open(
+        path: &Path,
+        run: &Described<'_>,
+        console: Option<Console>,
+    ) -> Result<Self, SocketFileError> {
         let socket = SocketFile::bind(path, SocketType::STREAM, false)?;
         let (description, with_truth) = (description(run), run.with_truth());
         Ok(Self { socket, description, with_truth, console, viewers: Vec::new(), packet: Vec::new() })
     }
 
-    pub fn cycle(&mut self, record: &CycleRecord) {
+    pub(crate) fn cycle(&mut self, record: &CycleRecord) {
         if self.viewers.is_empty() {
             return;
         }
@@ -64,7 +68,7 @@ impl Telemetry {
         self.viewers.iter_mut().for_each(|viewer| viewer.offer(&self.packet));
     }
 
-    pub fn event(&mut self, event: &Event) {
+    pub(crate) fn event(&mut self, event: &Event) {
         if !self.viewers.is_empty() {
             self.packet.clear();
             write_event(&mut self.packet, event);
@@ -73,7 +77,7 @@ impl Telemetry {
     }
 
     /// Tells lines of an interval log.
-    pub fn histograms(&mut self, lines: &[u8]) {
+    pub(crate) fn histograms(&mut self, lines: &[u8]) {
         for line in lines.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
             self.packet.clear();
             write_packet(&mut self.packet, Kind::Histogram, line);
@@ -83,7 +87,7 @@ impl Telemetry {
 
     /// Lets viewers in, sends them the description and what `happened` so far, of which the `dropped` events are only counted,
     /// obeys their commands, and writes what their sockets take.
-    pub fn serve(&mut self, happened: &[Event], dropped: DroppedEvents) {
+    pub(crate) fn serve(&mut self, happened: &[Event], dropped: DroppedEvents) {
         while let Some(socket) = self.socket.accept() {
             if self.viewers.len() >= MOST_VIEWERS {
                 continue;

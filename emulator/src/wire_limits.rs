@@ -12,7 +12,7 @@ const ROUNDING: f64 = 1e-12;
 /// A number of the rig file that the wire cannot carry.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{table}.{key}: {problem}")]
-pub struct WireMisfit {
+pub(crate) struct WireMisfit {
     /// Table of the rig file.
     pub table: &'static str,
     pub key: &'static str,
@@ -24,7 +24,7 @@ pub struct WireMisfit {
 ///
 /// # Errors
 /// The first number that does not fit.
-pub fn check(rig: &RigParameters) -> Result<(), WireMisfit> {
+pub(crate) fn check(rig: &RigParameters) -> Result<(), WireMisfit> {
     let sensors = rig.sensors();
     let position = signal(DRIVE_SENSORS, "position");
     let force = signal(DRIVE_SENSORS, "force");

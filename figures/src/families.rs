@@ -91,7 +91,7 @@ impl Family {
 }
 
 /// All families, in the order in which they are listed.
-pub const FAMILIES: &[Family] = &[
+pub(crate) const FAMILIES: &[Family] = &[
     position::FAMILY,
     position_step::FAMILY,
     force::FAMILY,

@@ -13,18 +13,18 @@
 //! | [`table`] | the summary as a short table |
 //! | [`median`](mod@median) | a median with its interval |
 
-pub mod families;
+mod families;
 pub mod join;
 pub mod median;
 pub mod record;
-pub mod reports;
+mod reports;
 pub mod series;
 pub mod table;
 pub mod tables_read;
 pub mod thresholds;
 pub mod top;
 
-pub use families::{Definition, FAMILIES, Family, Figures, definition, definitions, list, of};
+pub use families::{Definition, Family, Figures, definition, definitions, list, of};
 pub use families::{emergency_stop, position};
 
 use runlog::run_folder::FileError;

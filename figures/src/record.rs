@@ -11,7 +11,7 @@ use crate::tables_read::{self, StateSpan, Table};
 use std::path::Path;
 
 /// Numbers of a controller's table.
-pub const CONTROLLER_NUMBERS: &[&str] = &[
+pub(crate) const CONTROLLER_NUMBERS: &[&str] = &[
     "set_position_m",
     "set_velocity_m_per_s",
     "set_force_N",
@@ -156,7 +156,7 @@ impl Record {
     }
 
     /// Whether the load's set-point follows from the motion: a spring, a damper, a mass, dry friction.
-    pub fn load_depends_on_state(&self) -> bool {
+    pub(crate) fn load_depends_on_state(&self) -> bool {
         let set_points = self.experiment.get("load").and_then(|load| load.get("set-point"));
         let laws = set_points.and_then(toml::Value::as_array).into_iter().flatten();
         laws.filter_map(|segment| segment.get("law")?.as_str()).any(|law| STATE_DEPENDENT.contains(&law))

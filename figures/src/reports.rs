@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use std::path::Path;
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Reports {
+pub(crate) enum Reports {
     /// No controller left one.
     None,
     /// One process for both axes.
@@ -21,7 +21,7 @@ pub enum Reports {
 }
 
 /// Reads the reports in `folder`.
-pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
+pub(crate) fn read(folder: &Path) -> Result<Reports, SummaryError> {
     let read = |name: &str| {
         let path = folder.join(name);
         path.exists().then(|| read_json(&path)).transpose()
@@ -38,7 +38,7 @@ pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
 
 impl Reports {
     /// What they say of each axis that they name.
-    pub fn axes(&self) -> Map<String, Value> {
+    pub(crate) fn axes(&self) -> Map<String, Value> {
         match self {
             Self::None => Map::new(),
             Self::Both(reported) => reported.axes.clone(),

@@ -214,12 +214,12 @@ impl Series {
         Some(self.most()? - self.least()?)
     }
 
-    pub fn first_time(&self, wanted: impl Fn(f64) -> bool) -> Option<f64> {
+    pub(crate) fn first_time(&self, wanted: impl Fn(f64) -> bool) -> Option<f64> {
         self.iter().find(|(_, value)| wanted(*value)).map(|(time, _)| time)
     }
 
     /// Time of the first sample from which on all values are as wanted; none when the last is not.
-    pub fn stays_from(&self, wanted: impl Fn(f64) -> bool) -> Option<f64> {
+    pub(crate) fn stays_from(&self, wanted: impl Fn(f64) -> bool) -> Option<f64> {
         let last_bad = self.values.iter().rposition(|value| !wanted(*value));
         self.time_s.get(last_bad.map_or(0, |place| place + 1)).copied()
     }
@@ -233,7 +233,7 @@ impl Series {
     }
 
     /// Stretches of neighbouring samples with the same value.
-    pub fn constant_stretches(&self) -> Vec<Span> {
+    pub(crate) fn constant_stretches(&self) -> Vec<Span> {
         self.stretches_of(|before, value| before.is_none_or(|before| before == value))
     }
 

@@ -130,7 +130,7 @@ pub fn judge(
 ///
 /// # Errors
 /// As [`judge`].
-pub fn judge_summary(
+pub(crate) fn judge_summary(
     passed: &toml::Table,
     summary: &JoinedSummary,
 ) -> Result<BTreeMap<String, JudgedBound>, SummaryError> {

@@ -26,7 +26,7 @@ const NAMED: usize = 12;
 
 /// What is wrong with a threshold file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BoundsError {
+pub(crate) enum BoundsError {
     #[error("{0}")]
     Toml(String),
     #[error("it holds a table [bounds] and nothing else")]
@@ -52,7 +52,7 @@ pub(crate) fn most(text: &str, figure: &str) -> Option<f64> {
 }
 
 /// Judges a report by the text of a threshold file.
-pub fn judge(text: &str, report: &Report) -> Result<Vec<BoundResult>, BoundsError> {
+pub(crate) fn judge(text: &str, report: &Report) -> Result<Vec<BoundResult>, BoundsError> {
     let file: toml::Table =
         text.parse().map_err(|error: toml::de::Error| BoundsError::Toml(error.to_string()))?;
     let bounds = file.get("bounds").and_then(toml::Value::as_table).filter(|_| file.len() == 1);

@@ -26,7 +26,7 @@ const FIGURES: [(&str, Pick); 4] = [
 
 /// Compares the groups of the runs in the order in which they first appear; runs of one group, or of none, stand each for
 /// itself. Nothing with fewer than two runs.
-pub fn compare(runs: &[RunPart]) -> Option<Comparison> {
+pub(crate) fn compare(runs: &[RunPart]) -> Option<Comparison> {
     let alone = runs.iter().all(|run| run.group == runs[0].group);
     let named = |(place, run): (usize, &RunPart)| match alone {
         true => format!("{place} {}", run.folder),

@@ -10,7 +10,7 @@ use realtime::{Grant, Machine};
 use std::collections::BTreeSet;
 
 /// The sentences of all runs, each once.
-pub fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+pub(crate) fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
     let mut reported = Vec::new();
     if let Some(host) = virtual_machine(runs) {
         reported.push(format!(

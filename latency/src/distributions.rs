@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 const BELOW_ZERO_SHARE: f64 = 0.01;
 
 /// The distributions of a run, by tag, the reference's among them; tells what could not be had.
-pub fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
+pub(crate) fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
     let mut found = run.logged.clone();
     if run.whole {
         for (process, rows) in &run.rows {
@@ -47,7 +47,7 @@ pub fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
 }
 
 /// Percentiles of a run by tag; those of the summaries where nothing better is there.
-pub fn percentiles_of_run(
+pub(crate) fn percentiles_of_run(
     run: &RunFiles,
     series: &BTreeMap<String, Series>,
 ) -> BTreeMap<String, PercentilesNs> {
@@ -79,7 +79,7 @@ pub fn percentiles_of_run(
 }
 
 /// Percentiles of the summaries; nothing without samples.
-pub fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
+pub(crate) fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
     let count = reported.count;
     let at = |value: Option<u64>, least: u64| value.filter(|_| count >= least);
     (count > 0).then(|| PercentilesNs {
@@ -91,7 +91,7 @@ pub fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
     })
 }
 
-pub fn add_up(runs: &[BTreeMap<String, Series>]) -> BTreeMap<String, Samples> {
+pub(crate) fn add_up(runs: &[BTreeMap<String, Series>]) -> BTreeMap<String, Samples> {
     let mut sums: BTreeMap<String, Samples> = BTreeMap::new();
     for (tag, series) in runs.iter().flatten() {
         sums.entry(tag.clone()).or_default().add(&series.samples);
@@ -100,7 +100,10 @@ pub fn add_up(runs: &[BTreeMap<String, Series>]) -> BTreeMap<String, Samples> {
 }
 
 /// The distributions as a report shows them.
-pub fn shown(runs: &[BTreeMap<String, Series>], sums: &BTreeMap<String, Samples>) -> Vec<Distribution> {
+pub(crate) fn shown(
+    runs: &[BTreeMap<String, Series>],
+    sums: &BTreeMap<String, Samples>,
+) -> Vec<Distribution> {
     let mut shown: Vec<_> = sums.iter().map(|(tag, samples)| one(tag, samples, runs)).collect();
     shown.sort_by_key(|distribution| kinds::place(&distribution.name));
     shown

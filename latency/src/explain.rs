@@ -11,8 +11,8 @@
 //!
 //! Pure: rows in, events out; it knows nothing of who disturbed a run.
 
-pub mod beside;
-pub mod rules;
+pub(crate) mod beside;
+pub(crate) mod rules;
 
 use super::files::RunFiles;
 use super::findings::lost_by_gaps;
@@ -24,7 +24,7 @@ use runlog::timing::CycleTiming;
 use std::collections::BTreeMap;
 
 /// A wake-up or an execution is looked at from this much later than usual on, ns.
-pub const EVENT_OVER_NS: u64 = 200_000;
+pub(crate) const EVENT_OVER_NS: u64 = 200_000;
 /// Late cycles this near to each other are one event.
 const CLUSTER_CYCLES: u64 = 5;
 /// Cycles shown on each side of an event.
@@ -58,7 +58,7 @@ impl Late {
 }
 
 /// All events of a run, in the order of its cycles, process by process.
-pub fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
+pub(crate) fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
     let late: Vec<_> =
         run.rows.iter().map(|(process, rows)| (process.as_str(), late_rows(process, rows, run))).collect();
     let mut events = Vec::new();
@@ -71,13 +71,13 @@ pub fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
 }
 
 /// The worst first.
-pub fn sort_by_severity(events: &mut [Event]) {
+pub(crate) fn sort_by_severity(events: &mut [Event]) {
     events.sort_by_key(|event| (std::cmp::Reverse(event.late_ns.max(event.slow_ns)), event.run, event.cycle));
 }
 
 /// One event for each moment: what several processes suffered at once, by the same cause, stands under the worst of them.
 /// Wants the worst first.
-pub fn one_of_each_moment(events: Vec<Event>) -> Vec<Event> {
+pub(crate) fn one_of_each_moment(events: Vec<Event>) -> Vec<Event> {
     let severity_ns = |event: &Event| event.late_ns.max(event.slow_ns);
     let from_ns = |event: &Event| event.cycle * CYCLE_NS;
     let to_ns = |event: &Event| from_ns(event) + severity_ns(event).max(CYCLE_NS);

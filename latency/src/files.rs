@@ -22,7 +22,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// Processes of a run that leave files, by the first part of their files' names.
-pub const PROCESSES: [&str; 4] = ["emulator", "controller", "controller-drive", "controller-load"];
+pub(crate) const PROCESSES: [&str; 4] = ["emulator", "controller", "controller-drive", "controller-load"];
 
 /// Longest interval of a log whose maximum is one of a second; older logs hold the run in one interval.
 const LONGEST_SECOND_S: f64 = 1.5;
@@ -60,7 +60,7 @@ pub struct RunFiles {
 }
 
 /// Whether a folder holds anything of a run.
-pub fn is_run(folder: &Path) -> bool {
+pub(crate) fn is_run(folder: &Path) -> bool {
     let names = ["summary.json", "run.json", "emulator.hlog", "emulator-timing.csv"];
     names.iter().any(|name| folder.join(name).is_file())
 }
@@ -142,7 +142,7 @@ impl RunFiles {
         }
     }
 
-    pub fn take_interval(&mut self, passing: Passing<'_>) {
+    pub(crate) fn take_interval(&mut self, passing: Passing<'_>) {
         let Passing { tag, start_s, duration_s, histogram } = passing;
         // Logs from before the load axis had a round trip of its own name the drive's without its axis.
         let tag = if tag == "round-trip" { "drive-round-trip" } else { tag };
@@ -254,12 +254,12 @@ impl RunFiles {
     }
 
     /// Each `controller*.json` by process.
-    pub fn controller_reports(&self) -> impl Iterator<Item = (&str, ControllerReport)> {
+    pub(crate) fn controller_reports(&self) -> impl Iterator<Item = (&str, ControllerReport)> {
         self.controllers.iter().map(|(process, reported)| (process.as_str(), typed(reported)))
     }
 
     /// What `summary.json` and each `controller*.json` have in common, by process.
-    pub fn process_reports(&self) -> impl Iterator<Item = (&str, ProcessReport)> {
+    pub(crate) fn process_reports(&self) -> impl Iterator<Item = (&str, ProcessReport)> {
         self.reports().map(|(process, reported)| (process, typed(reported)))
     }
 

@@ -27,7 +27,7 @@ const HOG_TOGETHER_NS: u64 = 8_000_000;
 const SAME_MAXIMUM: f64 = 0.98;
 
 /// All findings, the most telling first.
-pub fn find(runs: &[RunFiles], events: &[Event]) -> Vec<Finding> {
+pub(crate) fn find(runs: &[RunFiles], events: &[Event]) -> Vec<Finding> {
     let mut found: Vec<_> = [
         stopped(runs, events, Cause::EmulatorStopped),
         stopped(runs, events, Cause::ControllerStopped),
@@ -234,7 +234,7 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
 }
 
 /// Frames that never came, by gaps in the counters at rig and controllers.
-pub fn lost_by_gaps(run: &RunFiles) -> u64 {
+pub(crate) fn lost_by_gaps(run: &RunFiles) -> u64 {
     let summary = run.counted();
     let by_axis = summary.drive_commands.lost + summary.load_commands.lost;
     let of_process =

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 const VERSION: u32 = 2;
 
 /// The file's contents: wake-up latencies of all processes over all runs.
-pub fn value(sums: &BTreeMap<String, Samples>, runs: &[RunFiles]) -> Value {
+pub(crate) fn value(sums: &BTreeMap<String, Samples>, runs: &[RunFiles]) -> Value {
     // The rig first.
     let mut own: Vec<_> = sums.iter().filter(|(tag, _)| tag.ends_with("-wakeup")).collect();
     own.sort_by_key(|(tag, _)| super::kinds::place(tag));

@@ -33,7 +33,7 @@ impl Series {
 
 /// What joining gave.
 #[derive(Clone, Debug, Default)]
-pub struct OneWay {
+pub(crate) struct OneWay {
     pub series: BTreeMap<String, Series>,
     /// Latencies below what the stamps can tell.
     pub below_zero: u64,
@@ -42,7 +42,7 @@ pub struct OneWay {
 type OfAxis = fn(&CycleTiming) -> Exchange;
 
 /// One-way latencies of a run with rows of both sides.
-pub fn one_way(run: &RunFiles) -> OneWay {
+pub(crate) fn one_way(run: &RunFiles) -> OneWay {
     let mut found = OneWay::default();
     let Some(rig) = run.rows.get("emulator") else { return found };
     let axes: [(&str, OfAxis); 2] = [("drive", |row| row.drive), ("load", |row| row.load)];
@@ -94,7 +94,7 @@ impl OneWay {
 }
 
 /// What the rows of one process say by themselves, by tag: for runs whose log is missing.
-pub fn of_rows(process: &str, rows: &[CycleTiming]) -> BTreeMap<String, Series> {
+pub(crate) fn of_rows(process: &str, rows: &[CycleTiming]) -> BTreeMap<String, Series> {
     let mut found: BTreeMap<String, Series> = BTreeMap::new();
     let mut record = |what: &str, cycle: u64, ns: u64| {
         found.entry(format!("{process}-{what}")).or_default().record(cycle, ns);

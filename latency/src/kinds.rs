@@ -15,7 +15,7 @@ const OF_A_PROCESS: [(&str, &str); 7] = [
 ];
 
 /// Ping-pongs that `scripts/latency` sets beside a run: its name for each, and what it is.
-pub const PING_PONGS: [(&str, &str); 3] = [
+pub(crate) const PING_PONGS: [(&str, &str); 3] = [
     ("bus", "on the same bus"),
     ("embedded", "on the embedded bus"),
     ("socketpair", "on a bare pair of sockets"),

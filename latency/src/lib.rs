@@ -30,33 +30,33 @@
 //! | [`page`] | the report as one page |
 //! | [`table`] | the table of ratios that `scripts/latency` ends with |
 
-pub mod bounds;
+mod bounds;
 pub mod choice;
 pub mod claim;
-pub mod comparison;
+mod comparison;
 pub mod conditions;
-pub mod controlled;
-pub mod distributions;
-pub mod explain;
+mod controlled;
+mod distributions;
+mod explain;
 pub mod files;
-pub mod findings;
+mod findings;
 pub mod hlog;
-pub mod jitterdebugger;
-pub mod joined;
+mod jitterdebugger;
+mod joined;
 pub mod kinds;
 pub mod markdown;
 pub mod model;
 pub mod output;
 pub mod page;
-pub mod parts;
-pub mod probe;
-pub mod ratios;
-pub mod reference;
+mod parts;
+mod probe;
+mod ratios;
+mod reference;
 pub mod report_cause;
-pub mod resolution;
+mod resolution;
 pub mod samples;
 pub mod table;
-pub mod tallies;
+mod tallies;
 
 #[cfg(test)]
 mod made_up;
@@ -120,7 +120,7 @@ pub fn make(chosen: &[Chosen], title: Option<&str>, compare: bool) -> Made {
 }
 
 /// Makes the report of runs that were read; `groups` may name the group of each.
-pub fn from_files(
+pub(crate) fn from_files(
     mut runs: Vec<RunFiles>,
     groups: &[Option<&str>],
     title: Option<&str>,

@@ -12,7 +12,11 @@ use std::collections::BTreeMap;
 /// Group of a run that says none.
 const NO_GROUP: &str = "all";
 
-pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String, PercentilesNs>) -> RunPart {
+pub(crate) fn part(
+    run: &RunFiles,
+    group: Option<&str>,
+    percentiles_ns: BTreeMap<String, PercentilesNs>,
+) -> RunPart {
     let reported_group = run.conditions.as_ref().and_then(|reported| reported.group.as_deref());
     RunPart {
         folder: run.folder.display().to_string(),

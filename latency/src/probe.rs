@@ -19,14 +19,14 @@ pub struct Gap {
 
 impl Gap {
     /// Length of what the gap has in common with a stretch of time, ns.
-    pub fn within_ns(&self, from_ns: u64, to_ns: u64) -> u64 {
+    pub(crate) fn within_ns(&self, from_ns: u64, to_ns: u64) -> u64 {
         self.to_ns.min(to_ns).saturating_sub(self.from_ns.max(from_ns))
     }
 }
 
 /// Whether a probe watched a CPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Watched {
+pub(crate) enum Watched {
     Yes,
     No,
     /// Its table does not say.
@@ -34,7 +34,7 @@ pub enum Watched {
 }
 
 /// Whether a CPU was watched at a time, by the rows of a table.
-pub fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
+pub(crate) fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
     let Some(gaps) = gaps else { return Watched::No };
     if gaps.iter().any(|gap| gap.cpu == cpu && gap.from_ns <= at_ns) {
         return Watched::Yes;
@@ -45,13 +45,13 @@ pub fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
-pub struct ProbeError {
+pub(crate) struct ProbeError {
     line: usize,
     reason: String,
 }
 
 /// Reads a table; a last line without its end is left out. Columns may follow that are not known here.
-pub fn read(text: &str) -> Result<Vec<Gap>, ProbeError> {
+pub(crate) fn read(text: &str) -> Result<Vec<Gap>, ProbeError> {
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     let mut lines = (1..).zip(whole.lines());
     let head: Vec<_> = lines.next().map_or("", |(_, head)| head).split(',').collect();

@@ -20,12 +20,12 @@ const COMPARED: [(&str, &str, Pick, &str); 6] = [
 ];
 
 /// Names of all ratios that there can be.
-pub fn names() -> impl Iterator<Item = String> {
+pub(crate) fn names() -> impl Iterator<Item = String> {
     COMPARED.iter().map(|(tag, percentile, _, theirs)| format!("{tag} {percentile} / {theirs} {percentile}"))
 }
 
 /// The ratios of all runs that have a reference beside them.
-pub fn ratios(runs: &[RunPart]) -> Vec<Ratio> {
+pub(crate) fn ratios(runs: &[RunPart]) -> Vec<Ratio> {
     let mut ratios = Vec::new();
     for ((tag, _, of, theirs), name) in COMPARED.into_iter().zip(names()) {
         let pair = |run: &RunPart| {
@@ -40,7 +40,7 @@ pub fn ratios(runs: &[RunPart]) -> Vec<Ratio> {
 
 /// The name of a ratio in a threshold file: `emulator-wakeup.p50` for `emulator-wakeup p50 / cyclictest p50`, and
 /// `drive-round-trip.p50/ping-pong-bus` for one against another reference.
-pub fn short_name(name: &str) -> String {
+pub(crate) fn short_name(name: &str) -> String {
     let (ours, theirs) = name.split_once(" / ").unwrap_or((name, reference::TAG));
     let ours = ours.replace(' ', ".");
     let theirs = theirs.split(' ').next().unwrap_or(theirs);
@@ -48,7 +48,7 @@ pub fn short_name(name: &str) -> String {
 }
 
 /// The ratio of these pairs, ours first; nothing without a pair.
-pub fn ratio(name: String, pairs_ns: Vec<(u64, u64)>) -> Option<Ratio> {
+pub(crate) fn ratio(name: String, pairs_ns: Vec<(u64, u64)>) -> Option<Ratio> {
     let ratios = pairs_ns.iter().map(|(ours, theirs)| *ours as f64 / *theirs as f64).collect();
     let Median { value, interval, confidence } = median(ratios)?;
     Some(Ratio { name, pairs_ns, median: value, interval, confidence })

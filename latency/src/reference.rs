@@ -13,7 +13,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// The tag of the reference's wake-up latency.
-pub const TAG: &str = "cyclictest";
+pub(crate) const TAG: &str = "cyclictest";
 
 /// A run of cyclictest.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct Reference {
 }
 
 /// The value of an option in a command line, by its letter and its long name: `-p 80`, `-p80`, `--priority 80`, `--priority=80`.
-pub fn option<'a>(command_line: &'a str, letter: char, long: &str) -> Option<&'a str> {
+pub(crate) fn option<'a>(command_line: &'a str, letter: char, long: &str) -> Option<&'a str> {
     let short = format!("-{letter}");
     let mut words = command_line.split_whitespace();
     while let Some(word) = words.next() {
@@ -67,7 +67,7 @@ struct Thread {
 
 /// What keeps a reference from being read.
 #[derive(Debug, thiserror::Error)]
-pub enum ReferenceError {
+pub(crate) enum ReferenceError {
     #[error("{0}")]
     Json(#[from] serde_json::Error),
     #[error("histogram: bin \"{0}\" is no whole number")]
@@ -77,7 +77,7 @@ pub enum ReferenceError {
 }
 
 /// Reads what cyclictest wrote.
-pub fn read(text: &str) -> Result<Reference, ReferenceError> {
+pub(crate) fn read(text: &str) -> Result<Reference, ReferenceError> {
     let file: File = serde_json::from_str(text)?;
     let whole_us = file.resolution_in_ns != 1;
     let to_ns = if whole_us { 1000 } else { 1 };

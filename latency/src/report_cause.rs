@@ -43,7 +43,7 @@ pub fn name(report: &Report) -> (String, String) {
 }
 
 /// A cause by its name in `report.json`.
-pub fn in_kebab(cause: Cause) -> String {
+pub(crate) fn in_kebab(cause: Cause) -> String {
     let name = serde_json::to_value(cause).ok();
     name.as_ref().and_then(serde_json::Value::as_str).unwrap_or("unexplained").to_owned()
 }

@@ -43,7 +43,7 @@ pub enum Verdict {
 }
 
 /// Holds the interval of a ratio against its bounds.
-pub fn verdict(ratio: &Ratio, min: Option<f64>, max: Option<f64>) -> Verdict {
+pub(crate) fn verdict(ratio: &Ratio, min: Option<f64>, max: Option<f64>) -> Verdict {
     let Some((low, high)) = ratio.interval else {
         return Verdict::NotResolved { pairs: Some(median::LEAST_VALUES) };
     };
@@ -77,7 +77,7 @@ fn pairs_to_bring(ratio: &Ratio, end: f64, bound: f64) -> f64 {
 }
 
 /// What it would take to resolve a bound, after the words "not resolved".
-pub fn in_words(pairs: Option<u64>) -> String {
+pub(crate) fn in_words(pairs: Option<u64>) -> String {
     match pairs {
         Some(median::LEAST_VALUES) => format!("an interval needs {} pairs", median::LEAST_VALUES),
         Some(pairs) => format!("about {} pairs would resolve it", two_digits(pairs)),

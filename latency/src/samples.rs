@@ -38,7 +38,7 @@ impl FromIterator<u64> for Samples {
 
 impl Samples {
     /// Those of a histogram with bounds of its own.
-    pub fn from_histogram(other: &Histogram<u64>) -> Self {
+    pub(crate) fn from_histogram(other: &Histogram<u64>) -> Self {
         let mut samples = Self::default();
         samples.add_histogram(other);
         samples

@@ -6,7 +6,7 @@ use pagekit::grid::Grid;
 use std::collections::BTreeMap;
 
 /// Command age in cycles over all runs: a row for each age, a column for each axis; nothing when it was not counted.
-pub fn command_ages(runs: &[RunPart]) -> Option<Grid> {
+pub(crate) fn command_ages(runs: &[RunPart]) -> Option<Grid> {
     const AXES: [&str; 2] = ["drive", "load"];
     // Ages are sorted as numbers; what is no number, such as "more", comes last.
     let mut ages: BTreeMap<(u64, String), [u64; 2]> = BTreeMap::new();
@@ -29,7 +29,7 @@ pub fn command_ages(runs: &[RunPart]) -> Option<Grid> {
 }
 
 /// Frames of each run that were lost, late, came twice or made no sense, at the rig and at the controllers.
-pub fn frames(runs: &[RunPart]) -> Option<Grid> {
+pub(crate) fn frames(runs: &[RunPart]) -> Option<Grid> {
     let mut rows = Vec::new();
     for (place, run) in runs.iter().enumerate() {
         for (receiver, words) in

@@ -6,7 +6,7 @@
 use pagekit::page;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asset {
+pub(crate) struct Asset {
     /// Its type, as HTTP tells it.
     pub content_type: &'static str,
     pub body: &'static [u8],
@@ -62,7 +62,7 @@ const ASSETS: &[(&str, Asset)] = &[
     file!("vendor/uplot/uPlot.min.css", STYLE),
 ];
 
-pub fn find(path: &str) -> Option<Asset> {
+pub(crate) fn find(path: &str) -> Option<Asset> {
     ASSETS.iter().find(|(known, _)| *known == path).map(|(_, asset)| *asset)
 }
 

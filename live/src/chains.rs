@@ -87,14 +87,14 @@ fn states(signal: &str) -> &'static [&'static str] {
 }
 
 /// All chains: `name`, `states`, `edges`.
-pub fn diagrams() -> Value {
+pub(crate) fn diagrams() -> Value {
     let diagram =
         |chain: &Chain| json!({ "name": chain.name, "states": states(chain.signal), "edges": chain.edges });
     CHAINS.iter().map(diagram).collect()
 }
 
 /// The states of an axis by chain.
-pub fn active(status: ChainStatus) -> ChainStates {
+pub(crate) fn active(status: ChainStatus) -> ChainStates {
     let mut by_chain = ChainStates::new();
     // Both axes' statuses have one layout.
     Frame::DriveChainStatus(status).for_each_signal(|signal, value| {

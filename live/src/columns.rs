@@ -8,15 +8,15 @@ use runlog::telemetry::Table;
 use std::sync::LazyLock;
 
 /// Columns of `measurement.csv` for one axis, in its order: those that the bus tells too.
-pub const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
+pub(crate) const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
 /// How many there are of both axes.
-pub const MEASURED_COUNT: usize = 2 * MEASURED.len();
+pub(crate) const MEASURED_COUNT: usize = 2 * MEASURED.len();
 /// The axes as names begin.
-pub const AXES: [&str; 2] = ["drive", "load"];
+pub(crate) const AXES: [&str; 2] = ["drive", "load"];
 
 /// Where a value comes from.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Source {
+pub(crate) enum Source {
     /// Column of `measurement.csv`, by its place.
     Measured(usize),
     /// Sum of columns of `truth.csv`, each with this factor.
@@ -29,7 +29,7 @@ pub enum Source {
 
 /// What a controller says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Said {
+pub(crate) enum Said {
     /// Set-point of the position.
     Position,
     /// Set-point of the force.
@@ -39,7 +39,7 @@ pub enum Said {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
+pub(crate) struct Column {
     /// Name, ending in its unit where it has one.
     pub name: String,
     /// Unit in SI; `1` for a plain number.
@@ -48,7 +48,7 @@ pub struct Column {
     pub source: Source,
 }
 
-pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
+pub(crate) static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let mut columns: Vec<_> = (0..AXES.len()).flat_map(of_axis).collect();
     let truth = |name: &str| Source::Truth(vec![name.to_owned()], 1.0);
     for (name, unit, source) in [
@@ -98,7 +98,7 @@ fn of_axis(axis: usize) -> Vec<Column> {
 
 /// Where the columns' values stand in a cycle of the telemetry.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Layout {
+pub(crate) struct Layout {
     measured: [Option<usize>; MEASURED_COUNT],
     /// For each column that is a sum of true ones: their places; empty when one is missing.
     truth: Vec<Vec<usize>>,
@@ -107,7 +107,7 @@ pub struct Layout {
 
 impl Layout {
     /// From the description's columns: table and name of each.
-    pub fn new<'a>(described: impl Iterator<Item = (Table, &'a str)>) -> Self {
+    pub(crate) fn new<'a>(described: impl Iterator<Item = (Table, &'a str)>) -> Self {
         let described: Vec<_> = described.collect();
         let place = |table: Table, name: &str| described.iter().position(|known| *known == (table, name));
         let measured = std::array::from_fn(|index| {
@@ -125,16 +125,16 @@ impl Layout {
     }
 
     /// The measured values of a cycle.
-    pub fn measured(&self, values: &[f64]) -> [Option<f64>; MEASURED_COUNT] {
+    pub(crate) fn measured(&self, values: &[f64]) -> [Option<f64>; MEASURED_COUNT] {
         self.measured.map(|place| values.get(place?).copied())
     }
 
-    pub fn supply_pa(&self, values: &[f64]) -> Option<f64> {
+    pub(crate) fn supply_pa(&self, values: &[f64]) -> Option<f64> {
         values.get(self.supply?).copied()
     }
 
     /// The value of a column that is a sum of true ones, by the column's place.
-    pub fn truth(&self, column: usize, factor: f64, values: &[f64]) -> Option<f64> {
+    pub(crate) fn truth(&self, column: usize, factor: f64, values: &[f64]) -> Option<f64> {
         let places = self.truth.get(column).filter(|places| !places.is_empty())?;
         let sum: Option<f64> = places.iter().map(|place| values.get(*place)).sum();
         sum.map(|sum| factor * sum)

@@ -55,7 +55,7 @@ enum AskedAxis {
 
 /// How it is carried out.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Order {
+pub(crate) enum Order {
     /// A stop by the console, repeated on the bus until it is released.
     Stop,
     Release,
@@ -73,7 +73,7 @@ pub enum Order {
     Save(f64),
 }
 
-pub fn read(body: &[u8]) -> Result<Order, String> {
+pub(crate) fn read(body: &[u8]) -> Result<Order, String> {
     let asked: Asked = serde_json::from_slice(body).map_err(|error| error.to_string())?;
     let run = |command| Order::Frame(Frame::RunControl(RunControl { command, experiment: 0 }));
     let line = |line: &str| Order::Line(line.to_owned());

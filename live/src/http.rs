@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use std::net::IpAddr;
 
 /// Longest head of a request, bytes.
-pub const LONGEST_HEAD: usize = 16 << 10;
+pub(crate) const LONGEST_HEAD: usize = 16 << 10;
 /// Longest body of a request, bytes.
-pub const LONGEST_BODY: usize = 64 << 10;
+pub(crate) const LONGEST_BODY: usize = 64 << 10;
 const MOST_FIELDS: usize = 64;
 
 /// Sent with everything: the page loads nothing from elsewhere, is in no frame of another, and tells nobody where it is.
@@ -19,7 +19,7 @@ const SECURITY: &str = "Content-Security-Policy: default-src 'self'; style-src '
 
 /// A request that has come whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Request {
+pub(crate) struct Request {
     /// Its method, as `GET`.
     pub method: String,
     /// Its path, without what follows a question mark.
@@ -36,7 +36,7 @@ pub struct Request {
 
 /// How far a request has come.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Progress {
+pub(crate) enum Progress {
     Partial,
     Whole(Request),
     /// It is none, or more than is taken: what to answer.
@@ -44,7 +44,7 @@ pub enum Progress {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
+pub(crate) enum Status {
     Good,
     BadRequest,
     Unauthorized,
@@ -75,7 +75,7 @@ impl Status {
 }
 
 /// Reads what has come of a request so far.
-pub fn parse(bytes: &[u8]) -> Progress {
+pub(crate) fn parse(bytes: &[u8]) -> Progress {
     let mut fields = [httparse::EMPTY_HEADER; MOST_FIELDS];
     let mut head = httparse::Request::new(&mut fields);
     let head_bytes = match head.parse(bytes) {
@@ -122,7 +122,7 @@ pub fn parse(bytes: &[u8]) -> Progress {
 
 /// Whether a request was meant for the server at `port`, by a name that no foreign page can have: `localhost`, or an address in
 /// digits. A name of somebody's own that leads here (DNS rebinding) would make a foreign page's requests look like ours.
-pub fn is_ours(host: &str, port: u16) -> bool {
+pub(crate) fn is_ours(host: &str, port: u16) -> bool {
     let (name, reported) = match host.rsplit_once(':') {
         Some((name, reported)) if !reported.ends_with(']') => (name, reported),
         // Browsers leave out the port that http has by itself.
@@ -132,7 +132,7 @@ pub fn is_ours(host: &str, port: u16) -> bool {
     reported.parse() == Ok(port) && (name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok())
 }
 
-pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
+pub(crate) fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     let head = format!(
         "HTTP/1.1 {}\r\nContent-Type: {content_type}\r\nContent-Length: {}\r\nCache-Control: no-store\r\n{SECURITY}\
          Connection: close\r\n\r\n",
@@ -142,30 +142,30 @@ pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     [head.as_bytes(), body].concat()
 }
 
-pub fn json_response(status: Status, value: &Value) -> Vec<u8> {
+pub(crate) fn json_response(status: Status, value: &Value) -> Vec<u8> {
     response(status, "application/json", value.to_string().as_bytes())
 }
 
 /// What is said when something was refused or done.
-pub fn message_response(status: Status, message: &str) -> Vec<u8> {
+pub(crate) fn message_response(status: Status, message: &str) -> Vec<u8> {
     json_response(status, &json!({ "ok": status == Status::Good, "message": message }))
 }
 
 /// The head of a stream of Server-Sent Events, which ends with the connection.
-pub fn stream_head() -> Vec<u8> {
+pub(crate) fn stream_head() -> Vec<u8> {
     format!(
         "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n{SECURITY}Connection: close\r\n\r\n"
     )
     .into_bytes()
 }
 
-pub fn event(name: &str, data: &Value) -> Vec<u8> {
+pub(crate) fn event(name: &str, data: &Value) -> Vec<u8> {
     // JSON without line breaks, as it is written here, is one line of data.
     format!("event: {name}\ndata: {data}\n\n").into_bytes()
 }
 
 /// A comment that keeps a stream alive.
-pub const HEARTBEAT: &[u8] = b": still here\n\n";
+pub(crate) const HEARTBEAT: &[u8] = b": still here\n\n";
 
 #[cfg(test)]
 mod tests {

@@ -25,23 +25,23 @@
 //!
 //! The interface is described in `bench/docs/watch.md`.
 
-pub mod assets;
-pub mod chains;
+mod assets;
+mod chains;
 pub mod cli;
 pub mod client;
-pub mod columns;
-pub mod control;
+mod columns;
+mod control;
 mod feed;
-pub mod http;
-pub mod light;
-pub mod metrics;
-pub mod minute;
-pub mod rhythm;
-pub mod rows;
+mod http;
+mod light;
+mod metrics;
+mod minute;
+mod rhythm;
+mod rows;
 mod server;
-pub mod state;
-pub mod view;
-pub mod wire;
+mod state;
+mod view;
+mod wire;
 
 use cli::WatchArguments;
 use protocol::bus::BusError;

@@ -14,14 +14,14 @@ use std::path::{Path, PathBuf};
 
 /// The run as the rules see it.
 #[derive(Debug, Default)]
-pub struct Light {
+pub(crate) struct Light {
     folder: Option<PathBuf>,
     run: RunFiles,
 }
 
 /// What the light shows.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Judgement {
+pub(crate) struct Judgement {
     pub supported: Support,
     pub reasons: Vec<String>,
 }
@@ -29,7 +29,7 @@ pub struct Judgement {
 /// Whether the run so far supports a latency claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Support {
+pub(crate) enum Support {
     Yes,
     No,
     Doubtful,
@@ -37,12 +37,12 @@ pub enum Support {
 
 impl Light {
     /// Of the run in this folder.
-    pub fn new(folder: Option<&Path>) -> Self {
+    pub(crate) fn new(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(Path::to_path_buf), run: RunFiles::default() }
     }
 
     /// Judges anew, after so many cycles of which so many were skipped.
-    pub fn judge(&mut self, cycles: u64, skipped: u64) -> Judgement {
+    pub(crate) fn judge(&mut self, cycles: u64, skipped: u64) -> Judgement {
         if self.run.run.is_null() {
             // The emulator writes it when it has asked for its privileges, which is after it let viewers in.
             let path = self.folder.as_ref().map(|folder| folder.join("run.json"));

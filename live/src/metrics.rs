@@ -7,7 +7,7 @@ use super::view::{Audience, View};
 use std::fmt::{Display, Write as _};
 
 /// The text of `/metrics`.
-pub fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
+pub(crate) fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
     let state = view.state(audience);
     let mut text = String::new();
     let mut one = |name: &str, kind: &str, help: &str, value: Option<f64>| {

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Longest record, s.
-pub const LONGEST_S: f64 = 60.0;
+pub(crate) const LONGEST_S: f64 = 60.0;
 const CYCLES_KEPT: usize = 60_000;
 /// Frames that are kept: those of a minute, with room for noise.
 const FRAMES_KEPT: usize = 600_000;
@@ -22,7 +22,7 @@ struct Measured {
 }
 
 #[derive(Debug, Default)]
-pub struct Minute {
+pub(crate) struct Minute {
     cycles: VecDeque<Measured>,
     /// Stamped with the time of day.
     frames: VecDeque<FrameRecord>,
@@ -31,7 +31,7 @@ pub struct Minute {
 }
 
 /// A record that is to be written; it owns what it needs, so that another thread can.
-pub struct Saved {
+pub(crate) struct Saved {
     folder: PathBuf,
     interface: String,
     linked: bool,
@@ -44,7 +44,7 @@ pub struct Saved {
 
 impl Minute {
     /// Takes a cycle whose measured values are all there.
-    pub fn cycle(&mut self, cycle: u64, values: [Option<f64>; MEASURED_COUNT]) {
+    pub(crate) fn cycle(&mut self, cycle: u64, values: [Option<f64>; MEASURED_COUNT]) {
         let reported: Vec<f64> = values.into_iter().flatten().collect();
         if let Ok(values) = reported.try_into() {
             self.cycles.push_back(Measured { cycle, values });
@@ -55,7 +55,7 @@ impl Minute {
     }
 
     /// Takes a frame of the bus, sent or heard.
-    pub fn frame(&mut self, record: FrameRecord) {
+    pub(crate) fn frame(&mut self, record: FrameRecord) {
         self.frames.push_back(record);
         if self.frames.len() > FRAMES_KEPT {
             self.frames.pop_front();
@@ -63,13 +63,13 @@ impl Minute {
     }
 
     /// Notes that linkage or weights changed in this cycle.
-    pub fn change(&mut self, cycle: u64) {
+    pub(crate) fn change(&mut self, cycle: u64) {
         self.changed = cycle;
     }
 
     /// The last so many seconds, to be written to a folder of their own in `folder`. A record tells one set-up for all of it,
     /// which is that of its end: it begins no earlier than the last change.
-    pub fn last(&self, seconds: f64, folder: &Path, interface: &str, set_up: SetUp) -> Saved {
+    pub(crate) fn last(&self, seconds: f64, folder: &Path, interface: &str, set_up: SetUp) -> Saved {
         let newest = self.cycles.back().map_or(0, |measured| measured.cycle);
         let oldest = self.cycles.front().map_or(0, |measured| measured.cycle);
         let (mut cycles, mut cut) = ((seconds * 1000.0) as u64, String::new());
@@ -98,7 +98,7 @@ impl Saved {
     ///
     /// # Errors
     /// What the system says, with the file's name; an error too when there is nothing to write.
-    pub fn write(self) -> io::Result<String> {
+    pub(crate) fn write(self) -> io::Result<String> {
         if self.frames.is_empty() && self.cycles.is_empty() {
             return Err(io::Error::other("nothing was heard yet, or not since linkage or weights changed"));
         }

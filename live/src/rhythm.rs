@@ -21,13 +21,13 @@ struct Distribution {
 
 /// The heartbeat of a run.
 #[derive(Debug, Default)]
-pub struct Rhythm {
+pub(crate) struct Rhythm {
     distributions: [Distribution; SHOWN.len()],
 }
 
 impl Rhythm {
     /// Takes a line of an interval log.
-    pub fn take(&mut self, line: &str) -> Result<(), hlog::LogError> {
+    pub(crate) fn take(&mut self, line: &str) -> Result<(), hlog::LogError> {
         hlog::each(&format!("{line}\n"), |passing| {
             let known = SHOWN.iter().position(|(_, tags)| tags.contains(&passing.tag));
             let Some(distribution) = known.map(|place| &mut self.distributions[place]) else { return };
@@ -47,7 +47,7 @@ impl Rhythm {
     }
 
     /// Percentiles of all that was heard, us; null where there are too few samples for one.
-    pub fn percentiles(&self) -> BTreeMap<&'static str, StagePercentiles> {
+    pub(crate) fn percentiles(&self) -> BTreeMap<&'static str, StagePercentiles> {
         let us = |ns: Option<u64>| ns.map(|ns| ns as f64 / 1e3);
         self.each(|distribution| {
             let reported = distribution.whole.percentiles_ns();
@@ -63,7 +63,7 @@ impl Rhythm {
     }
 
     /// Bins on a logarithmic axis: upper end in us, and samples.
-    pub fn histograms(&self) -> Value {
+    pub(crate) fn histograms(&self) -> Value {
         let bins = |samples: &Samples| -> Value {
             samples.bins().iter().map(|bin| json!([bin.to_ns as f64 / 1e3, bin.count])).collect()
         };
@@ -76,7 +76,7 @@ impl Rhythm {
     }
 
     /// The samples of all that was heard, by name.
-    pub fn samples(&self) -> impl Iterator<Item = (&'static str, &Samples)> {
+    pub(crate) fn samples(&self) -> impl Iterator<Item = (&'static str, &Samples)> {
         SHOWN.iter().zip(&self.distributions).map(|((name, _), distribution)| (*name, &distribution.whole))
     }
 

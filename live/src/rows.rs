@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use std::collections::VecDeque;
 
 /// Cycles from row to row.
-pub const SPACING_CYCLES: u64 = 10;
+pub(crate) const SPACING_CYCLES: u64 = 10;
 /// Rows that are kept: a minute.
 const KEPT: usize = 6000;
 /// Cycles that a row waits for the controllers.
@@ -28,7 +28,7 @@ struct Row {
 }
 
 #[derive(Debug, Default)]
-pub struct Rows {
+pub(crate) struct Rows {
     /// Those that wait for the controllers.
     waiting: VecDeque<Row>,
     chain_values: [VecDeque<(u64, ChainValues)>; 2],
@@ -39,7 +39,7 @@ pub struct Rows {
 
 impl Rows {
     /// Takes what the controller of an axis said after the sensors of `cycle`.
-    pub fn hear(&mut self, axis: usize, cycle: u64, values: ChainValues) {
+    pub(crate) fn hear(&mut self, axis: usize, cycle: u64, values: ChainValues) {
         let chain_values = &mut self.chain_values[axis];
         chain_values.push_back((cycle, values));
         if chain_values.len() > VALUES_KEPT {
@@ -48,7 +48,7 @@ impl Rows {
     }
 
     /// Takes a row, without what controllers say.
-    pub fn add(&mut self, cycle: u64, values: &[Option<f64>]) {
+    pub(crate) fn add(&mut self, cycle: u64, values: &[Option<f64>]) {
         let values = values.iter().map(|value| value.map(|value| value as f32)).collect();
         self.waiting.push_back(Row { cycle, values });
         self.settle(cycle);
@@ -78,19 +78,19 @@ impl Rows {
     }
 
     /// The rows that are new since this was asked the last time; `None` when there are none.
-    pub fn take_fresh(&mut self) -> Option<Value> {
+    pub(crate) fn take_fresh(&mut self) -> Option<Value> {
         let fresh = std::mem::take(&mut self.fresh);
         (fresh > 0).then(|| table(self.kept.range(self.kept.len() - fresh..)))
     }
 
     /// The rows of the last so many seconds.
-    pub fn last(&self, seconds: f64) -> Value {
+    pub(crate) fn last(&self, seconds: f64) -> Value {
         let rows = (seconds * 1000.0 / SPACING_CYCLES as f64) as usize;
         table(self.kept.range(self.kept.len().saturating_sub(rows)..))
     }
 
     /// The newest row by column; empty before the first.
-    pub fn newest(&self) -> NewestRow {
+    pub(crate) fn newest(&self) -> NewestRow {
         let Some(row) = self.kept.back() else { return NewestRow::new() };
         let values = row.values.iter().map(|value| value.map(short));
         COLUMNS.iter().zip(values).map(|(column, value)| (column.name.clone(), value)).collect()

@@ -8,14 +8,14 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Values by column, each in the unit of its column.
-pub type NewestRow = BTreeMap<String, Option<f64>>;
+pub(crate) type NewestRow = BTreeMap<String, Option<f64>>;
 
 /// The state of each chain of an axis by its name; `None` of a number that `rig.dbc` does not name.
-pub type ChainStates = BTreeMap<&'static str, Option<&'static str>>;
+pub(crate) type ChainStates = BTreeMap<&'static str, Option<&'static str>>;
 
 /// The state of the run that goes on.
 #[derive(Clone, Debug, Serialize)]
-pub struct State {
+pub(crate) struct State {
     pub cycle: Option<u64>,
     pub t_s: Option<f64>,
     /// The newest row by column; empty before the first.
@@ -42,7 +42,7 @@ pub struct State {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct EmergencyStopState {
+pub(crate) struct EmergencyStopState {
     /// Whether it is tripped; `None` before the first status of the rig.
     pub active: Option<bool>,
     /// Nodes that hold it.
@@ -51,7 +51,7 @@ pub struct EmergencyStopState {
 
 /// A fault that is put into the run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ActiveFault {
+pub(crate) struct ActiveFault {
     pub name: String,
     pub place: String,
     /// By key.
@@ -60,7 +60,7 @@ pub struct ActiveFault {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BusLoad {
+pub(crate) struct BusLoad {
     /// In the last second, with worst-case stuffing; `None` before the first is over.
     pub load_percent: Option<f64>,
     /// By name of the frame, those that came.
@@ -72,7 +72,7 @@ pub struct BusLoad {
 }
 
 #[derive(Clone, Debug, Serialize)]
-pub struct Timing {
+pub(crate) struct Timing {
     /// Percentiles of each stage by its name.
     #[serde(flatten)]
     pub percentiles: BTreeMap<&'static str, StagePercentiles>,
@@ -85,7 +85,7 @@ pub struct Timing {
 
 /// Percentiles of a stage, us; `None` where there are too few samples.
 #[derive(Clone, Debug, Serialize)]
-pub struct StagePercentiles {
+pub(crate) struct StagePercentiles {
     #[serde(rename = "p50")]
     pub p50_us: Option<f64>,
     #[serde(rename = "p90")]
@@ -102,7 +102,7 @@ pub struct StagePercentiles {
 
 /// A message of the page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Message {
+pub(crate) struct Message {
     pub t_s: f64,
     pub level: Level,
     pub text: String,
@@ -111,7 +111,7 @@ pub struct Message {
 /// How much a message concerns a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Level {
+pub(crate) enum Level {
     Info,
     Warning,
     Error,

@@ -25,7 +25,7 @@ const OVERRUN_SECONDS: usize = 60;
 const SECOND_CYCLES: u64 = 1000;
 
 #[derive(Default)]
-pub struct View {
+pub(crate) struct View {
     /// The run's folder, if it was named at the command line.
     folder: Option<PathBuf>,
     /// `None` before the telemetry sends one.
@@ -54,7 +54,7 @@ pub struct View {
 
 /// What only the server knows of the state.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Audience {
+pub(crate) struct Audience {
     /// Listeners to events.
     pub viewers: usize,
     pub missed: u64,
@@ -64,12 +64,12 @@ pub struct Audience {
 
 impl View {
     /// Nothing heard yet.
-    pub fn new(folder: Option<&Path>) -> Self {
+    pub(crate) fn new(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(Path::to_path_buf), light: Light::new(folder), ..Self::default() }
     }
 
     /// Takes a packet of the telemetry, save an answer, which is the server's.
-    pub fn packet(&mut self, packet: Packet) {
+    pub(crate) fn packet(&mut self, packet: Packet) {
         match packet {
             Packet::Description(text) => self.describe(&text),
             Packet::Cycle(cycle, values) => self.take_cycle(cycle, &values),
@@ -148,7 +148,7 @@ impl View {
         self.rows.add(cycle, &row);
     }
 
-    pub fn frame(&mut self, record: FrameRecord, now_ms: u64) {
+    pub(crate) fn frame(&mut self, record: FrameRecord, now_ms: u64) {
         self.minute.frame(record);
         match self.wire.take(&record.frame, now_ms) {
             Some(News::Said(axis, cycle, values)) => self.rows.hear(axis, cycle, values),
@@ -210,7 +210,7 @@ impl View {
     }
 
     /// A message of the page's own, at the run's newest moment.
-    pub fn tell(&mut self, level: Level, text: &str) {
+    pub(crate) fn tell(&mut self, level: Level, text: &str) {
         self.say(self.cycle.unwrap_or_default(), level, text, true);
     }
 
@@ -226,24 +226,24 @@ impl View {
     }
 
     /// Messages that are new since this was asked the last time.
-    pub fn take_messages(&mut self) -> Vec<Message> {
+    pub(crate) fn take_messages(&mut self) -> Vec<Message> {
         std::mem::take(&mut self.fresh)
     }
 
     /// What is due once a second.
-    pub fn second(&mut self) {
+    pub(crate) fn second(&mut self) {
         let newest = self.cycle.unwrap_or_default();
         self.recent_overruns
             .retain(|cycle| newest.saturating_sub(*cycle) < OVERRUN_SECONDS as u64 * SECOND_CYCLES);
         self.claim = Some(self.light.judge(newest, self.skipped));
     }
 
-    pub fn run_folder(&self) -> Option<PathBuf> {
+    pub(crate) fn run_folder(&self) -> Option<PathBuf> {
         self.folder.clone().or_else(|| self.description.as_ref().and_then(folder_of))
     }
 
     /// How the rig is set up in the newest cycles.
-    pub fn set_up(&self) -> SetUp {
+    pub(crate) fn set_up(&self) -> SetUp {
         self.set_up
     }
 
@@ -263,7 +263,7 @@ impl View {
     }
 
     /// What does not change while a run goes on.
-    pub fn description(&self, control: bool) -> Value {
+    pub(crate) fn description(&self, control: bool) -> Value {
         let described = self.description.as_ref();
         let column = |column: &super::columns::Column| json!({ "name": column.name, "unit": column.unit });
         json!({
@@ -283,7 +283,7 @@ impl View {
         })
     }
 
-    pub fn state(&self, audience: Audience) -> State {
+    pub(crate) fn state(&self, audience: Audience) -> State {
         let status = self.wire.status();
         State {
             cycle: self.cycle,
@@ -311,12 +311,12 @@ impl View {
     }
 
     /// The same, and the last messages, for who comes later.
-    pub fn state_with_messages(&self, audience: Audience) -> State {
+    pub(crate) fn state_with_messages(&self, audience: Audience) -> State {
         State { messages: Some(self.messages.iter().cloned().collect()), ..self.state(audience) }
     }
 
     /// A frame that was sent from here.
-    pub fn sent(&mut self, frame: CanFrame, stamp_ns: u64) {
+    pub(crate) fn sent(&mut self, frame: CanFrame, stamp_ns: u64) {
         self.minute.frame(FrameRecord { stamp_ns, frame });
     }
 }

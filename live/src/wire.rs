@@ -17,13 +17,13 @@ const STATUS_HOLDS_MS: u64 = 1000;
 /// Values of the tick's count of skipped cycles.
 const SKIPPED_RANGE: u64 = 1 << 16;
 /// Senders of emergency stops.
-pub const STOPPERS: [&str; 4] = ["console", "rig", "drive", "load"];
+pub(crate) const STOPPERS: [&str; 4] = ["console", "rig", "drive", "load"];
 /// Place of the console among them, whose frames are sent from here too.
-pub const CONSOLE: usize = 0;
+pub(crate) const CONSOLE: usize = 0;
 
 /// What a frame tells the rest of the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum News {
+pub(crate) enum News {
     /// The rig is at this cycle, and started anew if that is reported.
     Cycle(u64, bool),
     /// The controller of an axis says what it does, in its answer to the sensors of this cycle.
@@ -32,7 +32,7 @@ pub enum News {
 
 /// Frames of the bus, taken in.
 #[derive(Debug, Default)]
-pub struct Wire {
+pub(crate) struct Wire {
     /// The newest that is known of, once a tick has reported one.
     cycle: Option<u64>,
     /// Low bits of the cycle that each controller answered last, as its command to the valve tells.
@@ -74,7 +74,7 @@ struct Counts {
 }
 
 impl Wire {
-    pub fn take(&mut self, frame: &CanFrame, now_ms: u64) -> Option<News> {
+    pub(crate) fn take(&mut self, frame: &CanFrame, now_ms: u64) -> Option<News> {
         self.frames.count(frame);
         match Frame::decode(frame) {
             Ok(frame) => self.obey(frame, now_ms),
@@ -168,14 +168,14 @@ impl Wire {
     }
 
     /// Another run: of the one before nothing but the counts of frames holds.
-    pub fn begin_anew(&mut self) {
+    pub(crate) fn begin_anew(&mut self) {
         let frames = std::mem::take(&mut self.frames);
         *self = Self { frames, malformed: self.malformed, ..Self::default() };
     }
 
     /// A set-point by hand. The frame has room for a position and a force, and the axis follows the one that it controls: what
     /// was not given is what its controller reported last, and leads nowhere. `None` as long as no controller of it was heard.
-    pub fn hand_set_point(
+    pub(crate) fn hand_set_point(
         &self,
         axis: HandSetPointAxis,
         position_m: Option<f64>,
@@ -190,21 +190,21 @@ impl Wire {
         Some(HandSetPoint { axis, position_m, force_n })
     }
 
-    pub fn note_stop(&mut self, stopper: usize, stop: EmergencyStop, now_ms: u64) {
+    pub(crate) fn note_stop(&mut self, stopper: usize, stop: EmergencyStop, now_ms: u64) {
         self.stops[stopper] = (!stop.release).then_some(now_ms);
     }
 
-    pub fn status(&self) -> Option<&RigStatus> {
+    pub(crate) fn status(&self) -> Option<&RigStatus> {
         self.status.as_ref()
     }
 
     /// What sensors and valves show.
-    pub fn measured(&self) -> &[Option<f64>; MEASURED_COUNT] {
+    pub(crate) fn measured(&self) -> &[Option<f64>; MEASURED_COUNT] {
         &self.measured
     }
 
     /// The emergency stop: whether it is tripped, and who holds it.
-    pub fn emergency_stop(&self, now_ms: u64) -> EmergencyStopState {
+    pub(crate) fn emergency_stop(&self, now_ms: u64) -> EmergencyStopState {
         let holds = |at: &Option<u64>| at.is_some_and(|at_ms| now_ms.saturating_sub(at_ms) < STOP_HOLDS_MS);
         let senders = STOPPERS.iter().zip(&self.stops).filter(|(_, at)| holds(at));
         EmergencyStopState {
@@ -214,7 +214,7 @@ impl Wire {
     }
 
     /// The states of the chains of both axes; null of a controller that is silent.
-    pub fn chains(&self, now_ms: u64) -> BTreeMap<&'static str, Option<ChainStates>> {
+    pub(crate) fn chains(&self, now_ms: u64) -> BTreeMap<&'static str, Option<ChainStates>> {
         let fresh = self.chains.map(|received| {
             received
                 .filter(|(at_ms, _)| now_ms.saturating_sub(*at_ms) < STATUS_HOLDS_MS)
@@ -224,12 +224,12 @@ impl Wire {
     }
 
     /// A second is over, perhaps.
-    pub fn turn(&mut self, now_ms: u64) {
+    pub(crate) fn turn(&mut self, now_ms: u64) {
         self.frames.turn(now_ms);
     }
 
     /// How full the bus is, by frame, and what was lost here.
-    pub fn load(&self) -> BusLoad {
+    pub(crate) fn load(&self) -> BusLoad {
         let counts = &self.frames;
         let seconds = counts.last_ms as f64 / 1000.0;
         let reported = |(place, count): (usize, &u64)| {
@@ -247,7 +247,7 @@ impl Wire {
     }
 
     /// Frames so far by name.
-    pub fn totals(&self) -> impl Iterator<Item = (&'static str, u64)> {
+    pub(crate) fn totals(&self) -> impl Iterator<Item = (&'static str, u64)> {
         self.frames.total.iter().enumerate().map(|(place, count)| (name(place), *count))
     }
 }

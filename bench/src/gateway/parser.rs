@@ -18,10 +18,10 @@ use protocol::bus::LONGEST_NAME;
 use protocol::can::{CanFrame, EXTENDED_FLAG};
 
 /// Longest request in bytes, brackets not counted: twice what the longest one that is allowed needs.
-pub const LONGEST_REQUEST: usize = 128;
+pub(super) const LONGEST_REQUEST: usize = 128;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Request {
+pub(super) enum Request {
     /// Use the bus of this name.
     Open(String),
     /// Every frame from now on.
@@ -32,7 +32,7 @@ pub enum Request {
 
 /// Why something is no request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
+pub(super) enum Refusal {
     /// A command that is not in the list above.
     UnknownCommand,
     /// A known command with other words than it has.
@@ -54,7 +54,7 @@ enum Place {
 
 /// Takes bytes as they come and gives requests as they are complete.
 #[derive(Clone, Debug)]
-pub struct Parser {
+pub(super) struct Parser {
     place: Place,
     bytes: [u8; LONGEST_REQUEST],
     length: usize,
@@ -68,7 +68,7 @@ impl Default for Parser {
 
 impl Parser {
     /// Takes the next byte; what it completes, if anything.
-    pub fn push(&mut self, byte: u8) -> Option<Result<Request, Refusal>> {
+    pub(super) fn push(&mut self, byte: u8) -> Option<Result<Request, Refusal>> {
         match (self.place, byte) {
             (Place::Between, b'<') => {
                 (self.place, self.length) = (Place::Inside, 0);
@@ -106,7 +106,7 @@ impl Parser {
 ///
 /// # Errors
 /// What is wrong with it; never [`Refusal::TooLong`] or [`Refusal::NotTheProtocol`].
-pub fn read(bytes: &[u8]) -> Result<Request, Refusal> {
+pub(super) fn read(bytes: &[u8]) -> Result<Request, Refusal> {
     let text = std::str::from_utf8(bytes).map_err(|_| Refusal::Malformed)?;
     let mut words = text.split_ascii_whitespace();
     let command = words.next().ok_or(Refusal::Malformed)?;

@@ -24,7 +24,7 @@ fn explain(counted: &VitalCounts, length_ns: u64) -> bool {
 
 /// A gap on one CPU, on CLOCK_MONOTONIC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Gap {
+pub(super) struct Gap {
     /// Last look before it, ns.
     pub from_ns: u64,
     /// First look after it, ns.
@@ -35,7 +35,7 @@ pub struct Gap {
 
 /// Finds gaps in looks at the clock.
 #[derive(Debug)]
-pub struct GapWatch {
+pub(super) struct GapWatch {
     gap_ns: u64,
     last_ns: u64,
     refreshed_ns: u64,
@@ -43,12 +43,12 @@ pub struct GapWatch {
 
 impl GapWatch {
     /// A watch whose first look is at `now_ns`.
-    pub fn new(gap_ns: u64, now_ns: u64) -> Self {
+    pub(super) fn new(gap_ns: u64, now_ns: u64) -> Self {
         Self { gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
     }
 
     /// The next look. `counts` tells what was counted since it was last called.
-    pub fn look(&mut self, now_ns: u64, counts: impl FnOnce() -> VitalCounts) -> Option<Gap> {
+    pub(super) fn look(&mut self, now_ns: u64, counts: impl FnOnce() -> VitalCounts) -> Option<Gap> {
         let from_ns = std::mem::replace(&mut self.last_ns, now_ns);
         let length_ns = now_ns - from_ns;
         let is_gap = length_ns > self.gap_ns;
@@ -63,14 +63,14 @@ impl GapWatch {
 
 /// Gaps of one kind, added up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Total {
+pub(super) struct Total {
     pub count: u64,
     pub longest_ns: u64,
     pub together_ns: u64,
 }
 
 impl Total {
-    pub fn add(&mut self, gap: &Gap) {
+    pub(super) fn add(&mut self, gap: &Gap) {
         let length_ns = gap.to_ns - gap.from_ns;
         self.count += 1;
         self.longest_ns = self.longest_ns.max(length_ns);

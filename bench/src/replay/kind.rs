@@ -16,7 +16,7 @@ use std::str::FromStr;
 const RIG: &str = "Rig";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(super) enum Kind {
     /// Sent by a controller, the console or the bench.
     Command,
     Rig,
@@ -42,7 +42,7 @@ pub struct NotToBeLeftOut(String);
 
 impl Kind {
     /// Of a frame, by its identifier: a malformed frame of the rig is still one that only a rig sends.
-    pub fn of(frame: &CanFrame) -> Self {
+    pub(super) fn of(frame: &CanFrame) -> Self {
         if frame.raw_id() & ERROR_FLAG != 0 {
             return Self::Error;
         }

@@ -21,27 +21,27 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Frames by the name of their identifier.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Counts(BTreeMap<String, u64>);
+pub(super) struct Counts(BTreeMap<String, u64>);
 
 impl Counts {
-    pub fn of(&self, id: &str) -> u64 {
+    pub(super) fn of(&self, id: &str) -> u64 {
         self.0.get(id).copied().unwrap_or(0)
     }
 
-    pub fn add(&mut self, id: &str, frames: u64) {
+    pub(super) fn add(&mut self, id: &str, frames: u64) {
         *self.0.entry(id.to_owned()).or_default() += frames;
     }
 
-    pub fn add_all(&mut self, other: &Self) {
+    pub(super) fn add_all(&mut self, other: &Self) {
         other.0.iter().for_each(|(id, frames)| self.add(id, *frames));
     }
 
-    pub fn total(&self) -> u64 {
+    pub(super) fn total(&self) -> u64 {
         self.0.values().sum()
     }
 
     /// Identifiers that were counted.
-    pub fn ids(&self) -> impl Iterator<Item = &String> {
+    pub(super) fn ids(&self) -> impl Iterator<Item = &String> {
         self.0.keys()
     }
 }
@@ -54,7 +54,7 @@ impl<const N: usize> From<[(&str, u64); N]> for Counts {
 
 /// What the host of the embedded bus saw of a peer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Seen {
+pub(super) struct Seen {
     /// Frames that it took from the peer.
     pub taken: Counts,
     /// Frames of others before the peer came.
@@ -71,7 +71,7 @@ pub struct Seen {
 
 /// Gaps that a receiver saw by what frames say of themselves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Gaps {
+pub(super) enum Gaps {
     /// The rig, of an axis's commands: gaps between the first and the last one, whose counters these are.
     Commands {
         /// Missing in between.
@@ -93,7 +93,7 @@ pub enum Gaps {
 
 impl Gaps {
     /// All that is missing, when `sent` were sent; sums to the frame.
-    pub fn missing(&self, sent: u64) -> u64 {
+    pub(super) fn missing(&self, sent: u64) -> u64 {
         match *self {
             Self::Commands { lost, first, last, .. } => {
                 let before = (u64::from(first) + ALIVE_RANGE - 1) % ALIVE_RANGE;
@@ -114,7 +114,7 @@ impl Gaps {
 
 /// A process on the bus, as it and the host tell.
 #[derive(Clone, Debug, Default)]
-pub struct Party {
+pub(super) struct Party {
     pub name: String,
     /// Frames that it handed to the bus.
     pub sent: Counts,
@@ -132,7 +132,7 @@ pub struct Party {
 
 /// What the wire of the embedded bus did.
 #[derive(Clone, Debug, Default)]
-pub struct Wire {
+pub(super) struct Wire {
     /// Frames that it lost on purpose.
     pub injected: Counts,
     /// Frames that a modelled wire never sent: at a full transmit queue, or in bus-off.
@@ -144,7 +144,7 @@ pub struct Wire {
 
 /// One identifier at one receiver.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// Identifier, as candump names it.
     pub id: String,
     pub sender: String,
@@ -171,7 +171,7 @@ pub struct Row {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Account {
+pub(super) struct Account {
     /// Each identifier at each receiver.
     pub rows: Vec<Row>,
     /// What does not add up, a sentence each; empty when everything does.
@@ -191,7 +191,7 @@ impl Row {
 }
 
 /// Adds up who sent and who received what. `wire`: on the embedded bus.
-pub fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
+pub(super) fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
     let mut account = Account::default();
     let senders = senders(parties, wire);
     if let Some(wire) = wire {

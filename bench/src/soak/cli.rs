@@ -92,7 +92,7 @@ pub enum YesNo {
 
 impl SoakArguments {
     /// Length of the soak.
-    pub fn planned_s(&self) -> f64 {
+    pub(crate) fn planned_s(&self) -> f64 {
         self.hours.map_or(0.0, |hours| hours * 3600.0) + self.minutes.map_or(0.0, |minutes| minutes * 60.0)
     }
 }

@@ -15,7 +15,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 /// The files of a segment; empty where there is none.
-pub struct SegmentFiles {
+pub(super) struct SegmentFiles {
     pub summary: Summary,
     /// `run.json`; the machine as it stands, which goes into `soak.json`.
     pub run: RunDescription,
@@ -45,14 +45,14 @@ fn read_json<T: DeserializeOwned + Default>(path: &Path, damaged: &mut Vec<Strin
 }
 
 /// Counts by the names of identifiers, unknown ones together.
-pub fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts {
+pub(super) fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts {
     let mut counts = Counts::default();
     by_name.into_iter().for_each(|(id, frames)| counts.add(&known_name(&id), frames));
     counts
 }
 
 impl SegmentFiles {
-    pub fn read(spec: &Spec, folder: &Path) -> Self {
+    pub(super) fn read(spec: &Spec, folder: &Path) -> Self {
         let names: &[&str] =
             if spec.two_processes { &["controller-drive", "controller-load"] } else { &["controller"] };
         let controllers = names.iter().map(|name| (*name, folder.join(format!("{name}.json"))));
@@ -77,7 +77,7 @@ impl SegmentFiles {
     ///
     /// # Errors
     /// A sentence that says which file is damaged, who left no report, or was on the bus twice.
-    pub fn account(&self, outcome: &Outcome) -> Result<Account, String> {
+    pub(super) fn account(&self, outcome: &Outcome) -> Result<Account, String> {
         if let Some(damaged) = self.damaged.first() {
             return Err(format!("no account: {damaged}"));
         }
@@ -147,7 +147,7 @@ impl SegmentFiles {
         Ok(wire)
     }
 
-    pub fn figures(&self) -> Figures {
+    pub(super) fn figures(&self) -> Figures {
         let axes = self.controllers.values().flat_map(|reported| reported.axes.values());
         let drive = self.drive();
         let summary = &self.summary;
@@ -164,7 +164,7 @@ impl SegmentFiles {
         }
     }
 
-    pub fn drive(&self) -> Option<&AxisReport> {
+    pub(super) fn drive(&self) -> Option<&AxisReport> {
         self.controllers.values().find_map(|reported| reported.axes.get("drive"))
     }
 

@@ -13,7 +13,7 @@ use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct FrameLog {
+pub(super) struct FrameLog {
     /// Frames by the name of their identifier.
     pub frames: Counts,
     /// Counters (4 bits) of the first and the last command, by the name of their identifier.
@@ -21,7 +21,7 @@ pub struct FrameLog {
 }
 
 /// Reads a log to its last whole line.
-pub fn read(path: &Path) -> io::Result<FrameLog> {
+pub(super) fn read(path: &Path) -> io::Result<FrameLog> {
     let mut reader = BufReader::with_capacity(1 << 18, File::open(path)?);
     let mut frames: BTreeMap<Vec<u8>, u64> = BTreeMap::new();
     let mut counters = BTreeMap::new();
@@ -48,7 +48,7 @@ pub fn read(path: &Path) -> io::Result<FrameLog> {
 }
 
 /// The name of an identifier as peers count it: what `rig.dbc` does not know stands together.
-pub fn known_name(name: &str) -> String {
+pub(super) fn known_name(name: &str) -> String {
     let known = name.len() == 3
         && u16::from_str_radix(name, 16).is_ok_and(|id| MESSAGES.iter().any(|spec| spec.id == id));
     if known { name.to_owned() } else { OTHERS.to_owned() }

@@ -15,7 +15,7 @@ use std::path::Path;
 /// Standard deviations that the injected loss may be away from its probability.
 const LOSS_DEVIATIONS: f64 = 5.0;
 
-pub struct Judged {
+pub(super) struct Judged {
     pub checks: Vec<Check>,
     pub figures: Figures,
     pub account: Account,
@@ -24,7 +24,7 @@ pub struct Judged {
     pub machine: Value,
 }
 
-pub fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: bool) -> Judged {
+pub(super) fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: bool) -> Judged {
     let evidence = SegmentFiles::read(spec, folder);
     let account = evidence.account(outcome);
     let memory: BTreeMap<_, _> =

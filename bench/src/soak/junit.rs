@@ -3,7 +3,7 @@
 use super::model::{Check, CheckResult, Segment, Soak};
 use crate::junit::Case;
 
-pub fn text(soak: &Soak) -> String {
+pub(super) fn text(soak: &Soak) -> String {
     let mut cases: Vec<_> = soak.segments.iter().flat_map(cases).collect();
     let result = if soak.trusted { CheckResult::Passed } else { CheckResult::Failed };
     let check = Check::new("verdict", result, &soak.verdict);

@@ -14,7 +14,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-pub struct SoakFolder {
+pub(super) struct SoakFolder {
     pub soak: Soak,
     pub merged: Merged,
     out: PathBuf,
@@ -28,7 +28,12 @@ impl SoakFolder {
     /// # Errors
     /// [`SoakError`]: another soak is at work here, the files cannot be read or written, or the settings differ and `anyway`
     /// was not said.
-    pub fn open(out: &Path, settings: Settings, planned_s: f64, anyway: bool) -> Result<Self, SoakError> {
+    pub(super) fn open(
+        out: &Path,
+        settings: Settings,
+        planned_s: f64,
+        anyway: bool,
+    ) -> Result<Self, SoakError> {
         std::fs::create_dir_all(out.join("segments")).map_err(|error| SoakError::output(out, &error))?;
         let lock_path = out.join("soak.lock");
         let lock = File::create(&lock_path).map_err(|error| SoakError::output(&lock_path, &error))?;
@@ -82,16 +87,16 @@ impl SoakFolder {
         Ok(())
     }
 
-    pub fn out(&self) -> &Path {
+    pub(super) fn out(&self) -> &Path {
         &self.out
     }
 
-    pub fn next_number(&self) -> u32 {
+    pub(super) fn next_number(&self) -> u32 {
         self.soak.segments.iter().map(|segment| segment.spec.number).max().unwrap_or(0) + 1
     }
 
     /// Adds up and writes everything.
-    pub fn write(&mut self) -> Result<(), SoakError> {
+    pub(super) fn write(&mut self) -> Result<(), SoakError> {
         let failed = |path: &Path, error: &io::Error| SoakError::output(path, error);
         let soak = &mut self.soak;
         soak.totals = Totals::of(&soak.segments);
@@ -113,7 +118,7 @@ impl SoakFolder {
 }
 
 /// Seconds since 1970.
-pub fn unix_s() -> f64 {
+pub(super) fn unix_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 

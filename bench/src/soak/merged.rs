@@ -19,11 +19,11 @@ use std::time::Duration;
 const LOGS: &[&str] = &["emulator.hlog", "controller.hlog", "controller-drive.hlog", "controller-load.hlog"];
 
 #[derive(Clone, Default)]
-pub struct Merged(BTreeMap<String, Histogram<u64>>);
+pub(super) struct Merged(BTreeMap<String, Histogram<u64>>);
 
 /// A distribution as `soak.json` keeps it: figures for people, and the histogram to go on with.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Kept {
+pub(crate) struct Kept {
     /// Half of the samples were at most this, ns.
     pub p50_ns: u64,
     pub p90_ns: u64,
@@ -38,7 +38,7 @@ pub struct Kept {
 
 impl Merged {
     /// Adds what a segment left in its folder. Tells what cannot be read.
-    pub fn add_segment(&mut self, folder: &Path) -> Vec<String> {
+    pub(super) fn add_segment(&mut self, folder: &Path) -> Vec<String> {
         let mut unread = Vec::new();
         for path in LOGS.iter().map(|name| folder.join(name)).filter(|path| path.exists()) {
             if let Err(error) = self.add_log(&path) {
@@ -74,7 +74,7 @@ impl Merged {
     }
 
     /// Takes up what an earlier start kept.
-    pub fn from_kept(kept: &BTreeMap<String, Kept>) -> io::Result<Self> {
+    pub(super) fn from_kept(kept: &BTreeMap<String, Kept>) -> io::Result<Self> {
         let mut merged = Self::default();
         for (tag, kept) in kept {
             let histogram = decode(&kept.hdr_v2_base64, &mut Deserializer::new());
@@ -87,12 +87,12 @@ impl Merged {
     ///
     /// # Errors
     /// A histogram that cannot be written, which no counts of ours bring about.
-    pub fn keep(&self) -> io::Result<BTreeMap<String, Kept>> {
+    pub(super) fn keep(&self) -> io::Result<BTreeMap<String, Kept>> {
         self.0.iter().map(|(tag, histogram)| Ok((tag.clone(), kept(histogram)?))).collect()
     }
 
     /// Writes all of it as one interval, under a temporary name first.
-    pub fn write(&self, path: &Path, started_unix_s: f64, length: Duration) -> io::Result<()> {
+    pub(super) fn write(&self, path: &Path, started_unix_s: f64, length: Duration) -> io::Result<()> {
         let tagged = self.0.iter().filter(|(tag, _)| !tag.is_empty());
         let parts: Vec<_> = tagged.map(|(tag, histogram)| (tag.as_str(), histogram)).collect();
         let temporary = path.with_extension("hlog.part");

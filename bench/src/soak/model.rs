@@ -9,11 +9,11 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Version of `soak.json`; goes up when a key changes its meaning or goes.
-pub const SOAK_SCHEMA_VERSION: u32 = 1;
+pub(crate) const SOAK_SCHEMA_VERSION: u32 = 1;
 
 /// A soak, over all its starts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Soak {
+pub(crate) struct Soak {
     pub schema_version: u32,
     /// Whether its results may be trusted so far.
     pub trusted: bool,
@@ -46,7 +46,7 @@ pub struct Soak {
 
 /// What must be the same when a soak goes on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
+pub(crate) struct Settings {
     pub bus: String,
     pub experiments: Vec<String>,
     /// Length of a segment with all around it.
@@ -64,7 +64,7 @@ pub struct Settings {
 
 impl Settings {
     /// What differs from another, a few words each.
-    pub fn differences(&self, other: &Self) -> Vec<String> {
+    pub(crate) fn differences(&self, other: &Self) -> Vec<String> {
         let tables = [self, other].map(|settings| serde_json::to_value(settings).unwrap_or_default());
         let keys = tables[0].as_object().into_iter().flatten().map(|(key, _)| key);
         keys.filter(|key| tables[0][*key] != tables[1][*key])
@@ -75,7 +75,7 @@ impl Settings {
 
 /// Sums over all segments that finished.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Totals {
+pub(crate) struct Totals {
     /// Segments that were accounted for.
     pub segments: usize,
     /// Those of them with a broken check.
@@ -103,7 +103,7 @@ pub struct Totals {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Segment {
+pub(crate) struct Segment {
     pub spec: Spec,
     /// Its folder below the soak's.
     pub folder: String,
@@ -132,7 +132,7 @@ pub struct Segment {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Check {
+pub(crate) struct Check {
     pub name: String,
     pub result: CheckResult,
     /// What was found, in a line or more.
@@ -147,7 +147,7 @@ impl Check {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum CheckResult {
+pub(crate) enum CheckResult {
     Passed,
     Failed,
     /// Nothing to judge.
@@ -156,7 +156,7 @@ pub enum CheckResult {
 
 /// Figures of a segment's run; what nobody reported is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
+pub(crate) struct Figures {
     /// Cycles of the rig.
     pub cycles: Option<u64>,
     /// Cycles that it computed late and did not send.
@@ -177,7 +177,7 @@ pub struct Figures {
 
 impl Segment {
     /// One that was running when the soak was killed.
-    pub fn cut_off(number: u32, experiment: &str, folder: &str) -> Self {
+    pub(crate) fn cut_off(number: u32, experiment: &str, folder: &str) -> Self {
         Self {
             spec: Spec { number, experiment: experiment.into(), ..Spec::default() },
             folder: folder.into(),
@@ -187,17 +187,17 @@ impl Segment {
     }
 
     /// Whether a check was broken.
-    pub fn failed(&self) -> bool {
+    pub(crate) fn failed(&self) -> bool {
         self.checks.iter().any(|check| check.result == CheckResult::Failed)
     }
 
-    pub fn broken(&self) -> impl Iterator<Item = &Check> {
+    pub(crate) fn broken(&self) -> impl Iterator<Item = &Check> {
         self.checks.iter().filter(|check| check.result == CheckResult::Failed)
     }
 }
 
 impl Totals {
-    pub fn of(segments: &[Segment]) -> Self {
+    pub(crate) fn of(segments: &[Segment]) -> Self {
         let mut totals = Self::default();
         for segment in segments {
             if !segment.finished {

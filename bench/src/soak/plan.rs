@@ -12,7 +12,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Shortest segment, s: below it there is nothing but its start and its end.
-pub const SHORTEST_SEGMENT_S: f64 = 8.0;
+pub(super) const SHORTEST_SEGMENT_S: f64 = 8.0;
 /// Usual length of a segment, s.
 const USUAL_SEGMENT_S: f64 = 300.0;
 /// Segments that the shortest soak is cut into: one of each way.
@@ -21,7 +21,7 @@ const WAYS: u32 = 4;
 const AROUND_S: f64 = 2.5;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Spec {
+pub(crate) struct Spec {
     /// Its number, from 1.
     pub number: u32,
     pub experiment: String,
@@ -34,7 +34,7 @@ pub struct Spec {
 }
 
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub(super) struct Plan {
     pub experiments: Vec<String>,
     /// Whether there is a load generator.
     pub load: bool,
@@ -43,7 +43,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    pub fn segment(&self, number: u32) -> Spec {
+    pub(super) fn segment(&self, number: u32) -> Spec {
         let place = number - 1;
         let count = self.experiments.len() as u32;
         let way = (place + place / least_common_multiple(count, WAYS)) % WAYS;
@@ -58,12 +58,12 @@ impl Plan {
 }
 
 impl Spec {
-    pub fn folder(&self) -> String {
+    pub(crate) fn folder(&self) -> String {
         format!("{:04}-{}", self.number, self.experiment)
     }
 
     /// What sets it apart, in words.
-    pub fn in_words(&self) -> String {
+    pub(crate) fn in_words(&self) -> String {
         let mut words =
             vec![if self.two_processes { "two controllers" } else { "one controller" }.to_owned()];
         words.extend(self.load.then(|| "under load".to_owned()));
@@ -73,12 +73,12 @@ impl Spec {
 }
 
 /// Length of a segment with all around it, for a soak of `planned_s`.
-pub fn segment_s(asked_s: Option<f64>, planned_s: f64) -> f64 {
+pub(super) fn segment_s(asked_s: Option<f64>, planned_s: f64) -> f64 {
     asked_s.unwrap_or_else(|| (planned_s / f64::from(WAYS)).clamp(SHORTEST_SEGMENT_S, USUAL_SEGMENT_S))
 }
 
 /// How long the rig runs in the next segment, of `segment_s` with all around it; `None` when too little of the soak is left.
-pub fn rig_s(segment_s: f64, left_s: f64) -> Option<f64> {
+pub(super) fn rig_s(segment_s: f64, left_s: f64) -> Option<f64> {
     // The last one may be shorter or longer than the others by a part that would be none of its own.
     let with_rest = if left_s < segment_s + SHORTEST_SEGMENT_S { left_s } else { segment_s };
     (with_rest >= SHORTEST_SEGMENT_S).then(|| ((with_rest - AROUND_S) * 10.0).round() / 10.0)

@@ -46,7 +46,7 @@ impl Running {
     }
 
     /// Whether it still runs.
-    pub fn is_running(&mut self) -> bool {
+    pub(crate) fn is_running(&mut self) -> bool {
         if self.ended.is_none() {
             self.ended = self.child.try_wait().ok().flatten();
         }
@@ -98,7 +98,7 @@ impl Drop for Running {
     }
 }
 
-pub fn end_in_words(status: Option<ExitStatus>) -> String {
+pub(crate) fn end_in_words(status: Option<ExitStatus>) -> String {
     match status.map(|status| (status.code(), status.signal())) {
         Some((Some(code), _)) => format!("exit code {code}"),
         Some((_, Some(9))) => "killed by SIGKILL".into(),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// Memory of a process; `None` when it is gone. With `pss`, the kernel walks all its pages, which holds its address space for a
 /// moment: seldom enough, that disturbs nobody.
-pub fn memory(pid: u32, at_s: f64, pss: bool) -> Option<Sample> {
+pub(super) fn memory(pid: u32, at_s: f64, pss: bool) -> Option<Sample> {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
     let pss_kib = pss
         .then(|| std::fs::read_to_string(format!("/proc/{pid}/smaps_rollup")).ok())
@@ -20,7 +20,7 @@ fn kib(text: &str, key: &str) -> Option<u64> {
 }
 
 /// Bytes of all files in a folder and below.
-pub fn folder_bytes(folder: &Path) -> u64 {
+pub(super) fn folder_bytes(folder: &Path) -> u64 {
     let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
     let bytes = entries.filter_map(Result::ok).map(|entry| match entry.file_type() {
         Ok(kind) if kind.is_dir() => folder_bytes(&entry.path()),
@@ -31,19 +31,19 @@ pub fn folder_bytes(folder: &Path) -> u64 {
 }
 
 /// Bytes free for this user on the disk of a folder; `None` when the system does not tell.
-pub fn free_bytes(folder: &Path) -> Option<u64> {
+pub(super) fn free_bytes(folder: &Path) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder).ok()?;
     Some(disk.f_bavail * disk.f_frsize)
 }
 
 /// Frames that an interface has sent since it is there; `None` when it does not tell.
-pub fn sent_by_interface(interface: &str) -> Option<u64> {
+pub(super) fn sent_by_interface(interface: &str) -> Option<u64> {
     let path = format!("/sys/class/net/{interface}/statistics/tx_packets");
     std::fs::read_to_string(path).ok()?.trim().parse().ok()
 }
 
 /// Sockets that listen to all frames of a CAN interface, error frames apart; `None` without CAN in the kernel.
-pub fn listeners(interface: &str) -> Option<usize> {
+pub(super) fn listeners(interface: &str) -> Option<usize> {
     let list = std::fs::read_to_string("/proc/net/can/rcvlist_all").ok()?;
     Some(list.lines().filter(|line| line.split_whitespace().next() == Some(interface)).count())
 }

@@ -13,7 +13,7 @@ const BIG_ENDS: &[&str] = &["-timing.csv", ".hlog"];
 const FLIGHT: &str = "flight";
 
 /// Removes the big files of segments that keep theirs no longer; marks them.
-pub fn rotate(out: &Path, segments: &mut [Segment], keep: u64, keep_failed: u64) -> io::Result<()> {
+pub(super) fn rotate(out: &Path, segments: &mut [Segment], keep: u64, keep_failed: u64) -> io::Result<()> {
     let (mut newest, mut failed) = (0, 0);
     for segment in segments.iter_mut().rev() {
         newest += 1;

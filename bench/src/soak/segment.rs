@@ -29,7 +29,7 @@ const LISTEN: Duration = Duration::from_secs(20);
 const SAVE: Duration = Duration::from_secs(20);
 
 /// What all segments of a soak have in common.
-pub struct Common<'a> {
+pub(super) struct Common<'a> {
     pub arguments: &'a SoakArguments,
     pub bin_dir: PathBuf,
     /// Command line of the load generator, its program first; empty for none.
@@ -37,7 +37,7 @@ pub struct Common<'a> {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
+pub(super) enum End {
     TimeUp,
     /// Somebody asked the soak to end.
     Interrupted,
@@ -48,7 +48,7 @@ pub enum End {
 }
 
 /// What a segment leaves besides its files.
-pub struct Outcome {
+pub(super) struct Outcome {
     pub end: End,
     /// Each program's process number, and its exit code, `None` when it has none; by name.
     pub exits: BTreeMap<String, (u32, Option<i32>, String)>,
@@ -58,10 +58,10 @@ pub struct Outcome {
 }
 
 /// Tells a person how far the segment is: seconds since its start.
-pub type Tell<'a> = dyn FnMut(f64) + 'a;
+pub(super) type Tell<'a> = dyn FnMut(f64) + 'a;
 
 /// Runs a segment of `rig_s` in `folder`, which is made.
-pub fn run(
+pub(super) fn run(
     common: &Common<'_>,
     spec: &Spec,
     rig_s: f64,

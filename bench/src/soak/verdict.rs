@@ -9,7 +9,7 @@ const NAMED: usize = 4;
 const QUOTED: usize = 120;
 
 /// Whether the soak may be trusted, and the line that says so.
-pub fn of(soak: &Soak) -> (bool, String) {
+pub(super) fn of(soak: &Soak) -> (bool, String) {
     let totals = &soak.totals;
     if totals.segments == 0 {
         return (false, "may not be trusted: no segment has finished yet".into());
@@ -66,7 +66,7 @@ fn named_broken(segment: &Segment) -> Vec<String> {
     segment.broken().map(|check| format!("{} {}: {}", segment.folder, check.name, check.detail)).collect()
 }
 
-pub fn page(soak: &Soak) -> String {
+pub(super) fn page(soak: &Soak) -> String {
     let mut page = format!("# Soak\n\n**{}**\n\n", soak.verdict);
     let settings = &soak.settings;
     let _ = writeln!(page, "- bus: `{}`", settings.bus);

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const LAST_TURN: Duration = Duration::from_millis(500);
 
 /// Runs the rig in the barrier; `simulated_ns` is the clock that stamps its frames.
-pub fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Result<RunOutcome, BusError> {
+pub(crate) fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Result<RunOutcome, BusError> {
     context.bus.join_lockstep(Role::Rig, "rig")?;
     let mut posted = Vec::new();
     let mut cycles = 0;

@@ -18,7 +18,7 @@ const EARLY_FRAMES: usize = 256;
 const NEWCOMER_CYCLES: u64 = 10 * STALE_AFTER_CYCLES;
 
 /// Runs the rig on `clock`.
-pub fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: PeriodicConfig) -> RunOutcome {
+pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: PeriodicConfig) -> RunOutcome {
     let start = clock.now() + CYCLE;
     let mut periodic = PeriodicLoop::new(&clock, config, start);
     let mut vitals = VitalsReader::new(context.shared.continued.clone());

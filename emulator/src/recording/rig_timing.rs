@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use std::io;
 
 /// Name of this process in tags and folders.
-pub const PROCESS: &str = "emulator";
+pub(crate) const PROCESS: &str = "emulator";
 /// Names of the axes in tags.
 const AXES: [&str; 2] = ["drive", "load"];
 /// Steps of the wall clock that are kept.
@@ -22,7 +22,7 @@ const MOST_STEPS: usize = 100;
 
 /// The timing of a run, for `summary.json`; empty in simulated time.
 #[derive(Clone, Debug, Default)]
-pub struct RigTimingReport {
+pub(crate) struct RigTimingReport {
     /// Stages, arrivals, the kernel's counters, the flight recorder.
     pub timing: TimingFigures,
     /// Sensors handed over to command received, drive and load.
@@ -36,7 +36,7 @@ pub struct RigTimingReport {
 }
 
 /// Records the rig's timing.
-pub struct RigTiming {
+pub(crate) struct RigTiming {
     recorder: TimingRecorder,
     round_trip: [Further; 2],
     /// Those of cycles whose rows are to come.
@@ -49,7 +49,7 @@ pub struct RigTiming {
 
 impl RigTiming {
     /// Opens the files.
-    pub fn create(setup: TimingSetup) -> io::Result<Self> {
+    pub(crate) fn create(setup: TimingSetup) -> io::Result<Self> {
         let mut recorder = TimingRecorder::create(setup)?;
         let round_trip = AXES.map(|axis| recorder.add(&format!("{axis}-round-trip")));
         let command_age = AXES.map(|axis| recorder.add(&format!("{axis}-command-age")));
@@ -65,7 +65,7 @@ impl RigTiming {
     }
 
     /// Records what the loop measured.
-    pub fn timing(&mut self, record: &TimingRecord) -> io::Result<()> {
+    pub(crate) fn timing(&mut self, record: &TimingRecord) -> io::Result<()> {
         match record {
             TimingRecord::Cycle { row, axes } => self.cycle(row, axes),
             TimingRecord::Stopped { first, skipped, late_ns, woke_ns } => {
@@ -92,7 +92,7 @@ impl RigTiming {
     }
 
     /// Takes a round trip. It waits for the row of its cycle, and so belongs to the second of that, however late both are taken.
-    pub fn round_trip(&mut self, trip: RoundTrip) {
+    pub(crate) fn round_trip(&mut self, trip: RoundTrip) {
         self.trips.push_back(trip);
     }
 
@@ -104,20 +104,20 @@ impl RigTiming {
     }
 
     /// Records a frame that was sent or received.
-    pub fn frame(&mut self, record: &FrameRecord) {
+    pub(crate) fn frame(&mut self, record: &FrameRecord) {
         let spec = record.frame.standard_id().and_then(MessageSpec::by_id);
         self.recorder.frame(*record, spec.is_some_and(|spec| spec.sender != RIG_STATUS.sender));
     }
 
     /// Takes an event: a fault freezes the recorder.
-    pub fn event(&mut self, event: &Event) {
+    pub(crate) fn event(&mut self, event: &Event) {
         if event.kind.is_fault() {
             self.recorder.fault(event.cycle, self.recorder.newest_done());
         }
     }
 
     /// What is due at `now`, after everything was taken; `asked` when a signal asked for a dump.
-    pub fn poll(&mut self, now: realtime::Instant, asked: bool) -> io::Result<()> {
+    pub(crate) fn poll(&mut self, now: realtime::Instant, asked: bool) -> io::Result<()> {
         if asked {
             self.recorder.signal(now);
         }
@@ -127,17 +127,17 @@ impl RigTiming {
     }
 
     /// New lines of the `.hlog`.
-    pub fn new_lines(&mut self) -> Vec<u8> {
+    pub(crate) fn new_lines(&mut self) -> Vec<u8> {
         self.recorder.new_lines()
     }
 
     /// Writes the table out.
-    pub fn flush(&mut self) -> io::Result<()> {
+    pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.recorder.write_out()
     }
 
     /// Writes what is left, and returns the figures, those of a failed file too.
-    pub fn finish(mut self, now: realtime::Instant) -> (RigTimingReport, io::Result<()>) {
+    pub(crate) fn finish(mut self, now: realtime::Instant) -> (RigTimingReport, io::Result<()>) {
         self.record_trips(u64::MAX);
         let written = self.recorder.finish(now);
         let of = |further: [Further; 2]| further.map(|further| self.recorder.further(further));

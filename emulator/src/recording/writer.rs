@@ -36,7 +36,7 @@ const SKIPS_TOLD: usize = 10;
 const FRAME_DELAY_NS: u64 = 250_000_000;
 
 /// What the writer has to know of the run.
-pub struct WriterSetup {
+pub(crate) struct WriterSetup {
     /// The run's folder; it exists.
     pub folder: PathBuf,
     /// Interface name in `bus.log`.
@@ -59,7 +59,7 @@ pub struct WriterSetup {
 
 /// What the writer leaves behind.
 #[derive(Debug, Default)]
-pub struct WriterReport {
+pub(crate) struct WriterReport {
     /// Rows in `measurement.csv` and `truth.csv`.
     pub rows: u64,
     /// Lines in `bus.log`.
@@ -74,7 +74,7 @@ pub struct WriterReport {
 }
 
 /// The open files of a run.
-pub struct Writer {
+pub(crate) struct Writer {
     setup: WriterSetup,
     bus_log: LineFile,
     measurement: LineFile,
@@ -89,7 +89,7 @@ pub struct Writer {
 
 impl Writer {
     /// Opens the files and writes their heads.
-    pub fn create(mut setup: WriterSetup) -> io::Result<Self> {
+    pub(crate) fn create(mut setup: WriterSetup) -> io::Result<Self> {
         let open = |name: &str| LineFile::create(&setup.folder.join(name));
         let (bus_log, mut measurement, mut truth) =
             (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
@@ -115,7 +115,7 @@ impl Writer {
     }
 
     /// Writes until the sending ends are gone and the queues are empty.
-    pub fn run(mut self, records: &Records, shared: &Shared) -> WriterReport {
+    pub(crate) fn run(mut self, records: &Records, shared: &Shared) -> WriterReport {
         let mut last_flush = Instant::now();
         loop {
             // Asked before draining: what was sent before the ends went is drained below, and in the next rounds.

@@ -10,7 +10,7 @@ use runlog::run_folder::SCHEMA_VERSION;
 use runlog::telemetry::{Column, Description, DroppedEvents, Experiment, RigFigures, SetUp, Table};
 use std::path::Path;
 
-pub struct Described<'a> {
+pub(crate) struct Described<'a> {
     /// How the emulator was started.
     pub arguments: &'a RunArguments,
     pub inputs: &'a Inputs,
@@ -22,7 +22,7 @@ pub struct Described<'a> {
 
 impl Described<'_> {
     /// Whether viewers get what only a simulation knows. Of sealed effects nothing but `truth.csv` may tell.
-    pub fn with_truth(&self) -> bool {
+    pub(crate) fn with_truth(&self) -> bool {
         !self.inputs.sealed
     }
 
@@ -35,7 +35,7 @@ impl Described<'_> {
     }
 }
 
-pub fn description(run: &Described<'_>) -> Description {
+pub(crate) fn description(run: &Described<'_>) -> Description {
     let Described { arguments, inputs, started_unix_s, .. } = run;
     let (cylinder, supply, mass) = (inputs.rig.cylinder(), inputs.rig.supply(), inputs.rig.mass());
     let out = std::path::absolute(&arguments.out).unwrap_or_else(|_| arguments.out.clone());

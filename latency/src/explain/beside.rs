@@ -13,7 +13,7 @@ const DUMP_WITHIN_CYCLES: u64 = 5;
 const RIG_WITHIN_CYCLES: u64 = 10;
 
 /// Adds to an event of this run what lies beside it in the run's folder and summary.
-pub fn add(event: &mut Event, run: &RunFiles) {
+pub(crate) fn add(event: &mut Event, run: &RunFiles) {
     let last = event.cycle + event.skipped;
     if let Some(dump) = dump(&run.folder, &event.process, event.cycle, last) {
         event.frames = frames(&run.folder.join(&dump).join("bus.log"));

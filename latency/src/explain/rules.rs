@@ -30,14 +30,14 @@ const MAJOR_FAULT_NS: u64 = 100_000;
 
 /// Whether the kernel tells something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Known {
+pub(crate) enum Known {
     Yes,
     No,
 }
 
 /// What was seen of an event, at its worst cycle.
 #[derive(Clone, Debug)]
-pub struct Seen {
+pub(crate) struct Seen {
     pub process: String,
     pub late_ns: u64,
     /// How much slower than usual, ns.
@@ -68,13 +68,13 @@ pub struct Seen {
 }
 
 #[derive(Clone, Debug)]
-pub struct Explanation {
+pub(crate) struct Explanation {
     pub cause: Cause,
     pub sentence: String,
     pub evidence: Vec<String>,
 }
 
-pub fn cause(seen: &Seen) -> Explanation {
+pub(crate) fn cause(seen: &Seen) -> Explanation {
     let cause = first_that_holds(seen);
     Explanation { cause, sentence: sentence(cause, seen), evidence: evidence(seen) }
 }
@@ -121,7 +121,7 @@ impl Seen {
 
     /// Whether something shows that the machine ran: a thread that kept the probe away, a process on another CPU, or that the
     /// rig, which its own CPU's timer wakes, was ready for half of it.
-    pub fn machine_ran(&self) -> bool {
+    pub(crate) fn machine_ran(&self) -> bool {
         self.another_ns.saturating_mul(2) >= self.bad_ns()
             || self.ran_elsewhere
             || (self.process == "emulator" && self.waited_half())
@@ -145,7 +145,7 @@ impl Seen {
 }
 
 /// A length of time as a person reads it.
-pub fn in_words(ns: u64) -> String {
+pub(crate) fn in_words(ns: u64) -> String {
     match ns {
         0..1_000 => format!("{ns} ns"),
         1_000..1_000_000 => format!("{:.1} us", ns as f64 * 1e-3),
