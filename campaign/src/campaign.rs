@@ -6,13 +6,14 @@ use crate::condition::{self, Condition, ConditionError};
 use crate::factor::Value;
 use crate::figures;
 use crate::file;
-use crate::file::{CampaignFile, ExperimentKind, FileError, Kind, Pace, RESERVED};
+use crate::file::{CampaignFile, ExperimentKind, Kind, Pace, RESERVED};
 use crate::outcome::{Ended, Outcome};
 use crate::parts::{Parts, hash, usual_runs_per_part};
 use crate::points::{Point, Points, TooMany};
 use crate::processes::{self, ProcessesError, Programs};
 use crate::rehearsed;
 use crate::shelf::{CampaignInputs, ShelfError};
+use settings::SettingsError;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::io;
@@ -43,7 +44,7 @@ pub struct Places {
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     #[error(transparent)]
-    File(#[from] FileError),
+    File(#[from] SettingsError),
     #[error(transparent)]
     CampaignInputs(#[from] ShelfError),
     #[error("{0}: {1}")]

@@ -18,8 +18,9 @@
 
 use plant::effects::draw::Among;
 use plant::effects::{SHEETS, sheet};
-use serde::Deserialize;
+use settings::{Section, SettingsError};
 use std::fmt;
+use toml::de::DeValue;
 
 /// What is varied, and through which values.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,8 +100,7 @@ impl Range {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(untagged)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// In the unit of the file that it goes into.
     Number(f64),
@@ -146,156 +146,126 @@ impl Values {
     }
 }
 
-/// `[[vary]]` as it stands in the file.
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct VaryTable {
-    name: Option<String>,
-    rig: Option<String>,
-    experiment: Option<String>,
-    set: Option<String>,
-    fault: Option<String>,
-    choose: Option<String>,
-    at: Option<String>,
-    key: Option<String>,
-    from_s: Option<f64>,
-    to_s: Option<f64>,
-    among: Option<String>,
-    list: Option<Vec<Value>>,
-    range: Option<[f64; 2]>,
-    log: bool,
+/// Keys that say what is changed.
+const SUBJECTS: [&str; 5] = ["rig", "experiment", "set", "fault", "choose"];
+/// Keys of a fault besides.
+const OF_A_FAULT: [&str; 4] = ["at", "key", "from_s", "to_s"];
+
+/// What `choose` may name; `None`: a hidden effect.
+const CHOICES: [(&str, Option<FileChoice>); 5] = [
+    ("experiment", Some(FileChoice::Experiment)),
+    ("rig", Some(FileChoice::Rig)),
+    ("drive-program", Some(FileChoice::DriveProgram)),
+    ("load-program", Some(FileChoice::LoadProgram)),
+    ("hidden", None),
+];
+const AMONG: [(&str, Among); 3] = [("drive", Among::Drive), ("load", Among::Load), ("both", Among::Both)];
+
+/// The factor of a `[[vary]]`.
+///
+/// # Errors
+/// What is wrong and what would be right.
+pub(crate) fn read(section: &mut Section<'_>) -> Result<Factor, SettingsError> {
+    section.allow(&[&SUBJECTS[..], &OF_A_FAULT, &["name", "among", "list", "range", "log"]].concat())?;
+    let name = section.text("name")?.map(|name| name.text);
+    let values = values(section)?;
+    let (usual, changes) = changes(section, name.as_ref())?;
+    check_kind(section, &changes, &values)?;
+    Ok(Factor { name: name.unwrap_or(usual), changes, values })
 }
 
-/// What `choose` may name.
-const CHOICES: &str = "\"experiment\", \"rig\", \"drive-program\", \"load-program\" or \"hidden\"";
-
-impl VaryTable {
-    /// The factor.
-    ///
-    /// # Errors
-    /// What is wrong and what would be right, in words; the caller knows the line.
-    pub(crate) fn factor(self) -> Result<Factor, String> {
-        let values = self.values()?;
-        let (usual, changes) = self.changes()?;
-        check_kind(&changes, &values)?;
-        Ok(Factor { name: self.name.clone().unwrap_or(usual), changes, values })
-    }
-
-    fn values(&self) -> Result<Values, String> {
-        match (&self.list, self.range) {
-            (Some(list), None) if list.is_empty() => Err("list: needs at least one value".into()),
-            (Some(_), None) if self.log => Err("log: goes with a range, not with a list".into()),
-            (Some(list), None) => check_list(list).map(|()| Values::List(list.clone())),
-            (None, Some(ends)) => check_range(ends, self.log),
-            _ => Err("needs either list = [value, …] or range = [least, most]".into()),
+fn values(section: &mut Section<'_>) -> Result<Values, SettingsError> {
+    let (list, ends, log) = (section.list("list")?, section.numbers("range")?, section.flag("log")?);
+    match list {
+        Some([]) => Err(section.refused("list", "needs at least one value")),
+        Some(_) if log => Err(section.refused("log", "goes with a range, not with a list")),
+        Some(list) if !section.has("range") => {
+            let value = |item: &DeValue<'_>| match item.as_str() {
+                Some(text) => Some(Value::Text(text.to_owned())),
+                None => settings::number(item).filter(|number| number.is_finite()).map(Value::Number),
+            };
+            let values: Option<Vec<_>> = list.iter().map(|item| value(item.get_ref())).collect();
+            let values =
+                values.ok_or_else(|| section.refused("list", "allowed are finite numbers and names"))?;
+            let doubled = values.iter().enumerate().find(|(place, value)| values[..*place].contains(value));
+            if let Some((_, value)) = doubled {
+                return Err(section.refused("list", &format!("{value} stands there twice")));
+            }
+            Ok(Values::List(values))
         }
-    }
-
-    fn changes(&self) -> Result<(String, Changes), String> {
-        let subjects = [&self.rig, &self.experiment, &self.set, &self.fault, &self.choose];
-        let one = "needs exactly one of rig, experiment, set, fault, choose";
-        match (subjects.iter().filter(|subject| subject.is_some()).count(), &self.name) {
-            (0, Some(name)) => return Ok((name.clone(), Changes::Passed)),
-            (1, _) => {}
-            _ => return Err(one.into()),
-        }
-        let of_fault = [self.at.is_some(), self.key.is_some(), self.from_s.is_some(), self.to_s.is_some()];
-        if self.fault.is_none() && of_fault.contains(&true) {
-            return Err("at, key, from_s and to_s go with fault".into());
-        }
-        if self.choose.as_deref() != Some("hidden") && self.among.is_some() {
-            return Err("among goes with choose = \"hidden\"".into());
-        }
-        let named = |text: &String, make: fn(String) -> Changes| (text.clone(), make(text.clone()));
-        if let Some(path) = &self.rig {
-            return Ok(named(path, Changes::Rig));
-        }
-        if let Some(path) = &self.experiment {
-            return Ok(named(path, Changes::Experiment));
-        }
-        if let Some(name) = &self.set {
-            return Ok(named(name, Changes::Variable));
-        }
-        if let Some(fault) = &self.fault {
-            return self.fault_number(fault);
-        }
-        let choose = self.choose.as_deref().ok_or(one)?;
-        let changes = match choose {
-            "experiment" => Changes::File(FileChoice::Experiment),
-            "rig" => Changes::File(FileChoice::Rig),
-            "drive-program" => Changes::File(FileChoice::DriveProgram),
-            "load-program" => Changes::File(FileChoice::LoadProgram),
-            "hidden" => Changes::Hidden(self.places()?),
-            other => return Err(format!("choose = \"{other}\": allowed are {CHOICES}")),
-        };
-        Ok((choose.to_owned(), changes))
-    }
-
-    fn fault_number(&self, fault: &str) -> Result<(String, Changes), String> {
-        let key = self.key.clone().ok_or("fault: needs the key of its number that is varied")?;
-        let from_s = self.from_s.unwrap_or(0.0);
-        let sound = from_s >= 0.0 && self.to_s.is_none_or(|to_s| to_s > from_s);
-        if !sound {
-            return Err("from_s: from 0, and before to_s".into());
-        }
-        let at = self.at.clone();
-        let usual =
-            [Some(fault), at.as_deref(), Some(&key)].into_iter().flatten().collect::<Vec<_>>().join(".");
-        Ok((usual, Changes::Fault(FaultNumber { fault: fault.to_owned(), at, key, from_s, to_s: self.to_s })))
-    }
-
-    fn places(&self) -> Result<Among, String> {
-        match self.among.as_deref() {
-            None | Some("drive") => Ok(Among::Drive),
-            Some("load") => Ok(Among::Load),
-            Some("both") => Ok(Among::Both),
-            Some(other) => Err(format!("among = \"{other}\": allowed are \"drive\", \"load\", \"both\"")),
-        }
+        None if section.has("range") => match ends[..] {
+            [least, most] if least < most && log && least <= 0.0 => {
+                Err(section.refused("range", "with log = true both are above 0"))
+            }
+            [least, most] if least < most => Ok(Values::Range(Range { ends: [least, most], log })),
+            _ => Err(section.refused("range", "allowed are two finite numbers, the smaller first")),
+        },
+        _ => Err(section.wrong("list: needs either list = [value, …] or range = [least, most]")),
     }
 }
 
-fn check_list(list: &[Value]) -> Result<(), String> {
-    let finite = |value: &Value| !matches!(value, Value::Number(number) if !number.is_finite());
-    if !list.iter().all(finite) {
-        return Err("list: numbers must be finite".into());
+/// What is changed, and the name of its column when it has no other.
+fn changes(section: &mut Section<'_>, name: Option<&String>) -> Result<(String, Changes), SettingsError> {
+    let subjects: Vec<_> = SUBJECTS.into_iter().filter(|key| section.has(key)).collect();
+    let subject = match (&subjects[..], name) {
+        ([], Some(name)) => return Ok((name.clone(), Changes::Passed)),
+        ([subject], _) => *subject,
+        _ => return Err(section.wrong(&format!("rig: needs exactly one of {}", SUBJECTS.join(", ")))),
+    };
+    let text = section.needed_text(subject, "what is changed")?.text;
+    if let Some(key) = OF_A_FAULT.iter().find(|key| subject != "fault" && section.has(key)) {
+        return Err(section.refused(key, "at, key, from_s and to_s go with fault"));
     }
-    let doubled = list.iter().enumerate().find(|(place, value)| list[..*place].contains(value));
-    doubled.map_or(Ok(()), |(_, value)| Err(format!("list: {value} stands there twice")))
+    if section.has("among") && (subject, text.as_str()) != ("choose", "hidden") {
+        return Err(section.refused("among", "goes with choose = \"hidden\""));
+    }
+    let changes = match subject {
+        "rig" => Changes::Rig(text.clone()),
+        "experiment" => Changes::Experiment(text.clone()),
+        "set" => Changes::Variable(text.clone()),
+        "fault" => return fault_number(section, text),
+        _ => match section.choice("choose", &CHOICES)? {
+            Some(file) => Changes::File(file),
+            None => Changes::Hidden(section.choice("among", &AMONG)?),
+        },
+    };
+    Ok((text, changes))
 }
 
-fn check_range(ends: [f64; 2], log: bool) -> Result<Values, String> {
-    let [least, most] = ends;
-    if !(least.is_finite() && most.is_finite() && least < most) {
-        return Err(format!("range = [{least}, {most}]: two finite numbers, the smaller first"));
+fn fault_number(section: &mut Section<'_>, fault: String) -> Result<(String, Changes), SettingsError> {
+    let key = section.needed_text("key", "which number of the fault is varied")?.text;
+    let at = section.text("at")?.map(|at| at.text);
+    let (from_s, to_s) = (section.finite("from_s")?.unwrap_or(0.0), section.finite("to_s")?);
+    if from_s < 0.0 || to_s.is_some_and(|to_s| to_s <= from_s) {
+        return Err(section.wrong("from_s: from 0, and before to_s"));
     }
-    if log && least <= 0.0 {
-        return Err(format!("range = [{least}, {most}]: with log = true both are above 0"));
-    }
-    Ok(Values::Range(Range { ends, log }))
+    let usual = [Some(&fault), at.as_ref(), Some(&key)].into_iter().flatten().cloned().collect::<Vec<_>>();
+    Ok((usual.join("."), Changes::Fault(FaultNumber { fault, at, key, from_s, to_s })))
 }
 
 /// Files and effects have names, everything else has numbers.
-fn check_kind(changes: &Changes, values: &Values) -> Result<(), String> {
+fn check_kind(section: &Section<'_>, changes: &Changes, values: &Values) -> Result<(), SettingsError> {
     if *changes == Changes::Passed {
         return Ok(());
     }
     let names = matches!(changes, Changes::File(_) | Changes::Hidden(_));
-    let fits = match values {
-        Values::List(list) => list.iter().all(|value| matches!(value, Value::Text(_)) == names),
-        Values::Range(_) => !names,
+    let (key, fits) = match values {
+        Values::List(list) => ("list", list.iter().all(|value| matches!(value, Value::Text(_)) == names)),
+        Values::Range(_) => ("range", !names),
     };
     if !fits {
-        return Err(if names { "needs a list of names" } else { "needs numbers" }.into());
+        return Err(section.refused(key, if names { "needs a list of names" } else { "needs numbers" }));
     }
     if let (Changes::Hidden(among), Values::List(list)) = (changes, values) {
         for name in list.iter().map(Value::to_string).filter(|name| name != NONE_HIDDEN) {
             let known = sheet(&name).filter(|sheet| sheet.place.places().iter().any(|at| among.allows(*at)));
             if known.is_none() {
                 let names: Vec<_> = SHEETS.iter().map(|sheet| sheet.name).collect();
-                return Err(format!(
-                    "list: no effect \"{name}\" on these axes; there are \"{NONE_HIDDEN}\", {}",
+                let problem = format!(
+                    "no effect \"{name}\" on these axes; there are \"{NONE_HIDDEN}\", {}",
                     names.join(", ")
-                ));
+                );
+                return Err(section.refused("list", &problem));
             }
         }
     }
@@ -308,9 +278,12 @@ pub const NONE_HIDDEN: &str = "none";
 #[cfg(test)]
 mod tests {
     use super::*;
+    use settings::Source;
+    use std::path::Path;
 
     fn factor(text: &str) -> Result<Factor, String> {
-        toml::from_str::<VaryTable>(text).map_err(|error| error.to_string())?.factor()
+        let source = Source::parse(text, Path::new("c.toml")).map_err(|error| error.to_string())?;
+        read(&mut source.root()).map_err(|error| error.to_string())
     }
 
     #[test]

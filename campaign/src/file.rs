@@ -23,12 +23,12 @@
 //! (`command.rs`); `figures` are the keys of its answer that are collected, and `programs = ["NAME", …]` those that it starts
 //! in its turn: results of another version of one of them are none of this campaign's.
 
-use crate::factor::{Changes, Factor, FileChoice, VaryTable};
+use crate::factor::{self, Changes, Factor, FileChoice};
 use crate::figures;
-use serde::Deserialize;
-use std::ops::Range;
+use settings::{Section, SettingsError, Source};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
+use toml::de::DeValue;
 
 /// A campaign as its file asks for it; paths are from the file's folder.
 #[derive(Clone, Debug)]
@@ -74,57 +74,20 @@ pub struct ExperimentKind {
 }
 
 /// How the rig is simulated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// In the process of its controllers, without a bus.
-    #[default]
     Rehearsal,
     /// Emulator and controllers as processes on an embedded bus, in lockstep.
     Lockstep,
 }
 
-/// A campaign file that cannot be used: file, line, and what would be right.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{file}:{line}: {message}")]
-pub struct FileError {
-    pub file: String,
-    pub line: usize,
-    pub message: String,
-}
+const PACES: [(&str, Pace); 2] = [("rehearsal", Pace::Rehearsal), ("lockstep", Pace::Lockstep)];
 
-impl FileError {
-    fn of(path: &Path, error: &std::io::Error) -> Self {
-        FileError { file: path.display().to_string(), line: 1, message: error.to_string() }
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Form {
-    title: String,
-    experiment: Option<String>,
-    rig: Option<String>,
-    command: Option<Spanned<Vec<String>>>,
-    programs: Option<Spanned<Vec<String>>>,
-    seconds: Option<Spanned<f64>>,
-    pace: Option<Spanned<Pace>>,
-    draws: Option<Spanned<u64>>,
-    seed: Option<u64>,
-    runs_per_part: Option<Spanned<u64>>,
-    #[serde(default)]
-    collect: Collect,
-    #[serde(default)]
-    vary: Vec<Spanned<VaryTable>>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct Collect {
-    figures: Vec<Spanned<String>>,
-    worst: Vec<Spanned<String>>,
-    confusion: Vec<Spanned<[String; 2]>>,
-}
+/// Keys of an experiment, which a command has not.
+const OF_AN_EXPERIMENT: [&str; 4] = ["experiment", "rig", "seconds", "pace"];
+const OTHERS: [&str; 8] =
+    ["title", "command", "programs", "draws", "seed", "runs_per_part", "collect", "vary"];
 
 /// Longest that a process of a run may take, s of the wall clock.
 pub const LONGEST_WALL_S: f64 = 3600.0;
@@ -138,159 +101,138 @@ const MOST_DRAWS: u64 = 1_000_000_000;
 const MOST_PER_PART: u64 = 100_000;
 
 impl CampaignFile {
-    pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|error| FileError::of(path, &error))?;
+    pub fn read(path: &Path) -> Result<Self, SettingsError> {
+        let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
         Self::from_toml(&text, path)
     }
 
     /// The same of a text; `path` is for messages and as the place that paths are from.
-    pub fn from_toml(text: &str, path: &Path) -> Result<Self, FileError> {
-        let at = At { text, path };
-        let form: Form = toml::from_str(text)
-            .map_err(|error| at.error(&error.span().unwrap_or(0..0), error.message().to_owned()))?;
-        let kind = at.kind(&form)?;
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, SettingsError> {
+        let source = Source::parse(text, path)?;
+        let mut root = source.root();
+        root.allow(&[&OTHERS[..], &OF_AN_EXPERIMENT].concat())?;
+        let title = root.needed_text("title", "what the campaign is called")?.text;
+        let kind = kind(&mut root)?;
         let mut factors: Vec<Factor> = Vec::new();
-        for vary in form.vary {
-            let span = vary.span();
-            let reported = |reported: String| at.error(&span, format!("[[vary]]: {reported}"));
-            let factor = vary.into_inner().factor().map_err(reported)?;
-            check_factor(&factor, &kind, &factors).map_err(reported)?;
+        for mut section in root.sections("vary")? {
+            let factor = factor::read(&mut section)?;
+            check_factor(&factor, &kind, &factors).map_err(|problem| section.wrong(&problem))?;
             factors.push(factor);
         }
         let chosen = |factor: &Factor| factor.changes == Changes::File(FileChoice::Experiment);
         if let (Kind::Experiment(ExperimentKind { experiment: None, .. }), false) =
             (&kind, factors.iter().any(chosen))
         {
-            let reported =
+            let problem =
                 "experiment: name one, or let a [[vary]] choose = \"experiment\", or give a command";
-            return Err(at.error(&(0..0), reported.into()));
+            return Err(root.wrong(problem));
         }
-        let programs = form.programs.map(Spanned::into_inner).unwrap_or_default();
-        let file = Self {
+        let mut collect = root.section_or_empty("collect")?;
+        collect.allow(&["figures", "worst", "confusion"])?;
+        let mut file = Self {
             path: path.to_owned(),
-            programs,
+            programs: root.texts("programs")?,
             text: text.to_owned(),
-            title: form.title,
-            draws: at.whole(form.draws, "draws", MOST_DRAWS)?.unwrap_or(1),
-            seed: form.seed.unwrap_or(1),
-            runs_per_part: at.whole(form.runs_per_part, "runs_per_part", MOST_PER_PART)?,
-            figures: at.figures(&form.collect.figures, &kind, &factors)?,
-            worst: form.collect.worst.iter().map(|name| name.as_ref().clone()).collect(),
-            confusion: form.collect.confusion.iter().map(|pair| pair.as_ref().clone()).collect(),
+            title,
+            draws: root.whole("draws", [1, MOST_DRAWS])?.unwrap_or(1),
+            seed: root.whole("seed", [0, u64::MAX])?.unwrap_or(1),
+            runs_per_part: root.whole("runs_per_part", [1, MOST_PER_PART])?,
+            figures: collect.texts("figures")?,
+            worst: collect.texts("worst")?,
+            confusion: Vec::new(),
             kind,
             factors,
         };
-        file.check_collected(&at, &form.collect)?;
+        file.check_figures(&collect)?;
+        file.confusion = confusion(&mut collect)?;
+        file.check_shown(&collect)?;
         Ok(file)
     }
 
     /// The folder that its paths are from, absolute.
     ///
     /// # Errors
-    /// [`FileError`] where the system does not tell where this process is.
-    pub fn folder(&self) -> Result<PathBuf, FileError> {
+    /// [`SettingsError`] where the system does not tell where this process is.
+    pub fn folder(&self) -> Result<PathBuf, SettingsError> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-        std::path::absolute(folder).map_err(|error| FileError::of(&self.path, &error))
+        std::path::absolute(folder).map_err(|error| SettingsError::unreadable(&self.path, &error))
+    }
+
+    /// What is collected has names of its own.
+    fn check_figures(&self, collect: &Section<'_>) -> Result<(), SettingsError> {
+        let experiment = matches!(self.kind, Kind::Experiment(_));
+        if self.figures.is_empty() && !experiment {
+            return Err(collect.wrong("figures: name the keys of the command's answer"));
+        }
+        let mut taken: Vec<&str> = RESERVED.to_vec();
+        taken.extend(self.factors.iter().map(|factor| factor.name.as_str()));
+        for (place, name) in self.figures.iter().enumerate() {
+            let refused = |problem: String| collect.refused_item("figures", place, &problem);
+            check_column(name, &taken).map_err(refused)?;
+            if experiment && !figures::is_known(name) {
+                return Err(refused(format!("no figure {name}; `bench figures` lists them")));
+            }
+            taken.push(name);
+        }
+        Ok(())
     }
 
     /// What the page shows is among what is varied or collected.
-    fn check_collected(&self, at: &At<'_>, collect: &Collect) -> Result<(), FileError> {
+    fn check_shown(&self, collect: &Section<'_>) -> Result<(), SettingsError> {
         let own = |name: &String| {
             self.figures.contains(name)
                 || self.factors.iter().any(|factor| factor.name == *name)
                 || (matches!(self.kind, Kind::Experiment(_)) && figures::is_known(name))
         };
-        let reported = |name: &String| format!("{name} is neither varied nor collected");
-        for name in &collect.worst {
-            if !own(name.as_ref()) {
-                return Err(at.error(&name.span(), format!("collect.worst: {}", reported(name.as_ref()))));
-            }
-        }
-        for pair in &collect.confusion {
-            if let Some(name) = pair.as_ref().iter().find(|name| !own(name)) {
-                return Err(at.error(&pair.span(), format!("collect.confusion: {}", reported(name))));
+        let worst = self.worst.iter().map(std::slice::from_ref).enumerate().map(|item| ("worst", item));
+        let confusion = self.confusion.iter().map(|pair| &pair[..]).enumerate();
+        for (key, (place, names)) in worst.chain(confusion.map(|item| ("confusion", item))) {
+            if let Some(name) = names.iter().find(|name| !own(name)) {
+                let problem = format!("{name} is neither varied nor collected");
+                return Err(collect.refused_item(key, place, &problem));
             }
         }
         Ok(())
     }
 }
 
-/// A text and where it comes from.
-struct At<'a> {
-    text: &'a str,
-    path: &'a Path,
+/// Pairs of columns of truth and answer.
+fn confusion(collect: &mut Section<'_>) -> Result<Vec<[String; 2]>, SettingsError> {
+    let list = collect.list("confusion")?.unwrap_or_default();
+    let pair = |item: &Spanned<DeValue<'_>>| -> Option<[String; 2]> {
+        let names = item.get_ref().as_array()?.iter().map(|name| name.get_ref().as_str().map(str::to_owned));
+        names.collect::<Option<Vec<_>>>()?.try_into().ok()
+    };
+    let allowed = "allowed are pairs of columns, [\"truth\", \"answer\"]";
+    list.iter().map(pair).collect::<Option<_>>().ok_or_else(|| collect.refused("confusion", allowed))
 }
 
-impl At<'_> {
-    fn error(&self, span: &Range<usize>, message: String) -> FileError {
-        let line = settings::line_of(self.text, span.start);
-        FileError { file: self.path.display().to_string(), line, message }
+fn kind(root: &mut Section<'_>) -> Result<Kind, SettingsError> {
+    let command = root.texts("command")?;
+    if root.has("command") {
+        let problem = if command.is_empty() {
+            "needs at least the program"
+        } else if OF_AN_EXPERIMENT.iter().any(|key| root.has(key)) {
+            "experiment, rig, seconds and pace belong to a campaign of experiments"
+        } else {
+            return Ok(Kind::Command(command));
+        };
+        return Err(root.refused("command", problem));
     }
-
-    fn kind(&self, form: &Form) -> Result<Kind, FileError> {
-        if let Some(command) = &form.command {
-            let given =
-                [form.experiment.is_some(), form.rig.is_some(), form.seconds.is_some(), form.pace.is_some()];
-            let reported = if command.as_ref().is_empty() {
-                "command: needs at least the program"
-            } else if given.contains(&true) {
-                "command: experiment, rig, seconds and pace belong to a campaign of experiments"
-            } else {
-                return Ok(Kind::Command(command.as_ref().clone()));
-            };
-            return Err(self.error(&command.span(), reported.into()));
-        }
-        if let Some(programs) = &form.programs {
-            let reported = "programs: what a command starts; a campaign of experiments knows its programs";
-            return Err(self.error(&programs.span(), reported.into()));
-        }
-        if let Some(seconds) = form.seconds.as_ref().filter(|s| !(s.as_ref() > &0.0 && s.as_ref() <= &MOST_S))
-        {
-            let reported = format!("seconds = {}: allowed is more than 0, to {MOST_S}", seconds.as_ref());
-            return Err(self.error(&seconds.span(), reported));
-        }
-        Ok(Kind::Experiment(ExperimentKind {
-            experiment: form.experiment.clone(),
-            rig: form.rig.clone(),
-            longest_s: form.seconds.as_ref().map_or(LONGEST_S, |seconds| *seconds.as_ref()),
-            pace: form.pace.as_ref().map_or(Pace::default(), |pace| *pace.as_ref()),
-        }))
+    if root.has("programs") {
+        let problem = "it is what a command starts; a campaign of experiments knows its programs";
+        return Err(root.refused("programs", problem));
     }
-
-    fn whole(&self, number: Option<Spanned<u64>>, name: &str, most: u64) -> Result<Option<u64>, FileError> {
-        match number {
-            Some(number) if !(1..=most).contains(number.as_ref()) => {
-                let reported = format!("{name} = {}: allowed is 1 to {most}", number.as_ref());
-                Err(self.error(&number.span(), reported))
-            }
-            number => Ok(number.map(Spanned::into_inner)),
-        }
+    let longest_s = root.finite("seconds")?.unwrap_or(LONGEST_S);
+    if longest_s <= 0.0 || longest_s > MOST_S {
+        return Err(root.refused("seconds", &format!("allowed is more than 0, to {MOST_S}")));
     }
-
-    fn figures(
-        &self,
-        names: &[Spanned<String>],
-        kind: &Kind,
-        factors: &[Factor],
-    ) -> Result<Vec<String>, FileError> {
-        let mut taken: Vec<&str> = RESERVED.to_vec();
-        taken.extend(factors.iter().map(|factor| factor.name.as_str()));
-        for name in names {
-            check_column(name.as_ref(), &taken)
-                .map_err(|reported| self.error(&name.span(), format!("collect.figures: {reported}")))?;
-            taken.push(name.as_ref());
-        }
-        let experiment = matches!(kind, Kind::Experiment(_));
-        if let Some(name) = names.iter().find(|name| experiment && !figures::is_known(name.as_ref())) {
-            let reported =
-                format!("collect.figures: no figure {}; `bench figures` lists them", name.as_ref());
-            return Err(self.error(&name.span(), reported));
-        }
-        if names.is_empty() && !experiment {
-            return Err(self.error(&(0..0), "collect.figures: name the keys of the command's answer".into()));
-        }
-        Ok(names.iter().map(|name| name.as_ref().clone()).collect())
-    }
+    Ok(Kind::Experiment(ExperimentKind {
+        experiment: root.text("experiment")?.map(|experiment| experiment.text),
+        rig: root.text("rig")?.map(|rig| rig.text),
+        longest_s,
+        pace: root.choice("pace", &PACES)?,
+    }))
 }
 
 /// Whether a factor fits the campaign and those before it.
@@ -300,7 +242,7 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
         .iter()
         .any(|other| other.name == *name || (other.changes == *changes && *changes != Changes::Passed))
     {
-        return Err(format!("{name} is varied twice; give one of them another name, or leave one out"));
+        return Err(format!("name: {name} is varied twice; give one of them another name, or leave one out"));
     }
     check_column(name, RESERVED).map_err(|reported| format!("name = {reported}"))?;
     if figures::is_known(name) {
@@ -309,10 +251,10 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
     match (kind, changes) {
         (Kind::Command(_), Changes::Passed) => Ok(()),
         (Kind::Command(_), _) => {
-            Err("a command is told name and value: leave out what is changed, give a name".into())
+            Err("name: a command is told name and value: leave out what is changed, give a name".into())
         }
         (Kind::Experiment(_), Changes::Passed) => {
-            Err("needs exactly one of rig, experiment, set, fault, choose".into())
+            Err("rig: needs exactly one of rig, experiment, set, fault, choose".into())
         }
         (Kind::Experiment(ExperimentKind { pace: Pace::Rehearsal, .. }), Changes::Fault(_)) => {
             Err("fault: a rehearsal has no rig process that could break; use pace = \"lockstep\"".into())
@@ -347,7 +289,7 @@ pub const RESERVED: &[&str] = &["run", "draw", "seed", "ended", "because", "simu
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<CampaignFile, FileError> {
+    fn read(text: &str) -> Result<CampaignFile, SettingsError> {
         CampaignFile::from_toml(text, Path::new("camp/aign.toml"))
     }
 
@@ -388,10 +330,9 @@ mod tests {
             ("experiment = \"step\"\n".into(), 1, "title"),
             ("title = \"t\"\n".into(), 1, "name one"),
         ] {
-            let error = read(&text).unwrap_err();
-            assert_eq!(error.line, line, "{text}: {error}");
-            assert!(error.to_string().starts_with("camp/aign.toml:"), "{error}");
-            assert!(error.message.contains(words), "{text}: {error}");
+            let error = read(&text).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("camp/aign.toml:{line}: ")), "{text}: {error}");
+            assert!(error.contains(words), "{text}: {error}");
         }
     }
 

@@ -6,9 +6,11 @@
 
 pub mod parameters;
 mod section;
+mod source;
 mod spelling;
 
-pub use section::{Result, Section, SettingsError, Source, Text};
+pub use section::{Section, Text};
+pub use source::{Result, SettingsError, Source};
 
 use std::ops::Range;
 use toml::Value;

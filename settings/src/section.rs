@@ -4,95 +4,12 @@
 //! those that were asked for.
 
 use crate::parameters::Parameter;
+use crate::source::{Result, SettingsError, Source};
 use crate::spelling::nearest;
-use crate::{column_of, line_of, number, written};
+use crate::{number, written};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-
-/// A file that cannot be used: file, line, key, value and what is allowed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct SettingsError(String);
-
-impl SettingsError {
-    /// A file that cannot be opened or read.
-    #[must_use]
-    pub fn unreadable(file: &Path, error: &std::io::Error) -> Self {
-        Self(format!("cannot read {}: {error}", file.display()))
-    }
-}
-
-/// What a file says, or its place and what is wrong there.
-pub type Result<T, E = SettingsError> = core::result::Result<T, E>;
-
-/// A TOML file that is being read.
-pub struct Source<'a> {
-    text: &'a str,
-    file: &'a Path,
-    root: Spanned<DeTable<'a>>,
-    /// In place of a table that is left out.
-    empty: DeTable<'a>,
-    columns: bool,
-}
-
-impl<'a> Source<'a> {
-    /// Parses `text`; `file` is for messages, and paths in it are relative to its folder.
-    ///
-    /// # Errors
-    /// [`SettingsError`] for what is no TOML.
-    pub fn parse(text: &'a str, file: &'a Path) -> Result<Self> {
-        let root = DeTable::parse(text).map_err(|error| {
-            let line = line_of(text, error.span().map_or(0, |span| span.start));
-            SettingsError(format!("{}:{line}: not TOML: {}", file.display(), error.to_string().trim_end()))
-        })?;
-        Ok(Self { text, file, root, empty: DeTable::new(), columns: false })
-    }
-
-    /// The same, with messages that name the column after the line.
-    #[must_use]
-    pub fn with_columns(self) -> Self {
-        Self { columns: true, ..self }
-    }
-
-    /// The file as it was parsed.
-    #[must_use]
-    pub fn text(&self) -> &str {
-        self.text
-    }
-
-    /// An error at a byte of the file.
-    #[must_use]
-    pub fn wrong_from(&self, at: usize, message: &str) -> SettingsError {
-        self.error_at(at, message)
-    }
-
-    /// The whole file.
-    #[must_use]
-    pub fn root(&self) -> Section<'_> {
-        Section { source: self, path: String::new(), table: self.root.get_ref(), at: 0, asked: Vec::new() }
-    }
-
-    fn line(&self, at: usize) -> usize {
-        line_of(self.text, at)
-    }
-
-    fn error_at(&self, at: usize, message: &str) -> SettingsError {
-        let (file, line) = (self.file.display(), self.line(at));
-        SettingsError(if self.columns {
-            format!("{file}:{line}:{}: {message}", column_of(self.text, at))
-        } else {
-            format!("{file}:{line}: {message}")
-        })
-    }
-
-    /// Where the text of a value begins: behind its quote where it is written as it reads, else at the value.
-    fn start_of_text(&self, value: &Spanned<DeValue<'_>>, text: &str) -> usize {
-        let span = value.span();
-        let raw = self.text.get(span.clone()).unwrap_or_default();
-        span.start + raw.find(text).filter(|_| !text.is_empty()).unwrap_or(0)
-    }
-}
 
 /// A text with the line that it stands in.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -115,6 +32,10 @@ pub struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
+    pub(crate) fn new(source: &'a Source<'a>, path: String, table: &'a DeTable<'a>, at: usize) -> Self {
+        Self { source, path, table, at, asked: Vec::new() }
+    }
+
     /// Its keys, in the order of the file. To ask is not to allow them.
     #[must_use]
     pub fn keys(&self) -> Vec<String> {
@@ -171,15 +92,23 @@ impl<'a> Section<'a> {
         value.get_ref().as_bool().ok_or_else(|| self.refused(key, "allowed is true or false"))
     }
 
+    /// The values of the list under `key`, as they stand; `None` when it is absent.
+    ///
+    /// # Errors
+    /// No list.
+    pub fn list(&mut self, key: &str) -> Result<Option<&'a [Spanned<DeValue<'a>>]>> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let list = value.get_ref().as_array().map(|list| Some(&list[..]));
+        list.ok_or_else(|| self.refused(key, "allowed is a list"))
+    }
+
     /// The texts listed under `key`; none when it is absent.
     ///
     /// # Errors
     /// No list of texts.
     pub fn texts(&mut self, key: &str) -> Result<Vec<String>> {
-        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
-        let list = value.get_ref().as_array();
-        let texts =
-            list.and_then(|list| list.iter().map(|item| item.get_ref().as_str().map(String::from)).collect());
+        let list = self.list(key)?.unwrap_or_default();
+        let texts = list.iter().map(|item| item.get_ref().as_str().map(String::from)).collect::<Option<_>>();
         texts.ok_or_else(|| self.refused(key, "allowed is a list of texts"))
     }
 
@@ -310,13 +239,7 @@ impl<'a> Section<'a> {
     /// # Errors
     /// No list, or one that holds something else.
     pub fn choices<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<Vec<T>> {
-        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
-        let list = value.get_ref().as_array();
-        let texts = list.and_then(|list| list.iter().map(|item| item.get_ref().as_str()).collect());
-        let Some(texts): Option<Vec<&str>> = texts else {
-            return Err(self.refused(key, "allowed is a list of texts"));
-        };
-        texts.into_iter().map(|text| self.chosen(key, text, choices)).collect()
+        self.texts(key)?.iter().map(|text| self.chosen(key, text, choices)).collect()
     }
 
     fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T> {
@@ -348,13 +271,9 @@ impl<'a> Section<'a> {
     /// # Errors
     /// No table.
     pub fn section_or_empty(&mut self, key: &str) -> Result<Self> {
-        Ok(self.section(key)?.unwrap_or_else(|| Self {
-            source: self.source,
-            path: self.path_of(key),
-            table: &self.source.empty,
-            at: self.at,
-            asked: Vec::new(),
-        }))
+        let section = self.section(key)?;
+        let empty = || Self::new(self.source, self.path_of(key), &self.source.empty, self.at);
+        Ok(section.unwrap_or_else(empty))
     }
 
     /// The table under `key`, which must be there; `meaning` is for the message when it is not.
@@ -446,6 +365,15 @@ impl<'a> Section<'a> {
         self.reported(value, &format!("{key} = {written}; {problem}"))
     }
 
+    /// The same of one item of the list under `key`, by its place from 0.
+    #[must_use]
+    pub fn refused_item(&self, key: &str, place: usize, problem: &str) -> SettingsError {
+        let item = self.entry(key).and_then(|value| value.get_ref().as_array()?.get(place));
+        let Some(item) = item else { return self.refused(key, problem) };
+        let written = written(self.source.text, item.span());
+        self.reported(item, &format!("{key} has {written}; {problem}"))
+    }
+
     /// A missing key, with those that are there: it may be one of them, misspelt.
     fn lacks(&self, message: &str) -> SettingsError {
         let keys: Vec<&str> = self.table.keys().map(|name| name.get_ref().as_ref()).collect();
@@ -483,7 +411,7 @@ impl<'a> Section<'a> {
             };
             return Err(self.source.error_at(value.span().start, &message));
         };
-        Ok(Self { source: self.source, path, table, at: value.span().start, asked: Vec::new() })
+        Ok(Self::new(self.source, path, table, value.span().start))
     }
 }
 

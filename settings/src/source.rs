@@ -1,0 +1,90 @@
+//! A TOML file with the places of what stands in it, for messages.
+
+use crate::{Section, column_of, line_of};
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A file that cannot be used: file, line, key, value and what is allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct SettingsError(pub(crate) String);
+
+impl SettingsError {
+    /// A file that cannot be opened or read.
+    #[must_use]
+    pub fn unreadable(file: &Path, error: &std::io::Error) -> Self {
+        Self(format!("cannot read {}: {error}", file.display()))
+    }
+}
+
+/// What a file says, or its place and what is wrong there.
+pub type Result<T, E = SettingsError> = core::result::Result<T, E>;
+
+/// A TOML file that is being read.
+pub struct Source<'a> {
+    pub(crate) text: &'a str,
+    pub(crate) file: &'a Path,
+    root: Spanned<DeTable<'a>>,
+    /// In place of a table that is left out.
+    pub(crate) empty: DeTable<'a>,
+    columns: bool,
+}
+
+impl<'a> Source<'a> {
+    /// Parses `text`; `file` is for messages, and paths in it are relative to its folder.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for what is no TOML.
+    pub fn parse(text: &'a str, file: &'a Path) -> Result<Self> {
+        let root = DeTable::parse(text).map_err(|error| {
+            let line = line_of(text, error.span().map_or(0, |span| span.start));
+            SettingsError(format!("{}:{line}: not TOML: {}", file.display(), error.to_string().trim_end()))
+        })?;
+        Ok(Self { text, file, root, empty: DeTable::new(), columns: false })
+    }
+
+    /// The same, with messages that name the column after the line.
+    #[must_use]
+    pub fn with_columns(self) -> Self {
+        Self { columns: true, ..self }
+    }
+
+    /// The file as it was parsed.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        self.text
+    }
+
+    /// An error at a byte of the file.
+    #[must_use]
+    pub fn wrong_from(&self, at: usize, message: &str) -> SettingsError {
+        self.error_at(at, message)
+    }
+
+    /// The whole file.
+    #[must_use]
+    pub fn root(&self) -> Section<'_> {
+        Section::new(self, String::new(), self.root.get_ref(), 0)
+    }
+
+    pub(crate) fn line(&self, at: usize) -> usize {
+        line_of(self.text, at)
+    }
+
+    pub(crate) fn error_at(&self, at: usize, message: &str) -> SettingsError {
+        let (file, line) = (self.file.display(), self.line(at));
+        SettingsError(if self.columns {
+            format!("{file}:{line}:{}: {message}", column_of(self.text, at))
+        } else {
+            format!("{file}:{line}: {message}")
+        })
+    }
+
+    /// Where the text of a value begins: behind its quote where it is written as it reads, else at the value.
+    pub(crate) fn start_of_text(&self, value: &Spanned<DeValue<'_>>, text: &str) -> usize {
+        let span = value.span();
+        let raw = self.text.get(span.clone()).unwrap_or_default();
+        span.start + raw.find(text).filter(|_| !text.is_empty()).unwrap_or(0)
+    }
+}
