@@ -27,7 +27,6 @@ const FIFO_PRIORITY: u8 = 1;
 /// How often the end is looked for while a bus is hosted.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Why a program could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum CanError {
     /// A bus that the kernel has itself.
@@ -42,7 +41,6 @@ pub enum CanError {
     /// The bus of a pair.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The program.
     #[error(transparent)]
     Guest(#[from] GuestError),
     /// The system gave no signal handler, or the host ended.

@@ -75,7 +75,6 @@ pub enum ConformanceError {
     /// The system gave no signal handler, or no folder for a bus.
     #[error("{0}")]
     System(io::Error),
-    /// The result cannot be written.
     #[error(transparent)]
     Write(#[from] FileError),
     #[error("interrupted before the last check; nothing was written")]
@@ -83,7 +82,6 @@ pub enum ConformanceError {
 }
 
 impl ConformanceError {
-    /// The exit code that tells it.
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) => Exit::BusFailed,

@@ -35,7 +35,6 @@ use table::Rows;
 /// Most rows of a table that is held: a log with a hole of years makes none that fills a disk.
 const MOST_HELD_ROWS: u64 = 100_000_000;
 
-/// What keeps a log from being exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     #[error(transparent)]

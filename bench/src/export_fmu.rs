@@ -31,7 +31,6 @@ pub struct ExportFmuArguments {
     pub library: Option<PathBuf>,
 }
 
-/// What keeps an FMU from being written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportFmuError {
     #[error(transparent)]

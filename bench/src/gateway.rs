@@ -48,7 +48,6 @@ const REPORTS_KEPT: usize = 100;
 /// Time between two messages about the same.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
-/// What keeps a gateway from opening.
 #[derive(Debug, thiserror::Error)]
 pub enum GatewayError {
     #[error(transparent)]
@@ -65,7 +64,6 @@ pub enum GatewayError {
 }
 
 impl GatewayError {
-    /// The exit code that tells it.
     pub fn exit(&self) -> Exit {
         if matches!(self, Self::Bus(_)) { Exit::BusFailed } else { Exit::BadInput }
     }

@@ -38,7 +38,6 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// Silence after which the answering process takes the other one for gone.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// What keeps a ping-pong from being played.
 #[derive(Debug, thiserror::Error)]
 pub enum PingPongError {
     #[error("{what}: {reason}")]
@@ -52,7 +51,6 @@ pub enum PingPongError {
 }
 
 impl PingPongError {
-    /// The exit code that the error leads to.
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::Silent(_) => Exit::BusFailed,

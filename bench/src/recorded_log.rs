@@ -19,7 +19,6 @@ const NEAR_ZERO_S: f64 = 60.0;
 
 const MOST_INTERFACES: usize = 64;
 
-/// What keeps a log from being read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedLogError {
     #[error("cannot read {file}: {reason}; give a run's folder, or a log of 'candump -L'")]

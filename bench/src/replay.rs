@@ -33,7 +33,6 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// Time between two looks for the bus.
 const LOOK_PERIOD: Duration = Duration::from_millis(10);
 
-/// What keeps a log from being replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     #[error(transparent)]
@@ -69,7 +68,6 @@ pub enum ReplayError {
 }
 
 impl ReplayError {
-    /// The exit code that the error leads to.
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::NoBus(_) => Exit::BusFailed,

@@ -15,7 +15,6 @@ use std::io::Write as _;
 /// Width that sentences are broken at.
 const WIDTH: usize = 100;
 
-/// Prints the catalogue.
 pub(crate) fn print(arguments: &EffectsArguments) -> Result<Exit, RunError> {
     let text = if arguments.json {
         serde_json::to_string_pretty(&as_json()).unwrap_or_default()

@@ -5,9 +5,7 @@ use plant::scene::{HandForces, Outcome};
 use runlog::event::{self, Axis, FaultMark};
 use serde::{Serialize, Serializer};
 
-/// An event of the run.
 pub(crate) type Event = event::Event<Mark>;
-/// The kind of an event.
 pub(crate) type EventKind = event::EventKind<Mark>;
 
 /// Written as the [`FaultMark`] that others read.

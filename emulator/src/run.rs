@@ -52,7 +52,6 @@ pub enum RunError {
     /// A file cannot be read, or says something that is not allowed.
     #[error("{0}")]
     Input(String),
-    /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
     /// A file of the run's folder cannot be written.

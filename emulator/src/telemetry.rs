@@ -27,7 +27,6 @@ pub(crate) use description::{Described, description};
 /// Viewers at a time; one more is parted with at once.
 const MOST_VIEWERS: usize = 8;
 
-/// The socket and its viewers.
 pub(crate) struct Telemetry {
     socket: SocketFile,
     /// The first packet of each viewer, save what it is given at its coming.

@@ -54,9 +54,7 @@ const STATE_DEPENDENT: &[&str] = &["spring", "damper", "mass", "dry-friction"];
 
 #[derive(Clone, Debug, Default)]
 pub struct Record {
-    /// The drive controller's table.
     pub drive: Table,
-    /// The load controller's table.
     pub load: Table,
     /// Sensors and valves.
     pub measured: Table,
@@ -244,7 +242,6 @@ pub mod made {
             .collect()
     }
 
-    /// A table of these columns.
     pub fn table(columns: &[(&'static str, &Series)]) -> Table {
         let mut table = Table::default();
         for (name, column) in columns {

@@ -20,7 +20,6 @@ pub(crate) enum Reports {
     Each(Vec<(&'static str, PartedReport)>),
 }
 
-/// Reads the reports in `folder`.
 pub(crate) fn read(folder: &Path) -> Result<Reports, SummaryError> {
     let read = |name: &str| {
         let path = folder.join(name);

@@ -89,7 +89,6 @@ impl Series {
         steps.fold(f64::INFINITY, f64::min).min(1.0)
     }
 
-    /// The samples inside `span`.
     #[must_use]
     pub fn within(&self, span: &Span) -> Self {
         let place = |time_s: f64| self.time_s.partition_point(|time| *time < time_s - SAME_S);

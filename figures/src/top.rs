@@ -57,7 +57,6 @@ pub const TOP: [TopFigure; 16] = [
     count("event_count"),
 ];
 
-/// The figure of this name.
 pub fn find(name: &str) -> Option<&'static TopFigure> {
     TOP.iter().find(|figure| figure.name == name)
 }

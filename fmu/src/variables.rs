@@ -17,17 +17,14 @@ use plant::{Plant, RigParameters, Setup, SetupError, Truth};
 /// What a variable stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Valve command of drive or load.
     Valve(usize),
     /// A hand's push on the carriage (0) or on the load's eye (1).
     Hand(usize),
-    /// Emergency stop asked for.
     EmergencyStop,
     /// Linkage asked for.
     Link,
     /// Where the carriage stands at the start.
     CarriagePosition,
-    /// Weights on the carriage.
     AddedMass,
     /// Seed of the sensors' noise.
     Seed,
@@ -35,7 +32,6 @@ pub enum Role {
     Rig(usize, usize),
     /// A column of [`Truth`].
     Truth(usize),
-    /// A term of an effect.
     Term(usize),
     /// What a sensor shows: axis and channel (position, force, pressure a, pressure b).
     Measured(usize, usize),

@@ -111,7 +111,6 @@ impl Children {
         Ok(number)
     }
 
-    /// Waits for what happens next.
     pub(crate) fn next(&mut self, deadline: Option<Instant>) -> Event {
         loop {
             let message = match deadline {
@@ -154,12 +153,10 @@ impl Children {
         self.running.iter().filter(|one| of.contains(&one.number)).count()
     }
 
-    /// Asks a child to end.
     pub(crate) fn stop(&self, child: Pid) {
         self.running.iter().filter(|one| one.number == child).for_each(|one| one.signal(Signal::TERM));
     }
 
-    /// Asks all to end.
     pub(crate) fn stop_all(&self) {
         self.running.iter().for_each(|one| one.signal(Signal::TERM));
     }

@@ -77,7 +77,6 @@ pub struct Fact {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
-    /// The rig's process.
     #[default]
     Emulator,
     Controller,

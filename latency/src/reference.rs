@@ -65,7 +65,6 @@ struct Thread {
     max: u64,
 }
 
-/// What keeps a reference from being read.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ReferenceError {
     #[error("{0}")]
@@ -76,7 +75,6 @@ pub(crate) enum ReferenceError {
     NoHistogram,
 }
 
-/// Reads what cyclictest wrote.
 pub(crate) fn read(text: &str) -> Result<Reference, ReferenceError> {
     let file: File = serde_json::from_str(text)?;
     let whole_us = file.resolution_in_ns != 1;

@@ -80,7 +80,6 @@ const CHAINS: [Chain; 4] = [
     },
 ];
 
-/// Names of a signal's values.
 fn states(signal: &str) -> &'static [&'static str] {
     let spec = DRIVE_CHAIN_STATUS.signals.iter().find(|known| known.name == signal);
     spec.map_or(&[], |spec| spec.values)

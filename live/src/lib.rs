@@ -65,7 +65,6 @@ pub enum LiveError {
 }
 
 impl LiveError {
-    /// The exit code that tells it.
     pub fn exit(&self) -> Exit {
         if matches!(self, Self::Bus(_)) { Exit::BusFailed } else { Exit::BadInput }
     }

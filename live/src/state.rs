@@ -96,11 +96,9 @@ pub(crate) struct StagePercentiles {
     pub p999_us: Option<f64>,
     #[serde(rename = "max")]
     pub max_us: Option<f64>,
-    /// Samples.
     pub count: u64,
 }
 
-/// A message of the page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Message {
     pub t_s: f64,

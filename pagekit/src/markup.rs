@@ -21,7 +21,7 @@ pub enum Cell {
     Shaded(f64, String),
 }
 
-/// Text.
+/// Left-aligned cell of text.
 #[must_use]
 pub fn words(text: impl Into<String>) -> Cell {
     Cell::Words(text.into())

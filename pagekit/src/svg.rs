@@ -84,9 +84,9 @@ pub fn whole_decades(low: f64, high: f64) -> (f64, f64) {
 /// How a curve looks, by its place among those of its chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// One of ours.
+    /// A distribution of airbench, with the colour of this place.
     Ours(usize),
-    /// One of the reference's.
+    /// A distribution of a reference, with the look of this place.
     Reference(usize),
 }
 

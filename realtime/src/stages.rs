@@ -100,7 +100,7 @@ pub struct StageFigures {
     pub execution_ns: Percentiles,
     /// From due to done, of each cycle that was due.
     pub completion_ns: Percentiles,
-    /// Period error.
+    /// Size of the change of the wake-up latency from one cycle to the next.
     pub period_error_ns: Percentiles,
 }
 

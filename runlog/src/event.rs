@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 pub struct Event<M = FaultMark> {
     /// The rig's cycle in which it was noticed.
     pub cycle: u64,
-    /// The event.
+    /// What happened.
     pub kind: EventKind<M>,
 }
 
@@ -111,7 +111,7 @@ pub enum EventKind<M = FaultMark> {
     /// The bus is gone.
     #[error("the bus is gone; trying to come back")]
     BusLost,
-    /// The bus is back.
+    /// The bus is there again after a loss.
     #[error("the bus is back")]
     BusBack,
 }
@@ -145,7 +145,7 @@ impl<M> EventKind<M> {
 pub struct FaultMark {
     /// Number of the fault in this run; those of the script are first, from 1.
     pub number: u16,
-    /// Change of the fault.
+    /// Whether it began, ended or did not begin.
     pub what: FaultChange,
     /// Name in the table of faults.
     pub fault: String,

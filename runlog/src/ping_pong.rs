@@ -26,9 +26,9 @@ pub struct PingPongFigures {
     pub round_trip_ns: Percentiles,
     /// Ping sent to ping received, ns; null on a bare pair of sockets.
     pub to_arrival_ns: Option<Percentiles>,
-    /// Pings.
+    /// Pings sent.
     pub sent: u64,
-    /// Pongs.
+    /// Pongs received.
     pub answered: u64,
     /// Pings without a pong.
     pub lost: u64,

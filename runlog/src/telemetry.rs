@@ -82,7 +82,7 @@ pub enum Packet {
 pub struct EventMessage<M = FaultMark> {
     /// The rig's cycle in which it was noticed.
     pub cycle: u64,
-    /// The event.
+    /// What happened, with its numbers.
     pub kind: EventKind<M>,
     /// The event in words, for a person.
     pub text: String,

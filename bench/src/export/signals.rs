@@ -6,7 +6,6 @@
 use crate::recorded_log::RecordedLog;
 use protocol::frames::{DecodeError, Frame, MESSAGES, MessageSpec, SignalKind, SignalSpec};
 
-/// All frames of one message.
 #[derive(Clone, Debug)]
 pub(super) struct MessageFrames {
     pub(super) spec: &'static MessageSpec,

@@ -40,7 +40,6 @@ impl Counts {
         self.0.values().sum()
     }
 
-    /// Identifiers that were counted.
     pub(super) fn ids(&self) -> impl Iterator<Item = &String> {
         self.0.keys()
     }

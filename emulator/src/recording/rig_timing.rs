@@ -31,11 +31,9 @@ pub(crate) struct RigTimingReport {
     pub command_age_ns: [Percentiles; 2],
     /// Cycles sent, by the age in cycles of the command that acted.
     pub command_age_cycles: CommandAges,
-    /// Steps of the wall clock.
     pub wall_clock_steps: Vec<WallClockStep>,
 }
 
-/// Records the rig's timing.
 pub(crate) struct RigTiming {
     recorder: TimingRecorder,
     round_trip: [Further; 2],
@@ -48,7 +46,6 @@ pub(crate) struct RigTiming {
 }
 
 impl RigTiming {
-    /// Opens the files.
     pub(crate) fn create(setup: TimingSetup) -> io::Result<Self> {
         let mut recorder = TimingRecorder::create(setup)?;
         let round_trip = AXES.map(|axis| recorder.add(&format!("{axis}-round-trip")));

@@ -66,7 +66,6 @@ pub(crate) struct WriterReport {
     pub frames: u64,
     /// The first events of each kind.
     pub events: Vec<Event>,
-    /// Events in all.
     pub event_count: u64,
     pub timing: RigTimingReport,
     /// Why writing stopped, if it did.

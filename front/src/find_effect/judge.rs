@@ -53,7 +53,6 @@ pub(super) struct Judged {
     pub(super) right: bool,
 }
 
-/// Reads a report.
 pub(super) fn read(file: &Path) -> Result<Report, FrontError> {
     read_json(file)
         .map_err(|error| FrontError::Process(format!("discrepancy close left no usable report: {error}")))

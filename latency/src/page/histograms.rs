@@ -18,7 +18,6 @@ const SHORTEST_NS: f64 = 10.0;
 /// Where a curve of nothing lies: below one, so that a single sample is seen.
 const NO_SAMPLE: f64 = 0.5;
 
-/// Pixels of a chart.
 pub(super) struct Size {
     pub(super) width: f64,
     pub(super) height: f64,

@@ -142,7 +142,7 @@ impl RigAnalysis {
         Self { bits_per_s, errors: None, frames }
     }
 
-    /// With errors.
+    /// The same on a wire with at most so many errors.
     #[must_use]
     pub fn with_errors(mut self, errors: ErrorBound) -> Self {
         self.errors = Some(errors);

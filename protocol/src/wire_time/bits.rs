@@ -45,7 +45,7 @@ impl BitSequence {
         u32::from(CRC.checksum(&self.bits.to_be_bytes()))
     }
 
-    /// Bits in it.
+    /// Bits put in so far.
     #[must_use]
     pub fn count(self) -> u32 {
         self.count

@@ -32,7 +32,7 @@ pub enum WireEvent {
     },
     /// A node gets an error frame with its own state.
     Told {
-        /// The node.
+        /// Node whose state it tells.
         node: NodeId,
         /// The error frame.
         frame: CanFrame,
@@ -49,7 +49,7 @@ struct Sending {
     hit: bool,
 }
 
-/// The wire.
+/// A simulated bus: one frame at a time, the rank of identifiers decides, errors come as drawn.
 pub struct WireModel {
     timing: WireTiming,
     errors: Errors,

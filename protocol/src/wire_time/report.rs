@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 pub struct ResponseReport {
     /// Shortest.
     pub min: u64,
-    /// Mean.
+    /// Their mean, ns.
     pub mean: u64,
     /// Longest.
     pub max: u64,
@@ -81,7 +81,7 @@ pub struct NodeReport {
 pub struct Lateness {
     /// How often it was done.
     pub count: u64,
-    /// Mean.
+    /// Mean of all times it was done.
     pub mean_ns: u64,
     /// Most.
     pub max_ns: u64,

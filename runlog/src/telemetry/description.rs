@@ -130,17 +130,17 @@ pub struct FaultEntry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FaultGroup {
-    /// A sensor.
+    /// Position, force and pressure sensors.
     Sensor,
-    /// A valve.
+    /// Proportional valves.
     Valve,
-    /// The supply.
+    /// Compressed-air supply.
     Supply,
     /// A chamber or its hose.
     Air,
     /// Masses, friction, linkage, end stops.
     Mechanics,
-    /// The bus.
+    /// Frames, and nodes that send them.
     Bus,
 }
 

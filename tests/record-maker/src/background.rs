@@ -6,7 +6,7 @@
 //!   steps of first order in place of the midpoint's
 //! ```
 //!
-//! Source: issue 32; discrepancy-notes.md, Second reading, 8.
+//! Source: discrepancy-notes.md, Second reading, 8.
 
 use super::Hidden;
 use plant::parameters::VALVE_POINTS;
