@@ -130,6 +130,18 @@ impl<'a> Section<'a> {
         self.entry(key).and_then(|value| value.get_ref().as_str())
     }
 
+    /// The number under `key`, if it is there and one. To look is not to allow it.
+    #[must_use]
+    pub fn peek_number(&self, key: &str) -> Option<f64> {
+        self.entry(key).and_then(|value| number(value.get_ref()))
+    }
+
+    /// The value under `key` as it is written, on one line and cut; empty when it is absent.
+    #[must_use]
+    pub fn written(&self, key: &str) -> String {
+        self.entry(key).map_or_else(String::new, |value| written(self.source.text, value.span()))
+    }
+
     /// Its name with those of the tables around it, such as `drive.change[1]`; empty for the whole file.
     #[must_use]
     pub fn path(&self) -> &str {
@@ -291,9 +303,7 @@ impl<'a> Section<'a> {
     pub fn sections(&mut self, key: &str) -> Result<Vec<Self>> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let Some(list) = value.get_ref().as_array() else {
-            return Err(
-                self.reported(value, &format!("{key} must be a list of tables: [[{}]]", self.path_of(key)))
-            );
+            return Err(self.refused(key, &format!("allowed is a list of tables: [[{}]]", self.path_of(key))));
         };
         let path = |place: usize| format!("{}[{place}]", self.path_of(key));
         list.iter().enumerate().map(|(index, item)| self.inner(path(index + 1), item, None)).collect()

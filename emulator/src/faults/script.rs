@@ -22,12 +22,17 @@
 
 use super::{Fault, FaultError};
 use plant::Truth;
-use settings::number;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use settings::parameters::Parameter;
+use settings::{Section, SettingsError, Source};
+use std::path::Path;
 
 /// Longest time of a script, s: more than a day.
 const LONGEST_S: f64 = 1e5;
+static FROM: Parameter =
+    Parameter::new(("from_s", "s"), [0.0, LONGEST_S], 0.0, "first time at which it may be");
+static TO: Parameter = Parameter::new(("to_s", "s"), [0.0, LONGEST_S], 0.0, "when it ends");
+static FOR: Parameter = Parameter::new(("for_s", "s"), [0.001, LONGEST_S], 0.0, "how long it lasts");
+static SEED: Parameter = Parameter::new(("seed", ""), [0.0, 9e15], 1.0, "of all that is random").whole();
 /// Most faults of a script: their numbers are 16 bits on the bus, and the console's come after them.
 const MOST_FAULTS: usize = 1000;
 
@@ -101,175 +106,73 @@ impl Condition {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{file}:{line}: {problem}")]
-pub struct ScriptError {
-    pub file: String,
-    pub line: usize,
-    /// What is wrong, with key, value and what is allowed.
-    pub problem: Problem,
-}
-
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Problem {
-    #[error("not TOML: {0}")]
-    Syntax(String),
-    /// Not as the table of faults says.
-    #[error(transparent)]
-    Fault(#[from] FaultError),
-    /// A key that no script has, or a value of the wrong type or out of range.
-    #[error("{key} = {value}: allowed: {allowed}")]
-    Value { key: String, value: String, allowed: String },
-    /// Something is missing, or does not go with something else.
-    #[error("{0}")]
-    Rule(String),
-}
-
 /// Keys of a fault that are not its numbers.
 const OWN_KEYS: [&str; 8] = ["name", "at", "from_s", "to_s", "for_s", "when", "above", "below"];
 
 impl FaultScript {
     /// The script in `text`; `file` is for messages.
-    pub fn from_toml(text: &str, file: &str) -> Result<Self, ScriptError> {
-        Reader { text, file }.read()
+    pub fn from_toml(text: &str, file: &str) -> Result<Self, SettingsError> {
+        let source = Source::parse(text, Path::new(file))?;
+        let mut root = source.root();
+        root.allow(&["seed", "fault"])?;
+        let seed = root.number_or_default(&SEED)? as u64;
+        let sections = root.sections("fault")?;
+        if sections.len() > MOST_FAULTS {
+            return Err(root.refused("fault", &format!("allowed are at most {MOST_FAULTS}")));
+        }
+        let faults = sections.into_iter().map(|mut section| planned(&source, &mut section));
+        Ok(Self { seed, faults: faults.collect::<Result<_, _>>()? })
     }
 }
 
-struct Reader<'t> {
-    text: &'t str,
-    file: &'t str,
+fn planned(source: &Source<'_>, section: &mut Section<'_>) -> Result<Planned, SettingsError> {
+    let name = section.needed_text("name", "'emulator faults' lists them")?.text;
+    let at = section.text("at")?.map(|at| at.text);
+    let numbers: Vec<_> = section
+        .keys()
+        .into_iter()
+        .filter(|key| !OWN_KEYS.contains(&key.as_str()))
+        .map(|key| (key.clone(), section.peek_number(&key), section.written(&key)))
+        .collect();
+    let fault = Fault::new(&name, at.as_deref(), &numbers).map_err(|error| {
+        let blamed = match &error {
+            FaultError::Unknown(_) => "name",
+            FaultError::Place { .. } => "at",
+            FaultError::Key { key, .. } | FaultError::Value { key, .. } => key,
+            FaultError::Missing { key, .. } => key, // at the head of the fault, since it is not there
+        };
+        source.wrong_from(section.at(blamed), &error.to_string())
+    })?;
+    let mut cycle = |parameter| {
+        let time_s = section.number(parameter)?;
+        Ok(time_s.map(|time_s| (time_s * 1000.0).round() as u64))
+    };
+    let (from, to, after) = (cycle(&FROM)?.unwrap_or(0), cycle(&TO)?, cycle(&FOR)?);
+    let until = match (to, after) {
+        (Some(_), Some(_)) => return Err(section.refused("for_s", "to_s and for_s exclude each other")),
+        (Some(to), None) if to <= from => {
+            return Err(section.refused("to_s", "to_s must be at least 0.001 s after from_s"));
+        }
+        (Some(to), None) => Some(Until::Cycle(to)),
+        (None, after) => after.map(Until::After),
+    };
+    let when = condition(section)?;
+    Ok(Planned { fault, line: section.line() as u32, from, when, until })
 }
 
-impl Reader<'_> {
-    fn line(&self, offset: usize) -> usize {
-        settings::line_of(self.text, offset)
+fn condition(section: &mut Section<'_>) -> Result<Option<Condition>, SettingsError> {
+    let (above, below) = (section.finite("above")?, section.finite("below")?);
+    if !section.has("when") {
+        let alone = ["above", "below"].into_iter().find(|key| section.has(key));
+        let rule = "above and below belong to a condition: say when = \"SIGNAL\"";
+        return alone.map_or(Ok(None), |key| Err(section.refused(key, rule)));
     }
-
-    fn refuse(&self, offset: usize, problem: impl Into<Problem>) -> ScriptError {
-        ScriptError { file: self.file.to_owned(), line: self.line(offset), problem: problem.into() }
-    }
-
-    fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
-        settings::written(self.text, value.span())
-    }
-
-    fn bad_value(&self, key: &str, value: &Spanned<DeValue<'_>>, allowed: impl Into<String>) -> ScriptError {
-        let (key, allowed) = (key.to_owned(), allowed.into());
-        let problem = Problem::Value { key, value: self.written(value), allowed };
-        self.refuse(value.span().start, problem)
-    }
-
-    fn read(&self) -> Result<FaultScript, ScriptError> {
-        let root = DeTable::parse(self.text).map_err(|error| {
-            let offset = error.span().map_or(0, |span| span.start);
-            self.refuse(offset, Problem::Syntax(error.message().to_owned()))
-        })?;
-        let mut script = FaultScript { seed: 1, faults: Vec::new() };
-        for (key, value) in root.get_ref() {
-            match (key.get_ref().as_ref(), value.get_ref()) {
-                ("seed", _) => {
-                    let whole = |number: &f64| (0.0..=9e15).contains(number) && *number == number.trunc();
-                    let seed = number(value.get_ref()).filter(whole);
-                    script.seed = seed
-                        .ok_or_else(|| self.bad_value("seed", value, "whole numbers from 0 to 9e15"))?
-                        as u64;
-                }
-                ("fault", DeValue::Array(tables)) if tables.len() <= MOST_FAULTS => {
-                    for table in tables {
-                        let DeValue::Table(keys) = table.get_ref() else {
-                            return Err(self.bad_value("fault", table, "tables, each as [[fault]]"));
-                        };
-                        script.faults.push(self.fault(keys, table.span().start)?);
-                    }
-                }
-                ("fault", _) => {
-                    let allowed = format!("tables, each as [[fault]], at most {MOST_FAULTS}");
-                    return Err(self.bad_value("fault", value, allowed));
-                }
-                (other, _) => return Err(self.bad_value(other, value, "the keys seed and [[fault]]")),
-            }
-        }
-        Ok(script)
-    }
-
-    fn fault(&self, table: &DeTable<'_>, head: usize) -> Result<Planned, ScriptError> {
-        let text = |key: &str| {
-            let Some(value) = table.get(key) else { return Ok(None) };
-            match value.get_ref() {
-                DeValue::String(text) => Ok(Some(text.as_ref())),
-                _ => Err(self.bad_value(key, value, "a text in quotes")),
-            }
-        };
-        let name = text("name")?.ok_or_else(|| {
-            self.refuse(head, Problem::Rule("[[fault]] has no name; 'emulator faults' lists them".into()))
-        })?;
-        let at = text("at")?;
-        let numbers: Vec<_> = table
-            .iter()
-            .filter(|(key, _)| !OWN_KEYS.contains(&key.get_ref().as_ref()))
-            .map(|(key, value)| (key.get_ref().to_string(), number(value.get_ref()), self.written(value)))
-            .collect();
-        let fault = Fault::new(name, at, &numbers).map_err(|error| {
-            let blamed = match &error {
-                FaultError::Unknown(_) => table.get("name"),
-                FaultError::Place { .. } => table.get("at"),
-                FaultError::Key { key, .. } | FaultError::Value { key, .. } => table.get(key.as_str()),
-                FaultError::Missing { .. } => None,
-            };
-            self.refuse(blamed.map_or(head, |value| value.span().start), error)
-        })?;
-        let from = self.cycle(table, "from_s", 0.0)?.unwrap_or(0);
-        let until = match (self.cycle(table, "to_s", 0.0)?, self.cycle(table, "for_s", 0.001)?) {
-            (Some(_), Some(_)) => {
-                return Err(self.rule(table, "for_s", "to_s and for_s exclude each other"));
-            }
-            (Some(to), None) if to <= from => {
-                return Err(self.rule(table, "to_s", "to_s must be at least 0.001 s after from_s"));
-            }
-            (Some(to), None) => Some(Until::Cycle(to)),
-            (None, after) => after.map(Until::After),
-        };
-        let when = self.condition(table, text("when")?)?;
-        Ok(Planned { fault, line: self.line(head) as u32, from, when, until })
-    }
-
-    fn condition(&self, table: &DeTable<'_>, signal: Option<&str>) -> Result<Option<Condition>, ScriptError> {
-        let bound = |key: &str| {
-            let Some(value) = table.get(key) else { return Ok(None) };
-            let number = number(value.get_ref()).filter(|number| number.is_finite());
-            number.map(Some).ok_or_else(|| self.bad_value(key, value, "finite numbers"))
-        };
-        let (above, below) = (bound("above")?, bound("below")?);
-        let Some(name) = signal else {
-            return match ["above", "below"].into_iter().find(|key| table.contains_key(*key)) {
-                Some(key) => {
-                    Err(self.rule(table, key, "above and below belong to a condition: say when = \"SIGNAL\""))
-                }
-                None => Ok(None),
-            };
-        };
-        let Some(signal) = signals().position(|known| known == name) else {
-            let value = table.get("when").expect("it was read");
-            return Err(self.bad_value("when", value, signals().collect::<Vec<_>>().join(", ")));
-        };
-        match (above, below) {
-            (Some(threshold), None) => Ok(Some(Condition { signal, above: true, threshold })),
-            (None, Some(threshold)) => Ok(Some(Condition { signal, above: false, threshold })),
-            _ => Err(self.rule(table, "when", "a condition has either above or below")),
-        }
-    }
-
-    fn rule(&self, table: &DeTable<'_>, key: &str, rule: &str) -> ScriptError {
-        let value = table.get(key).expect("the key at fault is there");
-        self.refuse(value.span().start, Problem::Rule(format!("{key} = {}: {rule}", self.written(value))))
-    }
-
-    fn cycle(&self, table: &DeTable<'_>, key: &str, least_s: f64) -> Result<Option<u64>, ScriptError> {
-        let Some(value) = table.get(key) else { return Ok(None) };
-        let time_s = number(value.get_ref()).filter(|time_s| (least_s..=LONGEST_S).contains(time_s));
-        let time_s =
-            time_s.ok_or_else(|| self.bad_value(key, value, format!("{least_s} to {LONGEST_S} s")))?;
-        Ok(Some((time_s * 1000.0).round() as u64))
+    let names: Vec<_> = signals().enumerate().map(|(place, name)| (name, place)).collect();
+    let signal = section.choice("when", &names)?;
+    match (above, below) {
+        (Some(threshold), None) => Ok(Some(Condition { signal, above: true, threshold })),
+        (None, Some(threshold)) => Ok(Some(Condition { signal, above: false, threshold })),
+        _ => Err(section.refused("when", "a condition has either above or below")),
     }
 }
 
@@ -277,7 +180,7 @@ impl Reader<'_> {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<FaultScript, ScriptError> {
+    fn read(text: &str) -> Result<FaultScript, SettingsError> {
         FaultScript::from_toml(text, "f.toml")
     }
 
@@ -304,12 +207,18 @@ mod tests {
         let stuck = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\n";
         let offset = "[[fault]]\nname = \"valve-offset\"\nat = \"drive\"\n";
         for (text, expected) in [
-            ("x = 1\n".to_owned(), "f.toml:1: x = 1: allowed: the keys seed and [[fault]]"),
+            ("x = 1\n".to_owned(), "f.toml:1: unknown key x; allowed is seed, fault"),
             ("[[fault]\n".to_owned(), "f.toml:1: not TOML:"),
-            ("seed = -1\n".to_owned(), "f.toml:1: seed = -1: allowed: whole numbers"),
-            ("fault = 3\n".to_owned(), "f.toml:1: fault = 3: allowed: tables"),
-            ("[[fault]]\nat = \"drive\"\n".to_owned(), "f.toml:1: [[fault]] has no name"),
-            ("[[fault]]\nname = 3\n".to_owned(), "f.toml:2: name = 3: allowed: a text"),
+            (
+                "seed = -1\n".to_owned(),
+                "f.toml:1: seed = -1; allowed is a whole number, 0 to 9000000000000000",
+            ),
+            ("fault = 3\n".to_owned(), "f.toml:1: fault = 3; allowed is a list of tables: [[fault]]"),
+            (
+                "[[fault]]\nat = \"drive\"\n".to_owned(),
+                "f.toml:1: fault[1].name is missing: 'emulator faults' lists them",
+            ),
+            ("[[fault]]\nname = 3\n".to_owned(), "f.toml:2: fault[1].name = 3; allowed is a text"),
             (
                 "[[fault]]\nname = \"valve\"\n".to_owned(),
                 "f.toml:2: fault 'valve' is unknown; 'emulator faults' lists those that there are, such as valve-",
@@ -335,25 +244,31 @@ mod tests {
                 "f.toml:5: unknown key gain = 2; valve-offset has offset",
             ),
             (format!("{stuck}gain = 2\n"), "f.toml:4: unknown key gain = 2; valve-stuck has no numbers"),
-            (format!("{stuck}from_s = -1\n"), "f.toml:4: from_s = -1: allowed: 0 to 100000 s"),
-            (format!("{stuck}from_s = inf\n"), "f.toml:4: from_s = inf: allowed: 0 to 100000 s"),
+            (format!("{stuck}from_s = -1\n"), "f.toml:4: fault[1].from_s = -1 s; allowed is 0 to 100000 s"),
+            (format!("{stuck}from_s = inf\n"), "f.toml:4: fault[1].from_s = inf s; allowed is 0 to 100000 s"),
             (
                 format!("{stuck}from_s = 1\nto_s = 1\n"),
-                "f.toml:5: to_s = 1: to_s must be at least 0.001 s after from_s",
+                "f.toml:5: fault[1].to_s = 1; to_s must be at least 0.001 s after from_s",
             ),
             (
                 format!("{stuck}to_s = 1\nfor_s = 1\n"),
-                "f.toml:5: for_s = 1: to_s and for_s exclude each other",
+                "f.toml:5: fault[1].for_s = 1; to_s and for_s exclude each other",
             ),
-            (format!("{stuck}above = 1\n"), "f.toml:4: above = 1: above and below belong to a condition"),
-            (format!("{stuck}when = \"x\"\n"), "f.toml:4: when = \"x\": allowed: drive.position_m, "),
+            (
+                format!("{stuck}above = 1\n"),
+                "f.toml:4: fault[1].above = 1; above and below belong to a condition",
+            ),
+            (
+                format!("{stuck}when = \"x\"\n"),
+                "f.toml:4: fault[1].when = \"x\"; allowed is drive.position_m, ",
+            ),
             (
                 format!("{stuck}when = \"drive.valve\"\n"),
-                "f.toml:4: when = \"drive.valve\": a condition has either",
+                "f.toml:4: fault[1].when = \"drive.valve\"; a condition has either",
             ),
             (
                 format!("{stuck}when = \"drive.valve\"\nabove = nan\n"),
-                "f.toml:5: above = nan: allowed: finite",
+                "f.toml:5: fault[1].above = nan; allowed is a finite number",
             ),
             (
                 "[[fault]]\nname = \"bus-delay\"\ndelay_ms = 1.5\n".to_owned(),
