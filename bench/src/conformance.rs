@@ -13,15 +13,15 @@
 //! |---|---|
 //! | `line` | the bus as the rig has it, cycle by cycle |
 //! | `stand_in` | what a rig says, and a carriage that follows |
-//! | `watch` | what was heard of the controller |
+//! | `observer` | what was heard of the controller |
 //! | `judge` | the checks |
 //! | [`cli`] | the command line |
 
 pub(crate) mod cli;
 mod judge;
 mod line;
+mod observer;
 mod stand_in;
-mod watch;
 
 use crate::junit::{self, Case};
 use crate::say;
@@ -29,6 +29,7 @@ use crate::soak::model::CheckResult;
 use cli::{CheckPace, ConformanceArguments};
 use judge::{Phase, case};
 use line::{Broken, Line};
+use observer::Observer;
 use protocol::bus::{BusError, BusUrl, WireOptions};
 use protocol::can::CanFrame;
 use protocol::exit::Exit;
@@ -41,7 +42,6 @@ use std::os::unix::fs::DirBuilderExt;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
-use watch::Watch;
 
 /// Cycles of each part of the first session after regular operation.
 const NOISE_CYCLES: u64 = 200;
@@ -164,7 +164,7 @@ struct Session<'a> {
     controller: Option<Controller>,
     line: Line,
     rig: StandIn,
-    watch: Watch,
+    observer: Observer,
     /// Cycles that were sent, and the stamps of those that say something of time.
     cycles: Vec<(u64, Option<u64>)>,
     cycle: u64,
@@ -210,7 +210,7 @@ fn emergency_stop(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceErro
     }
     let from = session.cycle;
     session.cycles(STOP_CYCLES, Disturbance { stopped_since: Some(from), ..Disturbance::default() })?;
-    let mut cases = judge::emergency_stop(&session.watch.received, from..session.cycle);
+    let mut cases = judge::emergency_stop(&session.observer.received, from..session.cycle);
     cases.push(session.about_the_end("emergency-stop"));
     Ok(cases)
 }
@@ -229,7 +229,7 @@ fn sensor_loss(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> 
     session.cycles(LOSS_CYCLES, Disturbance { sensors_lost: true, ..Disturbance::default() })?;
     let back = session.cycle;
     session.cycles(BACK_CYCLES, Disturbance::default())?;
-    let mut cases = judge::sensor_loss(&session.watch.received, from..back, back..session.cycle);
+    let mut cases = judge::sensor_loss(&session.observer.received, from..back, back..session.cycle);
     cases.push(session.about_the_end("sensor-loss"));
     Ok(cases)
 }
@@ -252,7 +252,7 @@ impl<'a> Session<'a> {
             controller,
             line,
             rig: StandIn::new(arguments.axis, lockstep),
-            watch: Watch::new(arguments.axis, arguments.both_axes),
+            observer: Observer::new(arguments.axis, arguments.both_axes),
             cycles: Vec::new(),
             cycle: 0,
             broken: None,
@@ -268,20 +268,20 @@ impl<'a> Session<'a> {
             if self.interrupt.came() {
                 return Err(ConformanceError::Interrupted);
             }
-            if self.broken.is_some() || self.watch.babbles() {
+            if self.broken.is_some() || self.observer.babbles() {
                 return Ok(());
             }
             self.rig.frames(self.cycle, &disturbance, &mut self.frames);
-            self.watch.note_sent(self.cycle, !disturbance.sensors_lost);
-            let watch = &mut self.watch;
-            match self.line.exchange(&self.frames, |frame, stamp_ns| watch.take(frame, stamp_ns)) {
+            self.observer.note_sent(self.cycle, !disturbance.sensors_lost);
+            let observer = &mut self.observer;
+            match self.line.exchange(&self.frames, |frame, stamp_ns| observer.take(frame, stamp_ns)) {
                 Ok(sent) => self.cycles.push((self.cycle, (!sent.disturbed).then_some(sent.stamp_ns))),
                 Err(broken) => {
                     self.broken = Some(broken);
                     return Ok(());
                 }
             }
-            let opening = if disturbance.stopped_since.is_some() { 0.0 } else { self.watch.opening };
+            let opening = if disturbance.stopped_since.is_some() { 0.0 } else { self.observer.opening };
             self.rig.advance(opening);
             self.cycle += 1;
         }
@@ -295,11 +295,11 @@ impl<'a> Session<'a> {
     fn wait_for_answers(&mut self) -> Result<bool, ConformanceError> {
         for _ in 0..self.patience_cycles() {
             self.cycles(1, Disturbance::default())?;
-            if !self.watch.received.is_empty() || self.broken.is_some() {
+            if !self.observer.received.is_empty() || self.broken.is_some() {
                 break;
             }
         }
-        Ok(!self.watch.received.is_empty())
+        Ok(!self.observer.received.is_empty())
     }
 
     /// Waits until the valve has been open for a while, and pushes the carriage when that takes long.
@@ -307,7 +307,7 @@ impl<'a> Session<'a> {
         let mut open_cycles = 0;
         for waited in 1..=self.patience_cycles() {
             self.cycles(1, Disturbance::default())?;
-            open_cycles = if self.watch.opening.abs() > OPEN { open_cycles + 1 } else { 0 };
+            open_cycles = if self.observer.opening.abs() > OPEN { open_cycles + 1 } else { 0 };
             if open_cycles >= OPEN_CYCLES && waited > SETTLING_CYCLES {
                 return Ok(true);
             }
@@ -323,12 +323,12 @@ impl<'a> Session<'a> {
 
     fn phase(&self, from: u64) -> Phase<'_> {
         let first = self.cycles.partition_point(|(cycle, _)| *cycle < from);
-        let received = self.watch.received.partition_point(|received| received.cycle < from);
-        Phase { cycles: &self.cycles[first..], received: &self.watch.received[received..] }
+        let received = self.observer.received.partition_point(|received| received.cycle < from);
+        Phase { cycles: &self.cycles[first..], received: &self.observer.received[received..] }
     }
 
     fn about_answers(&self) -> String {
-        match (&self.broken, self.watch.received.first()) {
+        match (&self.broken, self.observer.received.first()) {
             (_, Some(first)) => format!("the first frame came in cycle {}", first.cycle),
             (Some(Broken::NobodyThere), _) => "nobody is in the barrier".into(),
             (Some(Broken::TimedOut(name)), _) => format!("{name} did not answer cycle {}", self.cycle),
@@ -341,7 +341,9 @@ impl<'a> Session<'a> {
         let ended = self.controller.as_mut().and_then(Controller::ended);
         let why = match (&self.broken, ended) {
             (Some(broken), _) => format!("{broken:?}"),
-            (None, _) if self.watch.babbles() => format!("it babbles, {} frames", self.watch.received.len()),
+            (None, _) if self.observer.babbles() => {
+                format!("it babbles, {} frames", self.observer.received.len())
+            }
             (None, Some(status)) => format!("its process has ended: {status}"),
             (None, None) => {
                 let detail = format!("{} cycles", self.cycles.len());

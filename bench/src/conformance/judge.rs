@@ -4,7 +4,7 @@
 //! `docs/buses.md`.
 
 use super::cli::{CheckPace, ConformanceArguments};
-use super::watch::{Received, What, Wrong};
+use super::observer::{Received, What, Wrong};
 use crate::junit::Case;
 use crate::soak::model::{Check, CheckResult};
 use protocol::commands::STALE_AFTER_CYCLES;

@@ -49,7 +49,7 @@ pub(super) struct Received {
     pub(super) what: What,
 }
 
-pub(super) struct Watch {
+pub(super) struct Observer {
     command: &'static MessageSpec,
     /// Nodes of rig.dbc whose frames it may send.
     nodes: Vec<&'static str>,
@@ -61,7 +61,7 @@ pub(super) struct Watch {
     pub(super) opening: f64,
 }
 
-impl Watch {
+impl Observer {
     pub(super) fn new(axis: CheckedAxis, both_axes: bool) -> Self {
         let axes = [CheckedAxis::Drive, CheckedAxis::Load];
         let nodes = axes.into_iter().filter(|one| *one == axis || both_axes);
@@ -158,10 +158,10 @@ mod tests {
 
     /// What a controller is asked to have sent, after cycles up to 4999 of which 4990 was skipped.
     fn judged(frames: &[CanFrame]) -> Vec<What> {
-        let mut watch = Watch::new(CheckedAxis::Drive, false);
-        (0..5000).filter(|cycle| *cycle != 4990).for_each(|cycle| watch.note_sent(cycle, cycle != 4995));
-        frames.iter().for_each(|frame| watch.take(frame, 0));
-        watch.received.into_iter().map(|received| received.what).collect()
+        let mut observer = Observer::new(CheckedAxis::Drive, false);
+        (0..5000).filter(|cycle| *cycle != 4990).for_each(|cycle| observer.note_sent(cycle, cycle != 4995));
+        frames.iter().for_each(|frame| observer.take(frame, 0));
+        observer.received.into_iter().map(|received| received.what).collect()
     }
 
     #[test]
