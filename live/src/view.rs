@@ -406,6 +406,9 @@ mod tests {
         assert_eq!((&state["messages"], &state["timing"]["skipped"]), (&json!([]), &json!(0)));
         assert_eq!(state["bus"]["frames_per_s"]["Tick"], 1.0, "the bus is as full as it was");
         assert_eq!(view.wire.totals().map(|(_, count)| count).sum::<u64>(), 1);
+        assert_eq!(state["chains"], json!({ "drive": null, "load": null }), "of controllers that are silent");
+        let none = json!({ "p50": null, "p90": null, "p99": null, "p999": null, "max": null, "count": 0 });
+        assert_eq!((&state["timing"]["wake_up"], &state["timing"]["round_trip"]), (&none, &none));
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The cycle of the rig, and how often and when cyclic frames are sent, in cycles of the rig: `rig.dbc`'s periods, and the places within them.
+//! The cycle of the rig, and how often and when cyclic frames are sent, in cycles: `rig.dbc`'s periods, and the places within
+//! them.
 //!
 //! Tick and status of the rig are half a period apart, so that no millisecond carries both. Whoever sends or awaits one of
 //! these frames counts by what stands here.

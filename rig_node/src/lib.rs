@@ -26,6 +26,8 @@ use protocol::live_cycles::LiveCycles;
 use protocol::periods;
 use telegrams::SaturatedSensors;
 
+const _: () = assert!(plant::PERIOD_S == periods::CYCLE_S, "a step of the plant is a cycle of the bus");
+
 /// A simulated rig on its bus.
 pub struct RigNode<R> {
     rig: R,

@@ -1,8 +1,8 @@
 //! Events of a run: as the 1 ms path of the emulator notes them, as `summary.json` lists them and as the telemetry sends them.
 //!
-//! In the emulator the mark of a fault is a small copy (`Event<M>`); its text is made when the event is written. Files and viewers
-//! read [`FaultMark`]. In JSON a kind without details is its name in kebab case, another one an object of its name and its
-//! details: `"linked"`, `{"weights":{"added_mass_kg":2.5}}`.
+//! In the emulator the mark of a fault is a small copy, whose text is made when the event is written. Files and viewers read
+//! [`FaultMark`]. In JSON a kind without details is its name in kebab case, another one an object of its name and its details:
+//! `"linked"`, `{"weights":{"added_mass_kg":2.5}}`.
 
 use protocol::commands::STALE_AFTER_CYCLES;
 use serde::{Deserialize, Serialize};
