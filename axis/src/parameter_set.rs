@@ -45,7 +45,7 @@ pub fn parse(text: &str, file: &Path) -> Result<Vec<Setting>, SettingsError> {
             let Some(mut values) = tasks.section_as(&task, example)? else { continue };
             for key in values.keys() {
                 let Some(value) = values.finite(&key)? else { continue };
-                let place = format!("{}:{}: ", file.display(), settings::line_of(text, values.at(&key)));
+                let place = format!("{}:{}: ", file.display(), values.line_of(&key));
                 settings.push(Setting { axis, name: format!("{task}.{key}"), value, place });
             }
         }

@@ -120,7 +120,7 @@ fn a_key_with_a_default_may_be_left_out_and_any_other_is_asked_for() {
                 assert_eq!(
                     refused(&text),
                     format!(
-                        "my-rig.toml:{}: key effects.{}.{place}.{} is missing from the table that starts here; allowed: {}",
+                        "my-rig.toml:{}: effects.{}.{place}.{} is missing; allowed is {}",
                         first_line(),
                         sheet.name,
                         key.name,
@@ -132,69 +132,64 @@ fn a_key_with_a_default_may_be_left_out_and_any_other_is_asked_for() {
     }
 }
 
-/// Keys that are unknown in a table of an effect: the lines after `[effects.`, on which of them the key is, the key with its
-/// value, and what is known there.
+/// Keys that are unknown in a table of an effect: the lines after `[effects.`, on which of them the key is, the key, and
+/// what is allowed there.
 const UNKNOWN: &[(&str, usize, &str, &str)] = &[
-    ("piston-leak.drive]\nleakage_nl_per_min = 2.5", 0, "piston-leak = piston-leak", FIRST),
-    ("Piston-Leakage.drive]\nleakage_nl_per_min = 2.5", 0, "Piston-Leakage = ", ""),
-    ("piston-leakage]\nleakage_nl_per_min = 2.5", 1, "piston-leakage.leakage_nl_per_min = 2.5", AXES),
-    ("piston-leakage]\ndrive = 2.5", 1, "piston-leakage.drive = 2.5", AXES),
-    (
-        "piston-leakage.left]\nleakage_nl_per_min = 2.5",
-        0,
-        "piston-leakage.left = [effects.piston-leakage.left]",
-        AXES,
-    ),
-    ("piston-leakage.left]", 0, "piston-leakage.left = ", ""),
-    ("rod-leakage.drive]", 0, "rod-leakage.drive = [effects.rod-leakage.drive]", CHAMBERS),
-    (
-        "piston-leakage.drive.a]\nleakage_nl_per_min = 2.5",
-        0,
-        "piston-leakage.drive.a = [effects.piston-leakage.drive.a]",
-        "leakage_nl_per_min",
-    ),
-    (
-        "rod-leakage.drive.position]\nleakage_nl_per_min = 2.5",
-        0,
-        "rod-leakage.drive.position = [effects.rod-leakage.drive.position]",
-        CHAMBERS,
-    ),
-    ("rod-leakage.linkage.a]\nleakage_nl_per_min = 2.5", 0, "rod-leakage.linkage = linkage", CHAMBERS),
-    ("rod-leakage.drive]\nb = 2.5", 0, "rod-leakage.drive.b = 2.5", CHAMBERS),
+    ("piston-leak.drive]\nleakage_nl_per_min = 2.5", 0, "piston-leak", FIRST),
+    ("Piston-Leakage.drive]\nleakage_nl_per_min = 2.5", 0, "Piston-Leakage", ""),
+    ("piston-leakage]\nleakage_nl_per_min = 2.5", 1, "piston-leakage.leakage_nl_per_min", AXES),
+    ("piston-leakage.left]\nleakage_nl_per_min = 2.5", 0, "piston-leakage.left", AXES),
+    ("piston-leakage.left]", 0, "piston-leakage.left", ""),
+    ("piston-leakage.drive.a]\nleakage_nl_per_min = 2.5", 0, "piston-leakage.drive.a", "leakage_nl_per_min"),
+    ("rod-leakage.drive.position]\nleakage_nl_per_min = 2.5", 0, "rod-leakage.drive.position", "a, b"),
+    ("rod-leakage.linkage.a]\nleakage_nl_per_min = 2.5", 0, "rod-leakage.linkage", AXES),
     ("coupling-backlash.drive]\ngap_mm = 1.0", 0, "coupling-backlash.drive", ""),
     (
         "piston-leakage.drive]\nleakage_nl_per_min = 2.5\nleakage_bar = 3",
         2,
-        "piston-leakage.drive.leakage_bar = 3",
+        "piston-leakage.drive.leakage_bar",
         "leakage_nl_per_min",
     ),
 ];
 const FIRST: &str = "critical-pressure-ratio, valve-characteristic, ";
 const AXES: &str = "drive, load";
-const CHAMBERS: &str = "drive.a, drive.b, load.a, load.b";
 
 /// Other lines at the end of the shipped file, on which of them the mistake is, and the message.
 const CASES: &[(&str, usize, &str)] = &[
     (
         "[effects]\npiston-leakage = 2.5",
         1,
-        "effects.piston-leakage = 2.5 is of the wrong type; allowed: drive, load",
+        "effects.piston-leakage = 2.5 must be a table: write [effects.piston-leakage.PLACE], PLACE one of drive, load",
+    ),
+    (
+        "[effects.piston-leakage]\ndrive = 2.5",
+        1,
+        "effects.piston-leakage.drive = 2.5 must be a table: write [effects.piston-leakage.drive]",
+    ),
+    (
+        "[effects.rod-leakage]\ndrive.b = 2.5",
+        1,
+        "effects.rod-leakage.drive.b = 2.5 must be a table: write [effects.rod-leakage.drive.b]",
+    ),
+    (
+        "[effects.rod-leakage.drive]",
+        0,
+        "effects.rod-leakage.drive = [effects.rod-leakage.drive]; allowed are tables of drive.a, drive.b, load.a, load.b",
     ),
     (
         "[[effects.rod-leakage]]",
         0,
-        "effects.rod-leakage = [[effects.rod-leakage]] is of the wrong type; allowed: drive.a, drive.b, load.a, load.b",
+        "effects.rod-leakage must be a table and no list: write [effects.rod-leakage.PLACE], PLACE one of drive.a, drive.b, load.a, load.b",
     ),
     (
         "[effects.rod-leakage]",
         0,
-        "effects.rod-leakage = [effects.rod-leakage] is of the wrong type; allowed: drive.a, ",
+        "effects.rod-leakage = [effects.rod-leakage]; allowed are tables of drive.a, drive.b, load.a, load.b",
     ),
     (
         "[effects.piston-leakage.drive]",
         0,
-        "key effects.piston-leakage.drive.leakage_nl_per_min is missing from the table that starts here; \
-         allowed: 0 to 50 Nl/min",
+        "effects.piston-leakage.drive.leakage_nl_per_min is missing; allowed is 0 to 50 Nl/min",
     ),
     (
         "[effects.pressure-sensor-offset.drive.a]\noffset_mbar = 1e9",
@@ -211,7 +206,7 @@ const CASES: &[(&str, usize, &str)] = &[
 #[test]
 fn every_mistake_is_named_with_file_line_key_value_and_what_is_allowed() {
     let unknown = UNKNOWN.iter().map(|(lines, at, key, known)| {
-        let known = if known.is_empty() { String::new() } else { format!("; known here: {known}") };
+        let known = if known.is_empty() { String::new() } else { format!("; allowed is {known}") };
         (format!("[effects.{lines}"), at, format!("unknown key effects.{key}{known}"))
     });
     let others = CASES.iter().map(|(lines, at, message)| ((*lines).to_owned(), at, (*message).to_owned()));
@@ -221,19 +216,19 @@ fn every_mistake_is_named_with_file_line_key_value_and_what_is_allowed() {
         assert!(error.starts_with(&wanted), "\n   got {error}\nwanted {wanted}");
     }
     for (number, wrong) in [
-        ("51", "is out of range"),
-        ("nan", "is out of range"),
-        ("\"2\"", "is of the wrong type"),
-        ("[2.0]", "is of the wrong type"),
-        ("true", "is of the wrong type"),
+        ("51", " is out of range; allowed:"),
+        ("nan", " is out of range; allowed:"),
+        ("\"2\"", "; allowed is"),
+        ("[2.0]", "; allowed is"),
+        ("true", "; allowed is"),
     ] {
         let error = refused(&with(&format!("[effects.piston-leakage.drive]\nleakage_nl_per_min = {number}")));
-        let said = format!("effects.piston-leakage.drive.leakage_nl_per_min = {number} {wrong}");
-        let wanted = format!("my-rig.toml:{}: {said}; allowed: 0 to 50 Nl/min", first_line() + 1);
+        let said = format!("effects.piston-leakage.drive.leakage_nl_per_min = {number}{wrong}");
+        let wanted = format!("my-rig.toml:{}: {said} 0 to 50 Nl/min", first_line() + 1);
         assert!(error.starts_with(&wanted), "\n   got {error}\nwanted {wanted}");
     }
     let error = refused(&format!("effects = 3\n{}", RigParameters::BASELINE_TOML));
-    assert_eq!(error, "my-rig.toml:1: effects = 3 is of the wrong type; allowed: tables");
+    assert_eq!(error, "my-rig.toml:1: effects = 3 must be a table: write [effects] with its keys below");
 }
 
 #[test]

@@ -51,38 +51,38 @@ fn whatever_is_wrong_is_named_with_line_key_value_and_what_is_allowed() {
     let many: Vec<String> = (0..65).map(|at| at.to_string()).collect();
     let many = format!("{HEAD}at = [{}]\nvalue_n = [1, 2]", many.join(", "));
     let whole = [
-        ("tabulated = 3".to_owned(), 0, "tables, each under [[tabulated]]"),
-        ("[tabulated]\nat = [0, 1]".to_owned(), 0, "is of the wrong type; allowed: tables"),
-        ("[[tabulated]]\nvariable = \"x\"".to_owned(), 0, "key tabulated.balance is missing"),
+        ("tabulated = 3".to_owned(), 0, "tabulated = 3; allowed is a list of tables: [[tabulated]]"),
+        ("[tabulated]\nat = [0, 1]".to_owned(), 0, "allowed is a list of tables: [[tabulated]]"),
+        (
+            "[[tabulated]]\nvariable = \"x\"".to_owned(),
+            0,
+            "tabulated[1].balance is missing: one of drive.force, drive.flow-a, ",
+        ),
         (
             HEAD.replace("drive.force", "linkage"),
             1,
-            "tabulated.balance = \"linkage\" is of the wrong type; allowed: drive.force, drive.flow-a, ",
+            "tabulated[1].balance = \"linkage\"; allowed is drive.force, drive.flow-a, ",
         ),
-        (
-            HEAD.replace("\"x\"", "\"dp/dt\""),
-            2,
-            "tabulated.variable = \"dp/dt\" is of the wrong type; allowed: x, v, ",
-        ),
-        (HEAD.replace("\"x\"", "1"), 2, "tabulated.variable = 1 is of the wrong type"),
-        (many, 3, "is out of range; allowed: 2 to 64 numbers"),
+        (HEAD.replace("\"x\"", "\"dp/dt\""), 2, "tabulated[1].variable = \"dp/dt\"; allowed is x, v, "),
+        (HEAD.replace("\"x\"", "1"), 2, "tabulated[1].variable = 1; allowed is a text"),
+        (many, 3, "; allowed are 2 to 64 numbers"),
     ];
     let below_head = [
-        ("value_n = [0, 1]", 0, "key tabulated.at is missing"),
-        ("at = [0, 1]", 0, "key tabulated.value_n is missing"),
-        ("at = [0, 1]\nvalue = [0, 1]", 4, "unknown key tabulated.value = [0, 1]; known here: balance, "),
-        ("at = [0, 1]\nvalue_nl_per_min = [0, 1]", 4, "unknown key tabulated.value_nl_per_min"),
-        ("at = [0]\nvalue_n = [1]", 3, "tabulated.at = [0] is out of range; allowed: 2 to 64 numbers"),
-        ("at = [0, nan]\nvalue_n = [1, 2]", 3, "tabulated.at = [0, nan] is out of range"),
-        ("at = [0, 1]\nvalue_n = [1, nan]", 4, "tabulated.value_n = [1, nan] is out of range"),
-        ("at = [0, 1]\nvalue_n = [1, 1e9]", 4, "2 to 64 numbers, each -2000 to 2000"),
-        ("at = [0, \"1\"]\nvalue_n = [1, 2]", 3, "tabulated.at = [0, \"1\"] is of the wrong type"),
+        ("value_n = [0, 1]", 0, "tabulated[1].at is missing; allowed are 2 to 64 numbers"),
+        ("at = [0, 1]", 0, "tabulated[1].value_n is missing; allowed are 2 to 64 numbers"),
+        ("at = [0, 1]\nvalue = [0, 1]", 4, "unknown key tabulated[1].value; allowed is balance, "),
+        ("at = [0, 1]\nvalue_nl_per_min = [0, 1]", 4, "unknown key tabulated[1].value_nl_per_min"),
+        ("at = [0]\nvalue_n = [1]", 3, "tabulated[1].at = [0]; allowed are 2 to 64 numbers"),
+        ("at = [0, nan]\nvalue_n = [1, 2]", 3, "tabulated[1].at = [0, nan]; allowed are 2 to 64 numbers"),
         (
-            "at = [1, 1]\nvalue_n = [1, 2]",
-            3,
-            "tabulated.at = [1, 1] contradicts another key: each number must",
+            "at = [0, 1]\nvalue_n = [1, nan]",
+            4,
+            "tabulated[1].value_n = [1, nan]; allowed are 2 to 64 numbers",
         ),
-        ("at = [0, 1]\nvalue_n = [1, 2, 3]", 4, "it must hold as many numbers as tabulated.at, 2, not 3"),
+        ("at = [0, 1]\nvalue_n = [1, 1e9]", 4, "2 to 64 numbers, each -2000 to 2000"),
+        ("at = [0, \"1\"]\nvalue_n = [1, 2]", 3, "tabulated[1].at = [0, \"1\"]; allowed are 2 to 64 numbers"),
+        ("at = [1, 1]\nvalue_n = [1, 2]", 3, "tabulated[1].at = [1, 1]; each number must"),
+        ("at = [0, 1]\nvalue_n = [1, 2, 3]", 4, "it must hold as many numbers as at, 2, not 3"),
     ];
     let below_head = below_head.map(|(lines, line, message)| (format!("{HEAD}{lines}"), line, message));
     for (lines, line, message) in whole.into_iter().chain(below_head) {

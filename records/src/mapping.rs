@@ -288,7 +288,7 @@ mod tests {
             (
                 "column = \"t\"",
                 "",
-                "m.toml:1: time.column: allowed is a column with its unit, or period_s alone",
+                "m.toml:1: time.column is missing; allowed is a column with its unit, or period_s alone",
             ),
             ("column = \"t\"", "column = \"t\"\nunit = \"h\"", "time.unit = \"h\"; allowed is s, ms"),
             (

@@ -136,6 +136,12 @@ impl<'a> Section<'a> {
         self.entry(key).and_then(|value| number(value.get_ref()))
     }
 
+    /// The numbers of the list under `key`, if it is there and one of numbers. To look is not to allow it.
+    #[must_use]
+    pub fn peek_numbers(&self, key: &str) -> Option<Vec<f64>> {
+        self.entry(key)?.get_ref().as_array()?.iter().map(|item| number(item.get_ref())).collect()
+    }
+
     /// The value under `key` as it is written, on one line and cut; empty when it is absent.
     #[must_use]
     pub fn written(&self, key: &str) -> String {
@@ -146,6 +152,12 @@ impl<'a> Section<'a> {
     #[must_use]
     pub fn path(&self) -> &str {
         &self.path
+    }
+
+    /// Line of the value under `key`, from 1; that of the table when it is absent.
+    #[must_use]
+    pub fn line_of(&self, key: &str) -> usize {
+        self.source.line(self.at(key))
     }
 
     /// Line in which the table begins, from 1.
@@ -367,10 +379,12 @@ impl<'a> Section<'a> {
         self.entry(key).map_or_else(|| self.wrong(message), |value| self.reported(value, message))
     }
 
-    /// An error of the value under `key`, which it repeats as it is written before it says what is wrong.
+    /// An error of the value under `key`, which it repeats as it is written before it says what is wrong; or of its absence.
     #[must_use]
     pub fn refused(&self, key: &str, problem: &str) -> SettingsError {
-        let Some(value) = self.entry(key) else { return self.wrong(&format!("{key}: {problem}")) };
+        let Some(value) = self.entry(key) else {
+            return self.wrong(&format!("{key} is missing; {problem}"));
+        };
         let written = written(self.source.text, value.span());
         self.reported(value, &format!("{key} = {written}; {problem}"))
     }

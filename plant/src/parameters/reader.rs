@@ -4,9 +4,9 @@
 //! what a person needs to repair the file without opening the code.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use settings::{Section, Source};
 
 use super::table::{KEYS, Key, Unit};
 use super::{declared, switched, tabulated};
@@ -58,20 +58,23 @@ pub(super) struct Entries {
 impl Entries {
     /// Reads the whole file; unknown, missing, mistyped and out-of-range keys are errors.
     pub(super) fn read(text: &str, file: &str) -> Result<Self, ParameterError> {
-        let place = Place { text, file };
-        let root = place.parse()?;
-        place.refuse_unknown(root.get_ref())?;
+        let source = Source::parse(text, Path::new(file))?;
+        let mut root = source.root();
+        let mut tables: Vec<&str> = KEYS.iter().map(|key| key.table).collect();
+        tables.dedup();
+        root.allow(&[&tables[..], &["effects", "tables", "tabulated", "terms"]].concat())?;
         let mut entries = BTreeMap::new();
-        for key in KEYS {
-            entries.insert((key.table, key.name), place.read_key(root.get_ref(), key)?);
+        for table in tables {
+            let section = root.section_or_empty(table)?;
+            let keys: Vec<&Key> = KEYS.iter().filter(|key| key.table == table).collect();
+            section.allow(&keys.iter().map(|key| key.name).collect::<Vec<_>>())?;
+            for key in keys {
+                entries.insert((key.table, key.name), read_key(&section, key, file)?);
+            }
         }
-        let effects = switched::read(root.get_ref(), &place)?;
-        let tabulated = tabulated::read(root.get_ref(), &place)?;
-        let terms = if root.get_ref().contains_key("terms") {
-            declared::read(text, file, "terms")?
-        } else {
-            Vec::new()
-        };
+        let effects = switched::read(&mut root)?;
+        let tabulated = tabulated::read(&mut root)?;
+        let terms = if root.has("terms") { declared::read(text, file, "terms")? } else { Vec::new() };
         Ok(Entries { file: file.to_owned(), effects, tabulated, terms, entries })
     }
 
@@ -136,27 +139,24 @@ impl Entries {
     /// The same rig with these tables and no others, by a file of their own that says so.
     pub(super) fn with_tabulated(&self, tables: &[Tabulated]) -> Result<Self, ParameterError> {
         let text: String = tables.iter().map(Tabulated::toml).collect();
-        let place = Place { text: &text, file: &self.file };
-        let tabulated = tabulated::read(place.parse()?.get_ref(), &place)?;
+        let source = Source::parse(&text, Path::new(&self.file))?;
+        let tabulated = tabulated::read(&mut source.root())?;
         Ok(Entries { tabulated, ..self.clone() })
     }
 
     /// The same rig with the effects and declared terms of a file that holds nothing else; they replace those of the same name
     /// and place.
     pub(super) fn with_effects_of(&self, text: &str, file: &str) -> Result<Self, ParameterError> {
-        let in_file = Place { text, file };
-        let root = in_file.parse()?;
-        let is_known = |name: &str| ["effects", "tables", "terms"].contains(&name);
-        if let Some((name, value)) = root.get_ref().iter().find(|(name, _)| !is_known(name.get_ref())) {
-            return Err(in_file.unknown(name, name.get_ref(), value, "effects, tables, terms"));
-        }
+        let source = Source::parse(text, Path::new(file))?;
+        let mut root = source.root();
+        root.allow(&["effects", "tables", "terms"])?;
         let mut changed = self.clone();
-        for effect in switched::read(root.get_ref(), &in_file)? {
+        for effect in switched::read(&mut root)? {
             changed.effects.retain(|old| old.name != effect.name || old.place != effect.place);
             changed.effects.push(effect);
         }
         switched::sort(&mut changed.effects);
-        if root.get_ref().contains_key("terms") {
+        if root.has("terms") {
             declared::read(text, file, "terms")?.into_iter().for_each(|term| changed.put_term(term));
         }
         Ok(changed)
@@ -171,115 +171,15 @@ impl Entries {
     }
 }
 
-/// Text and name of the file being read.
-pub(super) struct Place<'t> {
-    text: &'t str,
-    file: &'t str,
-}
-
-impl<'t> Place<'t> {
-    fn parse(&self) -> Result<Spanned<DeTable<'t>>, ParameterError> {
-        DeTable::parse(self.text).map_err(|error| {
-            let line = self.line(error.span().map_or(0, |span| span.start));
-            self.refused(line, &format!("not TOML: {}", error.message()))
-        })
-    }
-}
-
-impl Place<'_> {
-    pub(super) fn line(&self, offset: usize) -> usize {
-        settings::line_of(self.text, offset)
-    }
-
-    /// The value as the file writes it.
-    fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
-        settings::written(self.text, value.span())
-    }
-
-    fn refused(&self, line: usize, message: &str) -> ParameterError {
-        ParameterError::at(self.file, line, message)
-    }
-
-    /// A key or table that no rig has, `key` in the file and `path` in full.
-    pub(super) fn unknown<T>(
-        &self,
-        key: &Spanned<T>,
-        path: &str,
-        value: &Spanned<DeValue<'_>>,
-        known: &str,
-    ) -> ParameterError {
-        let message = format!("unknown key {path} = {}; known here: {known}", self.written(value));
-        self.refused(self.line(key.span().start), &message)
-    }
-
-    /// A key that is not there, in a table that starts in this line.
-    pub(super) fn missing(&self, line: usize, path: &str, range: &str) -> ParameterError {
-        let message = format!("key {path} is missing from the table that starts here; allowed: {range}");
-        self.refused(line, &message)
-    }
-
-    /// A value of the wrong type.
-    pub(super) fn wrong(&self, path: &str, value: &Spanned<DeValue<'_>>, range: &str) -> ParameterError {
-        self.of_value(path, value, &format!("is of the wrong type; allowed: {range}"))
-    }
-
-    pub(super) fn out_of_range(
-        &self,
-        path: &str,
-        value: &Spanned<DeValue<'_>>,
-        range: &str,
-    ) -> ParameterError {
-        self.of_value(path, value, &format!("is out of range; allowed: {range}"))
-    }
-
-    /// What is said of a value, behind it.
-    pub(super) fn of_value(&self, path: &str, value: &Spanned<DeValue<'_>>, message: &str) -> ParameterError {
-        self.refused(self.line(value.span().start), &format!("{path} = {} {message}", self.written(value)))
-    }
-
-    fn refuse_unknown(&self, root: &DeTable<'_>) -> Result<(), ParameterError> {
-        let is_key = |name: &str| !["effects", "tables", "tabulated", "terms"].contains(&name);
-        for (name, value) in root.iter().filter(|(name, _)| is_key(name.get_ref())) {
-            let known: Vec<&str> =
-                KEYS.iter().filter(|key| key.table == name.get_ref()).map(|key| key.name).collect();
-            if known.is_empty() {
-                let mut tables: Vec<&str> = KEYS.iter().map(|key| key.table).collect();
-                tables.dedup();
-                return Err(self.unknown(name, name.get_ref(), value, &tables.join(", ")));
-            }
-            for (inner, value) in value.get_ref().as_table().into_iter().flatten() {
-                if !known.iter().any(|known| known == inner.get_ref()) {
-                    let path = format!("{}.{}", name.get_ref(), inner.get_ref());
-                    return Err(self.unknown(inner, &path, value, &known.join(", ")));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn read_key(&self, root: &DeTable<'_>, key: &Key) -> Result<Entry, ParameterError> {
-        let table = root.iter().find(|(name, _)| name.get_ref() == key.table);
-        let value =
-            table.and_then(|(_, table)| table.get_ref().as_table()).and_then(|table| table.get(key.name));
-        let Some(value) = value else {
-            let line = table.map_or(1, |(name, _)| self.line(name.span().start));
-            return Err(self.missing(line, &key.path(), &key.range()));
-        };
-        let numbers = match value.get_ref() {
-            DeValue::Array(items) => items.iter().map(|item| settings::number(item.get_ref())).collect(),
-            single => settings::number(single).map(|number| vec![number]),
-        };
-        let is_array = matches!(value.get_ref(), DeValue::Array(_));
-        match numbers {
-            Some(numbers) if numbers.len() == key.count && is_array == (key.count > 1) => {
-                let (text, line) = (self.written(value), self.line(value.span().start));
-                let entry = Entry { numbers, text, line };
-                check_range(key, &entry, self.file)?;
-                Ok(entry)
-            }
-            _ => Err(self.wrong(&key.path(), value, &key.range())),
-        }
-    }
+fn read_key(section: &Section<'_>, key: &Key, file: &str) -> Result<Entry, ParameterError> {
+    let numbers = match key.count {
+        1 => section.peek_number(key.name).map(|number| vec![number]),
+        count => section.peek_numbers(key.name).filter(|numbers| numbers.len() == count),
+    };
+    let numbers = numbers.ok_or_else(|| section.refused(key.name, &format!("allowed is {}", key.range())))?;
+    let entry = Entry { numbers, text: section.written(key.name), line: section.line_of(key.name) };
+    check_range(key, &entry, file)?;
+    Ok(entry)
 }
 
 fn check_range(key: &Key, entry: &Entry, file: &str) -> Result<(), ParameterError> {

@@ -9,94 +9,77 @@
 //!
 //! A place of two words is a table in a table; what stands under an effect's name is walked down to its keys.
 
-use toml::de::DeTable;
+use settings::{Result, Section};
 
-use super::reader::{ParameterError, Place as Text};
-use crate::effects::sheet::{EffectKey, Sheet, Switched};
+use crate::effects::sheet::{EffectKey, Place, Sheet, Switched};
 use crate::effects::{SHEETS, sheet};
 
 /// All effects that the file switches on, in the order of the catalogue and of its places.
-pub(super) fn read(root: &DeTable<'_>, text: &Text<'_>) -> Result<Vec<Switched>, ParameterError> {
-    let Some((_, table)) = root.iter().find(|(name, _)| name.get_ref() == "effects") else {
-        return Ok(Vec::new());
-    };
+pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<Switched>> {
     let mut effects = Vec::new();
-    let names = SHEETS.iter().map(|sheet| sheet.name).collect::<Vec<_>>().join(", ");
-    let table = table.get_ref().as_table().ok_or_else(|| text.wrong("effects", table, "tables"))?;
-    for (name, value) in table {
-        let path = format!("effects.{}", name.get_ref());
-        let sheet = sheet(name.get_ref()).ok_or_else(|| text.unknown(name, &path, value, &names))?;
-        let places = value.get_ref().as_table().ok_or_else(|| text.wrong(&path, value, &at(sheet)))?;
+    let mut table = root.section_or_empty("effects")?;
+    for name in table.keys() {
+        let Some(sheet) = sheet(&name) else {
+            table.allow(&SHEETS.iter().map(|sheet| sheet.name).collect::<Vec<_>>())?;
+            continue;
+        };
+        let names = sheet.place.names();
+        let allowed = format!("allowed are tables of {}", names.join(", "));
+        let example = format!("[effects.{}.PLACE], PLACE one of {}", sheet.name, names.join(", "));
+        let Some(mut places) = table.section_as(sheet.name, Some(&example))? else { continue };
         // A table without a place would switch on nothing, and the file would not say so.
-        if places.is_empty() {
-            return Err(text.wrong(&path, value, &at(sheet)));
+        if places.keys().is_empty() {
+            return Err(table.refused(sheet.name, &allowed));
         }
-        for (first, value) in places {
-            let path = format!("{path}.{}", first.get_ref());
-            let bad = |path: &str, value| text.unknown(first, path, value, &at(sheet));
-            let inner = value.get_ref().as_table().ok_or_else(|| bad(&path, value))?;
-            if let Some(place) = sheet.place_named(first.get_ref()) {
-                let line = text.line(first.span().start);
-                let numbers = read_numbers(sheet, inner, &path, line, text)?;
-                effects.push(Switched { name: sheet.name, place, numbers });
+        let mut parts: Vec<_> = names.iter().filter_map(|name| name.split('.').next()).collect();
+        parts.dedup();
+        for part in parts {
+            let Some(mut inner) = places.section(part)? else { continue };
+            if let Some(place) = sheet.place_named(part) {
+                effects.push(switched(sheet, place, &inner)?);
                 continue;
             }
-            let part = format!("{}.", first.get_ref());
-            if inner.is_empty() || !sheet.place.names().iter().any(|name| name.starts_with(&part)) {
-                return Err(bad(&path, value));
+            if inner.keys().is_empty() {
+                return Err(places.refused(part, &allowed));
             }
-            for (second, value) in inner {
-                let place = sheet.place_named(&format!("{}.{}", first.get_ref(), second.get_ref()));
-                let path = format!("{path}.{}", second.get_ref());
-                let (Some(place), Some(keys)) = (place, value.get_ref().as_table()) else {
-                    return Err(bad(&path, value));
+            for name in &names {
+                let Some(element) = name.strip_prefix(part).and_then(|rest| rest.strip_prefix('.')) else {
+                    continue;
                 };
-                let line = text.line(second.span().start);
-                let numbers = read_numbers(sheet, keys, &path, line, text)?;
-                effects.push(Switched { name: sheet.name, place, numbers });
+                if let (Some(place), Some(keys)) = (sheet.place_named(name), inner.section(element)?) {
+                    effects.push(switched(sheet, place, &keys)?);
+                }
             }
+            inner.finish()?;
         }
+        places.finish()?;
     }
     sort(&mut effects);
     Ok(effects)
 }
 
-/// One number for each key of the sheet, checked.
-fn read_numbers(
-    sheet: &Sheet,
-    table: &DeTable<'_>,
-    path: &str,
-    line: usize,
-    text: &Text<'_>,
-) -> Result<Vec<f64>, ParameterError> {
-    let known = || sheet.keys.iter().map(|key| key.name).collect::<Vec<_>>().join(", ");
-    for (name, value) in table {
-        if !sheet.keys.iter().any(|key| key.name == name.get_ref()) {
-            let path = format!("{path}.{}", name.get_ref());
-            return Err(text.unknown(name, &path, value, &known()));
+/// The effect with one number for each key of its sheet.
+fn switched(sheet: &Sheet, place: Place, section: &Section<'_>) -> Result<Switched> {
+    section.allow(&sheet.keys.iter().map(|key| key.name).collect::<Vec<_>>())?;
+    let numbers = sheet.keys.iter().map(|key| number(section, key)).collect::<Result<_>>()?;
+    Ok(Switched { name: sheet.name, place, numbers })
+}
+
+fn number(section: &Section<'_>, key: &EffectKey) -> Result<f64> {
+    match (section.peek_number(key.name), key.default) {
+        // A NaN, which TOML admits, lies in no range.
+        (Some(number), _) if (key.min..=key.max).contains(&number) => Ok(number),
+        (Some(_), _) => {
+            let (name, written, range) = (key.name, section.written(key.name), key.range());
+            let message = format!("{name} = {written} is out of range; allowed: {range}");
+            Err(section.wrong_at(name, &message))
         }
+        (None, Some(default)) if !section.has(key.name) => Ok(default),
+        _ => Err(section.refused(key.name, &format!("allowed is {}", key.range()))),
     }
-    let number = |key: &EffectKey| {
-        let path = format!("{path}.{}", key.name);
-        let Some(value) = table.get(key.name) else {
-            return key.default.ok_or_else(|| text.missing(line, &path, &key.range()));
-        };
-        let number =
-            settings::number(value.get_ref()).ok_or_else(|| text.wrong(&path, value, &key.range()))?;
-        // Written so that a NaN, which TOML admits, fails.
-        if number >= key.min && number <= key.max {
-            return Ok(number);
-        }
-        Err(text.out_of_range(&path, value, &key.range()))
-    };
-    sheet.keys.iter().map(number).collect()
 }
 
 /// Into the order of the catalogue, and of the places of an effect.
 pub(super) fn sort(effects: &mut [Switched]) {
     effects.sort_by_key(|effect| (SHEETS.iter().position(|sheet| sheet.name == effect.name), effect.place));
-}
-
-fn at(sheet: &Sheet) -> String {
-    sheet.place.names().join(", ")
 }

@@ -8,10 +8,8 @@
 //! value_n = [0.0, -4.0, -9.5]  # along the axis' own extension; value_nl_per_min into a chamber
 //! ```
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use settings::{Result, Section};
 
-use super::reader::{ParameterError, Place as Text};
 use crate::effects::tabulated::{Balance, POINTS, Tabulated, Variable};
 use crate::state::Axis;
 
@@ -19,93 +17,36 @@ use crate::state::Axis;
 const MOST_AT: f64 = 1e8;
 
 /// All tables of the file, in its order.
-pub(super) fn read(root: &DeTable<'_>, text: &Text<'_>) -> Result<Vec<Tabulated>, ParameterError> {
-    let Some((_, value)) = root.iter().find(|(name, _)| name.get_ref() == "tabulated") else {
-        return Ok(Vec::new());
-    };
-    let tables = || text.wrong("tabulated", value, "tables, each under [[tabulated]]");
-    let DeValue::Array(items) = value.get_ref() else { return Err(tables()) };
-    items.iter().map(|item| read_one(item.get_ref().as_table().ok_or_else(tables)?, item, text)).collect()
+pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<Tabulated>> {
+    root.sections("tabulated")?.into_iter().map(read_one).collect()
 }
 
-fn read_one(
-    table: &DeTable<'_>,
-    item: &Spanned<DeValue<'_>>,
-    text: &Text<'_>,
-) -> Result<Tabulated, ParameterError> {
-    let line = text.line(item.span().start);
-    let places = || -> Vec<(String, Axis, Balance)> {
-        let axes = Axis::ALL.into_iter();
-        axes.flat_map(|axis| Balance::ALL.map(|own| (format!("{}.{}", axis.name(), own.name()), axis, own)))
-            .collect()
-    };
-    let known = places().into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(", ");
-    let balance = word(table, "balance", line, text, &known)?;
-    let (_, axis, balance) = places()
-        .into_iter()
-        .find(|(name, ..)| *name == balance.0)
-        .ok_or_else(|| text.wrong("tabulated.balance", balance.1, &known))?;
-    let known = Variable::ALL.map(Variable::name).join(", ");
-    let variable = word(table, "variable", line, text, &known)?;
-    let variable = Variable::ALL
-        .into_iter()
-        .find(|own| own.name() == variable.0)
-        .ok_or_else(|| text.wrong("tabulated.variable", variable.1, &known))?;
-    let keys = ["balance", "variable", "at", balance.key()];
-    if let Some((name, value)) = table.iter().find(|(name, _)| !keys.contains(&name.get_ref().as_ref())) {
-        let path = format!("tabulated.{}", name.get_ref());
-        return Err(text.unknown(name, &path, value, &keys.join(", ")));
-    }
-    let at = numbers(table, "at", MOST_AT, line, text)?;
-    let value = numbers(table, balance.key(), balance.most(), line, text)?;
-    let broken = |key: &str, rule: &str| {
-        let value = table.get(key).expect("it was read");
-        text.of_value(&format!("tabulated.{key}"), value, &format!("contradicts another key: {rule}"))
-    };
+fn read_one(mut section: Section<'_>) -> Result<Tabulated> {
+    let balances = Axis::ALL
+        .map(|axis| Balance::ALL.map(|own| (format!("{}.{}", axis.name(), own.name()), (axis, own))));
+    let balances: Vec<_> = balances.iter().flatten().map(|(name, own)| (name.as_str(), *own)).collect();
+    let (axis, balance) = section.needed_choice("balance", &balances)?;
+    let variable = section.needed_choice("variable", &Variable::ALL.map(|own| (own.name(), own)))?;
+    section.allow(&["balance", "variable", "at", balance.key()])?;
+    let at = numbers(&section, "at", MOST_AT)?;
+    let value = numbers(&section, balance.key(), balance.most())?;
     if at.windows(2).any(|pair| pair[0] >= pair[1]) {
-        return Err(broken("at", "each number must be above the one before"));
+        return Err(section.refused("at", "each number must be above the one before"));
     }
     if at.len() != value.len() {
-        let rule = format!("it must hold as many numbers as tabulated.at, {}, not {}", at.len(), value.len());
-        return Err(broken(balance.key(), &rule));
+        let rule = format!("it must hold as many numbers as at, {}, not {}", at.len(), value.len());
+        return Err(section.refused(balance.key(), &rule));
     }
     Ok(Tabulated { axis, balance, variable, at, value })
 }
 
-/// The word of a key, and its value for a message.
-fn word<'v>(
-    table: &'v DeTable<'_>,
-    key: &str,
-    line: usize,
-    text: &Text<'_>,
-    known: &str,
-) -> Result<(&'v str, &'v Spanned<DeValue<'v>>), ParameterError> {
-    let path = format!("tabulated.{key}");
-    let value = table.get(key).ok_or_else(|| text.missing(line, &path, known))?;
-    let word = value.get_ref().as_str();
-    Ok((word.ok_or_else(|| text.wrong(&path, value, known))?, value))
-}
-
 /// The numbers of a key, each within `most` of 0.
-fn numbers(
-    table: &DeTable<'_>,
-    key: &str,
-    most: f64,
-    line: usize,
-    text: &Text<'_>,
-) -> Result<Vec<f64>, ParameterError> {
+fn numbers(section: &Section<'_>, key: &str, most: f64) -> Result<Vec<f64>> {
     let [fewest, many] = POINTS;
-    let range = format!("{fewest} to {many} numbers, each -{most} to {most}");
-    let path = format!("tabulated.{key}");
-    let value = table.get(key).ok_or_else(|| text.missing(line, &path, &range))?;
-    let numbers: Option<Vec<f64>> = match value.get_ref() {
-        DeValue::Array(items) => items.iter().map(|item| settings::number(item.get_ref())).collect(),
-        _ => None,
+    // A NaN, which TOML admits, is within nothing.
+    let fits = |numbers: &Vec<f64>| {
+        (fewest..=many).contains(&numbers.len()) && numbers.iter().all(|own| own.abs() <= most)
     };
-    let numbers = numbers.ok_or_else(|| text.wrong(&path, value, &range))?;
-    // Written so that a NaN, which TOML admits, fails.
-    if (fewest..=many).contains(&numbers.len()) && numbers.iter().all(|own| own.abs() <= most) {
-        return Ok(numbers);
-    }
-    Err(text.out_of_range(&path, value, &range))
+    let allowed = format!("allowed are {fewest} to {many} numbers, each -{most} to {most}");
+    section.peek_numbers(key).filter(fits).ok_or_else(|| section.refused(key, &allowed))
 }
