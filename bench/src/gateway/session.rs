@@ -18,17 +18,17 @@ use protocol::can::CanFrame;
 use std::fmt::Write;
 
 /// What a client hears first.
-pub(super) const GREETING: &str = "< hi >";
+pub(crate) const GREETING: &str = "< hi >";
 /// Time between the answer to `< rawmode >` and the first frame, ms.
-pub(super) const PAUSE_MS: u64 = 30;
+pub(crate) const PAUSE_MS: u64 = 30;
 /// Time to get from the greeting to raw mode, ms: who takes longer is no client.
-pub(super) const PATIENCE_MS: u64 = 10_000;
+pub(crate) const PATIENCE_MS: u64 = 10_000;
 /// Requests refused in one session after which it ends: nobody understands the other.
-pub(super) const MOST_REFUSED: u64 = 100;
+pub(crate) const MOST_REFUSED: u64 = 100;
 
 /// What the server has to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Action {
+pub(crate) enum Action {
     /// Send this text to the client.
     Reply(String),
     Send(CanFrame),
@@ -39,7 +39,7 @@ pub(super) enum Action {
 /// Why the gateway ends a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Parting {
+pub(crate) enum Parting {
     NotTheProtocol,
     UnknownBus,
     NoRawMode,
@@ -57,7 +57,7 @@ enum State {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Session {
+pub(crate) struct Session {
     state: State,
     parser: Parser,
     began_ms: u64,
@@ -67,12 +67,12 @@ pub(super) struct Session {
 
 impl Session {
     /// A client that was greeted at `now_ms`, of a clock of the caller's choice; one that is `read_only` sends nothing.
-    pub(super) fn new(now_ms: u64, read_only: bool) -> Self {
+    pub(crate) fn new(now_ms: u64, read_only: bool) -> Self {
         Self { state: State::Greeted, parser: Parser::default(), began_ms: now_ms, refused: 0, read_only }
     }
 
     /// Takes what the client sent; `bus` is the name of the bus that is here. Adds to `actions` what is to be done, in order.
-    pub(super) fn take(&mut self, bytes: &[u8], bus: &str, now_ms: u64, actions: &mut Vec<Action>) {
+    pub(crate) fn take(&mut self, bytes: &[u8], bus: &str, now_ms: u64, actions: &mut Vec<Action>) {
         for byte in bytes {
             if self.state == State::Parted {
                 return;
@@ -86,12 +86,12 @@ impl Session {
     }
 
     /// Whether frames of the bus are queued for this client: it is in raw mode.
-    pub(super) fn is_raw(&self) -> bool {
+    pub(crate) fn is_raw(&self) -> bool {
         matches!(self.state, State::Raw { .. })
     }
 
     /// Whether what is queued after the answer to `< rawmode >` may be written.
-    pub(super) fn pause_is_over(&self, now_ms: u64) -> bool {
+    pub(crate) fn pause_is_over(&self, now_ms: u64) -> bool {
         match self.state {
             State::Raw { since_ms } => now_ms.saturating_sub(since_ms) >= PAUSE_MS,
             _ => true,
@@ -99,13 +99,13 @@ impl Session {
     }
 
     /// Whether the client has taken too long to get to raw mode.
-    pub(super) fn is_overdue(&self, now_ms: u64) -> bool {
+    pub(crate) fn is_overdue(&self, now_ms: u64) -> bool {
         matches!(self.state, State::Greeted | State::Opened)
             && now_ms.saturating_sub(self.began_ms) >= PATIENCE_MS
     }
 
     /// Requests refused so far.
-    pub(super) fn refused(&self) -> u64 {
+    pub(crate) fn refused(&self) -> u64 {
         self.refused
     }
 
@@ -158,7 +158,7 @@ fn reply(text: &str) -> Action {
 
 /// Appends a frame of the bus as a client reads it; false for remote requests and error frames, which the protocol cannot carry
 /// to python-can. `stamp_ns`: since the Unix epoch.
-pub(super) fn write_frame(text: &mut String, frame: &CanFrame, stamp_ns: u64) -> bool {
+pub(crate) fn write_frame(text: &mut String, frame: &CanFrame, stamp_ns: u64) -> bool {
     use protocol::can::{ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
     let raw_id = frame.raw_id();
     if raw_id & (ERROR_FLAG | REMOTE_FLAG) != 0 {
