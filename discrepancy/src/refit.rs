@@ -241,6 +241,9 @@ pub(crate) fn refit_steps(
         let from = prior_deviations(&linearisation.factors, &iterate.placed);
         let joint = products.fit_from(&chosen, &all_precisions, &from);
         let promised = iterate.loss() - joint.loss;
+        if promised < estimator.tolerance(iterate.loss()) {
+            return Step::Refused { promised };
+        }
         estimator.backtrack(iterate, promised, options.fractions, |share| {
             let mut placed = iterate.placed.clone();
             for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
@@ -295,19 +298,27 @@ pub(crate) fn linearise_at(
     Linearisation { columns: engine.parameter_columns(&rig, &factors), factors }
 }
 
-/// Refits a model with the parameters linearised anew at its own values, until the loss converges.
+/// Refits a model with the parameters linearised anew at its own values; `None` where the loss does not fall, an error where no
+/// rig can have it.
+fn linearised_anew(engine: &Engine<'_>, model: &Refit) -> Result<Option<Refit>, ()> {
+    let next = refit(engine, &linearise(engine, model), &model.placed).ok_or(())?;
+    let convergence = model.convergence.then(next.convergence);
+    Ok((next.loss < model.loss).then_some(Refit { convergence, ..next }))
+}
+
+/// The same once; the model itself where the loss does not fall.
+pub(crate) fn relinearise_once(engine: &Engine<'_>, model: Refit) -> Refit {
+    linearised_anew(engine, &model).ok().flatten().unwrap_or(model)
+}
+
+/// The same until the loss converges.
 pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, options: Options) -> Refit {
-    let (fit, outer) = Estimator::new(options).descend(model, |_, best| {
-        let Some(next) = refit(engine, &linearise(engine, best), &best.placed) else {
-            return Step::Impossible;
-        };
-        if next.loss < best.loss {
-            let convergence = best.convergence.then(next.convergence);
-            Step::Taken(Refit { convergence, ..next })
-        } else {
-            Step::Refused { promised: 0.0 }
-        }
-    });
+    let (fit, outer) =
+        Estimator::new(options).descend(model, |_, best| match linearised_anew(engine, best) {
+            Err(()) => Step::Impossible,
+            Ok(Some(next)) => Step::Taken(next),
+            Ok(None) => Step::Refused { promised: 0.0 },
+        });
     if outer.outcome == Outcome::StepLimit {
         return Refit { convergence: Convergence { outcome: outer.outcome, ..fit.convergence }, ..fit };
     }

@@ -25,6 +25,8 @@ pub struct Options {
     /// Fall of the loss in a step below which the fit has converged. The loss is minus twice a log-likelihood, so that a
     /// parameter off by one standard error costs 1; the tolerances are below what decides between two models.
     pub converged: f64,
+    /// The same as a share of the loss: where no model is exact, the last steps decide nothing. The larger of the two holds.
+    pub converged_share: f64,
     /// Fractions of the step that are tried, longest first.
     pub fractions: &'static [f64],
 }
@@ -32,22 +34,33 @@ pub struct Options {
 /// Backtracking factor.
 const SHORTER: f64 = 0.4;
 const SHORTER_TWICE: f64 = SHORTER * SHORTER;
+/// Share of the loss of an inexact model that decides nothing: fits are alike within twenty times as much.
+const OF_INEXACT: f64 = 1e-3;
 
 /// A candidate beside fixed parameter sensitivities. A step that is still too long at the last fraction crosses a break-away.
-pub const CANDIDATE: Options =
-    Options { steps: 7, converged: 0.3, fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER] };
+pub const CANDIDATE: Options = Options {
+    steps: 7,
+    converged: 0.3,
+    converged_share: OF_INEXACT,
+    fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER],
+};
 /// All numbers of a model, with one fraction more: this is the model that is reported.
 pub const JOINT: Options = Options {
     steps: 6,
     converged: 0.3,
+    converged_share: 0.1 * OF_INEXACT,
     fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER, SHORTER_TWICE * SHORTER_TWICE],
 };
+/// The same for models that are compared and not reported.
+pub const JOINT_COMPARED: Options = Options { converged_share: OF_INEXACT, ..JOINT };
 /// Tables: each step is some [`TABLES_WITHIN`] with the same derivatives, which cost many times a step.
-pub const TABLES: Options = Options { steps: 7, converged: 1.0, fractions: &[1.0, 0.4, 0.15, 0.05] };
+pub const TABLES: Options =
+    Options { steps: 7, converged: 1.0, converged_share: OF_INEXACT, fractions: &[1.0, 0.4, 0.15, 0.05] };
 /// The same with the derivatives held.
 pub const TABLES_WITHIN: Options = Options { steps: 3, ..TABLES };
 /// New linearisations of the parameters beside a candidate: those of a model that has an effect differ from the rig file's.
-pub const RELINEARISED: Options = Options { steps: 4, converged: 1.0, fractions: &[1.0] };
+pub const RELINEARISED: Options =
+    Options { steps: 4, converged: 1.0, converged_share: OF_INEXACT, fractions: &[1.0] };
 /// New linearisations of the parameters alone, from the rig file's values to a supply or a mass that is a tenth off.
 pub const CALIBRATION: Options = Options { steps: 7, ..RELINEARISED };
 
@@ -127,6 +140,11 @@ impl Estimator {
         Estimator { options, evaluations: 0 }
     }
 
+    /// Fall of this loss below which a fit has converged.
+    pub fn tolerance(&self, loss: f64) -> f64 {
+        self.options.converged.max(self.options.converged_share * loss)
+    }
+
     /// The longest fraction of a step that lowers the loss; `at` simulates a fraction.
     pub fn backtrack<P: Iterate>(
         &mut self,
@@ -167,7 +185,7 @@ impl Estimator {
         while iterations < self.options.steps {
             let next = match step(&mut self, &point) {
                 Step::Taken(next) => next,
-                Step::Refused { promised } if promised > self.options.converged => {
+                Step::Refused { promised } if promised > self.tolerance(point.loss()) => {
                     outcome = Outcome::Stalled;
                     break;
                 }
@@ -177,9 +195,9 @@ impl Estimator {
                 }
             };
             iterations += 1;
-            let fall = point.loss() - next.loss();
+            let (fall, tolerance) = (point.loss() - next.loss(), self.tolerance(point.loss()));
             point = next;
-            if fall < self.options.converged {
+            if fall < tolerance {
                 outcome = Outcome::Converged;
                 break;
             }
@@ -210,7 +228,8 @@ mod tests {
         }
     }
 
-    const OPTIONS: Options = Options { steps: 20, converged: 1e-6, fractions: &[1.0, 0.5, 0.25] };
+    const OPTIONS: Options =
+        Options { steps: 20, converged: 1e-6, converged_share: 0.0, fractions: &[1.0, 0.5, 0.25] };
 
     /// Newton's method with a slope and a curvature that belong to the loss, or do not.
     fn fitted(loss: fn(f64) -> f64, start: f64, slope: fn(f64) -> f64, curvature: f64) -> (At, Convergence) {
@@ -249,6 +268,20 @@ mod tests {
     fn a_wrong_slope_stalls() {
         let (at, convergence) = fitted(|x| (x - 3.0).powi(2), 9.0, |x| -2.0 * (x - 3.0), 20.0);
         assert_eq!((at.0, convergence.outcome, convergence.iterations), (9.0, Outcome::Stalled, 0));
+    }
+
+    #[test]
+    fn of_a_large_loss_a_share_is_the_tolerance() {
+        let from = |start: f64, converged_share: f64| {
+            let loss = |x: f64| 1000.0 + (x - 3.0).powi(2);
+            let options = Options { converged_share, ..OPTIONS };
+            let halfway = |estimator: &mut Estimator, at: &At| {
+                estimator.backtrack(at, 1.0, &[1.0], |_| Some(At(3.0 + 0.5 * (at.0 - 3.0), loss)))
+            };
+            Estimator::new(options).descend(At(start, loss), halfway).1
+        };
+        assert_eq!((from(4.0, 1e-3).iterations, from(9.0, 1e-3).iterations), (1, 4));
+        assert!(from(4.0, 0.0).iterations > 5);
     }
 
     #[test]

@@ -22,6 +22,7 @@ use nalgebra::{DMatrix, DVector};
 pub(super) const OPTIONS: Options = Options {
     steps: 80,
     converged: 0.1,
+    converged_share: 0.0,
     fractions: &[1.0, 0.999_999, 0.999_99, 0.9999, 0.999, 0.99, 0.9, 0.6, 0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4],
 };
 /// What a sample adds to the fall of the loss that counts: a change of the residual by half of it, relatively.

@@ -15,7 +15,7 @@ use crate::refit::{
     EffectEstimate, MOST_OFF, Refit, coordinate_columns, is_at_bound, model_penalty, prior_deviations,
     prior_precisions, rig_of,
 };
-use model_fit::estimator::{Estimator, Iterate, JOINT, Step};
+use model_fit::estimator::{Estimator, Iterate, JOINT, JOINT_COMPARED, Options, Step};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -42,7 +42,7 @@ pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COU
 /// Fits all parameters and coordinates of a model in the simulator, penalties included; returns the model itself where the loss
 /// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
-    let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
+    let Some(mut fit) = fit_for_comparison(engine, model) else { return model.clone() };
     fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
@@ -73,6 +73,15 @@ impl Iterate for Simulated {
 /// Fits a model in the simulator with the parameters that are not `needed` at the rig file's values; `None` where no rig can have
 /// it. Its loss has the priors and no penalties.
 pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
+    fit_within(engine, model, needed, JOINT)
+}
+
+/// The same with all parameters, to compare models: of an inexact one the last steps do not count.
+pub(super) fn fit_for_comparison(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
+    fit_within(engine, model, &[true; COUNT], JOINT_COMPARED)
+}
+
+fn fit_within(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT], options: Options) -> Option<Refit> {
     let mut factors = model.factors;
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
         *factor = 1.0;
@@ -80,7 +89,7 @@ pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; C
     let start = iterate(engine, model.placed.clone(), factors)?;
     let chosen: Vec<usize> =
         (0..COUNT + coordinates(&start.placed)).filter(|at| *at >= COUNT || needed[*at]).collect();
-    let (iterate, convergence) = Estimator::new(JOINT).descend(start, |estimator, iterate| {
+    let (iterate, convergence) = Estimator::new(options).descend(start, |estimator, iterate| {
         linearised(engine, iterate).map_or(Step::Impossible, |linearisation| {
             stepped(engine, estimator, iterate, &linearisation, &chosen)
         })

@@ -7,7 +7,7 @@
 //! Free parameters absorb noise, and of two correlated ones both move where one is off. The report, the extended rig file and the
 //! held-out test use the one refitted model.
 
-use super::gauss_newton::fit_selected;
+use super::gauss_newton::{fit_for_comparison, fit_selected};
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::refit::{Refit, coordinate_columns, linearise, prior_precisions, rig_of};
@@ -60,7 +60,7 @@ fn integration_shifts(engine: &Engine<'_>, model: &Refit) -> Option<[f64; COUNT]
 /// The model refitted with the needed parameters only; with all parameters where the loss rises by more than the linearised
 /// estimate.
 pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
-    let Some(all) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
+    let Some(all) = fit_for_comparison(engine, model) else { return model.clone() };
     let Some(needed) = needed(engine, &all) else { return all };
     let held = needed.iter().filter(|needed| !**needed).count();
     match fit_selected(engine, &all, &needed) {
