@@ -109,8 +109,7 @@ pub struct SelectionResult {
     pub(crate) null_loss: f64,
     /// Detection limit of each candidate as a coordinate of its amplitude; `None` where the record does not excite it.
     pub limits: Vec<Option<f64>>,
-    /// Whether the model of the search, before the probabilities may have replaced it, leaves more than noise on the searched
-    /// part of the records.
+    /// Whether the model leaves more than noise on the searched part of the records.
     pub lacks_fit: bool,
     /// How much the windows disagree on each effect of the reported model; empty without one.
     pub(crate) heterogeneity: Vec<Heterogeneity>,
@@ -199,14 +198,13 @@ pub fn name(
     let explanations = explanations(here, &linearisation, &columns, &fits);
     let searched = Searched { selection, all_rounds, lacks_fit, any_homogeneous };
     let decision = decide(here, &explanations, searched);
-    let Decision { selection, shares, is_named, explained, not_explained } = decision;
-    let reported = if not_explained.is_some() {
+    let Decision { selection, lacks_fit, shares, is_named, explained } = decision;
+    let not_explained = explained.as_ref().err().copied();
+    let reported = explained.unwrap_or_else(|_| {
         let rig = with_factors(engine.rig(), &selection.calibrated.factors);
         let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
         with_needed(restarted.as_ref().unwrap_or(engine), &selection.calibrated)
-    } else {
-        explained
-    };
+    });
     let at_reported = linearise(here, &reported);
     let heterogeneity = if not_explained.is_none() && !reported.placed.is_empty() {
         heterogeneity(here, &at_reported, &reported).unwrap_or_default()
@@ -280,6 +278,11 @@ fn loss_on(engine: &Engine<'_>, axes: [bool; 2], fit: &Refit) -> f64 {
 /// The loss of a model on the axes that the last effect of another one acts on.
 fn loss_where_last_acts(engine: &Engine<'_>, model: &Refit, other: &Refit) -> f64 {
     loss_on(engine, axes_of(other.placed.last().map_or(&[], std::slice::from_ref)), model)
+}
+
+/// Share of a loss that a model removes; 0 where there was none to remove.
+pub(crate) fn share_removed(before: f64, after: f64) -> f64 {
+    if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// Whether a model with this loss leaves more than noise.

@@ -55,13 +55,23 @@ pub struct Refit {
     pub(crate) convergence: Convergence,
 }
 
+impl Refit {
+    /// The same with the standard errors of its parameters widened by their spread between the windows.
+    pub(crate) fn widened(&self, spread: &[f64; COUNT]) -> Self {
+        let mut wider = self.clone();
+        let from = wider.errors.len() - COUNT;
+        wider.errors[from..].iter_mut().zip(spread).for_each(|(error, tau)| *error = error.hypot(*tau));
+        wider
+    }
+}
+
 impl Iterate for Refit {
     fn loss(&self) -> f64 {
         self.loss
     }
 
     fn is_at_bound(&self) -> bool {
-        is_at_bound(&self.placed)
+        is_at_bound(&self.placed) || self.factors.iter().any(|factor| (factor - 1.0).abs() >= MOST_OFF)
     }
 }
 

@@ -21,7 +21,7 @@ use crate::calibrate::quantity;
 use crate::engine::Engine;
 use crate::locate::maps::map;
 use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
-use crate::name::MIN_LOSS_REDUCTION;
+use crate::name::{MIN_LOSS_REDUCTION, share_removed};
 use crate::parameters::{COUNT, with_factors};
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
@@ -85,7 +85,6 @@ pub(crate) fn tabulate(
         best = fit::fit(engine, second, STEPS);
     }
     let (best, off) = with_needed(engine, best);
-    let share_explained = (parameters_alone.loss - best.loss) / parameters_alone.loss.max(1e-9);
     if best.loss > parameters_alone.loss - LEAST_SHARE * parameters_alone.loss.abs() {
         return Err("its table leaves the windows of the training records no better".to_owned());
     }
@@ -101,7 +100,7 @@ pub(crate) fn tabulate(
     Ok(Tables {
         terms: best.model.tables.iter().map(|table| term(&table.table)).collect(),
         parameters: (0..COUNT).filter(|at| off[*at]).map(|at| quantity(engine, at, &refit)).collect(),
-        share_explained: share_explained.min(1.0),
+        share_explained: share_removed(parameters_alone.loss, best.loss),
     })
 }
 

@@ -188,6 +188,8 @@ def regressors(row: Row, *, selected: bool) -> Vector:
         return [float(regressor == "none_of_these") for regressor in REGRESSORS]
     moved = float(row["parameters_moved"])
     amplitude = float(row["smallest_amplitude"] or 1)
+    # Amplitudes that cannot be compared between windows count as varying by their size.
+    variation = float(row["amplitude_variation"] or 1) if kind == "effects" else 0.0
     excess = math.log1p(max(float(row["loss_per_dof"]), 0) / 0.08)
     return [
         float(kind == "parameters"),
@@ -199,7 +201,7 @@ def regressors(row: Row, *, selected: bool) -> Vector:
         excess if kind == "effects" else 0.0,
         moved,
         math.log(max(moved, 1e-3) / 0.1) if kind == "parameters" else 0.0,
-        math.log1p(float(row["amplitude_variation"] or 0) / 0.1),
+        math.log1p(variation / 0.1),
         math.log(min(max(amplitude, 1), 10)),
     ]
 

@@ -14,10 +14,12 @@
 
 use super::elimination::Selection;
 use super::explanations::{Explanation, ExplanationKind};
+use super::heterogeneity::parameter_spread;
 use super::needed_parameters::{off, with_needed};
 use super::{axes_of, is_large, loss_on, same};
 use crate::engine::Engine;
-use crate::refit::{EffectEstimate, Refit};
+use crate::parameters::COUNT;
+use crate::refit::{EffectEstimate, Refit, linearise};
 
 /// Probability from which on an explanation decides: it is right more often than all others together.
 const DECIDES: f64 = 0.5;
@@ -69,12 +71,13 @@ pub(super) struct Searched {
 
 pub(super) struct Decision {
     pub(super) selection: Selection,
+    /// Whether the model leaves more than noise on the searched part of the records.
+    pub(super) lacks_fit: bool,
     /// Of each effect of the model.
     pub(super) shares: Vec<f64>,
     pub(super) is_named: Vec<bool>,
-    /// The model without the parameters that it does not need.
-    pub(super) explained: Refit,
-    pub(super) not_explained: Option<NotExplained>,
+    /// The model without the parameters that it does not need, where it is an explanation.
+    pub(super) explained: Result<Refit, NotExplained>,
 }
 
 pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched: Searched) -> Decision {
@@ -82,7 +85,7 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
     let likely = explanations.iter().find(|one| one.probability >= DECIDES);
     let falls_short = |one: &Explanation| {
         one.features.is_some_and(|features| {
-            features.amplitude_variation.is_some_and(|variation| variation > MAX_CV_WHEN_PROBABLE)
+            features.amplitude_variation.is_none_or(|variation| variation > MAX_CV_WHEN_PROBABLE)
                 || lacks_fit && features.share < 1.0 - MOST_LOSS_LEFT
         })
     };
@@ -101,6 +104,8 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
         selection.rounds = selection.rounds_of(fit, &all_rounds);
         selection.model = fit.clone();
     }
+    // From here on of the model that is reported.
+    let lacks_fit = super::lacks_fit(engine, selection.model.loss);
     let mut shares = selection.shares(engine);
     let only_large = selection.model.placed.iter().all(is_large);
     let named = |(placed, share): (_, &f64)| {
@@ -117,20 +122,24 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
         shares = selection.shares(engine);
         is_named = vec![false; selection.model.placed.len()];
     }
-    let explained = with_needed(engine, &selection.model);
-    let parameters_off = off(engine, &explained).into_iter().filter(|off| *off).count();
-    let not_explained = if too_little {
-        Some(NotExplained::TooLittle)
-    } else if !is_likely
-        && !any_homogeneous
-        && !selection.model.placed.is_empty()
-        && parameters_off > MAX_PARAMETERS_OFF
-    {
-        Some(NotExplained::TooManyParametersOff)
+    let explained = if too_little {
+        Err(NotExplained::TooLittle)
     } else {
-        None
+        let explained = with_needed(engine, &selection.model);
+        let may_need_many = is_likely || any_homogeneous || selection.model.placed.is_empty();
+        if !may_need_many && parameters_off(engine, &explained) > MAX_PARAMETERS_OFF {
+            Err(NotExplained::TooManyParametersOff)
+        } else {
+            Ok(explained)
+        }
     };
-    Decision { selection, shares, is_named, explained, not_explained }
+    Decision { selection, lacks_fit, shares, is_named, explained }
+}
+
+/// Number of parameters that a model has significantly off.
+fn parameters_off(engine: &Engine<'_>, model: &Refit) -> usize {
+    let spread = parameter_spread(engine, &linearise(engine, model), model).unwrap_or([0.0; COUNT]);
+    off(engine, &model.widened(&spread)).into_iter().filter(|off| *off).count()
 }
 
 /// Whether the effects of the search's model are less probable than nothing, or hardly probable at all.

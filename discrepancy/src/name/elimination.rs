@@ -40,6 +40,9 @@ impl Selection {
         for (at, refits) in rounds.iter().enumerate().take(model.placed.len() - 1) {
             for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
                 let Some(other) = other.placed.last() else { continue };
+                if model.placed.iter().any(|placed| same(placed, other)) {
+                    continue;
+                }
                 let mut placed = model.placed.clone();
                 placed[at] = other.clone();
                 tried.push((at, rank, placed));
@@ -151,7 +154,13 @@ impl Selection {
                 let after =
                     rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |fit| fit.loss);
                 let on_axes = loss_on(engine, axes_of(std::slice::from_ref(placed)), calibrated);
-                let share = (before - after) / excess * whole * (calibrated.loss / on_axes);
+                let removed = before - after;
+                // A loss below what noise gives, of all axes or of those of the effect, is no measure of what was there.
+                let share = if calibrated.loss > 0.0 && on_axes > 0.0 {
+                    removed / excess * whole * (calibrated.loss / on_axes)
+                } else {
+                    removed / on_axes.max(removed).max(1e-9)
+                };
                 before = after;
                 share.clamp(0.0, 1.0)
             })

@@ -12,7 +12,7 @@
 //! log-likelihood of the windows, priors and penalties included.
 
 use super::probabilities::probabilities;
-use super::{amplitude_ratio, axes_of, heterogeneity::heterogeneity, is_large, loss_on, same};
+use super::{amplitude_ratio, axes_of, heterogeneity::heterogeneity, is_large, loss_on, same, share_removed};
 use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -47,7 +47,8 @@ pub struct Features {
     pub behind: f64,
     /// Number of parameters off the rig file's values, each counted by x^2 / (x^2 + tolerance^2) of its relative deviation x.
     pub parameters_moved: f64,
-    /// Largest coefficient of variation of its effects' amplitudes between windows; null without effects.
+    /// Largest coefficient of variation of its effects' amplitudes between windows; null without effects, or where no derivative
+    /// exists.
     pub amplitude_variation: Option<f64>,
     /// Smallest amplitude of its effects over the smallest that is named; null without effects.
     pub smallest_amplitude: Option<f64>,
@@ -87,8 +88,11 @@ pub(super) fn explanations(
 ) -> Vec<Explanation> {
     let at_model = linearise(engine, fits.model);
     let dof: f64 = engine.scaled_dof().iter().sum();
-    let baseline = engine.squares(&engine.residual(&engine.simulate(engine.rig())));
-    let nothing = fit::loss(&baseline, engine.scaled_dof());
+    // Of linked rods each model has start states of its own.
+    let restarted = engine.is_linked().then(|| engine.with_starts_under(engine.rig()));
+    let of_rig_file = restarted.as_ref().unwrap_or(engine);
+    let baseline = of_rig_file.squares(&of_rig_file.residual(&of_rig_file.simulate(engine.rig())));
+    let nothing = fit::loss(&baseline, of_rig_file.scaled_dof());
     let alike = Alike::new(engine, linearisation, columns, fits.model);
     let classes = classes(fits, |left, right| alike.are(left, right));
     let losses = classes.iter().map(|class| class[0].loss).chain([nothing, fits.parameters.loss]);
@@ -100,7 +104,7 @@ pub(super) fn explanations(
         amplitude_variation: None,
         smallest_amplitude: None,
         small_beside: 0,
-        share: (1.0 - loss / fits.parameters.loss.max(1e-9)).clamp(0.0, 1.0),
+        share: share_removed(fits.parameters.loss, loss),
     };
     let without_effects =
         |kind, features| Explanation { kind, sets: Vec::new(), features, fit: None, probability: 0.0 };
@@ -122,7 +126,7 @@ pub(super) fn explanations(
         let [left, before] = [best, fits.parameters].map(|fit| loss_on(engine, axes, fit));
         let features = Features {
             loss_per_dof: left / engine.loss_on(axes, &best.squares).1,
-            share: (1.0 - left / before.max(1e-9)).clamp(0.0, 1.0),
+            share: share_removed(before, left),
             amplitude_variation: variations,
             smallest_amplitude: Some(named.iter().map(amplitude_ratio).fold(f64::INFINITY, f64::min)),
             small_beside: best.placed.len() - named.len(),

@@ -188,7 +188,12 @@ fn line_search(
         let fit = linearisation.products(engine, iterate, &out).fit_from(chosen, &precisions, &from);
         promised = iterate.loss - fit.loss;
         estimator.count();
-        let Some(tried) = step_by(engine, iterate, chosen, &fit, *whole) else { return Step::Impossible };
+        let Some(tried) = step_by(engine, iterate, chosen, &fit, *whole) else {
+            // No rig has the whole step: a shorter one may be possible.
+            return estimator.backtrack(iterate, promised, shorter, |fraction| {
+                step_by(engine, iterate, chosen, &fit, fraction)
+            });
+        };
         if tried.loss < iterate.loss {
             return Step::Taken(tried);
         }

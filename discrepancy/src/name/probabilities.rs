@@ -21,6 +21,8 @@ const EXCESS_SCALE: f64 = 0.08;
 const VARIATION_SCALE: f64 = 0.1;
 /// Above so many times the smallest amplitude that is named, a larger one counts no more.
 const LARGEST_RATIO: f64 = 10.0;
+/// What effects count as whose amplitudes cannot be compared between windows: they vary by as much as their size.
+const UNKNOWN_VARIATION: f64 = 1.0;
 /// Parameters that are moved by less are those of the rig file, and by so much they count as off.
 const SMALLEST_MOVED: f64 = 1e-3;
 const MOVED_SCALE: f64 = 0.1;
@@ -32,7 +34,7 @@ struct Weights {
     parameters: f64,
     effects: f64,
     none_of_these: f64,
-    /// The set of effects that the search selected, the first of them.
+    /// The first set of effects: that of the search, or the best fit where it selected none.
     selected: f64,
     behind: f64,
     excess: f64,
@@ -73,13 +75,17 @@ fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
         ExplanationKind::Nothing | ExplanationKind::NoneOfThese => 0.0,
     };
     let smallest = features.smallest_amplitude.unwrap_or(1.0);
-    let of_effects =
-        if explanation.kind == ExplanationKind::Effects { weights.excess_of_effects } else { 0.0 };
+    let (of_effects, variation) = match explanation.kind {
+        ExplanationKind::Effects => {
+            (weights.excess_of_effects, features.amplitude_variation.unwrap_or(UNKNOWN_VARIATION))
+        }
+        _ => (0.0, 0.0),
+    };
     of_kind
         + weights.behind * (features.behind / BEHIND_SCALE).ln_1p()
         + (weights.excess + of_effects) * (features.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
         + weights.moved * features.parameters_moved
-        + weights.variation * (features.amplitude_variation.unwrap_or(0.0) / VARIATION_SCALE).ln_1p()
+        + weights.variation * (variation / VARIATION_SCALE).ln_1p()
         + weights.amplitude * smallest.clamp(1.0, LARGEST_RATIO).ln()
 }
 

@@ -145,6 +145,11 @@ impl Model {
         self.coordinates().iter().map(|coordinate| self.precision(*coordinate)).collect()
     }
 
+    /// Deviations of all free coordinates from their prior means.
+    fn deviations(&self) -> Vec<f64> {
+        self.coordinates().iter().map(|coordinate| self.deviation(*coordinate)).collect()
+    }
+
     /// Deviation of a coordinate from its neutral value.
     fn deviation(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
@@ -153,17 +158,18 @@ impl Model {
         }
     }
 
-    /// Prior penalty of the factors and penalty for the points.
+    /// Priors of the factors and of the values, and the penalty for the points.
     fn penalty(&self) -> f64 {
-        let factors: f64 = (0..COUNT)
-            .map(|at| (self.deviation(Coordinate::Factor(at)) / PARAMETERS[at].prior_std).powi(2))
-            .sum();
-        let points = self
-            .coordinates()
-            .iter()
-            .filter(|coordinate| matches!(coordinate, Coordinate::Value(..)))
-            .count();
-        factors + EFFECT_PARAMETER_PENALTY * points as f64
+        let factors = (0..COUNT).map(Coordinate::Factor);
+        let values = self.coordinates().into_iter().filter(|one| matches!(one, Coordinate::Value(..)));
+        let prior = factors.chain(values).map(|one| self.precision(one) * self.deviation(one).powi(2));
+        prior.sum::<f64>() + self.penalty_for_points()
+    }
+
+    fn penalty_for_points(&self) -> f64 {
+        let coordinates = self.coordinates();
+        let points = coordinates.iter().filter(|one| matches!(one, Coordinate::Value(..)));
+        EFFECT_PARAMETER_PENALTY * points.count() as f64
     }
 }
 
@@ -300,7 +306,7 @@ impl TableLinearisation {
         let products = engine.products(&point.residual, &self.columns);
         let coordinates = self.model.coordinates();
         let precisions = self.model.precisions();
-        let from: Vec<f64> = coordinates.iter().map(|coordinate| self.model.deviation(*coordinate)).collect();
+        let from = self.model.deviations();
         products.cross_validated_loss(&(0..coordinates.len()).collect::<Vec<_>>(), &precisions, &from, FOLDS)
     }
 
@@ -315,7 +321,9 @@ impl TableLinearisation {
         model.tables.extend(tables.iter().map(|beside| beside.fitted.clone()));
         let columns = self.with(tables);
         let products = engine.products(&point.residual, &columns);
-        products.fit(&(0..columns.len()).collect::<Vec<_>>(), &model.precisions()).loss + model.penalty()
+        let all: Vec<usize> = (0..columns.len()).collect();
+        let fit = products.fit_from(&all, &model.precisions(), &model.deviations());
+        fit.loss + model.penalty_for_points()
     }
 }
 
@@ -336,8 +344,10 @@ pub(super) fn needed(
             Coordinate::Value(..) => true,
         };
         let chosen: Vec<usize> = (0..coordinates.len()).filter(is_in).collect();
-        let precisions: Vec<f64> = chosen.iter().map(|at| model.precision(coordinates[*at])).collect();
-        products.fit(&chosen, &precisions).loss
+        let free = chosen.iter().map(|at| coordinates[*at]);
+        let precisions: Vec<f64> = free.clone().map(|one| model.precision(one)).collect();
+        let from: Vec<f64> = free.map(|one| model.deviation(one)).collect();
+        products.fit_from(&chosen, &precisions, &from).loss
     };
     let mut loss = loss_with(&needed);
     for _ in 0..COUNT {
@@ -385,8 +395,11 @@ fn steps_within(engine: &Engine<'_>, start: Iterate, linearisation: &[&[f64]]) -
     let mut products = engine.products(&start.residual, linearisation);
     Estimator::new(TABLES_WITHIN).descend(start, |estimator, point| {
         products.set_residual(&point.residual, linearisation, engine.rows());
-        let joint = products.fit(&all, &precisions);
-        let promised = point.loss - point.model.penalty() - joint.loss;
+        let joint = products.fit_from(&all, &precisions, &point.model.deviations());
+        let promised = point.loss - point.model.penalty_for_points() - joint.loss;
+        if promised < estimator.tolerance(point.loss) {
+            return Step::Refused { promised };
+        }
         estimator.backtrack(point, promised, TABLES_WITHIN.fractions, |fraction| {
             let changes = coordinates.iter().zip(&joint.coefficients);
             let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {

@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{SelectionResult, is_large, off, same};
+use crate::name::{SelectionResult, is_large, off, same, share_removed};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
@@ -41,7 +41,6 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
     Report {
         named,
         small,
-        // Of the search's model, which the probabilities may have replaced.
         adequate: Some(!found.lacks_fit && found.not_explained.is_none()),
         fit: Some(found.reported.convergence),
         nearest,
@@ -129,12 +128,7 @@ fn named_effect(
 
 /// Parameters that are significantly off, and those that the model moved by less.
 fn parameters(engine: &Engine<'_>, found: &SelectionResult) -> (Vec<Quantity>, Vec<Quantity>) {
-    let mut model = found.reported.clone();
-    let from = model.errors.len() - COUNT;
-    model.errors[from..]
-        .iter_mut()
-        .zip(found.parameter_spread)
-        .for_each(|(error, tau)| *error = error.hypot(tau));
+    let model = found.reported.widened(&found.parameter_spread);
     let is_off = off(engine, &model);
     let (off, insignificant): (Vec<usize>, Vec<usize>) =
         (0..COUNT).filter(|at| model.factors[*at] != 1.0).partition(|at| is_off[*at]);
@@ -156,9 +150,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let of_model = found.model.placed.iter().position(is_it);
             let is_alike = found.alternatives.iter().flatten().any(|alternative| is_last(&&alternative.fit));
             let shown = alone.map_or(placed, |fit| &fit.placed[0]);
-            let share = alone.map(|fit| {
-                ((found.calibrated.loss - fit.loss) / found.calibrated.loss.max(1e-9)).clamp(0.0, 1.0)
-            });
+            let share = alone.map(|fit| share_removed(found.calibrated.loss, fit.loss));
             let decision = if let Some(reason) = of_model.and(found.not_explained) {
                 reason.reason()
             } else if let Some(at) = of_model {
