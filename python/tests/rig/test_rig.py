@@ -144,7 +144,7 @@ def test_an_end_of_the_run_fails_what_waits_for_it_and_says_why_it_ended(tmp_pat
 
 def test_bad_input_is_the_programs_own_message_and_exit_code(tmp_path):
     for number, (arguments, program, words) in enumerate([
-        ({"setup": {"carriage_position_m": 7}}, "emulator", "carriage_position_m = 7: allowed are 0 to 0.5 m"),
+        ({"setup": {"carriage_position_m": 7}}, "emulator", "rig.carriage_position_m = 7 m; allowed is 0 to 0.5 m"),
         ({"faults": [Fault("valve-offset", "drive")]}, "emulator", "valve-offset needs offset; allowed: -1 to 1"),
         ({"experiment": "step", "controller": Own(set={"drive.algorithm.nothing": 1.0})}, "controller", "no such variable"),
     ]):
