@@ -355,3 +355,14 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
         .collect();
     columns.screen(engine, &linearisation, &residual, &model_sensitivities)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::share_removed;
+
+    #[test]
+    fn nothing_is_removed_of_a_loss_that_noise_explains() {
+        let all = [(10.0, 4.0), (10.0, -2.0), (10.0, 12.0), (-1.0, -5.0), (0.0, -5.0)];
+        assert_eq!(all.map(|(before, after)| share_removed(before, after)), [0.6, 1.0, 0.0, 0.0, 0.0]);
+    }
+}

@@ -71,8 +71,13 @@ impl Iterate for Refit {
     }
 
     fn is_at_bound(&self) -> bool {
-        is_at_bound(&self.placed) || self.factors.iter().any(|factor| (factor - 1.0).abs() >= MOST_OFF)
+        is_at_bound(&self.placed) || has_factor_at_bound(&self.factors)
     }
+}
+
+/// Whether a factor is at the end of its range.
+pub(crate) fn has_factor_at_bound(factors: &[f64; COUNT]) -> bool {
+    factors.iter().any(|factor| (factor - 1.0).abs() >= MOST_OFF)
 }
 
 /// Whether a coordinate is at the end of its range.
@@ -369,4 +374,32 @@ pub(crate) fn derivative(
     let mut column = engine.difference(&coordinates, simulated);
     column.iter_mut().for_each(|value| *value /= change);
     Some(column)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clamped_factor_is_at_its_bound_and_spread_widens_the_errors_of_factors_alone() {
+        let fit = |factor: f64| {
+            let mut factors = [1.0; COUNT];
+            factors[2] = factor;
+            Refit {
+                placed: Vec::new(),
+                factors,
+                loss: 0.0,
+                squares: Vec::new(),
+                errors: vec![3.0; COUNT + 1],
+                design_effect: 1.0,
+                convergence: Convergence::default(),
+            }
+        };
+        let at_bound = [1.0 - MOST_OFF, 1.0 + MOST_OFF, 1.29].map(|factor| fit(factor).is_at_bound());
+        assert_eq!(at_bound, [true, true, false]);
+        let mut spread = [0.0; COUNT];
+        spread[0] = 4.0;
+        let wider = fit(1.0).widened(&spread);
+        assert_eq!(wider.errors[..3], [3.0, 5.0, 3.0]);
+    }
 }

@@ -12,8 +12,8 @@ use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
-    EffectEstimate, MOST_OFF, Refit, coordinate_columns, is_at_bound, model_penalty, prior_deviations,
-    prior_precisions, rig_of,
+    EffectEstimate, MOST_OFF, Refit, coordinate_columns, has_factor_at_bound, is_at_bound, model_penalty,
+    prior_deviations, prior_precisions, rig_of,
 };
 use model_fit::estimator::{Estimator, Iterate, JOINT, JOINT_COMPARED, Options, Step};
 use rayon::prelude::*;
@@ -65,8 +65,7 @@ impl Iterate for Simulated {
     }
 
     fn is_at_bound(&self) -> bool {
-        let is_far = |factor: &f64| (factor - 1.0).abs() >= MOST_OFF;
-        is_at_bound(&self.placed) || self.factors.iter().any(is_far)
+        is_at_bound(&self.placed) || has_factor_at_bound(&self.factors)
     }
 }
 

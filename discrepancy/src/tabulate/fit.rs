@@ -13,7 +13,7 @@ use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::loss;
 use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{MOST_OFF, Refit};
+use crate::refit::{MOST_OFF, Refit, has_factor_at_bound};
 use crate::windows::{ReferenceRun, VariableRanges};
 use model_fit::estimator::{Convergence, Estimator, Options, Outcome, Step, TABLES, TABLES_WITHIN};
 use plant::RigParameters;
@@ -188,11 +188,10 @@ impl model_fit::estimator::Iterate for Iterate {
     }
 
     fn is_at_bound(&self) -> bool {
-        let is_far = |factor: &f64| (factor - 1.0).abs() >= MOST_OFF;
         let is_most = |fitted: &FittedTable| {
             fitted.table.value.iter().any(|value| value.abs() >= fitted.table.balance.most())
         };
-        self.model.factors.iter().any(is_far) || self.model.tables.iter().any(is_most)
+        has_factor_at_bound(&self.model.factors) || self.model.tables.iter().any(is_most)
     }
 }
 
