@@ -258,8 +258,8 @@ def test_a_foreign_program_takes_part_by_its_echo(tmp_path):
 def test_a_controller_that_hangs_is_named_and_one_that_crashes_too(tmp_path):
     program = tmp_path / "foreign.py"
     program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "time.sleep(1000)"))
-    with Rig(controller=Process(["{python}", program, "{path}"]), answer_s=0.5, out=tmp_path / "hangs") as rig:
-        with pytest.raises(NotAnswered, match="not answered cycle 100 within 0.5 s"):
+    with Rig(controller=Process(["{python}", program, "{path}"]), answer_s=3.0, out=tmp_path / "hangs") as rig:
+        with pytest.raises(NotAnswered, match="not answered cycle 100 within 3 s"):
             rig.run_for("1 s")
     program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "sys.exit('I broke')"))
     with Rig(controller=Process(["{python}", program, "{path}"]), out=tmp_path / "crashes") as rig:
@@ -267,7 +267,8 @@ def test_a_controller_that_hangs_is_named_and_one_that_crashes_too(tmp_path):
         with pytest.raises(ProgramFailed, match="process ended with exit code 1:\nI broke"):
             rig.run_for("1 s")
     program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "os.write(2, b'I left'); sys.exit()"))
-    with Rig(controller=Process(["{python}", program, "{path}"]), answer_s=1.0, out=tmp_path / "leaves") as rig:
+    # The rig's own patience: on a loaded machine an interpreter takes more than a second to leave.
+    with Rig(controller=Process(["{python}", program, "{path}"]), out=tmp_path / "leaves") as rig:
         with pytest.raises(NotAnswered, match="process has ended with exit code 0:\nI left"):
             rig.run_for("1 s")
     program.write_text(_FOREIGN.replace("# from cycle 100 on", "if cycle == 100: " + "os.abort()"))
