@@ -11,9 +11,6 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// How long the answers to the last cycles may still come in after the farewell.
-const FAREWELL: Duration = Duration::from_millis(30);
-
 /// How time passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pace {

@@ -1,5 +1,6 @@
 //! Lockstep: the same command lines give the same files to the byte, however fast the machine and whoever starts first.
 
+use protocol::frames::{Frame, ValveCommand};
 use rustix::process::Signal;
 use std::time::Duration;
 use system_tests::load::BusyLoops;
@@ -79,6 +80,24 @@ fn two_runs_give_the_same_files_to_the_byte_whatever_the_circumstances() {
             assert!(of(&first).is_number(), "{figure} was measured");
         }
     }
+}
+
+#[test]
+fn an_answer_to_the_last_cycle_is_logged_however_long_it_takes() {
+    const CYCLES: u32 = 50;
+    let scene = Scene::new(SHORT);
+    let emulator = scene.emulator(Pace::Lockstep).with("--seconds 0.05").start();
+    scene.peer().take_part("slow", |peer, cycle, _| {
+        if cycle + 1 == CYCLES {
+            std::thread::sleep(Duration::from_millis(300));
+        }
+        let command = ValveCommand { alive: (cycle % 16) as u8, echo: cycle as u16, ..Default::default() };
+        peer.say(&Frame::DriveValveCommand(command));
+    });
+    let _ = emulator.wait().expect_code(0);
+    let log = bus_log(&scene.path("emulator/bus.log"));
+    let answers = log.iter().filter(|frame| matches!(Frame::decode(frame), Ok(Frame::DriveValveCommand(_))));
+    assert_eq!(answers.count(), CYCLES as usize);
 }
 
 #[test]

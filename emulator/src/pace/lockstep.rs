@@ -1,6 +1,6 @@
 //! The rig as the barrier's rig: as fast as all members allow, in simulated time.
 
-use super::{End, FAREWELL, RunContext, RunOutcome};
+use super::{End, RunContext, RunOutcome};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{BusError, Received};
 use protocol::can::CanFrame;
@@ -36,8 +36,10 @@ pub(crate) fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Resu
         if let Some(end) = context.after_cycle(cycles).or(left) {
             context.node.publish_end(cycles, context.bus);
             context.bus.done(cycle as u32);
-            // The members' last words belong into the log; a member that is gone says none.
-            let _ = wait_for_go(&mut context, &mut posted, cycles, FAREWELL);
+            // What the members answer to the last cycle belongs into the log, as of any other: a member that is gone answers
+            // nothing, and one that hangs ends nothing any more.
+            let patience = context.limits.cycle * 2;
+            let _ = wait_for_go(&mut context, &mut posted, cycles, patience);
             take(&mut posted, |frame, stamp_ns| context.node.take(frame, stamp_ns, cycles));
             break end;
         }

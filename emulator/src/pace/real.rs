@@ -1,6 +1,6 @@
 //! The rig on the machine's clock: one cycle each millisecond.
 
-use super::{End, FAREWELL, RunContext, RunOutcome};
+use super::{End, RunContext, RunOutcome};
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
 use protocol::commands::STALE_AFTER_CYCLES;
@@ -8,8 +8,10 @@ use protocol::periods::CYCLE;
 use realtime::{Clock, PeriodicConfig, PeriodicLoop, VitalsReader};
 use runlog::timing::CycleTiming;
 use runlog::timing_recorder::WARM_UP_CYCLES;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+/// How long the answers to the last cycles may still come in after the farewell.
+const FAREWELL: Duration = Duration::from_millis(30);
 /// How often the farewell is said in that time: a frame may be lost.
 const FAREWELLS: u32 = 3;
 /// Frames that may arrive between a cycle's start and a late loop's reading; they belong to the next cycle.
