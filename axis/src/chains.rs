@@ -31,8 +31,7 @@ mod sync;
 pub use fault::Fault;
 
 use protocol::frames::{ChainStatus, ChainValues, RunControl, RunControlCommand};
-
-const CYCLE_S: f64 = 1e-3;
+use protocol::periods::CYCLE_S;
 
 /// Cycles after which a partner that is needed counts as lost: ten periods of its status. Those that the axis answered itself
 /// count: when the rig skips cycles, or the own process is held up, the partner is not to blame.

@@ -21,13 +21,13 @@ use crate::set_point::{Actual, ForceSetPoint, SetPoint};
 use algorithms::algorithm::{Quantity, Ready};
 use algorithms::guard::{AlgorithmFault, Guarded};
 use protocol::frames::Sensors;
+use protocol::periods::CYCLE_S;
 use settings::parameters::{Declaration, OutOfRange, Parameter, declare};
 use std::ops::Range;
 
 /// Multiple of the basic cycle of a task; the first parameter of each.
 pub const EVERY_CYCLES: Declaration =
     declare("cycles", [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms").whole();
-const CYCLE_S: f64 = 1e-3;
 /// A task that is so many cycles late begins anew: a stall is no reason for a jump.
 const STALLED: u64 = 100;
 

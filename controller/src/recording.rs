@@ -15,7 +15,7 @@ use runlog::timing_recorder::TimingFigures;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
-use xcp::clerk::ParameterFileWorker;
+use xcp::parameter_files::ParameterFileWorker;
 
 const POLL_PERIOD: Duration = Duration::from_millis(4);
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
@@ -83,7 +83,7 @@ pub(crate) struct Writer {
     /// Who looks at the program files, if anybody does.
     pub(crate) reloader: Option<Reloader>,
     /// Who does what XCP asks for, if it may.
-    pub(crate) clerk: Option<ParameterFileWorker>,
+    pub(crate) parameter_files: Option<ParameterFileWorker>,
     /// Stamps of the stopwatch and their recorder, where time is real.
     pub(crate) timing: Option<TimingQueues>,
 }
@@ -99,7 +99,7 @@ impl Writer {
     /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
     /// which does not return, when an algorithm never does, with everything written.
     pub(crate) fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
-        let Self { mut tables, records, news, mut reloader, mut clerk, mut timing } = self;
+        let Self { mut tables, records, news, mut reloader, mut parameter_files, mut timing } = self;
         let mut reported = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
@@ -117,7 +117,7 @@ impl Writer {
                 }
             }
             reloader.iter_mut().for_each(Reloader::look);
-            clerk.iter_mut().for_each(ParameterFileWorker::look);
+            parameter_files.iter_mut().for_each(ParameterFileWorker::look);
             for item in news.try_iter() {
                 protocol::say!("controller: {}", sentence(item));
                 if let (NodeEvent::State { state: MainChainState::Fault, cycle, .. }, Some(timing)) =

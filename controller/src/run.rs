@@ -26,8 +26,8 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::time::Duration;
 use xcp::a2l::{self, Described};
-use xcp::clerk::{AxisParameters, ParameterFileWorker};
 use xcp::config::XcpConfig;
+use xcp::parameter_files::{AxisParameters, ParameterFileWorker};
 use xcp::port::{Port, Queues};
 
 /// Rows that fit the queue: 16 s of both axes.
@@ -104,7 +104,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (news_sender, news) = bounded(NEWS_QUEUE);
     let (change_sender, changes) = bounded(CHANGE_QUEUE);
     let outlets = Outlets { records: record_sender, news: news_sender, changes, waits: !real_time };
-    let (mut ports, clerk) = match &xcp {
+    let (mut ports, parameter_files) = match &xcp {
         Some(config) => open_xcp(arguments, &inputs, config, &controllers, &change_sender)?,
         None => (Vec::new(), None),
     };
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let asking = &signals.interrupt;
         let writer = scope.spawn(move || {
-            let writer = Writer { tables, records, news, reloader, clerk, timing };
+            let writer = Writer { tables, records, news, reloader, parameter_files, timing };
             writer.run(|| asking.ask(), || end_stuck(out, axes))
         });
         let bus = bus.as_mut();
@@ -131,7 +131,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     })
 }
 
-/// A port for each controller, and the clerk behind them; their A2L files go into the run's folder.
+/// A port for each controller, and the worker for their files; their A2L files go into the run's folder.
 fn open_xcp(
     arguments: &RunArguments,
     inputs: &Inputs,

@@ -61,14 +61,14 @@ pub(crate) fn in_words(model: &Model) -> String {
     };
     section("record", record(&model.record));
     section("inputs", model.inputs.iter().map(|one| input(model, one)).collect());
-    let own = |suspect: Option<usize>| suspect.is_none();
+    let is_of_model = |suspect: Option<usize>| suspect.is_none();
     section(
         "equations",
-        model.states.iter().filter(|one| own(one.suspect)).map(|one| equation(model, one)).collect(),
+        model.states.iter().filter(|one| is_of_model(one.suspect)).map(|one| equation(model, one)).collect(),
     );
     section("with", definitions(model, None).collect());
-    section("memory", model.memories.iter().filter(|one| own(one.suspect)).map(memory).collect());
-    let frictions = model.frictions.iter().filter(|one| own(one.suspect));
+    section("memory", model.memories.iter().filter(|one| is_of_model(one.suspect)).map(memory).collect());
+    let frictions = model.frictions.iter().filter(|one| is_of_model(one.suspect));
     section("friction", frictions.map(|one| friction(model, one)).collect());
     let output = |output: &model::Output| {
         let noise = output.noise_si.map_or("noise estimated".into(), |noise| {
@@ -89,7 +89,10 @@ pub(crate) fn in_words(model: &Model) -> String {
     };
     section("tables", model.tables.iter().map(table).collect());
     section("outputs", model.outputs.iter().map(output).collect());
-    section("parameters", model.parameters.iter().filter(|one| own(one.suspect)).map(parameter).collect());
+    section(
+        "parameters",
+        model.parameters.iter().filter(|one| is_of_model(one.suspect)).map(parameter).collect(),
+    );
     section("rows", rows(&model.rows));
     section("held out", vec![held_out(model.start_samples)]);
     section("fit", vec![fit(model.starts)]);
@@ -238,8 +241,8 @@ fn equation(model: &Model, state: &model::State) -> String {
 
 /// Definitions of the model itself, or of a suspect.
 fn definitions(model: &Model, suspect: Option<usize>) -> impl Iterator<Item = String> {
-    let own = model.definitions.iter().enumerate().filter(move |(_, one)| one.suspect == suspect);
-    own.map(|(index, one)| {
+    let of_suspect = model.definitions.iter().enumerate().filter(move |(_, one)| one.suspect == suspect);
+    of_suspect.map(|(index, one)| {
         format!("{} = {}    in {}", one.name, one.value.text, model.definition_unit(index).text)
     })
 }

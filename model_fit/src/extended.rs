@@ -79,9 +79,9 @@ impl ReportedModel {
 }
 
 /// The first line that one of both lacks; none where the report has none at all.
-fn difference(reported: &[String], own: &[String]) -> Option<String> {
-    let unknown = reported.iter().find(|line| !own.contains(line));
-    let added = own.iter().find(|line| !reported.contains(line));
+fn difference(reported: &[String], in_file: &[String]) -> Option<String> {
+    let unknown = reported.iter().find(|line| !in_file.contains(line));
+    let added = in_file.iter().find(|line| !reported.contains(line));
     unknown.or(added).filter(|_| !reported.is_empty()).cloned()
 }
 
@@ -194,8 +194,8 @@ fn find_again(table: &mut Table, folder: &Path) {
 
 /// What reports call a suspect or a term: its name, else that in its library.
 fn name_of(table: &dyn TableLike, folder: &Path) -> Option<String> {
-    let own = table.get("name").and_then(Item::as_str);
-    own.map(str::to_owned).or_else(|| library_of(table, folder).map(|found| found.entry().name.clone()))
+    let given = table.get("name").and_then(Item::as_str);
+    given.map(str::to_owned).or_else(|| library_of(table, folder).map(|found| found.entry().name.clone()))
 }
 
 /// Writes fitted numbers over the values of a table's parameters. One at an end of its range keeps that of the file.
@@ -206,9 +206,9 @@ fn put(table: &mut dyn TableLike, report: &ReportedModel, (suspect, folder): (Op
     let parameters = match table.get_mut("parameters") {
         None if library.is_none() => return,
         None => {
-            let mut own = Table::new();
-            own.set_dotted(true);
-            table.entry("parameters").or_insert(Item::Table(own))
+            let mut dotted = Table::new();
+            dotted.set_dotted(true);
+            table.entry("parameters").or_insert(Item::Table(dotted))
         }
         Some(parameters) => parameters,
     };

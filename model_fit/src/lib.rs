@@ -29,7 +29,7 @@
 //! | `structure` | which suspects can be told apart, before any fit |
 //! | `sensors` | which state, measured, would tell suspects apart |
 //! | `adequacy` | whether what is left is noise |
-//! | `watch` | progress of work that takes long |
+//! | `progress` | progress of work that takes long |
 //! | `report` | the report |
 //! | `explain`, `explain_page` | equations, units, suspects in words; on a page |
 //! | `page` | the page |
@@ -69,6 +69,7 @@ mod normal;
 mod page;
 mod pairs;
 mod processing;
+mod progress;
 mod record;
 mod report;
 mod samples;
@@ -81,7 +82,6 @@ mod term_curves;
 mod typeset;
 mod unit_row;
 mod verdict;
-mod watch;
 
 pub use adequacy::Residual;
 pub use begin::{NewError, NewModel, Roles, new_model};
@@ -215,8 +215,9 @@ pub fn close_with(
         )),
         _ => discover::grown(&found.baseline),
     });
-    let located =
-        watch::watched(progress, ("where it comes from: steps", 1), |_| discover::located(&found.baseline));
+    let located = progress::with_progress(progress, ("where it comes from: steps", 1), |_| {
+        discover::located(&found.baseline)
+    });
     let (found, mut report) = match &grown {
         None => {
             let report = report::report(file, &found, &structure);

@@ -33,7 +33,7 @@ const FAR: f64 = 10.0;
 const ASIDE: usize = 2;
 /// Correlation below which a model runs against the record; above which a column is that of the model, and below which not.
 const AGAINST: f64 = -0.7;
-const ALIKE: f64 = 0.85;
+const SAME_SHAPE: f64 = 0.85;
 const UNLIKE: f64 = 0.5;
 
 /// Size of a model at the values of its file over that of the record, or the other way round, from which on a unit is doubted.
@@ -242,7 +242,7 @@ fn of_record(model: &Model, record: &Measured) -> Vec<String> {
             Some((correlation(&said[output], &exchanged.outputs[output]), &of.column))
         });
         let best = like.chain(exchanged).max_by(|one, other| one.0.total_cmp(&other.0));
-        if let Some((best, column)) = best.filter(|(best, _)| *best > ALIKE) {
+        if let Some((best, column)) = best.filter(|(best, _)| *best > SAME_SHAPE) {
             notes.push(format!(
                 "before the fit the model of {name} is not like column {} (correlation {own:.2}), and with {column} in its place \
                  it is ({best:.2}): are columns exchanged?",

@@ -14,10 +14,10 @@
 
 use super::fit::{Fitting, What};
 use super::judge::{Evaluation, GAIN_APART, Sides, judge};
+use super::progress::Done;
 use super::select::{Fitted, Found, fitted_from};
 use super::starts;
 use super::structure::{self, Beside};
-use super::watch::Done;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -138,15 +138,15 @@ fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Re
     let (taken, values_si, scale) = (&base.suspects[..], &point.values_si[..], &beside.scale[..]);
     let base = structure::Base { fitting, taken, values_si, scale };
     let of_suspect = |(suspect, fit): &&(usize, Fitted<'_>)| -> Vec<Response> {
-        let own = |values_si: &[f64]| -> Vec<(What, f64)> {
+        let of_this = |values_si: &[f64]| -> Vec<(What, f64)> {
             let all = fit.fitting.unknowns.iter().zip(values_si);
-            let own = all.filter(|(unknown, _)| fit.fitting.suspect_of(unknown) == Some(*suspect));
-            own.map(|(unknown, value)| (unknown.what, *value)).collect()
+            let chosen = all.filter(|(unknown, _)| fit.fitting.suspect_of(unknown) == Some(*suspect));
+            chosen.map(|(unknown, value)| (unknown.what, *value)).collect()
         };
         let points = starts::of_newest(&fit.fitting, &fit.suspects, (fitting, point));
         let points = points.iter().map(Vec::as_slice).chain([fit.point.values_si.as_slice()]);
         let response = |values_si: &[f64]| {
-            let values_si = own(values_si);
+            let values_si = of_this(values_si);
             let change = beside.rest(base.changed(*suspect, &values_si).ok()? - &beside.said);
             let size = change.norm_squared();
             let gain = change.dot(&beside.left);

@@ -14,9 +14,9 @@ use super::folds::{Folds, folds, refitted, steps};
 use super::judge::{Evaluation, SHARE_FLOOR, Sides, apart, is_one_effect, judge, most_share, weigh};
 use super::normal::Normal;
 use super::pairs::{self, Pair};
+use super::progress::{Done, with_progress};
 use super::record::Measured;
 use super::starts;
-use super::watch::{Done, watched};
 use crate::estimator::Convergence;
 use model::{Failure, Model, Program};
 use nalgebra::DVector;
@@ -91,7 +91,7 @@ pub(crate) fn search<'a>(
     records: &'a [Measured],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Found<'a>, Failure> {
-    let baseline = watched(progress, ("the model alone: fits", 2), |done| {
+    let baseline = with_progress(progress, ("the model alone: fits", 2), |done| {
         let first = fitted(model, records, &[], None)?;
         done.one_more();
         // Once more from there: suspects are fitted from its values, and must gain nothing by that alone.
@@ -112,7 +112,7 @@ pub(crate) fn search<'a>(
         let taken = found.extended.suspects.clone();
         let is_open = |suspect: &usize| !taken.contains(suspect) && !model.suspects[*suspect].is_term;
         let open: Vec<usize> = (0..model.suspects.len()).filter(is_open).collect();
-        let round = watched(progress, ("fits of suspects", open.len()), |done| {
+        let round = with_progress(progress, ("fits of suspects", open.len()), |done| {
             let with = |suspect: &usize| {
                 let suspects: Vec<usize> = taken.iter().copied().chain([*suspect]).collect();
                 let fit = fitted(model, records, &suspects, Some(&found.extended));
@@ -149,8 +149,9 @@ pub(crate) fn search<'a>(
         let best = passing.clone().max_by(|a, b| value(*a).total_cmp(&value(*b)));
         if best.is_none() && found.taken.is_empty() {
             let alone: Vec<(usize, Fitted<'a>)> = tried.into_iter().zip(fits).collect();
-            let pair =
-                watched(progress, ("fits of pairs", pairs::FITTED), |done| pairs::best(&found, &alone, done));
+            let pair = with_progress(progress, ("fits of pairs", pairs::FITTED), |done| {
+                pairs::best(&found, &alone, done)
+            });
             match pair {
                 Ok(pair) => found.take_pair(pair, progress),
                 Err(why) => {
@@ -219,7 +220,7 @@ impl<'a> Found<'a> {
             as_good.chain(near).collect::<Vec<_>>()
         };
         let all: Vec<_> = self.taken.iter().flat_map(of).collect();
-        watched(progress, ("fits in place of what was named", all.len()), |done| {
+        with_progress(progress, ("fits in place of what was named", all.len()), |done| {
             all.into_par_iter().map(|one| in_place(one, done)).collect()
         })
     }

@@ -31,7 +31,7 @@ const OWN_ROWS: usize = 14_400;
 const OWN: [usize; 2] = [4, 24];
 /// Of a suspect's values and points those that are fitted beside the first, and the cosine of what two do that are one start.
 const PROMISING: usize = 6;
-const ALIKE: f64 = 0.999;
+const SAME_DIRECTION: f64 = 0.999;
 /// Points of the sequence that are kept.
 const KEPT: usize = 3;
 /// Steps of each round, and how many of those that have come lowest go on.
@@ -114,7 +114,7 @@ fn promising(
     others.sort_by(|one, other| other.0.total_cmp(&one.0));
     let mut kept: Vec<DVector<f64>> = Vec::new();
     for (_, direction, values) in others {
-        if kept.len() < PROMISING && kept.iter().all(|known| known.dot(&direction) < ALIKE) {
+        if kept.len() < PROMISING && kept.iter().all(|known| known.dot(&direction) < SAME_DIRECTION) {
             kept.push(direction);
             all.push(values);
         }

@@ -259,13 +259,13 @@ impl<'a> Base<'a> {
     }
 
     /// Scaled outputs with a suspect at these values, or its first; all other numbers as they are.
-    pub(super) fn changed(self, suspect: usize, own: &[(What, f64)]) -> Result<DVector<f64>, Failure> {
-        let (extended, values_si) = self.beside(suspect, own);
+    pub(super) fn changed(self, suspect: usize, of_suspect: &[(What, f64)]) -> Result<DVector<f64>, Failure> {
+        let (extended, values_si) = self.beside(suspect, of_suspect);
         Ok(DVector::from_vec(extended.said(&values_si, self.scale)?))
     }
 
     /// The fit with one suspect more, and its numbers.
-    fn beside(self, suspect: usize, own: &[(What, f64)]) -> (Fitting<'a>, Vec<f64>) {
+    fn beside(self, suspect: usize, of_suspect: &[(What, f64)]) -> (Fitting<'a>, Vec<f64>) {
         let Base { fitting, taken, values_si, .. } = self;
         let mut suspects = taken.to_vec();
         suspects.push(suspect);
@@ -273,8 +273,8 @@ impl<'a> Base<'a> {
         let extended = Fitting::new(fitting.model, program, fitting.records, &suspects);
         let known = |what| fitting.unknowns.iter().position(|unknown| unknown.what == what);
         let value = |unknown: &Unknown| {
-            let own = own.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
-            own.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
+            let of_it = of_suspect.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
+            of_it.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
         };
         let values_si = extended.unknowns.iter().map(value).collect();
         (extended, values_si)

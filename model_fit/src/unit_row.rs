@@ -5,7 +5,7 @@ use model::{Dimension, Model, Unit, with_powers};
 use records::UnitRow;
 
 /// Relative difference of two units that counts as none: roundings of their factors.
-const ALIKE: f64 = 1e-9;
+const FACTOR_TOLERANCE: f64 = 1e-9;
 
 /// A unit of the row that is not that of the model file.
 #[derive(Debug, thiserror::Error)]
@@ -58,7 +58,7 @@ pub(super) fn compared(model: &Model, file: &str, row: &UnitRow) -> Result<Optio
             unread.push(format!("'{cell}' of {}", read.column));
             continue;
         };
-        if unit.dimension != read.dimension || (unit.factor / read.factor - 1.0).abs() > ALIKE {
+        if unit.dimension != read.dimension || (unit.factor / read.factor - 1.0).abs() > FACTOR_TOLERANCE {
             let (file, line, column) = (file.to_owned(), row.line, read.column.to_owned());
             let (written, read, table) = (unit.text, read.words, read.table);
             let other = OtherUnit { file, line, column, written, read, table };

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   guest ── TX_SETUP, TX_SEND, TX_DELETE, TX_READ ──► jobs that send (transmit.rs)  ── frames ──► the interface
-//!         ── RX_SETUP, RX_DELETE, RX_READ ───────────► jobs that watch (watch.rs)    ◄── frames ── the interface
+//!         ── RX_SETUP, RX_DELETE, RX_READ ───────────► subscriptions (subscription.rs) ◄── frames ── the interface
 //!         ◄── TX_EXPIRED, TX_STATUS, RX_CHANGED, RX_TIMEOUT, RX_STATUS ── both
 //! ```
 //!
@@ -13,15 +13,15 @@
 //! Source: Linux 6.1 `net/can/bcm.c`, `include/uapi/linux/can/bcm.h`.
 
 mod message;
+mod subscription;
 mod transmit;
-mod watch;
 
 use crate::bus_peer::FrameBytes;
 use message::{Head, opcode};
 use rustix::io::Errno;
 use std::time::Instant;
+use subscription::Subscription;
 use transmit::Transmission;
-use watch::Watch;
 
 /// `MAX_NFRAMES`.
 const MOST_FRAMES: u32 = 256;
@@ -41,7 +41,7 @@ pub(crate) enum Action {
 #[derive(Debug, Default)]
 pub(crate) struct BroadcastManager {
     transmissions: Vec<Transmission>,
-    watches: Vec<Watch>,
+    subscriptions: Vec<Subscription>,
 }
 
 impl BroadcastManager {
@@ -60,9 +60,9 @@ impl BroadcastManager {
         let (head, frames) = Head::read(bytes)?;
         match head.opcode {
             opcode::TX_SETUP => self.set_up_transmission(&head, frames, interface, now, actions),
-            opcode::RX_SETUP => self.set_up_watch(&head, frames, interface, now, actions),
+            opcode::RX_SETUP => self.subscribe(&head, frames, interface, now, actions),
             opcode::TX_DELETE => delete(&mut self.transmissions, |job| job.is(&head, interface)),
-            opcode::RX_DELETE => delete(&mut self.watches, |job| job.is(&head, interface)),
+            opcode::RX_DELETE => delete(&mut self.subscriptions, |job| job.is(&head, interface)),
             opcode::TX_READ => {
                 let job =
                     self.transmissions.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
@@ -70,7 +70,8 @@ impl BroadcastManager {
                 Ok(message::HEAD_BYTES)
             }
             opcode::RX_READ => {
-                let job = self.watches.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
+                let job =
+                    self.subscriptions.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
                 actions.push(Action::Tell(interface, job.status()));
                 Ok(message::HEAD_BYTES)
             }
@@ -114,7 +115,7 @@ impl BroadcastManager {
         }
     }
 
-    fn set_up_watch(
+    fn subscribe(
         &mut self,
         head: &Head,
         frames: Vec<FrameBytes>,
@@ -122,14 +123,14 @@ impl BroadcastManager {
         now: Instant,
         actions: &mut Vec<Action>,
     ) -> Result<usize, Errno> {
-        let head = watch::normal(head)?;
+        let head = subscription::normal(head)?;
         let frames = head.announced(frames)?;
-        match self.watches.iter_mut().find(|job| job.is(&head, interface)) {
+        match self.subscriptions.iter_mut().find(|job| job.is(&head, interface)) {
             Some(job) => job.set_up(&head, &frames, now, actions),
             None => {
-                let mut job = Watch::new(&head, interface, &frames);
+                let mut job = Subscription::new(&head, interface, &frames);
                 let taken = job.set_up(&head, &frames, now, actions)?;
-                self.watches.push(job);
+                self.subscriptions.push(job);
                 Ok(taken)
             }
         }
@@ -143,19 +144,19 @@ impl BroadcastManager {
         now: Instant,
         actions: &mut Vec<Action>,
     ) {
-        self.watches.iter_mut().for_each(|job| job.take_frame(interface, frame, now, actions));
+        self.subscriptions.iter_mut().for_each(|job| job.take_frame(interface, frame, now, actions));
     }
 
     /// When the next job has something to do.
     pub(crate) fn due(&self) -> Option<Instant> {
         let sending = self.transmissions.iter().filter_map(Transmission::due);
-        sending.chain(self.watches.iter().filter_map(Watch::due)).min()
+        sending.chain(self.subscriptions.iter().filter_map(Subscription::due)).min()
     }
 
     /// Does what is due.
     pub(crate) fn advance(&mut self, now: Instant, actions: &mut Vec<Action>) {
         self.transmissions.iter_mut().for_each(|job| job.advance(now, actions));
-        self.watches.iter_mut().for_each(|job| job.advance(now, actions));
+        self.subscriptions.iter_mut().for_each(|job| job.advance(now, actions));
     }
 }
 

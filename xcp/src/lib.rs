@@ -5,7 +5,7 @@
 //!       ◄ 0x1E1 ──┘          ├── lock: seed and key                      0x1E2 and 0x1E3: the load's
 //!                            ├── daq: lists
 //!                            └── trace: trigger buffer
-//!                 port ─► queue ─► clerk, in the recorder's thread: files, messages
+//!                 port ─► queue ─► parameter_files, in the recorder's thread: files, messages
 //! ```
 //!
 //! Off unless `--xcp` asks for it. [`slave`] is a function over bytes; [`port`] puts it on the bus, after the commands to the
@@ -14,12 +14,12 @@
 
 pub mod a2l;
 pub mod alone;
-pub mod clerk;
 pub mod config;
 pub mod daq;
 pub mod image;
 pub mod lock;
 pub mod packet;
+pub mod parameter_files;
 pub mod port;
 pub mod signals;
 pub mod slave;

@@ -3,15 +3,15 @@
 //!
 //! In real time a command is answered in the wake-up that it causes, in lockstep in its cycle. At most [`COMMANDS`] are
 //! answered at a time and [`INBOX`] wait; what a flood brings beyond that is dropped and counted. Nothing here allocates,
-//! locks, prints or blocks: what needs a file goes to the [`crate::clerk`] by a queue.
+//! locks, prints or blocks: what needs a file goes to the worker of [`crate::parameter_files`] by a queue.
 
 use crate::a2l::{self, A2lError, Described};
-use crate::clerk::{Note, Returned};
 use crate::config::XcpConfig;
 use crate::identifiers;
 use crate::image::{Image, ParameterActions};
 use crate::lock::Lock;
 use crate::packet::{BYTES, Packet};
+use crate::parameter_files::{Note, Returned};
 use crate::signals::{self, View};
 use crate::slave::{Slave, SlaveCounters, SlaveParts};
 use axis_control::axis::AxisController;
@@ -42,7 +42,7 @@ pub struct PortCounters {
     pub changed: u64,
 }
 
-/// The queues between a port and the clerk.
+/// The queues between a port and the worker for files.
 pub struct Queues {
     pub notes: Sender<Note>,
     pub returned: Receiver<Returned>,
@@ -100,7 +100,7 @@ pub struct Port {
     response_id: u16,
     slave: Slave,
     queues: Queues,
-    /// Room for a copy of the parameters; gone while the clerk has it.
+    /// Room for a copy of the parameters; gone while the worker for files has it.
     spare: Option<Vec<f64>>,
     inbox: VecDeque<CanFrame>,
     cycle: u64,

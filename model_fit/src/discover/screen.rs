@@ -25,11 +25,11 @@ const DETERMINED: f64 = 1e-10;
 /// Pairs of complementary halves.
 const PAIRS: usize = 25;
 /// Cosine of two terms that count as one in the stability.
-const ALIKE: f64 = 0.8;
+const SAME_DIRECTION: f64 = 0.8;
 
 /// Responses to all terms beside a fitted model.
 pub(super) struct Screen {
-    own: DMatrix<f64>,
+    sensitivities: DMatrix<f64>,
     terms: DMatrix<f64>,
     left: DVector<f64>,
     block_of: Vec<usize>,
@@ -40,11 +40,15 @@ pub(super) struct Screen {
 /// Sums over some rows.
 #[derive(Clone)]
 struct Sums {
-    own: DMatrix<f64>,
-    mixed: DMatrix<f64>,
+    /// Of products of sensitivities.
+    information: DMatrix<f64>,
+    /// Of sensitivities with terms.
+    cross: DMatrix<f64>,
     squares: DVector<f64>,
-    own_left: DVector<f64>,
-    left: DVector<f64>,
+    /// Of sensitivities with what is left.
+    scores: DVector<f64>,
+    /// Of terms with what is left.
+    term_scores: DVector<f64>,
 }
 
 /// Gain and coefficient of each term; both 0 of one that looks like the model's own numbers.
@@ -66,7 +70,7 @@ impl Screen {
             .map(|output| fitting.variance(output, fitted.point.squares[output]).sqrt().recip())
             .collect();
         let (slopes, values) = fitting.sensitivities(&fitted.point.values_si, &scale).ok()?;
-        let own = DMatrix::from_row_slice(values.len(), fitting.unknowns.len(), &slopes);
+        let sensitivities = DMatrix::from_row_slice(values.len(), fitting.unknowns.len(), &slopes);
         let cut = fitting.in_time();
         let (mut left, mut block_of) = (Vec::new(), Vec::new());
         for (record, blocks) in fitting.records.iter().zip(&cut.block_of) {
@@ -89,7 +93,7 @@ impl Screen {
         }
         let left = DVector::from_vec(left);
         let whole = Projected { gains: Vec::new(), coefficients_si: Vec::new() };
-        let mut screen = Self { own, terms, left, block_of, blocks: cut.blocks, whole };
+        let mut screen = Self { sensitivities, terms, left, block_of, blocks: cut.blocks, whole };
         let sums = screen.sums();
         let whole = sums.iter().skip(1).fold(sums[0].clone(), Sums::plus);
         screen.whole = whole.projected();
@@ -123,18 +127,18 @@ impl Screen {
 
     /// Share of what is left, beyond what the model's own numbers explain, that some terms explain together.
     pub(super) fn share(&self, terms: &[usize]) -> f64 {
-        let (own, left) = (self.rest(self.terms.select_columns(terms)), self.left_rest());
-        let along = own.tr_mul(&left);
-        let explained = (along.transpose() * inverse(&own.tr_mul(&own)) * &along)[(0, 0)];
+        let (rest, left) = (self.rest(self.terms.select_columns(terms)), self.left_rest());
+        let along = rest.tr_mul(&left);
+        let explained = (along.transpose() * inverse(&rest.tr_mul(&rest)) * &along)[(0, 0)];
         (explained / left.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     }
 
     /// Those of some terms that do not look like the model's own numbers, and the coefficients by which they explain most
     /// together.
     pub(super) fn together(&self, terms: &[usize]) -> (Vec<usize>, Vec<f64>) {
-        let own = self.rest(self.terms.select_columns(terms));
-        let coefficients_si = inverse(&own.tr_mul(&own)) * own.tr_mul(&self.left_rest());
-        let all = terms.iter().zip(own.column_iter()).zip(coefficients_si.iter());
+        let rest = self.rest(self.terms.select_columns(terms));
+        let coefficients_si = inverse(&rest.tr_mul(&rest)) * rest.tr_mul(&self.left_rest());
+        let all = terms.iter().zip(rest.column_iter()).zip(coefficients_si.iter());
         let apart = all.filter(|((_, change), _)| change.norm_squared() > 0.0);
         apart.map(|((term, _), coefficient_si)| (*term, *coefficient_si)).unzip()
     }
@@ -155,8 +159,9 @@ impl Screen {
     }
 
     fn beyond(&self, change: DMatrix<f64>) -> DMatrix<f64> {
-        let taken = inverse(&self.own.tr_mul(&self.own)) * self.own.tr_mul(&change);
-        change - &self.own * taken
+        let taken =
+            inverse(&self.sensitivities.tr_mul(&self.sensitivities)) * self.sensitivities.tr_mul(&change);
+        change - &self.sensitivities * taken
     }
 
     /// Share of halves of the blocks in which the best term is this one or one that does nearly the same.
@@ -176,7 +181,7 @@ impl Screen {
                 let rest = half[1..].iter().map(|block| &sums[*block]);
                 let gains = rest.fold(sums[half[0]].clone(), |sum, block| sum.plus(block)).projected().gains;
                 let best = (0..gains.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).expect("a term");
-                let is_it = || self.direction(best).dot(&direction).abs() > ALIKE;
+                let is_it = || self.direction(best).dot(&direction).abs() > SAME_DIRECTION;
                 wins += usize::from(best == term || is_it());
             }
         }
@@ -186,35 +191,35 @@ impl Screen {
     /// What a term does to the outputs that the model's own numbers cannot do, of length 1.
     fn direction(&self, term: usize) -> DVector<f64> {
         let change = self.terms.column(term).into_owned();
-        let inverse = inverse(&self.own.tr_mul(&self.own));
-        let rest = &change - &self.own * (inverse * self.own.tr_mul(&change));
+        let inverse = inverse(&self.sensitivities.tr_mul(&self.sensitivities));
+        let rest = &change - &self.sensitivities * (inverse * self.sensitivities.tr_mul(&change));
         let norm = rest.norm();
         if norm > 0.0 { rest / norm } else { rest }
     }
 
     /// Sums of each block; the last holds rows that judge nothing.
     fn sums(&self) -> Vec<Sums> {
-        let (own, terms) = (self.own.ncols(), self.terms.ncols());
+        let (numbers, terms) = (self.sensitivities.ncols(), self.terms.ncols());
         let zero = Sums {
-            own: DMatrix::zeros(own, own),
-            mixed: DMatrix::zeros(own, terms),
+            information: DMatrix::zeros(numbers, numbers),
+            cross: DMatrix::zeros(numbers, terms),
             squares: DVector::zeros(terms),
-            own_left: DVector::zeros(own),
-            left: DVector::zeros(terms),
+            scores: DVector::zeros(numbers),
+            term_scores: DVector::zeros(terms),
         };
         let of_block = |block: usize| {
             let rows: Vec<usize> = (0..self.left.len()).filter(|row| self.block_of[*row] == block).collect();
             if rows.is_empty() {
                 return zero.clone();
             }
-            let (own, terms) = (self.own.select_rows(&rows), self.terms.select_rows(&rows));
+            let (slopes, terms) = (self.sensitivities.select_rows(&rows), self.terms.select_rows(&rows));
             let left = self.left.select_rows(&rows);
             Sums {
-                mixed: own.tr_mul(&terms),
+                cross: slopes.tr_mul(&terms),
                 squares: DVector::from_iterator(terms.ncols(), terms.column_iter().map(|g| g.norm_squared())),
-                own_left: own.tr_mul(&left),
-                left: terms.tr_mul(&left),
-                own: own.tr_mul(&own),
+                scores: slopes.tr_mul(&left),
+                term_scores: terms.tr_mul(&left),
+                information: slopes.tr_mul(&slopes),
             }
         };
         (0..=self.blocks).into_par_iter().map(of_block).collect()
@@ -223,21 +228,21 @@ impl Screen {
 
 impl Sums {
     fn plus(mut self, other: &Self) -> Self {
-        self.own += &other.own;
-        self.mixed += &other.mixed;
+        self.information += &other.information;
+        self.cross += &other.cross;
         self.squares += &other.squares;
-        self.own_left += &other.own_left;
-        self.left += &other.left;
+        self.scores += &other.scores;
+        self.term_scores += &other.term_scores;
         self
     }
 
     fn projected(&self) -> Projected {
-        let inverse = inverse(&self.own);
-        let along = self.mixed.tr_mul(&(&inverse * &self.own_left));
-        let taken = &inverse * &self.mixed;
+        let inverse = inverse(&self.information);
+        let along = self.cross.tr_mul(&(&inverse * &self.scores));
+        let taken = &inverse * &self.cross;
         let of = |term: usize| {
-            let squares = self.squares[term] - self.mixed.column(term).dot(&taken.column(term));
-            let product = self.left[term] - along[term];
+            let squares = self.squares[term] - self.cross.column(term).dot(&taken.column(term));
+            let product = self.term_scores[term] - along[term];
             if squares > HIDDEN * self.squares[term] && product.is_finite() {
                 (product * product / squares, product / squares)
             } else {

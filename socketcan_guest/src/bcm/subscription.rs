@@ -1,4 +1,4 @@
-//! A job that watches an identifier: tells of frames whose content changed, at most every `ival2`, and of silence after `ival1`.
+//! A subscription to an identifier: tells of frames whose content changed, at most every `ival2`, and of silence after `ival1`.
 //!
 //! With one frame in its list, that frame is the mask of the bits that count. With more, the first is the mask of a multiplexer:
 //! each other one tells by its bits under that mask which of them a frame is compared with.
@@ -23,7 +23,7 @@ struct Last {
 
 /// A job, by identifier and interface.
 #[derive(Debug)]
-pub(super) struct Watch {
+pub(super) struct Subscription {
     interface: u32,
     head: Head,
     frames: Vec<FrameBytes>,
@@ -50,11 +50,11 @@ pub(super) fn normal(head: &Head) -> Result<Head, Errno> {
     Ok(head)
 }
 
-impl Watch {
+impl Subscription {
     pub(super) fn new(head: &Head, interface: u32, frames: &[FrameBytes]) -> Self {
         Self {
             interface,
-            // A watch has no count; its times are taken over where they are set.
+            // A subscription has no count; its times are taken over where they are set.
             head: Head { count: 0, interval_1: Default::default(), interval_2: Default::default(), ..*head },
             frames: frames.to_vec(),
             last: vec![None; frames.len().max(1)],

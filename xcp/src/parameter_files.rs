@@ -47,7 +47,7 @@ pub struct Returned {
     pub stored: bool,
 }
 
-/// An axis of the clerk.
+/// An axis with an XCP port.
 pub struct AxisParameters {
     pub axis: Axis,
     pub variables: Vec<Variable>,
@@ -71,7 +71,7 @@ pub fn file_name(axis: Axis) -> String {
 }
 
 impl ParameterFileWorker {
-    /// A clerk for these axes, with the run's folder.
+    /// A worker for these axes, with the run's folder.
     pub fn new(
         notes: Receiver<Note>,
         axes: Vec<AxisParameters>,

@@ -16,7 +16,7 @@ impl Done {
 }
 
 /// Does work on another thread, and says every ten seconds how much of it is done.
-pub(super) fn watched<T: Send>(
+pub(super) fn with_progress<T: Send>(
     progress: &mut dyn FnMut(&str),
     (what, parts): (&str, usize),
     work: impl FnOnce(&Done) -> T + Send,
