@@ -15,7 +15,7 @@
 //! - A study of both worlds ([`worlds`]) records both axes, and its draws take turns in the world where the catalogue's laws
 //!   are exact and the one where everything is a little wrong, in the catalogue's form and in another.
 //!
-//! Source: issue 5 and effects.md, Blind protocol of discrepancy-notes.md; issue 32.
+//! Source: effects.md; discrepancy-notes.md, Blind protocol.
 
 mod worlds;
 

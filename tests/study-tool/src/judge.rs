@@ -1,7 +1,7 @@
 //! One case: what was hidden against what was named.
 //!
 //! An effect's *class* are all (effect, place) whose signature in this very record is more than 0.95 alike
-//! ([`super::classes`]), and itself. The rules, from issue 6:
+//! ([`super::classes`]), and itself. The rules:
 //!
 //! - A name is *right* when it is of the class, and at most two names stand beside those that are. Said as `ambiguous`, it is
 //!   right only where the class has more than one effect, when one of its alternatives or itself is of the class, and at most

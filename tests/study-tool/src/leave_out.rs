@@ -6,7 +6,7 @@
 //! ```
 //!
 //! An effect is left out as a whole, at all its places, and with it every effect that is its twin in this very record
-//! ([`super::classes`]); where the classes of a draw are not known, only the effect itself. The rules, from issue 6:
+//! ([`super::classes`]); where the classes of a draw are not known, only the effect itself. The rules:
 //!
 //! - *No wrong name*: there is a good report and nothing of the catalogue is named in it. A parameter of the baseline is no name.
 //! - The *balance* is right when it is one that `outside-expected.json` has for the effect, on the axis that the effect is at;
@@ -16,7 +16,7 @@
 //! - The gap *still closes* for effects without memory: a term over what is measured can stand in for them. With memory are those
 //!   for which the plant keeps something from step to step (`plant/src/effects/memory.rs`).
 //!
-//! Source: issue 6, What must be seen, 4; `discrepancy/docs/outside-expected.md`.
+//! Source: `discrepancy/docs/outside-expected.md`.
 
 use crate::classes::DrawClasses;
 use crate::draws::{Draw, axis_of};

@@ -19,7 +19,7 @@
 //! An effect that is seen at the weakest that a rig file takes (a stiffness or a coefficient that would have to be larger) has
 //! no limit either: it is always seen.
 //!
-//! Limits are computed from the plant and committed before any program is judged. Source: issue 5.
+//! Limits are computed from the plant and committed before any program is judged.
 
 use crate::draws::{axis_of, needs_both_axes};
 use crate::signature::{Observer, length};

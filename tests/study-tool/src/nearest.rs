@@ -8,7 +8,7 @@
 //! there is no background. The fit is Gauss-Newton in the coordinates of a candidate, from the drawn numbers, and ends where no
 //! shortened step falls. A number that the record hardly shows stays near the drawn one.
 //!
-//! Source: issue 32 (the true number of another form is that of the best fit). White 1982, Econometrica 50(1): what the fit of a
+//! The true number of another form is that of the best fit. Source: White 1982, Econometrica 50(1): what the fit of a
 //! misspecified model converges to.
 
 use crate::classes::with_parameter;

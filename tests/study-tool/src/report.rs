@@ -3,8 +3,6 @@
 //! What cannot be read is a result like any other: the program wrote no good report. So is a name that the catalogue does not
 //! have, a place that the effect cannot be at, a number that is none, a verdict that its own list contradicts. Fields that the
 //! study does not judge are not looked at.
-//!
-//! Source: the schema in issue 6, Output.
 
 pub use discrepancy::report::Verdict;
 use plant::effects::sheet::{Place, Sheet};

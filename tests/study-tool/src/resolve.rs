@@ -18,8 +18,6 @@
 //! - *Error*: no good report, an experiment that cannot be run, or one that the program does not propose again.
 //!
 //! Draws of one effect alone are looked at: of several, an ambiguity between two is not one draw's own.
-//!
-//! Source: issue 6, Acceptance 5.
 
 pub mod tables;
 

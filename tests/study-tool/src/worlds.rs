@@ -1,7 +1,5 @@
 //! A study of two worlds as one table: what the program says where the catalogue's laws are exact, and where everything is a
 //! little wrong.
-//!
-//! Source: issue 32, What must be seen.
 
 use crate::draws::Kind;
 use crate::interval::Rate;

@@ -40,8 +40,6 @@ def scored(report: bytes) -> bytes:
     own["location"] = {"dependence": dependence}
     own["candidates"] = []
     own["detection_limits"] = []
-    for explanation in own.get("explanations") or []:
-        explanation.pop("evidence", None)
     if own.get("outside"):
         own["outside"]["curve"] = None
         own["outside"]["surface"] = None

@@ -10,8 +10,6 @@
 //! Both axes are recorded, so that the place of an effect is a question. Every tenth amplitude lies beyond the drawn range, where
 //! a rig file takes that. The smallest that is drawn is the smallest of the sheet: what lies below is background, which nobody
 //! is asked to name.
-//!
-//! Source: issue 32.
 
 use super::Generator;
 use crate::limits::Scale;

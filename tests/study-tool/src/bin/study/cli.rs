@@ -234,7 +234,7 @@ pub(crate) struct CompareArguments {
     /// Where the tables are written; without it they are printed.
     #[arg(long)]
     pub(crate) to: Option<PathBuf>,
-    /// Writes the tables into tests/docs/study.md.
+    /// Writes the tables into tests/docs/study-earlier.md.
     #[arg(long)]
     pub(crate) write: bool,
 }
@@ -247,7 +247,7 @@ pub(crate) struct CurveArguments {
     /// Folder for curve-LABEL.md and curve-LABEL.svg.
     #[arg(long)]
     pub(crate) to: PathBuf,
-    /// Writes the tables into tests/docs/study.md, and the picture beside it.
+    /// Writes the tables into tests/docs/study-earlier.md, and the picture beside it.
     #[arg(long)]
     pub(crate) write: bool,
 }
@@ -267,7 +267,7 @@ pub(crate) struct ResolveArguments {
     /// What the results are called; those with the proposed experiments stand under LABEL-resolve.
     #[arg(long, default_value = "program")]
     pub(crate) label: String,
-    /// Writes the table into tests/docs/study.md.
+    /// Writes the table into tests/docs/study-earlier.md.
     #[arg(long)]
     pub(crate) write: bool,
 }

@@ -69,6 +69,8 @@ fn committed(name: &str) -> PathBuf {
 }
 
 const PAGE: &str = "docs/study.md";
+/// Tables that only studies of earlier programs have.
+const EARLIER: &str = "docs/study-earlier.md";
 const LIMITS: &str = "study/limits.json";
 const CLASSES: &str = "study/classes.json";
 const LEDGER: &str = "study/evidence/ledger.toml";
@@ -128,7 +130,7 @@ fn resolve(arguments: &ResolveArguments) -> Done {
     write_whole(&path("json"), format!("{:#}\n", serde_json::json!(table)).as_bytes())?;
     write_whole(&path("md"), text.as_bytes())?;
     if arguments.write {
-        document::put(&committed(PAGE), "resolve", &text)?;
+        document::put(&committed(EARLIER), "resolve", &text)?;
     }
     say(&format!("\n{text}"));
     say(&path("json").display().to_string());

@@ -1,7 +1,7 @@
 //! The commands that score: one label as a page, several side by side, several over their noise.
 
 use crate::cli::{Column, CompareArguments, CurveArguments, ScoreArguments, WorldsArguments};
-use crate::{Done, EXPECTED, LIMITS, PAGE, committed, known_classes, read_if_there, say};
+use crate::{Done, EARLIER, EXPECTED, LIMITS, PAGE, committed, known_classes, read_if_there, say};
 use std::error::Error;
 use std::path::PathBuf;
 use study::curve::Curves;
@@ -53,7 +53,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Done {
     }
     if arguments.write {
         let is_left_out = scores.iter().any(|score| score.leave_out.is_some());
-        document::put(&committed(PAGE), if is_left_out { "leave-out" } else { "compare" }, &text)?;
+        document::put(&committed(EARLIER), if is_left_out { "leave-out" } else { "compare" }, &text)?;
     }
     if arguments.to.is_none() && !arguments.write {
         say(&format!("\n{text}"));
@@ -70,7 +70,7 @@ pub(crate) fn curve(arguments: &CurveArguments) -> Done {
     write_whole(&arguments.to.join(format!("{name}.svg")), picture.as_bytes())?;
     if arguments.write {
         document::put(
-            &committed(PAGE),
+            &committed(EARLIER),
             "curve",
             &format!("{text}\n![rates over noise and amplitude](curve.svg)"),
         )?;
