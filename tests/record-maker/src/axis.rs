@@ -7,6 +7,7 @@
 //! The air of a chamber is M = p V and N, its normal volume times p_N: what M would be at the temperature of the rig. Both move
 //! alike while the gas is isothermal; their ratio is T / T_0 when it is not.
 
+use super::Form;
 use super::motion::{At, Motion};
 use super::numbers::Numbers;
 use super::port::{Node, Ports};
@@ -30,7 +31,7 @@ pub(super) type Y = [f64; 14];
 /// Heat, leakage and volumes; SI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct AirLaws {
-    pub(super) foreign: bool,
+    pub(super) form: Form,
     /// Heat transfer coefficient, W/(m^2 K).
     pub(super) heat_w_per_m2_k: Option<f64>,
     /// From 6 to 1 bar, m^3/s.
@@ -71,15 +72,20 @@ const GAS_PER_HEAT: f64 = 287.0 / 718.0;
 const GAMMA: f64 = 1005.0 / 718.0;
 const GAS_CONSTANT: f64 = 287.0;
 const HEAT_CAPACITY: f64 = 718.0;
-/// Polytropic exponent of the foreign form: between isothermal and adiabatic, as measured ones are.
+/// Polytropic exponent of both foreign forms: between isothermal and adiabatic, as measured ones are.
 const POLYTROPE: f64 = 1.28;
 /// Leakages are given from 6 bar to 1 bar absolute, Pa.
 const LEAKS_FROM_PA: f64 = 6e5;
 const LEAKS_TO_PA: f64 = 1e5;
-/// Share of the foreign line's time that is a lag and no delay.
+/// Share of the near form's time of a line that is a lag and no delay.
 pub(super) const LINE_LAG_SHARE: f64 = 0.25;
-/// What the foreign dead volume has more of its change in chamber a, and less in b.
-const DEAD_SHIFT: f64 = 0.2;
+/// By how much longer the line to chamber a is in the far form, and the one to b shorter.
+pub(super) const LINES_DIFFER: f64 = 0.5;
+/// What the forms' dead volume has more of its change in chamber a, and less in b.
+const DEAD_SHIFT: [f64; 3] = [0.0, 0.2, 0.75];
+/// The far forms' leaks of piston and rod are wider by this share in the middle of the stroke, and narrower at its ends.
+const PISTON_WORN: f64 = 0.45;
+const ROD_WORN: f64 = 0.52;
 
 impl Axis {
     pub(super) fn new(
@@ -92,7 +98,7 @@ impl Axis {
     ) -> Self {
         let file_m3 = numbers.dead_volume_m3;
         let more_m3 = laws.dead_volume_m3.map_or(0.0, |own_m3| own_m3 - file_m3);
-        let shift = if laws.foreign { DEAD_SHIFT } else { 0.0 };
+        let shift = laws.form.of(DEAD_SHIFT);
         // A shift may not empty a chamber of a rig whose dead volume is nearly none.
         let dead_m3 = [1.0 + shift, 1.0 - shift].map(|share| (file_m3 + share * more_m3).max(2e-6));
         Axis { numbers: numbers.clone(), valve, ports, silencer, laws, motion, dead_m3 }
@@ -143,15 +149,16 @@ impl Axis {
         for chamber in 0..2 {
             let (from_supply, from_exhaust) = (edges.supply[chamber], edges.exhaust[chamber]);
             let through = |port_pa: f64| {
-                self.valve.flow(from_supply, supply_pa, port_pa)
-                    + self.valve.flow(from_exhaust, exhaust_pa, port_pa)
+                self.valve.flow(chamber, from_supply, supply_pa, port_pa)
+                    + self.valve.flow(chamber, from_exhaust, exhaust_pa, port_pa)
             };
-            let (port_pa, total) = self.ports.pressure(pressure_pa[chamber], to_end[chamber], through);
+            let (port_pa, total) =
+                self.ports.pressure(chamber, [pressure_pa[chamber], to_end[chamber]], through);
             air.edge_flow[chamber] = total;
             let drawn = match (from_supply > 0.0, from_exhaust > 0.0) {
                 (true, false) => total,
                 (false, _) => 0.0,
-                (true, true) => self.valve.flow(from_supply, supply_pa, port_pa),
+                (true, true) => self.valve.flow(chamber, from_supply, supply_pa, port_pa),
             };
             air.drawn += drawn;
             air.vented -= total - drawn;
@@ -164,9 +171,10 @@ impl Axis {
 
     /// Friction's place at a state.
     #[inline(always)]
-    pub(super) fn at(&self, y: &Y, air: &Air, rest_s: f64) -> At {
+    pub(super) fn at(&self, y: &Y, air: &Air, rest_s: f64, torn_off: [f64; 2]) -> At {
         let gauge_pa = air.pressure_pa[0] + air.pressure_pa[1] - 2.0 * self.numbers.atmospheric_pa;
-        At { extension_m: y[X], gauge_pa, rest_s }
+        let across_pa = air.pressure_pa[0] - air.pressure_pa[1];
+        At { extension_m: y[X], gauge_pa, across_pa, rest_s, torn_off }
     }
 
     /// Rates of everything but x and v: `line` is what leaves the lines towards the chambers, m^3/s.
@@ -176,13 +184,13 @@ impl Axis {
         let mut rates = [0.0; 14];
         let spool = self.valve.spool_rates([y[SPOOL], y[SPOOL + 1], y[SPOOL + 2]], target);
         rates[SPOOL..SPOOL + 3].copy_from_slice(&spool);
-        let leaks = self.leaks(air);
+        let leaks = self.leaks(air, y[X]);
         let areas = self.areas();
         let swept = [areas[0] * y[V], -areas[1] * y[V]];
         for chamber in 0..2 {
             let (pressure, q) = (air.pressure_pa[chamber], y[FLOW + chamber]);
             let mut arrives = line[chamber];
-            if self.laws.foreign && self.laws.line_delay_s > 0.0 {
+            if self.laws.form == Form::Near && self.laws.line_delay_s > 0.0 {
                 arrives = y[LINE + chamber];
                 rates[LINE + chamber] = (line[chamber] - arrives) / (LINE_LAG_SHARE * self.laws.line_delay_s);
             }
@@ -204,12 +212,21 @@ impl Axis {
 
     /// Leakage into each chamber, m^3/s.
     #[inline(always)]
-    fn leaks(&self, air: &Air) -> [f64; 2] {
+    fn leaks(&self, air: &Air, extension_m: f64) -> [f64; 2] {
         let laws = &self.laws;
+        let worn = |share: f64| {
+            if !laws.form.is_far() {
+                return 1.0;
+            }
+            // Scored where the piston is most of its time.
+            let turns = extension_m / self.numbers.stroke_m;
+            1.0 - share * libm::cos(std::f64::consts::TAU * turns)
+        };
         let [a, b] = air.pressure_pa;
-        let across = self.leak(laws.piston_leakage, a, b);
+        let across = worn(PISTON_WORN) * self.leak(laws.piston_leakage, a, b);
         let out = [0, 1].map(|chamber| {
-            self.leak(laws.rod_leakage[chamber], air.pressure_pa[chamber], self.numbers.atmospheric_pa)
+            worn(ROD_WORN)
+                * self.leak(laws.rod_leakage[chamber], air.pressure_pa[chamber], self.numbers.atmospheric_pa)
         });
         [-across - out[0], across - out[1]]
     }
@@ -219,7 +236,7 @@ impl Axis {
     fn leak(&self, given: f64, from_pa: f64, to_pa: f64) -> f64 {
         if given == 0.0 {
             0.0
-        } else if self.laws.foreign {
+        } else if self.laws.form.is_foreign() {
             // A scratch is an orifice: choked from 6 to 1 bar, where c p / 2 flows.
             super::valve::flow(given / (LEAKS_FROM_PA / 2.0), from_pa, to_pa)
                 * if from_pa == to_pa { 0.0 } else { 1.0 }
@@ -235,7 +252,7 @@ impl Axis {
         let (pressure, volume) = (air.pressure_pa[chamber], air.volume_m3[chamber]);
         let (gas, normal) = (y[AIR + chamber], y[NORMAL + chamber]);
         let work = GAS_PER_HEAT * pressure * swept;
-        if self.laws.foreign {
+        if self.laws.form.is_foreign() {
             // Polytropic changes that relax in a fixed time: that of half a stroke at the start's pressure.
             let area = self.areas()[chamber];
             let mid_m3 = self.dead_m3[chamber] + area * numbers.stroke_m / 2.0;

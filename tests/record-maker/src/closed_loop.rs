@@ -3,7 +3,7 @@
 use super::axis::{AIR, FLOW, NORMAL, SPOOL, V, X};
 use super::noise::Stream;
 use super::numbers::Numbers;
-use super::rig::{Evaluated, Rig, STEPS_PER_MS, State, drift};
+use super::rig::{Evaluated, Rig, STEPS_PER_MS, State};
 use super::sensing::Sensing;
 use super::{Experiment, MakeError, ROWS, Recipe, Record, Row, TrueAxis, hidden};
 use axis_control::axis::AxisController;
@@ -241,7 +241,6 @@ pub(super) struct Made {
     pub(super) rig: Rig,
     pub(super) state: State,
     pub(super) sensing: [Sensing; 2],
-    foreign: bool,
     jitter: Option<Stream>,
     linked: bool,
     /// Valve openings over the cycle that is sampled.
@@ -293,7 +292,6 @@ impl Made {
             rig: made,
             state,
             sensing,
-            foreign: recipe.foreign_form,
             jitter: recipe.jitter.then(|| Stream::new(recipe.seed, JITTER_STREAM)),
             linked: scene.linked,
             expected: [0.0; 2],
@@ -352,10 +350,9 @@ impl SimulatedRig for Made {
             .jitter
             .as_mut()
             .map_or(0.0, |jitter| (JITTER_S * jitter.normal()).clamp(-MOST_JITTER_S, MOST_JITTER_S));
-        let drift = if self.foreign { drift(time_s) } else { 1.0 };
-        let without_noise = [0, 1].map(|i| sensing[i].without_noise(at, 0.0, drift));
+        let without_noise = [0, 1].map(|i| sensing[i].without_noise(at, 0.0, time_s));
         let readings = [0, 1].map(|i| {
-            let values = sensing[i].without_noise(at, jitter_s, drift);
+            let values = sensing[i].without_noise(at, jitter_s, time_s);
             sensing[i].read(values)
         });
         let row =

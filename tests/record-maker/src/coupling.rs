@@ -4,6 +4,8 @@
 //!   F_c = k e + c dd/dt beyond the gap, never pulling against its contact; d = x_load - x_drive
 //! ```
 
+use super::Form;
+
 /// Gap and contact, SI; what of it differs from the file is already in the numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Coupling {
@@ -14,20 +16,21 @@ pub(super) struct Coupling {
     pub(super) worn: bool,
     /// The contact stiffens with its load.
     pub(super) hertz: bool,
+    pub(super) form: Form,
 }
 
-/// Width of a worn edge, of the gap.
-const WORN: f64 = 0.05;
-/// Force at which both forms of the contact agree, N, and the exponent of the foreign one.
+/// Width of a worn edge, of the gap, of the forms.
+const WORN: [f64; 3] = [0.0, 0.05, 0.5];
+/// Force at which all forms of the contact agree, N, and the exponents of the forms.
 const AGREES_N: f64 = 200.0;
-const HERTZ: f64 = 1.15;
+const HERTZ: [f64; 3] = [1.0, 1.15, 1.5];
 
 impl Coupling {
     /// F_c, N, positive in +x on the carriage.
     #[inline(always)]
     pub(super) fn force(&self, distance_m: f64, speed_m_per_s: f64) -> f64 {
         let over = distance_m.abs() - self.gap_m / 2.0;
-        let width = if self.worn { WORN * self.gap_m } else { 0.0 };
+        let width = if self.worn { self.form.of(WORN) * self.gap_m } else { 0.0 };
         let overlap = if over <= -width {
             return 0.0;
         } else if over < width {
@@ -36,7 +39,7 @@ impl Coupling {
             over
         };
         let elastic = if self.hertz {
-            AGREES_N * libm::pow(overlap * self.stiffness_n_per_m / AGREES_N, HERTZ)
+            AGREES_N * libm::pow(overlap * self.stiffness_n_per_m / AGREES_N, self.form.of(HERTZ))
         } else {
             self.stiffness_n_per_m * overlap
         };

@@ -136,21 +136,26 @@ fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
         .iter()
         .map(|(name, factor)| json!({ "name": name, "factor": factor }))
         .collect();
-    Ok(json!({
+    let mut truth = json!({
         "schema_version": 1,
         "seed": recipe.seed,
         "axis": recipe.axis.name(),
         "both_axes": recipe.both_axes,
         "unlinked": recipe.unlinked,
         "hidden": recipe.hidden.iter().map(effect).collect::<Result<Vec<_>, MakeError>>()?,
-        "foreign_form": recipe.foreign_form,
+        "foreign_form": recipe.form.is_foreign(),
         "wrong_parameters": wrong,
         "coloured_noise": recipe.coloured_noise,
         "jitter": recipe.jitter,
         "noise": recipe.noise,
         "background": background,
         "experiment": experiment,
-    }))
+    });
+    // Written where it is so: the truth of other records stays what it was.
+    if recipe.form.is_far() {
+        truth["far_form"] = json!(true);
+    }
+    Ok(truth)
 }
 
 fn put(out: &mut Vec<u8>, text: std::fmt::Arguments<'_>) {

@@ -32,14 +32,15 @@ pub(super) fn rig(
     mut numbers: Numbers,
     steps_per_ms: usize,
 ) -> Result<(Rig, [SensingLaws; 2]), MakeError> {
-    let foreign = recipe.foreign_form;
+    let form = recipe.form;
+    let foreign = form.is_foreign();
     let mut laws = [Laws::default(), Laws::default()];
     for laws in &mut laws {
-        laws.valve.foreign = foreign;
-        laws.port.foreign = foreign;
-        laws.air.foreign = foreign;
-        laws.motion.foreign = foreign;
-        laws.sensing.foreign = foreign;
+        laws.valve.form = form;
+        laws.port.form = form;
+        laws.air.form = form;
+        laws.motion.form = form;
+        laws.sensing.form = form;
     }
     let mut supply = None;
     let (mut worn, mut hertz) = (false, false);
@@ -59,7 +60,7 @@ pub(super) fn rig(
     }
     let mut axis = 0;
     let axes = [&laws[0], &laws[1]].map(|laws| {
-        let silencer = laws.silencer.map(|silencer| Node::silencer(&numbers, silencer, foreign));
+        let silencer = laws.silencer.map(|silencer| Node::silencer(&numbers, silencer, form));
         let valve = Valve::new(&numbers, laws.valve.clone());
         let ports = Ports::new(&numbers, laws.port.clone());
         let motion = Motion::new(&numbers, axis, laws.motion.clone());
@@ -75,10 +76,11 @@ pub(super) fn rig(
             damping_n_s_per_m: numbers.damping_n_s_per_m,
             worn,
             hertz,
+            form,
         }),
-        supply: supply.map(|droop| Node::supply(&numbers, droop, foreign)),
+        supply: supply.map(|droop| Node::supply(&numbers, droop, form)),
         late_s: [laws[0].late_s, laws[1].late_s],
-        foreign,
+        form,
         first_order: recipe.background.is_some(),
         steps_per_ms,
     };

@@ -15,8 +15,9 @@
 //! |---|---|
 //! | `numbers.rs` | true numbers of the rig, some off by a few per cent |
 //! | `background.rs` | errors of the whole model, each small |
+//! | `form.rs` | which form a recipe's laws have |
 //! | `hidden.rs` | from a recipe's effects to laws |
-//! | `valve.rs`, `port.rs`, `axis.rs`, `motion.rs`, `coupling.rs` | the laws, both forms of each |
+//! | `valve.rs`, `port.rs`, `axis.rs`, `motion.rs`, `coupling.rs` | the laws, all forms of each |
 //! | `rig.rs` | steps, stick and slip, delays |
 //! | `sensing.rs`, `noise.rs` | sensors |
 //! | `closed_loop.rs` | the rig under the controllers, the record |
@@ -31,6 +32,7 @@ mod closed_loop;
 pub mod comparison;
 mod coupling;
 mod files;
+mod form;
 mod hidden;
 mod motion;
 mod noise;
@@ -45,6 +47,7 @@ mod valve;
 pub use background::Background;
 pub use closed_loop::{replay, simulate, simulate_proposed};
 pub use files::{make, write, write_measurement};
+pub use form::Form;
 pub use numbers::PARAMETERS;
 
 use axis_control::setup::InputError;
@@ -66,8 +69,8 @@ pub struct Recipe {
     /// With `both_axes`: the rods are apart, and both axes positioned.
     pub unlinked: bool,
     pub hidden: Vec<Hidden>,
-    /// Whether they have another functional form than the catalogue's.
-    pub foreign_form: bool,
+    /// Functional form of all of them, and of what is in the background.
+    pub form: Form,
     /// Names of [`PARAMETERS`] and the factors by which the true numbers differ from the rig file's, 0.5 to 2.
     pub wrong_parameters: Vec<(String, f64)>,
     /// Noise with a correlation of 5 ms and the same rms, in place of white noise.
@@ -90,7 +93,7 @@ impl Default for Recipe {
             both_axes: false,
             unlinked: false,
             hidden: Vec::new(),
-            foreign_form: false,
+            form: Form::Catalogue,
             wrong_parameters: Vec::new(),
             coloured_noise: false,
             jitter: false,

@@ -4,14 +4,14 @@
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Sheet};
 use plant::{Axis, RigParameters};
-use record_maker::{Experiment, Hidden, ROWS, Recipe, comparison, simulate, simulate_proposed, write};
+use record_maker::{Experiment, Form, Hidden, ROWS, Recipe, comparison, simulate, simulate_proposed, write};
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
 const USAGE: &str =
     "record-maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes [--unlinked]]
-    [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form] [--wrong parameter:NAME=FACTOR]...
+    [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form | --far-form] [--wrong parameter:NAME=FACTOR]...
     [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1 | --proposed FILE]
 record-maker list
 record-maker compare
@@ -89,26 +89,25 @@ fn steps() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Both forms of all effects at both ends of their range, as Markdown.
+/// All forms of all effects at both ends of their range, as Markdown.
 fn forms() -> Result<(), Box<dyn Error>> {
     let rig = RigParameters::baseline();
     let null = [false, true]
         .map(|both_axes| simulate(&Recipe { both_axes, ..Recipe::default() }, &rig).expect("null"));
-    println!("| effect | end | catalogue | foreign | cosine |\n|---|---|---|---|---|");
+    println!("| effect | end | form | catalogue | form | cosine |\n|---|---|---|---|---|---|");
     for sheet in SHEETS {
-        for end in [0, 1] {
+        for (end, form) in [0, 1].into_iter().flat_map(|end| [(end, Form::Near), (end, Form::Far)]) {
             let recipe = at_end(sheet, end);
             let null = &null[usize::from(recipe.both_axes)];
             let made = simulate(&recipe, &rig);
-            let foreign = simulate(&Recipe { foreign_form: true, ..recipe }, &rig);
-            match (made, foreign) {
-                (Ok(made), Ok(foreign)) => {
-                    let [made, foreign, cosine] = comparison::from_null(null, &made, &foreign, 1);
-                    println!("| {} | {end} | {made:.2} | {foreign:.2} | {cosine:.2} |", sheet.name);
+            let other = simulate(&Recipe { form, ..recipe }, &rig);
+            let name = format!("{} | {end} | {}", sheet.name, form.name());
+            match (made, other) {
+                (Ok(made), Ok(other)) => {
+                    let [made, other, cosine] = comparison::from_null(null, &made, &other, 1);
+                    println!("| {name} | {made:.2} | {other:.2} | {cosine:.2} |");
                 }
-                (made, foreign) => {
-                    println!("| {} | {end} | {:?} | {:?} |", sheet.name, made.err(), foreign.err())
-                }
+                (made, other) => println!("| {name} | {:?} | {:?} |", made.err(), other.err()),
             }
         }
     }
@@ -158,7 +157,8 @@ fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error
             "--axis" => recipe.axis = if value()? == "load" { Axis::Load } else { Axis::Drive },
             "--both-axes" => recipe.both_axes = true,
             "--unlinked" => recipe.unlinked = true,
-            "--foreign-form" => recipe.foreign_form = true,
+            "--foreign-form" => recipe.form = Form::Near,
+            "--far-form" => recipe.form = Form::Far,
             "--coloured-noise" => recipe.coloured_noise = true,
             "--jitter" => recipe.jitter = true,
             "--noise" => recipe.noise = value()?.parse()?,

@@ -7,12 +7,13 @@
 //! Source: Karnopp 1985, ASME J. Dyn. Sys. 107(1); Canudas de Wit et al. 1995, IEEE TAC 40(3) (LuGre); Dupont et al. 2002,
 //! IEEE TAC 47(5) (elasto-plastic form); Olsson 1996 (fading micro-damping).
 
+use super::Form;
 use super::numbers::Numbers;
 
 /// What of the motion's effects is on; SI, in the axis' own extension unless said otherwise.
 #[derive(Debug, Clone, Default)]
 pub(super) struct MotionLaws {
-    pub(super) foreign: bool,
+    pub(super) form: Form,
     /// Velocity in m/s and exponent.
     pub(super) stribeck: Option<[f64; 2]>,
     /// Bristle stiffness, N/m.
@@ -51,7 +52,11 @@ pub(super) struct At {
     pub(super) extension_m: f64,
     /// Sum of both gauge pressures, Pa.
     pub(super) gauge_pa: f64,
+    /// Pressure of a less that of b, Pa.
+    pub(super) across_pa: f64,
     pub(super) rest_s: f64,
+    /// Rest before the last break-away, s, and the extension at which it was, m.
+    pub(super) torn_off: [f64; 2],
 }
 
 /// Reach of the elastic stops, m.
@@ -64,12 +69,25 @@ const BRISTLE_DAMPING: f64 = 0.7;
 const ELASTIC_SHARE: f64 = 0.7;
 /// Bristles hold at least this much, N: without any they would have no deflection to relax to.
 const LEAST_N: f64 = 1e-3;
-/// The foreign asymmetry changes sides over this speed, m/s.
+/// The near form's asymmetry changes sides over this speed, m/s.
 const SIDES_M_PER_S: f64 = 2e-2;
-/// Sum of gauge pressures at which both forms of pressure-dependent friction agree, Pa.
+/// Sum of gauge pressures at which near form and catalogue's of pressure-dependent friction agree, Pa.
 const SEALS_AGREE_PA: f64 = 5e5;
-/// Rest after which both forms of the growth of break-away agree, s.
+/// Rest after which all forms of the growth of break-away agree, s.
 const REST_S: f64 = 10.0;
+/// How much steeper than on average the forms' rail is at its end.
+const RAIL_BENDS: [f64; 3] = [0.0, 0.15, 1.0];
+/// How much larger than on average the far form's asymmetry is where the rod is out.
+const ROD_BENDS: f64 = 0.9;
+/// The far form's bristles are stiffer by this share as the rod extends, and softer as it retracts.
+const BRISTLES_DIFFER: f64 = 0.65;
+/// Way over which the growth of the break-away force fades in the far form, m.
+const FILM_M: f64 = 1e-3;
+/// Third harmonic of the forms' cogging.
+const THIRD_HARMONIC: [f64; 3] = [0.0, 0.2, 0.5];
+/// What a far form of friction has more as the rod extends, and less as it retracts: lips of seals do not face both ways.
+const STRIBECK_DIFFERS: f64 = 0.52;
+const BORE_DIFFERS: f64 = 0.55;
 
 impl Motion {
     pub(super) fn new(numbers: &Numbers, axis: usize, laws: MotionLaws) -> Self {
@@ -101,17 +119,22 @@ impl Motion {
         let mut rig_n = laws.inclination_n;
         let mid = self.stroke_m / 2.0;
         let x = if self.to_rig > 0.0 { extension_m } else { self.stroke_m - extension_m };
-        if laws.foreign && rig_n != 0.0 {
+        if laws.form.is_foreign() && rig_n != 0.0 {
             // A bent rail: steeper towards one end.
-            rig_n *= 1.0 + 0.15 * (x - mid) / mid;
+            rig_n *= 1.0 + laws.form.of(RAIL_BENDS) * (x - mid) / mid;
         }
         if let Some([spring, ripple, pitch]) = laws.force_over_way {
             let along = (x - mid) / mid;
-            let hose = if laws.foreign { 0.75 * along + 0.25 * along * along * along } else { along };
+            let hose = match laws.form {
+                Form::Catalogue => along,
+                Form::Near => 0.75 * along + 0.25 * along * along * along,
+                // It hangs loose in the middle of the way and is drawn straight at the ends.
+                Form::Far => along * along * along,
+            };
             let phase = std::f64::consts::TAU * x / pitch;
             let mut wave = libm::sin(phase);
-            if laws.foreign {
-                wave += 0.2 * libm::sin(3.0 * phase);
+            if laws.form.is_foreign() {
+                wave += laws.form.of(THIRD_HARMONIC) * libm::sin(3.0 * phase);
             }
             rig_n += ripple * wave - spring * hose;
         }
@@ -120,7 +143,7 @@ impl Motion {
             let push = |depth_m: f64| {
                 let depth_m = depth_m.max(0.0);
                 // Rubber stiffens; as hard as the spring at half of its reach.
-                stiffness * depth_m * if laws.foreign { depth_m / (BUFFER_M / 2.0) } else { 1.0 }
+                stiffness * depth_m * if laws.form.is_foreign() { depth_m / (BUFFER_M / 2.0) } else { 1.0 }
             };
             own_n += push(BUFFER_M - extension_m) - push(extension_m - (self.stroke_m - BUFFER_M));
         }
@@ -130,28 +153,38 @@ impl Motion {
     /// Friction of a piston sliding in `direction` at a velocity, N along the own extension, viscous friction included.
     #[inline(always)]
     pub(super) fn sliding(&self, at: At, velocity: f64, direction: f64) -> f64 {
-        let side = self.side(velocity, direction);
+        let side = self.side(at.extension_m, velocity, direction);
         let viscous = self.viscous_n_s_per_m * (1.0 + side * self.laws.asymmetry) * velocity;
-        -direction * self.sliding_level(at, velocity.abs(), side) - viscous
+        let level = self.sliding_level(at, velocity.abs(), side, direction > 0.0) + self.still_grown(at);
+        -direction * level - viscous
     }
 
     /// -1 to 1: the direction as the asymmetry sees it.
     #[inline(always)]
-    fn side(&self, velocity: f64, direction: f64) -> f64 {
-        if self.laws.foreign && self.laws.asymmetry != 0.0 {
-            return libm::tanh(velocity / SIDES_M_PER_S);
+    fn side(&self, extension_m: f64, velocity: f64, direction: f64) -> f64 {
+        if self.laws.asymmetry == 0.0 {
+            return direction;
         }
-        direction
+        match self.laws.form {
+            Form::Catalogue => direction,
+            Form::Near => libm::tanh(velocity / SIDES_M_PER_S),
+            // A bent rod: it presses on its seal as far as it is out.
+            Form::Far => {
+                let mid = self.stroke_m / 2.0;
+                direction * (1.0 + ROD_BENDS * (extension_m - mid) / mid)
+            }
+        }
     }
 
     #[inline(always)]
-    fn sliding_level(&self, at: At, speed: f64, side: f64) -> f64 {
+    fn sliding_level(&self, at: At, speed: f64, side: f64, extends: bool) -> f64 {
         let laws = &self.laws;
-        let mut level = self.sliding_n * (1.0 + side * laws.asymmetry) + self.on_both(at);
+        let mut level = self.sliding_n * (1.0 + side * laws.asymmetry) + self.on_both(at, extends);
         if let Some([velocity, exponent]) = laws.stribeck {
             let share = speed / velocity;
             let power = libm::pow(share, exponent);
-            let falls = if laws.foreign { 1.0 / (1.0 + power) } else { libm::exp(-power) };
+            let falls = if laws.form == Form::Near { 1.0 / (1.0 + power) } else { libm::exp(-power) };
+            let falls = laws.form.side(extends, STRIBECK_DIFFERS) * falls;
             level += (self.break_away_n - self.sliding_n) * falls;
         }
         if let Some([share, velocity]) = self.fading_friction {
@@ -164,31 +197,52 @@ impl Motion {
     /// The largest force that a resting piston withstands in a direction, N.
     pub(super) fn break_away(&self, at: At, direction: f64) -> f64 {
         let laws = &self.laws;
-        let mut level = self.break_away_n * (1.0 + direction * laws.asymmetry) + self.on_both(at);
-        if let Some([growth, onset_s]) = laws.rest_growth {
-            let (now, then) = (1.0 + at.rest_s / onset_s, 1.0 + REST_S / onset_s);
-            let share = if laws.foreign {
-                (libm::pow(now, 0.15) - 1.0) / (libm::pow(then, 0.15) - 1.0)
-            } else {
-                libm::log(now) / libm::log(then)
-            };
-            level += self.break_away_n * growth * share;
+        let side = if laws.form.is_far() { self.side(at.extension_m, 0.0, direction) } else { direction };
+        let mut level = self.break_away_n * (1.0 + side * laws.asymmetry) + self.on_both(at, direction > 0.0);
+        if laws.rest_growth.is_some() {
+            level += self.grown(at.rest_s);
         }
-        level.max(self.sliding_level(at, 0.0, direction))
+        level.max(self.sliding_level(at, 0.0, side, direction > 0.0))
+    }
+
+    /// Growth of the break-away force after a rest, N.
+    fn grown(&self, rest_s: f64) -> f64 {
+        let Some([growth, onset_s]) = self.laws.rest_growth else { return 0.0 };
+        let (now, then) = (1.0 + rest_s / onset_s, 1.0 + REST_S / onset_s);
+        let share = if self.laws.form == Form::Near {
+            (libm::pow(now, 0.15) - 1.0) / (libm::pow(then, 0.15) - 1.0)
+        } else {
+            libm::log(now) / libm::log(then)
+        };
+        self.break_away_n * growth * share
+    }
+
+    /// What of it is left while the piston slides, N: in the far form the film of oil is built again over some way.
+    fn still_grown(&self, at: At) -> f64 {
+        if !self.laws.form.is_far() || self.laws.rest_growth.is_none() {
+            return 0.0;
+        }
+        let [rest_s, from_m] = at.torn_off;
+        self.grown(rest_s) * libm::exp(-(at.extension_m - from_m).abs() / FILM_M)
     }
 
     /// What pressure and place add to sliding and break-away level alike, N.
     #[inline(always)]
-    fn on_both(&self, at: At) -> f64 {
+    fn on_both(&self, at: At, extends: bool) -> f64 {
         let laws = &self.laws;
         let mut sum = 0.0;
         if laws.pressure_slope != 0.0 {
             let share = at.gauge_pa / SEALS_AGREE_PA;
-            let grown = if laws.foreign { libm::pow(share.max(0.0), 0.8) } else { share };
+            let grown = match laws.form {
+                Form::Catalogue => share,
+                Form::Near => libm::pow(share.max(0.0), 0.8),
+                // A lip is pressed on by what it seals against.
+                Form::Far => 0.2 * share + 1.8 * (at.across_pa / SEALS_AGREE_PA).abs(),
+            };
             sum += laws.pressure_slope * SEALS_AGREE_PA * grown;
         }
         if let Some(numbers) = laws.friction_over_way {
-            sum += self.over_way(numbers, at.extension_m);
+            sum += laws.form.side(extends, BORE_DIFFERS) * self.over_way(numbers, at.extension_m);
         }
         sum
     }
@@ -197,7 +251,7 @@ impl Motion {
         let (off, mid) = ((extension_m - centre) / width, self.stroke_m / 2.0);
         let along = (extension_m - mid) / mid;
         let turn = extension_m / pitch;
-        if !self.laws.foreign {
+        if self.laws.form != Form::Near {
             return bump * libm::exp(-off * off)
                 + slope * along
                 + ripple * libm::sin(std::f64::consts::TAU * turn);
@@ -215,17 +269,25 @@ impl Motion {
     #[inline(always)]
     fn full_deflection(&self, at: At, velocity: f64) -> f64 {
         let direction = if velocity < 0.0 { -1.0 } else { 1.0 };
-        let level = self.sliding_level(at, velocity.abs(), self.side(velocity, direction));
+        let side = self.side(at.extension_m, velocity, direction);
+        let level = self.sliding_level(at, velocity.abs(), side, direction > 0.0);
         let more = self.break_away(at, direction) - level;
         let share = velocity / BRISTLE_M_PER_S;
-        let stiffness = self.laws.presliding.expect("asked for with bristles alone");
+        let stiffness = self.stiffness(direction > 0.0);
         direction * (level + more * libm::exp(-share * share)).max(LEAST_N) / stiffness
+    }
+
+    /// Of bristles deflected to this side, N/m.
+    #[inline(always)]
+    fn stiffness(&self, extends: bool) -> f64 {
+        let stiffness = self.laws.presliding.expect("asked for with bristles alone");
+        self.laws.form.side(extends, BRISTLES_DIFFER) * stiffness
     }
 
     /// How much of the bristles' way is slip, 0 to 1.
     #[inline(always)]
     fn slip(&self, deflection: f64, full: f64) -> f64 {
-        if !self.laws.foreign {
+        if self.laws.form != Form::Near {
             return 1.0;
         }
         let share = deflection / full;
@@ -245,8 +307,8 @@ impl Motion {
         let full = self.full_deflection(at, velocity);
         let slip = self.slip(deflection, full);
         let rate = velocity * (1.0 - slip * deflection / full);
-        let stiffness = self.laws.presliding.expect("asked for with bristles alone");
-        let damping = if self.laws.foreign {
+        let stiffness = self.stiffness(deflection > 0.0);
+        let damping = if self.laws.form == Form::Near {
             let share = velocity / BRISTLE_M_PER_S;
             self.micro_damping_n_s_per_m * libm::exp(-share * share)
         } else {
@@ -255,7 +317,8 @@ impl Motion {
             self.micro_damping_n_s_per_m * level / (level + self.micro_damping_n_s_per_m * velocity.abs())
         };
         let direction = if velocity < 0.0 { -1.0 } else { 1.0 };
-        let viscous = self.viscous_n_s_per_m * (1.0 + self.side(velocity, direction) * self.laws.asymmetry);
+        let viscous = self.viscous_n_s_per_m
+            * (1.0 + self.side(at.extension_m, velocity, direction) * self.laws.asymmetry);
         -(stiffness * deflection + damping * rate + viscous * velocity)
     }
 

@@ -9,13 +9,14 @@
 //! drops. It is found by the Illinois rule [Dowell, Jarratt 1971, BIT 11], on the squares of the flows. Flows are normal flows
 //! into the chamber, m^3/s.
 
+use super::Form;
 use super::numbers::{CONDUCTANCE_PER_KV, Numbers};
 use super::valve::flow;
 
 /// What is on between valve and chamber; SI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PortLaws {
-    pub(super) foreign: bool,
+    pub(super) form: Form,
     /// Drop of the line at the reference flow, Pa.
     pub(super) line_drop_pa: f64,
     /// Cracking pressure, Pa, and K_V of the seat, m^3/h.
@@ -31,10 +32,16 @@ pub(super) struct Ports {
     reference_pa: f64,
 }
 
-/// The foreign check valve opens over this share of the full flow.
+/// The near form's check valve opens over this share of the full flow.
 const OPENS_OVER: f64 = 0.03;
-/// The foreign cushion is this much wider at its beginning than at the end.
-const TAPER: f64 = 1.0;
+/// The forms' cushion is this much wider at its beginning than at the end.
+const TAPER: [f64; 3] = [0.0, 1.0, 1.0];
+/// The far form's lip does not lift quite: a chamber that fills goes through a cushion so many times as wide.
+const LIP_LIFTS: f64 = 7.0;
+/// The far forms: what chamber a has more, and b less, of the cracking pressure of a check valve and of the drop of a line's
+/// filter.
+const SPRINGS_DIFFER: f64 = 0.5;
+const FILTERS_DIFFER: f64 = 0.25;
 /// A flow is found when it is as close as this, of the full one, or after so many trials.
 const CLOSE: f64 = 1e-7;
 const MOST_TRIALS: usize = 60;
@@ -54,16 +61,26 @@ impl Ports {
     ///
     /// `edges` is the flow of all edges into the chamber at a port pressure, m^3/s, falling.
     #[inline(always)]
-    pub(super) fn pressure(&self, chamber_pa: f64, to_end_m: f64, edges: impl Fn(f64) -> f64) -> (f64, f64) {
+    pub(super) fn pressure(
+        &self,
+        chamber: usize,
+        [chamber_pa, to_end_m]: [f64; 2],
+        edges: impl Fn(f64) -> f64,
+    ) -> (f64, f64) {
         let laws = &self.laws;
         let cushioned = laws.cushion.is_some_and(|[_, length_m]| to_end_m < length_m);
         if laws.line_drop_pa == 0.0 && laws.check_valve.is_none() && !cushioned {
             return (chamber_pa, edges(chamber_pa));
         }
-        self.solve(chamber_pa, to_end_m, edges)
+        self.solve(chamber, [chamber_pa, to_end_m], edges)
     }
 
-    fn solve(&self, chamber_pa: f64, to_end_m: f64, edges: impl Fn(f64) -> f64) -> (f64, f64) {
+    fn solve(
+        &self,
+        chamber: usize,
+        [chamber_pa, to_end_m]: [f64; 2],
+        edges: impl Fn(f64) -> f64,
+    ) -> (f64, f64) {
         let free = edges(chamber_pa);
         let least = NEGLIGIBLE * self.full_flow_m3_per_s;
         if free.abs() <= least {
@@ -73,7 +90,7 @@ impl Ports {
         // Flows of orifices are roots of pressures: in their squares the miss is next to straight.
         let miss = |square: f64| {
             let flow = square.sqrt();
-            let port_pa = self.beyond(direction * flow, chamber_pa, to_end_m);
+            let port_pa = self.beyond(chamber, direction * flow, [chamber_pa, to_end_m]);
             let passes = (direction * edges(port_pa)).max(0.0);
             (square - passes * passes, flow - passes, port_pa)
         };
@@ -104,26 +121,37 @@ impl Ports {
     }
 
     /// Pressure on the valve's side of the port at a flow, Pa.
-    fn beyond(&self, flow: f64, chamber_pa: f64, to_end_m: f64) -> f64 {
+    fn beyond(&self, chamber: usize, flow: f64, [chamber_pa, to_end_m]: [f64; 2]) -> f64 {
         let (laws, direction) = (&self.laws, flow.signum());
+        let split = |share| laws.form.side(chamber == 0, share);
         let mut pa = chamber_pa;
         if let Some([kv, length_m]) = laws.cushion
             && to_end_m < length_m
-            && flow < 0.0
+            && (flow < 0.0 || laws.form.is_far())
         {
-            let wider = if laws.foreign { 1.0 + TAPER * (to_end_m / length_m).max(0.0) } else { 1.0 };
-            pa = behind_orifice(CONDUCTANCE_PER_KV * kv * wider, flow, pa);
+            let wider = 1.0 + laws.form.of(TAPER) * (to_end_m / length_m).max(0.0);
+            let lifted = if flow < 0.0 { 1.0 } else { LIP_LIFTS };
+            pa = behind_orifice(lifted * CONDUCTANCE_PER_KV * kv * wider, flow, pa);
         }
         if let Some([cracking_pa, kv]) = laws.check_valve {
             let opened = flow.abs() / (OPENS_OVER * self.full_flow_m3_per_s);
-            // Foreign: the spring of the seat is pressed on as it opens.
-            let share = if laws.foreign { 0.7 + 0.3 * opened / (1.0 + opened * opened).sqrt() } else { 1.0 };
+            // Near: the spring of the seat is pressed on as it opens.
+            let share = if laws.form == Form::Near {
+                0.7 + 0.3 * opened / (1.0 + opened * opened).sqrt()
+            } else {
+                split(SPRINGS_DIFFER)
+            };
             pa = behind_orifice(CONDUCTANCE_PER_KV * kv, flow, pa) + direction * cracking_pa * share;
         }
         if laws.line_drop_pa > 0.0 && pa > 0.0 {
             let share = flow.abs() / self.full_flow_m3_per_s;
-            // Foreign: Blasius' law for smooth turbulent pipes, q^1.75.
-            let grown = if laws.foreign { share * share.sqrt() * share.sqrt().sqrt() } else { share * share };
+            let grown = match laws.form {
+                Form::Catalogue => share * share,
+                // Blasius' law for smooth turbulent pipes, q^1.75.
+                Form::Near => share * share.sqrt() * share.sqrt().sqrt(),
+                // A filter of sintered bronze in the line, laminar.
+                Form::Far => split(FILTERS_DIFFER) * share,
+            };
             pa += direction * laws.line_drop_pa * grown * self.reference_pa / pa;
         }
         pa.max(0.0)
@@ -158,25 +186,33 @@ pub(super) enum Passage {
     Linear(f64),
     /// Sintered bronze: as much as the orifice of this conductance when choked, but choked below [`SINTERED_RATIO`] alone.
     Sintered(f64),
+    /// A flow with the square of the difference: this flow, m^3/s, at this one, Pa.
+    Stiff(f64, f64),
+    /// Darcy's law: a flow with the difference of the squares, as much as the orifice of this conductance at twice the outside.
+    Porous(f64),
 }
 
 impl Node {
     /// The supply node behind a regulator that falls by `droop_pa` when one full supply edge draws.
-    pub(super) fn supply(numbers: &Numbers, [droop_pa, volume_m3]: [f64; 2], foreign: bool) -> Self {
+    pub(super) fn supply(numbers: &Numbers, [droop_pa, volume_m3]: [f64; 2], form: Form) -> Self {
         let (full, set_pa) = (numbers.full_flow_m3_per_s(), numbers.supply_pa);
-        let passage = if foreign {
-            Passage::Linear(full / (LINEAR_SHARE * droop_pa))
-        } else {
-            Passage::Orifice(full / (droop_pa * (set_pa - droop_pa)).sqrt())
+        let passage = match form {
+            Form::Catalogue => Passage::Orifice(full / (droop_pa * (set_pa - droop_pa)).sqrt()),
+            Form::Near => Passage::Linear(full / (LINEAR_SHARE * droop_pa)),
+            Form::Far => Passage::Stiff(full, LINEAR_SHARE * droop_pa),
         };
         Node { volume_m3, outside_pa: set_pa, passage }
     }
 
     /// The volume behind both exhaust edges, vented by a silencer of `kv_ratio` times the exhaust edge.
-    pub(super) fn silencer(numbers: &Numbers, [kv_ratio, volume_m3]: [f64; 2], foreign: bool) -> Self {
+    pub(super) fn silencer(numbers: &Numbers, [kv_ratio, volume_m3]: [f64; 2], form: Form) -> Self {
         let c = kv_ratio * numbers.exhaust_edge_m3_per_s_pa[numbers.opening.len() - 1];
         let outside_pa = numbers.exhaust_pa;
-        let passage = if foreign { Passage::Sintered(c) } else { Passage::Orifice(c) };
+        let passage = match form {
+            Form::Catalogue => Passage::Orifice(c),
+            Form::Near => Passage::Sintered(c),
+            Form::Far => Passage::Porous(c),
+        };
         Node { volume_m3, outside_pa, passage }
     }
 
@@ -186,6 +222,14 @@ impl Node {
         match self.passage {
             Passage::Orifice(c) => flow(c, self.outside_pa, node_pa),
             Passage::Linear(per_pa) => per_pa * (self.outside_pa - node_pa),
+            Passage::Stiff(flow, at_pa) => {
+                let share = (self.outside_pa - node_pa) / at_pa;
+                flow * share * share.abs()
+            }
+            Passage::Porous(c) => {
+                let outside_pa = self.outside_pa;
+                c / (3.0 * outside_pa) * (outside_pa * outside_pa - node_pa * node_pa)
+            }
             Passage::Sintered(c) => {
                 let (up, down) = (self.outside_pa.max(node_pa), self.outside_pa.min(node_pa));
                 let beyond = ((down / up - SINTERED_RATIO) / (1.0 - SINTERED_RATIO)).max(0.0);
@@ -196,8 +240,8 @@ impl Node {
     }
 }
 
-/// Critical pressure ratio of the foreign silencer.
+/// Critical pressure ratio of the near form's silencer.
 const SINTERED_RATIO: f64 = 0.2;
-/// The foreign regulator falls by this share of the droop at full flow: as much on average as an orifice, whose drop grows with
-/// the square of the flow.
+/// The foreign forms' regulator falls by this share of the droop at full flow: as much on average as an orifice, whose drop
+/// grows with the square of the flow.
 const LINEAR_SHARE: f64 = 0.6;

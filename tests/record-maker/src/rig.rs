@@ -9,12 +9,12 @@
 //! It shares no code and no scheme with the plant, which goes by exact exponentials of 100 us and locates corners; here corners
 //! cost the length of a step. What both must agree on is rig-model.md. How far they agree stands in `tests/docs/record-maker.md`.
 
-use super::TrueAxis;
-use super::axis::{AIR, Air, Axis, EXHAUST, FLOW, LINE_LAG_SHARE, NORMAL, SPOOL, V, X, Y};
+use super::axis::{AIR, Air, Axis, EXHAUST, FLOW, LINE_LAG_SHARE, LINES_DIFFER, NORMAL, SPOOL, V, X, Y};
 use super::coupling::Coupling;
 use super::port::Node;
 use super::sensing::{CHANNELS, Sensing};
 use super::valve::Play;
+use super::{Form, TrueAxis};
 
 /// Steps in a millisecond: 10 us, a tenth of the plant's substep. See the table of convergence in the docs.
 pub(super) const STEPS_PER_MS: usize = 100;
@@ -23,8 +23,14 @@ pub(super) const STEPS_PER_MS: usize = 100;
 const COMMANDS: usize = 16;
 /// Slower than this a piston on bristles is at rest, m/s.
 const CREEP_M_PER_S: f64 = 1e-5;
-/// Share of the foreign dead time that is a lag.
+/// Share of the near form's dead time that is a lag.
 const LATE_LAG_SHARE: f64 = 0.2;
+/// The far form's dead time slides from a third to five thirds and jumps back, as that of two clocks does that are
+/// not synchronised: by which share, and how often, s.
+const LATE_SLIDES: f64 = 0.66;
+const LATE_BEAT_S: f64 = 0.37;
+/// By how much the far form's null drifts as the valve warms up.
+const NULL_DRIFTS: f64 = 0.7;
 
 #[derive(Debug, Clone)]
 pub(super) struct Rig {
@@ -35,7 +41,7 @@ pub(super) struct Rig {
     pub(super) supply: Option<Node>,
     /// Command dead time of each axis, s.
     pub(super) late_s: [f64; 2],
-    pub(super) foreign: bool,
+    pub(super) form: Form,
     /// Steps by Euler's method in place of the midpoint's.
     pub(super) first_order: bool,
     pub(super) steps_per_ms: usize,
@@ -49,6 +55,8 @@ pub(super) struct State {
     /// Direction of sliding; 0 for a piston that is held.
     pub(super) direction: [f64; 2],
     pub(super) rest_since_s: [f64; 2],
+    /// Rest before the last break-away, s, and the extension at which it was, m.
+    torn_off: [[f64; 2]; 2],
     pub(super) supply_pa: f64,
     play: [Play; 2],
     late: [f64; 2],
@@ -73,18 +81,13 @@ pub(super) struct Evaluated {
     supply_rate: f64,
 }
 
-/// Slow drift of the foreign forms' offsets at a time: 1 on average.
-pub(super) fn drift(time_s: f64) -> f64 {
-    1.0 + 0.15 * libm::sin(std::f64::consts::TAU * time_s / 13.0 + 0.7)
-}
-
 impl Rig {
     /// At rest, extensions in m.
     pub(super) fn start(&self, extension_m: [f64; 2]) -> State {
         let y = [0, 1].map(|i| self.axes[i].start(extension_m[i]));
         let line = |i: usize| {
-            let steps =
-                self.delay_steps(i).map_or(0, |steps| (steps.ceil() as usize + 2).next_power_of_two());
+            let longest = self.delay_steps(i).map(|[a, b]| a.max(b));
+            let steps = longest.map_or(0, |steps| (steps.ceil() as usize + 2).next_power_of_two());
             Line { ring: vec![[0.0; 2]; steps], leaves: [0.0; 2] }
         };
         State {
@@ -92,6 +95,7 @@ impl Rig {
             bristles: [0.0; 2],
             direction: [0.0; 2],
             rest_since_s: [0.0; 2],
+            torn_off: [[0.0; 2]; 2],
             supply_pa: self.axes[0].numbers.supply_pa,
             play: [Play::default(); 2],
             late: [0.0; 2],
@@ -113,10 +117,12 @@ impl Rig {
         }
     }
 
-    fn delay_steps(&self, axis: usize) -> Option<f64> {
+    /// Of both chambers' lines.
+    fn delay_steps(&self, axis: usize) -> Option<[f64; 2]> {
         let laws = &self.axes[axis].laws;
-        let pure = if laws.foreign { 1.0 - LINE_LAG_SHARE } else { 1.0 };
-        (laws.line_delay_s > 0.0).then(|| pure * laws.line_delay_s / self.step_s())
+        let pure = laws.form.of([1.0, 1.0 - LINE_LAG_SHARE, 1.0]);
+        let of = |chamber| laws.form.side(chamber == 0, LINES_DIFFER) * pure * laws.line_delay_s;
+        (laws.line_delay_s > 0.0).then(|| [of(0), of(1)].map(|delay_s| delay_s / self.step_s()))
     }
 
     pub(super) fn step_s(&self) -> f64 {
@@ -170,7 +176,14 @@ impl Rig {
                 continue;
             }
             let past = &state.commands[i];
-            let pure = if self.foreign { 1.0 - LATE_LAG_SHARE } else { 1.0 };
+            let pure = match self.form {
+                Form::Catalogue => 1.0,
+                Form::Near => 1.0 - LATE_LAG_SHARE,
+                Form::Far => {
+                    let beats = self.time_s(state) / LATE_BEAT_S;
+                    1.0 + LATE_SLIDES * (2.0 * (beats - beats.floor()) - 1.0)
+                }
+            };
             let late_s = self.late_s[i];
             let mut command = past[0];
             if late_s > 0.0 {
@@ -181,15 +194,14 @@ impl Rig {
                 let before_edge = (end_ms.ceil() - 1.0 - begin_ms).max(0.0) * self.steps_per_ms as f64;
                 let share = before_edge.min(1.0);
                 command = share * at(begin_ms) + (1.0 - share) * at(end_ms - 1e-9);
-                if self.foreign {
+                if self.form == Form::Near {
                     let kept = libm::exp(-self.step_s() / (LATE_LAG_SHARE * late_s));
                     let before = state.late[i];
                     state.late[i] = command + (before - command) * kept;
                     command = (before + state.late[i]) / 2.0;
                 }
             }
-            let drift =
-                if self.foreign { drift(state.steps as f64 * 1e-3 / self.steps_per_ms as f64) } else { 1.0 };
+            let drift = self.form.drift(state.steps as f64 * 1e-3 / self.steps_per_ms as f64, NULL_DRIFTS);
             *target = self.axes[i].valve.target(command, &mut state.play[i], drift);
         }
         targets
@@ -201,8 +213,19 @@ impl Rig {
         let time_s = self.time_s(state);
         let rest_s = [0, 1].map(|i| time_s - state.rest_since_s[i]);
         let mut direction = state.direction;
-        let at = Instant { y: &state.y, bristles: state.bristles, supply_pa: state.supply_pa, rest_s };
+        let at = Instant {
+            y: &state.y,
+            bristles: state.bristles,
+            supply_pa: state.supply_pa,
+            rest_s,
+            torn_off: state.torn_off,
+        };
         let evaluated = self.evaluate(&at, &mut direction, targets, lines, true);
+        for i in 0..2 {
+            if state.direction[i] == 0.0 && direction[i] != 0.0 {
+                state.torn_off[i] = [rest_s[i], state.y[i][X]];
+            }
+        }
         state.direction = direction;
         evaluated
     }
@@ -256,7 +279,7 @@ impl Rig {
     ) {
         let (axis, y) = (&self.axes[i], &at.y[i]);
         let motion = &axis.motion;
-        let place = axis.at(y, &evaluated.air[i], at.rest_s[i]);
+        let place = axis.at(y, &evaluated.air[i], at.rest_s[i], at.torn_off[i]);
         let pushed_n = evaluated.air[i].force_n + motion.pushes(y[X]) + evaluated.contact_n;
         let stroke_m = axis.numbers.stroke_m;
         let pressed = |force: f64| y[X] <= 0.0 && force < 0.0 || y[X] >= stroke_m && force > 0.0;
@@ -295,7 +318,7 @@ impl Rig {
             if self.active[i] {
                 add(&mut y[i], &first.rates[i], h / 2.0);
                 if self.axes[i].motion.laws.presliding.is_some() {
-                    let place = self.axes[i].at(&state.y[i], &first.air[i], rest_s[i]);
+                    let place = self.axes[i].at(&state.y[i], &first.air[i], rest_s[i], state.torn_off[i]);
                     bristles[i] = self.axes[i].motion.deflect(place, state.y[i][V], bristles[i], h / 2.0);
                 }
             }
@@ -303,7 +326,7 @@ impl Rig {
         let supply_pa = state.supply_pa + h / 2.0 * first.supply_rate;
         let lines = [0, 1].map(|i| self.leaving(state, i, &y[i], supply_pa));
         let mut direction = state.direction;
-        let at = Instant { y: &y, bristles, supply_pa, rest_s };
+        let at = Instant { y: &y, bristles, supply_pa, rest_s, torn_off: state.torn_off };
         let middle =
             if self.first_order { *first } else { self.evaluate(&at, &mut direction, targets, lines, false) };
         for i in 0..2 {
@@ -318,7 +341,7 @@ impl Rig {
             }
             let axis = &self.axes[i];
             if axis.motion.laws.presliding.is_some() {
-                let place = axis.at(&y[i], &middle.air[i], rest_s[i]);
+                let place = axis.at(&y[i], &middle.air[i], rest_s[i], state.torn_off[i]);
                 state.bristles[i] = axis.motion.deflect(place, y[i][V], state.bristles[i], h);
             }
             self.catch(state, i, &from);
@@ -337,13 +360,14 @@ impl Rig {
         let line = &mut state.lines[i];
         let mask = line.ring.len() - 1;
         line.ring[now & mask] = enters;
-        let back = delay.floor() as usize;
-        let share = delay - delay.floor();
         let past = |back: usize, chamber: usize| {
             if back > now { 0.0 } else { line.ring[(now - back) & mask][chamber] }
         };
-        let leaves =
-            [0, 1].map(|chamber| past(back, chamber) * (1.0 - share) + past(back + 1, chamber) * share);
+        let leaves = [0, 1].map(|chamber| {
+            let back = delay[chamber].floor() as usize;
+            let share = delay[chamber] - delay[chamber].floor();
+            past(back, chamber) * (1.0 - share) + past(back + 1, chamber) * share
+        });
         line.leaves = leaves;
         Some(leaves)
     }
@@ -383,6 +407,7 @@ struct Instant<'a> {
     bristles: [f64; 2],
     supply_pa: f64,
     rest_s: [f64; 2],
+    torn_off: [[f64; 2]; 2],
 }
 
 impl Evaluated {

@@ -6,6 +6,7 @@
 //!
 //! A period is integrated before it is sampled, so that an instant a little after t_k is the truth too and no guess.
 
+use super::Form;
 use super::noise::{Noise, Stream};
 use plant::parameters::SensorParameters;
 use plant::{AxisReadings, Reading};
@@ -16,7 +17,7 @@ pub(super) const CHANNELS: usize = 4;
 /// What of the sensors' effects is on, for each channel; SI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SensingLaws {
-    pub(super) foreign: bool,
+    pub(super) form: Form,
     pub(super) lag_s: [f64; CHANNELS],
     pub(super) age_s: [f64; CHANNELS],
     pub(super) gain: [f64; CHANNELS],
@@ -30,7 +31,7 @@ pub(super) struct Sensing {
     /// What the sensor reads too much by its mounting, m.
     mounted_m: f64,
     step_s: f64,
-    /// Shares left after a step in each of three lags in a row, 0 for none, and their times.
+    /// Up to three lags in a row.
     lags: [[Option<Lag>; 3]; CHANNELS],
     before: [f64; CHANNELS],
     ring: Vec<[f64; CHANNELS]>,
@@ -40,16 +41,38 @@ pub(super) struct Sensing {
 
 #[derive(Debug, Clone, Copy)]
 struct Lag {
-    time_s: f64,
-    kept: f64,
+    rising: Time,
+    falling: Time,
     shown: f64,
 }
 
-/// Share of the foreign skew that is a lag.
+/// Time of a lag, and the share that is left after a step.
+#[derive(Debug, Clone, Copy)]
+struct Time {
+    s: f64,
+    kept: f64,
+}
+
+/// Share of the near form's skew that is a lag.
 const AGE_LAG_SHARE: f64 = 0.25;
+/// The far form's skew slides by this share about its mean and jumps back so often, s: two clocks that are not synchronised.
+const AGE_SLIDES: [f64; CHANNELS] = [0.28, 0.5, 0.8, 0.8];
+const AGE_BEAT_S: f64 = 0.37;
+/// The far form's position sensor measures in a cycle of its own, so many of its lags long, and holds the value; its lag is
+/// shorter by half of that.
+const HOLDS_LAGS: f64 = 0.36;
+/// By how much the far forms' offsets drift.
+const DRIFTS: [f64; CHANNELS] = [0.55, 0.7, 0.7, 0.7];
+/// The far form's pressure sensor is slower by this share as the pressure falls, and faster as it rises.
+const SNUBBER_DIFFERS: f64 = 0.5;
+/// How the forms' gains bend over the way, with the force and with the pressure.
+const FORCE_BENDS: [f64; 3] = [0.0, 0.1, 0.85];
+const POSITION_BENDS: [f64; 2] = [-0.4, 2.8];
+/// By how much the far form's gain of a pressure drifts.
+const GAIN_DRIFTS: f64 = 0.7;
 /// Longest look back and ahead, ms.
 const REACH_MS: usize = 14;
-/// Half of the pressure range of use and a force of use, where the foreign gains are those of the catalogue.
+/// Half of the pressure range of use and a force of use, where the near form's gains are those of the catalogue.
 const GAIN_AGREES_PA: f64 = 4e5;
 const GAIN_BENDS_N: f64 = 40.0;
 
@@ -62,16 +85,20 @@ impl Sensing {
         streams: impl Fn(usize) -> Stream,
         (noise, coloured, slow): (f64, bool, Option<f64>),
     ) -> Self {
-        let lag = |time_s: f64| {
-            (time_s > 0.0).then(|| Lag { time_s, kept: libm::exp(-step_s / time_s), shown: 0.0 })
+        let time = |s: f64| Time { s, kept: libm::exp(-step_s / s) };
+        let between = |s: f64, differs: f64| {
+            let of = |rises: bool| time(laws.form.side(!rises, differs) * s);
+            (s > 0.0).then(|| Lag { rising: of(true), falling: of(false), shown: 0.0 })
         };
+        let lag = |s: f64| between(s, 0.0);
         let lags = std::array::from_fn(|channel| {
             let (lag_s, age_s) = (laws.lag_s[channel], laws.age_s[channel]);
-            if laws.foreign {
+            match laws.form {
+                Form::Catalogue => [lag(lag_s), None, None],
                 // Two equal lags in a row, as an anti-aliasing filter has; a skew whose end is soft.
-                [lag(lag_s / 2.0), lag(lag_s / 2.0), lag(AGE_LAG_SHARE * age_s)]
-            } else {
-                [lag(lag_s), None, None]
+                Form::Near => [lag(lag_s / 2.0), lag(lag_s / 2.0), lag(AGE_LAG_SHARE * age_s)],
+                Form::Far if channel == 0 => [lag((1.0 - HOLDS_LAGS / 2.0) * lag_s), None, None],
+                Form::Far => [between(lag_s, SNUBBER_DIFFERS), None, None],
             }
         });
         let rms = [
@@ -81,6 +108,10 @@ impl Sensing {
             parameters.pressure_noise_pa,
         ];
         let per_ms = (1e-3 / step_s).round() as usize;
+        let longest_s =
+            (0..CHANNELS).map(|of| 2.0 * laws.age_s[of] + HOLDS_LAGS * laws.lag_s[of]).fold(0.0, f64::max);
+        let reach_ms =
+            if laws.form.is_far() { REACH_MS.max(2 + (1e3 * longest_s) as usize) } else { REACH_MS };
         Sensing {
             laws,
             parameters: *parameters,
@@ -88,7 +119,7 @@ impl Sensing {
             step_s,
             lags,
             before: [0.0; CHANNELS],
-            ring: vec![[0.0; CHANNELS]; (REACH_MS * per_ms).next_power_of_two()],
+            ring: vec![[0.0; CHANNELS]; (reach_ms * per_ms).next_power_of_two()],
             steps: 0,
             noise: std::array::from_fn(|channel| {
                 Noise::new(streams(channel), noise * rms[channel], coloured, slow)
@@ -116,16 +147,33 @@ impl Sensing {
         self.steps += 1;
     }
 
-    /// What the sensors would show without noise at step `at` and `late_s` after it.
-    pub(super) fn without_noise(&self, at: usize, late_s: f64, drift: f64) -> [f64; CHANNELS] {
+    /// What the sensors would show without noise at step `at`, a sample of `time_s`, and `late_s` after it.
+    pub(super) fn without_noise(&self, at: usize, late_s: f64, time_s: f64) -> [f64; CHANNELS] {
         let laws = &self.laws;
         std::array::from_fn(|channel| {
-            let skew = if laws.foreign { 1.0 - AGE_LAG_SHARE } else { 1.0 };
-            let back_s = skew * laws.age_s[channel] - late_s;
+            let back_s = match laws.form {
+                Form::Catalogue => laws.age_s[channel] - late_s,
+                Form::Near => (1.0 - AGE_LAG_SHARE) * laws.age_s[channel] - late_s,
+                Form::Far => self.slid_s(channel, at as f64 * self.step_s + late_s) - late_s,
+            };
             let truth = self.seen(channel, at as f64 - back_s / self.step_s);
             let mounted = if channel == 0 { self.mounted_m } else { 0.0 };
-            truth + self.gained(channel, truth) + laws.offset[channel] * drift + mounted
+            truth
+                + self.gained(channel, truth, time_s)
+                + laws.offset[channel] * laws.form.drift(time_s, DRIFTS[channel])
+                + mounted
         })
+    }
+
+    /// How old the value of the far form is at an instant, s.
+    fn slid_s(&self, channel: usize, instant_s: f64) -> f64 {
+        let laws = &self.laws;
+        let saw = |turns: f64| turns - turns.floor();
+        let slid = 1.0 + AGE_SLIDES[channel] * (2.0 * saw(instant_s / AGE_BEAT_S) - 1.0);
+        let age_s = slid * laws.age_s[channel];
+        let cycle_s = if channel == 0 { HOLDS_LAGS * laws.lag_s[channel] } else { 0.0 };
+        let held_s = if cycle_s > 0.0 { cycle_s * saw((instant_s - age_s) / cycle_s) } else { 0.0 };
+        age_s + held_s
     }
 
     fn seen(&self, channel: usize, step: f64) -> f64 {
@@ -138,14 +186,19 @@ impl Sensing {
         one + (step - before as f64) * (other - one)
     }
 
-    fn gained(&self, channel: usize, truth: f64) -> f64 {
-        let gain = self.laws.gain[channel];
-        if !self.laws.foreign || gain == 0.0 {
+    fn gained(&self, channel: usize, truth: f64, time_s: f64) -> f64 {
+        let laws = &self.laws;
+        let gain = laws.gain[channel];
+        if !self.laws.form.is_foreign() || gain == 0.0 {
             return gain * truth;
         }
         let bent = match channel {
-            0 => 0.8 + 0.4 * truth / self.parameters.position_range_m,
-            1 => 1.0 + 0.1 * libm::tanh(truth / GAIN_BENDS_N),
+            0 => {
+                let [flat, slope] = if laws.form.is_far() { POSITION_BENDS } else { [0.8, 0.4] };
+                flat + slope * truth / self.parameters.position_range_m
+            }
+            1 => 1.0 + laws.form.of(FORCE_BENDS) * libm::tanh(truth / GAIN_BENDS_N),
+            _ if laws.form.is_far() => laws.form.drift(time_s, GAIN_DRIFTS),
             _ => 0.8 + 0.2 * truth / GAIN_AGREES_PA,
         };
         gain * bent * truth
@@ -180,8 +233,9 @@ impl Lag {
     /// What is shown after a step in which the truth went straight from one value to another.
     #[inline(always)]
     fn after(&self, shown: f64, from: f64, to: f64, step_s: f64) -> f64 {
+        let time = if to < shown { self.falling } else { self.rising };
         let slope = (to - from) / step_s;
-        let behind = slope * self.time_s;
-        to - behind + (shown - from + behind) * self.kept
+        let behind = slope * time.s;
+        to - behind + (shown - from + behind) * time.kept
     }
 }

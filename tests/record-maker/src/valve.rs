@@ -4,16 +4,17 @@
 //!   command (late, shifted, with play) ─► target ─► spool, rate ─► opening (overlap) ─► c of both supply and both exhaust edges
 //! ```
 //!
-//! Each law has the catalogue's form and another one that means the same (`foreign`); the table of both stands in
+//! Each law has the catalogue's form and two others that mean the same ([`Form`]); their tables stand in
 //! `tests/docs/record-maker.md`.
 
+use super::Form;
 use super::numbers::Numbers;
 use plant::parameters::VALVE_POINTS;
 
 /// What of the valve's effects is on; SI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ValveLaws {
-    pub(super) foreign: bool,
+    pub(super) form: Form,
     pub(super) offset: f64,
     pub(super) play: f64,
     pub(super) dead_zone: f64,
@@ -49,7 +50,7 @@ pub(super) struct Play {
     lag: f64,
 }
 
-/// Spool, its rate, and the third state that only the foreign form has.
+/// Spool, its rate, and the third state that only the near form has.
 pub(super) type Spool = [f64; 3];
 
 impl Valve {
@@ -60,9 +61,10 @@ impl Valve {
 
     /// Where the spool is sent by a command that acts now; to be asked once a step, since the play moves.
     pub(super) fn target(&self, command: f64, play: &mut Play, drift: f64) -> f64 {
-        let (half, moved) = (self.laws.play, command - play.command);
+        let moved = command - play.command;
+        let half = self.laws.form.side(command > 0.0, SOLENOIDS_DIFFER) * self.laws.play;
         play.command = command;
-        if half > 0.0 && self.laws.foreign && moved != 0.0 {
+        if half > 0.0 && self.laws.form == Form::Near && moved != 0.0 {
             // Coleman, Hodgdon 1986: the lag bends exponentially towards the side that it comes from.
             let side = half.copysign(moved);
             play.lag = side + (play.lag - side) * libm::exp(-moved.abs() / (PLAY_BEND * half));
@@ -77,16 +79,20 @@ impl Valve {
     pub(super) fn spool_rates(&self, spool: Spool, target: f64) -> Spool {
         let [place, rate, third] = spool;
         let laws = &self.laws;
-        let limit = |wanted: f64| match laws.rate_per_s {
-            None => wanted,
-            Some(most) if laws.foreign => most * libm::tanh(wanted / most),
-            Some(most) => wanted.clamp(-most, most),
+        let opens = (target - place) * place >= 0.0;
+        let limit = |wanted: f64| match (laws.rate_per_s, laws.form) {
+            (None, _) => wanted,
+            (Some(most), Form::Near) => most * libm::tanh(wanted / most),
+            (Some(most), form) => {
+                let most = form.side(!opens, SPRING_HELPS) * most;
+                wanted.clamp(-most, most)
+            }
         };
         let Some([frequency_hz, damping]) = laws.second_order else {
             return [limit((target - place) / self.time_s), 0.0, 0.0];
         };
-        let w = std::f64::consts::TAU * frequency_hz;
-        if laws.foreign {
+        let w = std::f64::consts::TAU * frequency_hz * laws.form.side(!opens, SPRING_SPEEDS);
+        if laws.form == Form::Near {
             // The pilot stage ahead of it is a lag of its own; a stiffer slide makes up for its time.
             let (w, lag_s) = (FOREIGN_STIFFER * w, FOREIGN_PILOT / w);
             let pull = w * w * (third - place) - 2.0 * damping * w * rate;
@@ -101,17 +107,22 @@ impl Valve {
         let laws = &self.laws;
         let mut opening = spool.abs().min(1.0);
         if laws.dead_zone > 0.0 {
-            opening = self.beyond_overlap(opening);
+            opening = self.beyond_overlap(opening, spool > 0.0);
         }
+        let worn = laws.form.side(spool > 0.0, NOTCHES_DIFFER);
         let mut along = opening;
         if laws.bend != 0.0 {
             let o = opening;
-            let bow = if laws.foreign { 27.0 / 8.0 * o * (1.0 - o) * (1.0 - o) } else { 2.0 * o * (1.0 - o) };
-            along = (o + laws.bend * bow).clamp(0.0, 1.0);
+            let bow = if laws.form == Form::Near {
+                27.0 / 8.0 * o * (1.0 - o) * (1.0 - o)
+            } else {
+                2.0 * o * (1.0 - o)
+            };
+            along = (o + worn * laws.bend * bow).clamp(0.0, 1.0);
         }
         let [mut supply, mut exhaust] = self.table(along);
         if laws.edge_ratio != 0.0 {
-            let fade = if laws.foreign { 1.2 * opening / (opening + 0.2) } else { 1.0 };
+            let fade = if laws.form == Form::Near { 1.2 * opening / (opening + 0.2) } else { worn };
             supply *= 1.0 + fade * laws.edge_ratio / 2.0;
             exhaust *= 1.0 - fade * laws.edge_ratio / 2.0;
         }
@@ -124,17 +135,21 @@ impl Valve {
             let last = VALVE_POINTS - 1;
             let floors = [laws.null_leakage * self.edges[0][last], laws.null_leakage * self.edges[1][last]];
             for (edge, floor) in [(&mut edges.supply, floors[0]), (&mut edges.exhaust, floors[1])] {
-                for c in edge {
-                    *c = if laws.foreign { (*c * *c + floor * floor).sqrt() } else { c.max(floor) };
+                for (chamber, c) in edge.iter_mut().enumerate() {
+                    *c = if laws.form == Form::Near {
+                        (*c * *c + floor * floor).sqrt()
+                    } else {
+                        c.max(laws.form.side(chamber == 0, FLOORS_DIFFER) * floor)
+                    };
                 }
             }
         }
         edges
     }
 
-    fn beyond_overlap(&self, opening: f64) -> f64 {
-        let d = self.laws.dead_zone;
-        if !self.laws.foreign {
+    fn beyond_overlap(&self, opening: f64, extends: bool) -> f64 {
+        let d = self.laws.dead_zone * self.laws.form.side(extends, OVERLAPS_DIFFER);
+        if self.laws.form != Form::Near {
             return (opening - d).max(0.0) / (1.0 - d);
         }
         // A rounded edge: softplus of width d / 4, through 0 at 0 and 1 at 1.
@@ -160,17 +175,22 @@ impl Valve {
 
     /// Normal flow through an edge of conductance `c` into the chamber, m^3/s; pressures absolute, Pa.
     #[inline(always)]
-    pub(super) fn flow(&self, c: f64, far_pa: f64, port_pa: f64) -> f64 {
+    pub(super) fn flow(&self, chamber: usize, c: f64, far_pa: f64, port_pa: f64) -> f64 {
         if c == 0.0 {
             return 0.0;
         }
         match self.laws.critical_ratio {
             None => flow(c, far_pa, port_pa),
             Some(b) => {
+                let b = if self.laws.form.is_far() {
+                    (0.5 - self.laws.form.side(chamber == 0, PORTS_DIFFER) * (0.5 - b)).max(0.0)
+                } else {
+                    b
+                };
                 let (up, down) = if far_pa > port_pa { (far_pa, port_pa) } else { (port_pa, far_pa) };
                 let beyond = (down / up - b) / (1.0 - b);
                 let under = (1.0 - beyond * beyond).max(0.0);
-                let share = match (beyond > 0.0, self.laws.foreign) {
+                let share = match (beyond > 0.0, self.laws.form == Form::Near) {
                     (false, _) => 1.0,
                     (true, false) => under.sqrt(),
                     (true, true) => libm::pow(under, 0.5 + SUBSONIC_SHIFT * (0.5 - b)),
@@ -181,13 +201,22 @@ impl Valve {
     }
 }
 
-/// Length of the foreign play's bend, in half-widths.
+/// Length of the near form's bend of the play, in half-widths.
 const PLAY_BEND: f64 = 0.5;
-/// The foreign flow has ISO 6358-3's subsonic index m for an exponent: 0.5, and this share of what b lies below 0.5.
+/// The near form's flow has ISO 6358-3's subsonic index m for an exponent: 0.5, and this share of what b lies below 0.5.
 const SUBSONIC_SHIFT: f64 = 0.15;
-/// The foreign spool: its slide against the catalogue's natural frequency, and its pilot's lag in units of 1/w.
+/// The near form's spool: its slide against the catalogue's natural frequency, and its pilot's lag in units of 1/w.
 const FOREIGN_STIFFER: f64 = 1.15;
 const FOREIGN_PILOT: f64 = 0.25;
+/// The far forms: lands that one direction has worn more than the other, ports that differ, and a spring that helps the spool to
+/// close and is in its way when it opens; each is the share that one side has more, and the other less.
+const SOLENOIDS_DIFFER: f64 = 0.5;
+const NOTCHES_DIFFER: f64 = 0.42;
+const OVERLAPS_DIFFER: f64 = 0.65;
+const FLOORS_DIFFER: f64 = 0.6;
+const PORTS_DIFFER: f64 = 0.75;
+const SPRING_HELPS: f64 = 0.5;
+const SPRING_SPEEDS: f64 = 0.22;
 
 /// Eq. (4) of the paper as one formula; pressures absolute, Pa, c in m^3/s per Pa.
 #[inline(always)]

@@ -126,7 +126,7 @@ fn one(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
     let (number, rig) = (draw.number, RigParameters::baseline());
     let record = simulate(&draw.recipe, &rig).map_err(|error| ComputeError::Make { number, error })?;
     let mut classes = classes_of(draw, trajectory(&record, &rig))?;
-    if draw.recipe.foreign_form {
+    if draw.recipe.form.is_foreign() {
         for (class, hidden) in classes.hidden.iter_mut().zip(&draw.recipe.hidden) {
             class.nearest = nearest_law(draw, hidden)?;
         }

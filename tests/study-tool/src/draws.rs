@@ -7,7 +7,7 @@
 //!   that only shapes the effect: one half its default, one half uniform over its `drawn` range.
 //! - Place: any of the effect's kind. The record is of the axis it is at; of both, linked, for what needs two.
 //! - A fifth has a functional form that is not the catalogue's, a half 1 to 3 parameters of the baseline off by 1 to 3 %, a third
-//!   coloured noise and jitter: each drawn by itself.
+//!   coloured noise and jitter: each drawn by itself. That form is the near one, or by the study's shape the far one.
 //! - A study near the limits divides all amplitudes by a factor, the draws staying the same ones: what is drawn lies far
 //!   above them.
 //! - A case of wrong parameters alone has one that is off by 3 to 15 % and none of the other difficulties in the baseline.
@@ -27,7 +27,7 @@ use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Part, Place, PlaceKind, Sheet};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
-use record_maker::{Experiment, Hidden, PARAMETERS, Recipe};
+use record_maker::{Experiment, Form, Hidden, PARAMETERS, Recipe};
 use serde::{Deserialize, Serialize};
 
 /// Parameters that a case of wrong parameters alone is about, with their names in reports.
@@ -50,6 +50,9 @@ pub struct Shape {
     /// Exact and background world in turn, both axes recorded; absent in a file when the world is exact alone.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub worlds: bool,
+    /// Other forms are the far ones; absent in a file when they are the near ones.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub far_forms: bool,
 }
 
 fn one() -> f64 {
@@ -72,6 +75,7 @@ impl Shape {
         noise_factor: 1.0,
         weaker_factor: 1.0,
         worlds: false,
+        far_forms: false,
     };
     pub(crate) const SMALL: Shape =
         Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, ..Shape::NO_DRAW };
@@ -88,6 +92,7 @@ impl Default for Shape {
             noise_factor: 1.0,
             weaker_factor: 1.0,
             worlds: false,
+            far_forms: false,
         }
     }
 }
@@ -156,6 +161,9 @@ pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
         if !is_one(&shape.weaker_factor) {
             recipe.hidden.iter_mut().for_each(|hidden| weaken(hidden, shape.weaker_factor));
         }
+        if shape.far_forms && recipe.form.is_foreign() {
+            recipe.form = Form::Far;
+        }
         Draw { number, kind, recipe }
     };
     drawn.into_iter().enumerate().map(finish).collect()
@@ -212,9 +220,9 @@ impl Generator {
         let place = places[self.below(places.len())];
         let axis = axis_of(place).unwrap_or(Axis::Drive);
         let hidden = vec![self.hidden(sheet, place)];
-        let foreign_form = self.one_in(5.0);
+        let form = if self.one_in(5.0) { Form::Near } else { Form::Catalogue };
         let both_axes = needs_both_axes(sheet.place);
-        Recipe { hidden, foreign_form, both_axes, ..self.plain(axis) }
+        Recipe { hidden, form, both_axes, ..self.plain(axis) }
     }
 
     fn null(mut self) -> Recipe {
@@ -249,8 +257,8 @@ impl Generator {
             let place = *places[self.below(places.len())];
             hidden.push(self.hidden(sheet, place));
         }
-        let foreign_form = self.one_in(5.0);
-        Recipe { hidden, foreign_form, both_axes, ..self.plain(axis) }
+        let form = if self.one_in(5.0) { Form::Near } else { Form::Catalogue };
+        Recipe { hidden, form, both_axes, ..self.plain(axis) }
     }
 
     /// Nothing hidden, with the difficulties of all draws.
@@ -272,7 +280,7 @@ impl Generator {
             axis,
             both_axes: false,
             hidden: Vec::new(),
-            foreign_form: false,
+            form: Form::Catalogue,
             wrong_parameters,
             coloured_noise: coloured,
             jitter: coloured,
@@ -402,7 +410,7 @@ mod tests {
             singles.iter().filter(|draw| has(&draw.recipe)).count() as f64 / singles.len() as f64
         };
         // 2280 draws: five standard errors are 0.042, 0.052, 0.049.
-        assert!((share(&|recipe| recipe.foreign_form) - 0.2).abs() < 0.042);
+        assert!((share(&|recipe| recipe.form.is_foreign()) - 0.2).abs() < 0.042);
         assert!((share(&|recipe| !recipe.wrong_parameters.is_empty()) - 0.5).abs() < 0.052);
         assert!((share(&|recipe| recipe.coloured_noise) - 1.0 / 3.0).abs() < 0.049);
         for draw in draws {
@@ -410,7 +418,7 @@ mod tests {
             let range = if draw.kind == Kind::Parameter { 0.03..0.1501 } else { 0.01..0.0301 };
             assert!(draw.recipe.wrong_parameters.iter().all(|wrong| range.contains(&off(wrong))));
             assert!(draw.kind != Kind::Parameter || draw.recipe.wrong_parameters.len() == 1);
-            assert!(!draw.recipe.foreign_form || !draw.recipe.hidden.is_empty());
+            assert!(!draw.recipe.form.is_foreign() || !draw.recipe.hidden.is_empty());
         }
     }
 

@@ -17,7 +17,7 @@
 use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, Shape, draws};
 use campaign::parts;
-use record_maker::{Hidden, Recipe};
+use record_maker::{Form, Hidden, Recipe};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -136,8 +136,7 @@ fn name(number: usize) -> String {
 
 /// A draw as `draws.json` and `score.json` hold it.
 pub fn draw_as_json(draw: &Draw) -> Value {
-    let Recipe { seed, axis, both_axes, hidden, foreign_form, wrong_parameters, background, .. } =
-        &draw.recipe;
+    let Recipe { seed, axis, both_axes, hidden, form, wrong_parameters, background, .. } = &draw.recipe;
     let wrong = |(name, factor): &(String, f64)| json!({"name": name, "factor": factor});
     let mut draw_json = json!({
         "number": draw.number,
@@ -146,13 +145,16 @@ pub fn draw_as_json(draw: &Draw) -> Value {
         "axis": axis.name(),
         "both_axes": both_axes,
         "hidden": hidden.iter().map(hidden_as_json).collect::<Vec<_>>(),
-        "foreign_form": foreign_form,
+        "foreign_form": form.is_foreign(),
         "wrong_parameters": wrong_parameters.iter().map(wrong).collect::<Vec<_>>(),
         "coloured_noise": draw.recipe.coloured_noise,
         "jitter": draw.recipe.jitter,
         "noise_factor": draw.recipe.noise,
     });
     // What older studies did not have stands where it is something.
+    if *form == Form::Far {
+        draw_json["far_form"] = json!(true);
+    }
     if draw.recipe.unlinked {
         draw_json["unlinked"] = json!(true);
     }
@@ -257,6 +259,29 @@ mod tests {
         fs::write(&path, text).unwrap();
         let error = Study::open(folder.path()).unwrap_err().to_string();
         assert!(error.contains("use the version that began this study"), "{error}");
+    }
+
+    #[test]
+    fn far_forms_are_said_where_they_are_drawn_and_change_nothing_else() {
+        let near = Plan::new(7, Shape { each: 8, ..Shape::SMALL });
+        let far = Plan::new(7, Shape { far_forms: true, ..near.shape });
+        assert!(!near.text().contains("far_form"));
+        let mut foreign = 0;
+        for (near, far) in near.draws().iter().zip(far.draws()) {
+            foreign += usize::from(near.recipe.form == Form::Near);
+            let form = if near.recipe.form == Form::Near { Form::Far } else { Form::Catalogue };
+            assert_eq!(far.recipe, Recipe { form, ..near.recipe.clone() });
+            let (near, mut far) = (draw_as_json(near), draw_as_json(&far));
+            let said = far.as_object_mut().unwrap().remove("far_form");
+            assert_eq!(said.is_some(), form == Form::Far);
+            assert_eq!(near, far);
+        }
+        assert!(foreign > 0);
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(
+            Study::begin(folder.path(), &far).unwrap().draws,
+            Study::open(folder.path()).unwrap().draws
+        );
     }
 
     #[test]

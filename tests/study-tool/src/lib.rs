@@ -29,6 +29,7 @@
 //! | [`trajectory`], [`signature`] | true states of a record; what an effect changes in windows that start from them |
 //! | [`limits`] | amplitude from which an ideal observer sees an effect |
 //! | [`classes`] | which effects leave the same signature in a record |
+//! | [`nearest`], [`forms`] | the catalogue's law nearest to another form, and what it leaves of each |
 //! | [`compute`] | both, for all places and draws |
 //! | [`document`] | both as tables of a page |
 //!
@@ -42,6 +43,7 @@ pub mod curve;
 pub mod document;
 pub mod draws;
 pub mod folder;
+pub mod forms;
 pub mod interval;
 pub mod judge;
 pub mod leave_out;

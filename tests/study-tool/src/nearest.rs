@@ -19,7 +19,7 @@ use discrepancy::candidates::Candidate;
 use model_fit::estimator::{Estimator, Iterate, JOINT, Options, Step};
 use nalgebra::{DMatrix, DVector};
 use plant::RigParameters;
-use record_maker::{Hidden, Recipe, Record, simulate};
+use record_maker::{Form, Hidden, Recipe, Record, simulate};
 use serde::{Deserialize, Serialize};
 
 /// Step of finite differences, as a coordinate.
@@ -52,12 +52,12 @@ pub struct NearestLaw {
 /// # Errors
 /// [`ComputeError`] when a record cannot be made.
 pub fn nearest_law(draw: &Draw, hidden: &Hidden) -> Result<Option<NearestLaw>, ComputeError> {
-    let fitted = |foreign_form| fitted(&record(draw, hidden, foreign_form)?, hidden);
-    let own = fitted(false)?;
+    let fitted = |form| fitted(&record(draw, hidden, form)?, hidden);
+    let own = fitted(Form::Catalogue)?;
     if own.left_share > FAITHFUL_LEFT {
         return Ok(None);
     }
-    let other = fitted(true)?;
+    let other = fitted(draw.recipe.form)?;
     let found = |(own, drawn): (&f64, &f64)| (own / drawn - 1.0).abs() < FAITHFUL;
     let numbers = own.numbers.iter().zip(&hidden.numbers).zip(&other.numbers);
     let numbers = numbers.map(|((own, drawn), other)| if found((own, drawn)) { *other } else { *drawn });
@@ -65,15 +65,14 @@ pub fn nearest_law(draw: &Draw, hidden: &Hidden) -> Result<Option<NearestLaw>, C
 }
 
 /// A record of a hidden effect alone, in one of its forms.
-fn record(draw: &Draw, hidden: &Hidden, foreign_form: bool) -> Result<Record, ComputeError> {
-    let recipe =
-        Recipe { hidden: vec![hidden.clone()], background: None, foreign_form, ..draw.recipe.clone() };
+fn record(draw: &Draw, hidden: &Hidden, form: Form) -> Result<Record, ComputeError> {
+    let recipe = Recipe { hidden: vec![hidden.clone()], background: None, form, ..draw.recipe.clone() };
     simulate(&recipe, &RigParameters::baseline())
         .map_err(|error| ComputeError::Make { number: draw.number, error })
 }
 
 /// The catalogue's law of a hidden effect fitted to a record.
-fn fitted(made: &Record, hidden: &Hidden) -> Result<NearestLaw, ComputeError> {
+pub(crate) fn fitted(made: &Record, hidden: &Hidden) -> Result<NearestLaw, ComputeError> {
     let mut wrong = made.recipe.wrong_parameters.iter();
     let baseline = RigParameters::baseline();
     let rig = wrong.try_fold(baseline, |rig, (name, factor)| with_parameter(&rig, name, *factor))?;
@@ -181,8 +180,8 @@ mod tests {
         let draws = Plan::new(5, Shape { each: 1, ..Shape::SMALL }).draws();
         let draw = draws.iter().find(|draw| draw.recipe.hidden[0].name == "valve-characteristic").unwrap();
         let hidden = &draw.recipe.hidden[0];
-        let [own, other] = [false, true].map(|foreign_form| {
-            let mut record = record(draw, hidden, foreign_form).unwrap();
+        let [own, other] = [Form::Catalogue, Form::Near].map(|form| {
+            let mut record = record(draw, hidden, form).unwrap();
             record.rows.truncate(2000);
             fitted(&record, hidden).unwrap()
         });

@@ -251,7 +251,7 @@ fn case(
         recipe: draw_as_json(draw),
         separable: recipe.hidden.len() > 1 && clear && !twins,
         over_limit,
-        foreign_form: recipe.foreign_form,
+        foreign_form: recipe.form.is_foreign(),
         background: recipe.background.is_some(),
         beyond_drawn: recipe.hidden.iter().any(is_beyond_drawn),
         wrong_parameters: !recipe.wrong_parameters.is_empty(),

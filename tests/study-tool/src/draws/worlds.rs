@@ -16,7 +16,7 @@ use crate::limits::Scale;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, PlaceKind, Sheet};
 use plant::parameters::VALVE_POINTS;
-use record_maker::{Background, Hidden, Recipe};
+use record_maker::{Background, Form, Hidden, Recipe};
 
 /// Generators of worlds are beside those of draws.
 const STREAM: u64 = 1 << 20;
@@ -35,11 +35,11 @@ const TEMPERATURE_ERROR: f64 = 0.01;
 pub(super) fn turn(recipe: Recipe, seed: u64, stream: u64, repetition: u32) -> Recipe {
     let mut generator = Generator::new(seed, STREAM + stream, repetition);
     let mut recipe = Recipe { unlinked: !recipe.both_axes, both_axes: true, ..recipe };
-    let (background, foreign_form) = match (recipe.hidden.is_empty(), repetition % 5) {
+    let (background, is_foreign) = match (recipe.hidden.is_empty(), repetition % 5) {
         (true, _) => (repetition % 2 == 1, false),
         (false, turn) => (turn == 2 || turn == 3, turn == 1 || turn == 3),
     };
-    recipe.foreign_form = foreign_form;
+    recipe.form = if is_foreign { Form::Near } else { Form::Catalogue };
     for hidden in &mut recipe.hidden {
         if generator.one_in(10.0) {
             beyond(hidden, generator.uniform(BEYOND));
@@ -156,8 +156,8 @@ mod tests {
         };
         for kind in [Kind::Single, Kind::Pair, Kind::Triple] {
             assert_eq!(share(kind, &|recipe| recipe.background.is_some()), 0.4);
-            assert_eq!(share(kind, &|recipe| recipe.foreign_form), 0.4);
-            assert_eq!(share(kind, &|recipe| recipe.background.is_some() && recipe.foreign_form), 0.2);
+            assert_eq!(share(kind, &|recipe| recipe.form.is_foreign()), 0.4);
+            assert_eq!(share(kind, &|recipe| recipe.background.is_some() && recipe.form.is_foreign()), 0.2);
         }
         assert_eq!(share(Kind::Null, &|recipe| recipe.background.is_some()), 0.5);
         assert!(draws.iter().all(|draw| draw.recipe.both_axes));

@@ -22,6 +22,8 @@ pub(crate) enum Command {
     Limits(LimitsArguments),
     /// Computes for each draw which effects leave the same signature.
     Cosines(CosinesArguments),
+    /// Computes what the catalogue's law leaves of the other forms of each effect.
+    Forms(FormsArguments),
     /// Takes a step with one draw, for a campaign: its number comes as a line of JSON, what came of it goes out as one.
     One(OneArguments),
     /// Scores the results: score-LABEL.json and score-LABEL.html.
@@ -91,11 +93,14 @@ pub(crate) struct PlanArguments {
     /// Exact and background world in turn, both axes recorded.
     #[arg(long)]
     worlds: bool,
+    /// Draws of another form have the far one.
+    #[arg(long)]
+    far_forms: bool,
 }
 
 impl PlanArguments {
     pub(crate) fn plan(&self) -> Plan {
-        let Self { each, nulls, parameters, pairs, triples, noise, weaker, worlds, .. } = *self;
+        let Self { each, nulls, parameters, pairs, triples, noise, weaker, worlds, far_forms, .. } = *self;
         let shape = Shape {
             each,
             nulls,
@@ -105,6 +110,7 @@ impl PlanArguments {
             noise_factor: noise,
             weaker_factor: weaker,
             worlds,
+            far_forms,
         };
         Plan::new(self.seed, shape)
     }
@@ -141,6 +147,25 @@ pub(crate) struct CosinesArguments {
     #[arg(long, conflicts_with = "write")]
     pub(crate) done: Option<String>,
     /// Writes tests/study/classes.json and the table of tests/docs/study.md.
+    #[arg(long)]
+    pub(crate) write: bool,
+}
+
+#[derive(Args)]
+pub(crate) struct FormsArguments {
+    /// Only of this effect; may be repeated.
+    #[arg(long = "effect", conflicts_with = "write")]
+    pub(crate) effects: Vec<String>,
+    /// At this place of theirs, as the catalogue names it.
+    #[arg(long, conflicts_with = "write", requires = "effects")]
+    pub(crate) place: Option<String>,
+    /// Fits at once.
+    #[arg(long, default_value_t = 2)]
+    pub(crate) jobs: usize,
+    /// Without the near forms.
+    #[arg(long, conflicts_with = "write")]
+    pub(crate) far_only: bool,
+    /// Writes the table of tests/docs/record-maker.md.
     #[arg(long)]
     pub(crate) write: bool,
 }

@@ -1,4 +1,4 @@
-//! The study's commands, for `scripts/study`: draws, limits, cosines, one, score, compare, curve, ledger, resolve.
+//! The study's commands, for `scripts/study`: draws, limits, cosines, forms, one, score, compare, curve, ledger, resolve.
 
 mod cli;
 mod one;
@@ -6,9 +6,10 @@ mod scores;
 
 use clap::Parser;
 use cli::{
-    Cli, Command, CosinesArguments, DrawsArguments, LedgerArguments, LimitsArguments, PlanArguments,
-    ResolveArguments,
+    Cli, Command, CosinesArguments, DrawsArguments, FormsArguments, LedgerArguments, LimitsArguments,
+    PlanArguments, ResolveArguments,
 };
+use record_maker::Form;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -18,9 +19,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use study::classes::{Classes, DrawClasses};
 use study::draws::Draw;
 use study::folder::{Study, read, write_whole};
+use study::forms::{OTHERS, Selection};
 use study::ledger::Ledger;
 use study::resolve::Table;
-use study::{compute, document};
+use study::{compute, document, forms};
 
 /// Exit code of a study that was asked to stop: everything that is done is kept.
 const INTERRUPTED: u8 = 130;
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
         Command::Draws(arguments) => draws(&arguments),
         Command::Limits(arguments) => limits(&arguments),
         Command::Cosines(arguments) => cosines(&arguments, &stop),
+        Command::Forms(arguments) => forms(&arguments, &stop),
         Command::Score(arguments) => scores::score(&arguments),
         Command::Worlds(arguments) => scores::worlds(&arguments),
         Command::Compare(arguments) => scores::compare(&arguments),
@@ -71,6 +74,7 @@ fn committed(name: &str) -> PathBuf {
 const PAGE: &str = "docs/study.md";
 /// Tables that only studies of earlier programs have.
 const EARLIER: &str = "docs/study-earlier.md";
+const FORMS_PAGE: &str = "docs/record-maker.md";
 const LIMITS: &str = "study/limits.json";
 const CLASSES: &str = "study/classes.json";
 const LEDGER: &str = "study/evidence/ledger.toml";
@@ -103,6 +107,22 @@ fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
         let text = document::twin_table(&classes);
         write_whole(&committed(CLASSES), compute::classes_text(&classes).as_bytes())?;
         document::put(&committed(PAGE), "twins", &text)?;
+    }
+    Ok(())
+}
+
+fn forms(arguments: &FormsArguments, stop: &AtomicBool) -> Done {
+    let kinds = if arguments.far_only { &[Form::Far][..] } else { &OTHERS };
+    let of = Selection { effects: &arguments.effects, place: arguments.place.as_deref(), forms: kinds };
+    let left = forms::left(&of, arguments.jobs, stop, &say)?;
+    let text = forms::table(&left);
+    if stop.load(Ordering::Relaxed) {
+        return Ok(());
+    }
+    if arguments.write {
+        document::put(&committed(FORMS_PAGE), "forms", &text)?;
+    } else {
+        say(&format!("\n{text}"));
     }
     Ok(())
 }
