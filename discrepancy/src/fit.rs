@@ -208,13 +208,46 @@ impl Products {
         precisions: &[f64],
         prior_offset: &[f64],
     ) -> Option<Vec<f64>> {
+        self.bounded_solution(chosen, weights, precisions, prior_offset, &vec![f64::INFINITY; chosen.len()])
+    }
+
+    /// The same with the sums of `prior_offset` and the coefficients within `most`: those that exceed it are held there, and the
+    /// others are solved for again.
+    fn bounded_solution(
+        &self,
+        chosen: &[usize],
+        weights: &[f64],
+        precisions: &[f64],
+        prior_offset: &[f64],
+        most: &[f64],
+    ) -> Option<Vec<f64>> {
         let (matrix, mut vector) = self.normal(chosen, weights, precisions);
         vector
             .iter_mut()
             .zip(precisions)
             .zip(prior_offset)
             .for_each(|((score, precision), prior_offset)| *score -= precision * prior_offset);
-        solve(matrix, &vector).map(|solution| solution.iter().copied().collect())
+        let mut solution: Vec<f64> = solve(matrix.clone(), &vector)?.iter().copied().collect();
+        let mut free: Vec<usize> = (0..chosen.len()).collect();
+        loop {
+            let exceeds = |at: &usize| (prior_offset[*at] + solution[*at]).abs() > most[*at];
+            let (held, rest): (Vec<usize>, Vec<usize>) = free.iter().partition(|at| exceeds(at));
+            if held.is_empty() {
+                return Some(solution);
+            }
+            for at in held {
+                solution[at] = most[at].copysign(prior_offset[at] + solution[at]) - prior_offset[at];
+            }
+            free = rest;
+            let is_held = |at: &usize| !free.contains(at);
+            let right = DVector::from_fn(free.len(), |row, _| {
+                let of_held = (0..chosen.len()).filter(is_held);
+                vector[free[row]] - of_held.map(|at| matrix[(free[row], at)] * solution[at]).sum::<f64>()
+            });
+            let among = DMatrix::from_fn(free.len(), free.len(), |row, at| matrix[(free[row], free[at])]);
+            let solved = solve(among, &right)?;
+            free.iter().zip(solved.iter()).for_each(|(at, value)| solution[*at] = *value);
+        }
     }
 
     /// The best coefficients of some columns; `precisions` as in [`Products::normal`].
@@ -224,6 +257,17 @@ impl Products {
 
     /// The same with prior means at `-prior_offset`: ridges act on the sums of `prior_offset` and the coefficients.
     pub(crate) fn fit_from(&self, chosen: &[usize], precisions: &[f64], prior_offset: &[f64]) -> Fit {
+        self.fit_within(chosen, precisions, prior_offset, &vec![f64::INFINITY; chosen.len()])
+    }
+
+    /// The same with the absolute values of these sums at most `most`.
+    pub(crate) fn fit_within(
+        &self,
+        chosen: &[usize],
+        precisions: &[f64],
+        prior_offset: &[f64],
+        most: &[f64],
+    ) -> Fit {
         let mut weights = self.weights(&self.squares);
         let mut coefficients = vec![0.0; chosen.len()];
         let mut squares = self.squares.clone();
@@ -237,7 +281,7 @@ impl Products {
         };
         let mut loss = self.loss(&squares) + prior_loss(&coefficients);
         for _ in 0..PASSES {
-            let Some(tried) = self.weighted_solution(chosen, &weights, precisions, prior_offset) else {
+            let Some(tried) = self.bounded_solution(chosen, &weights, precisions, prior_offset, most) else {
                 break;
             };
             let tried_squares = self.squares(chosen, &tried);
@@ -396,6 +440,20 @@ mod tests {
         let products = Products::new(&residual, &[&column], &[50.0; 10], 50);
         let held = products.fit(&[0], &[1e6]);
         assert!(held.coefficients[0].abs() < 0.01, "{:?}", held.coefficients);
+    }
+
+    #[test]
+    fn a_bounded_coefficient_stays_at_its_bound_and_the_others_follow() {
+        let (residual, column) = made(0.8, false);
+        let other: Vec<f64> =
+            column.iter().enumerate().map(|(at, value)| value + (at as f64).cos()).collect();
+        let products = Products::new(&residual, &[&column, &other], &[50.0; 10], 50);
+        let within =
+            |most: f64| products.fit_within(&[0, 1], &[1e-6; 2], &[0.1, 0.0], &[most, f64::INFINITY]);
+        let (free, bounded) = (within(2.0), within(0.3));
+        assert_eq!(free.coefficients, products.fit_from(&[0, 1], &[1e-6; 2], &[0.1, 0.0]).coefficients);
+        assert!((bounded.coefficients[0] - 0.2).abs() < 1e-12 && bounded.loss > free.loss, "{bounded:?}");
+        assert!(bounded.coefficients[1] > free.coefficients[1] + 0.1, "{bounded:?} {free:?}");
     }
 
     /// A standard normal number from a generator that is the same each time.

@@ -194,7 +194,9 @@ pub fn name(
     let limits = limits_of(&null, &columns, threshold);
     let lacks_fit = lacks_fit(here, model.loss);
     progress("weighing explanations");
-    let fits = Fits { parameters: calibrated, model, fitted: &fitted };
+    // Its parameters were shrunk to start the next round: the fit that its loss is of has others.
+    let as_fitted = fitted.iter().find(|fit| fit.loss == model.loss).unwrap_or(model);
+    let fits = Fits { parameters: calibrated, model: as_fitted, fitted: &fitted };
     let explanations = explanations(here, &linearisation, &columns, &fits);
     let searched = Searched { selection, all_rounds, lacks_fit, any_homogeneous };
     let decision = decide(here, &explanations, searched);

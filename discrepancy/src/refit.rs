@@ -173,9 +173,9 @@ fn coordinates(placed: &[EffectEstimate]) -> Vec<(usize, usize)> {
 pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed: &[EffectEstimate]) -> f64 {
     let Some(rig) = rig_of(engine.rig(), placed, &linearisation.factors) else { return f64::INFINITY };
     let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &linearisation.columns);
-    products
-        .fit_from(&(0..COUNT).collect::<Vec<_>>(), &parameter_precisions(), &linearisation.deviations())
-        .loss
+    let parameters: Vec<usize> = (0..COUNT).collect();
+    let off = linearisation.deviations();
+    products.fit_within(&parameters, &parameter_precisions(), &off, &[MOST_OFF; COUNT]).loss
 }
 
 /// Effects at some coordinates, simulated, with the parameters fitted linearly.
@@ -217,6 +217,7 @@ pub(crate) fn refit_steps(
     let all_precisions = prior_precisions(start);
     let chosen: Vec<usize> = (0..all_precisions.len()).collect();
     let coordinates = coordinates(start);
+    let most = [vec![MOST_OFF; COUNT], vec![f64::INFINITY; coordinates.len()]].concat();
     let mut parameter_products: Option<Products> = None;
     let prior = |placed: &[EffectEstimate]| -> f64 {
         coordinates
@@ -236,7 +237,7 @@ pub(crate) fn refit_steps(
             }
             none => none.insert(engine.products(&residual, &linearisation.columns)),
         };
-        let fit = products.fit_from(&parameters, &precisions, &off);
+        let fit = products.fit_within(&parameters, &precisions, &off, &[MOST_OFF; COUNT]);
         let prior = prior(&placed);
         Some(Projected { placed, simulated, residual, fit, prior })
     };
@@ -254,7 +255,7 @@ pub(crate) fn refit_steps(
         last = products_at(iterate);
         let Some(products) = &last else { return Step::Impossible };
         let from = prior_deviations(&linearisation.factors, &iterate.placed);
-        let joint = products.fit_from(&chosen, &all_precisions, &from);
+        let joint = products.fit_within(&chosen, &all_precisions, &from, &most);
         let promised = iterate.loss() - joint.loss;
         if promised < estimator.tolerance(iterate.loss()) {
             return Step::Refused { promised };
@@ -291,6 +292,7 @@ pub(crate) fn refit_steps(
     let errors = (COUNT..chosen.len()).chain(0..COUNT).map(error).collect();
     let mut factors = linearisation.factors;
     for (factor, change) in factors.iter_mut().zip(&iterate.fit.coefficients) {
+        // Rounding alone may exceed the bound.
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
     let loss = iterate.loss() + model_penalty(coordinates.len(), &factors);

@@ -141,7 +141,7 @@ pub struct NamedEffect {
     pub parameters: Vec<Quantity>,
     /// Share of the excess of the training records that it removes.
     pub share_explained: f64,
-    /// Coefficient of variation of its amplitude between windows; null where none was computed.
+    /// Coefficient of variation between windows, in shares of its response; null where none was computed.
     #[serde(default)]
     pub amplitude_variation: Option<f64>,
     /// Effects that explain these records as well.

@@ -1,8 +1,8 @@
 //! Heterogeneity of an effect's amplitude between the windows of the records.
 //!
 //! ```text
-//!   d_k, i_k   change of the amplitude that window k asks for beside the fitted model, and its information
-//!   Q = sum_k i_k (d_k - mean)^2     tau^2 = (Q - (n - 1)) / (sum i - sum i^2 / sum i), at least 0     CV_B = tau / |amplitude|
+//!   d_k, i_k   change of the effect that window k asks for beside the fitted model, as a share of it, and its information
+//!   Q = sum_k i_k (d_k - mean)^2     tau^2 = (Q - (n - 1)) / (sum i - sum i^2 / sum i), at least 0     CV_B = tau
 //! ```
 //!
 //! A law that is nearly right has one amplitude whatever the rig does. Another one absorbs more of what is missing in some
@@ -128,17 +128,15 @@ pub(super) fn heterogeneity(
 ) -> Option<Vec<Heterogeneity>> {
     let windows = Windows::new(engine, linearisation, model)?;
     let mut column = linearisation.columns.len();
-    model
-        .placed
-        .iter()
-        .map(|placed| {
-            let key = leading_key(placed);
-            let all: Option<Vec<Vec<(f64, f64)>>> =
-                (0..placed.coordinates.len()).map(|at| windows.changes(column + at)).collect();
-            let all = all?;
-            column += placed.coordinates.len();
-            let spread = all.iter().map(|changes| significant_spread(changes)).collect();
-            Some(Heterogeneity { variation: spread_of(&all[key]) / placed.coordinates[key].abs(), spread })
+    (0..model.placed.len())
+        .map(|at| {
+            let placed = &model.placed[at];
+            let columns = column..column + placed.coordinates.len();
+            column = columns.end;
+            let scale = windows.with_response(engine, model, at, columns.start + leading_key(placed))?;
+            let variation = spread_of(&informative(&scale));
+            let spread = columns.map(|column| Some(significant_spread(&windows.changes(column)?)));
+            Some(Heterogeneity { variation, spread: spread.collect::<Option<_>>()? })
         })
         .collect()
 }
@@ -164,6 +162,9 @@ pub(super) fn parameter_spread(
 
 /// What each window asks for beside a model: its parameters first, then the coordinates of its effects.
 struct Windows {
+    simulated: Vec<f64>,
+    residual: Vec<f64>,
+    columns: Vec<Vec<f64>>,
     products: Products,
     weights: Vec<f64>,
     precisions: Vec<f64>,
@@ -177,7 +178,26 @@ impl Windows {
         columns.extend(coordinate_columns(engine, &model.factors, &model.placed, &simulated)?);
         let products = engine.products(&residual, &columns);
         let weights = products.weights(&engine.squares(&residual));
-        Some(Windows { products, weights, precisions: prior_precisions(&model.placed) })
+        let precisions = prior_precisions(&model.placed);
+        Some(Windows { simulated, residual, columns, products, weights, precisions })
+    }
+
+    /// Changes, as shares of it, that the windows ask for of the whole response to an effect, which stands in for one of its
+    /// columns: a derivative is small where the effect saturates, and the share is not.
+    fn with_response(
+        &self,
+        engine: &Engine<'_>,
+        model: &Refit,
+        effect: usize,
+        column: usize,
+    ) -> Option<Vec<(f64, f64)>> {
+        let mut without = model.placed.clone();
+        without.remove(effect);
+        let other = engine.simulate(&rig_of(engine.rig(), &without, &model.factors)?);
+        let mut columns: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
+        let response = engine.difference(&self.simulated, &other);
+        columns[column] = &response;
+        engine.products(&self.residual, &columns).window_changes(column, &self.weights, &self.precisions)
     }
 
     /// Of one column, with each window's information.
@@ -189,12 +209,7 @@ impl Windows {
 /// tau where I^2 is above [`HIGH_I2`], else 0. Neither uninformative windows count, nor the few that disagree most: there the
 /// break-away came at another moment.
 fn significant_spread(changes: &[(f64, f64)]) -> f64 {
-    let most = changes.iter().map(|(_, information)| *information).fold(0.0, f64::max);
-    let mut informative: Vec<(f64, f64)> = changes
-        .iter()
-        .copied()
-        .filter(|(_, information)| *information > MIN_INFORMATION_SHARE * most)
-        .collect();
+    let mut informative = informative(changes);
     let mean = mean_of(&informative);
     let part = |(change, information): &(f64, f64)| information * (change - mean).powi(2);
     informative.sort_by(|left, right| part(left).total_cmp(&part(right)));
@@ -205,6 +220,12 @@ fn significant_spread(changes: &[(f64, f64)]) -> f64 {
     } else {
         0.0
     }
+}
+
+/// The windows that say something: the others would count as windows that agree.
+fn informative(changes: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let most = changes.iter().map(|(_, information)| *information).fold(0.0, f64::max);
+    changes.iter().copied().filter(|(_, information)| *information > MIN_INFORMATION_SHARE * most).collect()
 }
 
 /// Q of the changes that windows ask for, each with its information.
