@@ -29,7 +29,7 @@ const LEAST_PROBABLE: f64 = 0.1;
 /// Coefficient of variation of an amplitude between windows above which its effect is not named, however probable. The limit of
 /// the search is stricter, since no probability speaks for the effect there. Of sets said at one half and more on seeds 15 and
 /// 3769683697404522, development seeds, right ones had 0.00 to 0.57, leaks that took over what was left of a background 1.1 to
-/// 1.6.
+/// 1.6; these figures are of the derivative that the whole response stands for since.
 const MAX_CV_WHEN_PROBABLE: f64 = 0.75;
 /// Share of the loss after calibration that an explanation may leave on its axes: impostors for what was left out left 0.54 and
 /// more on seed 13, a development seed, and on the frozen record without `inclination`; all but two right names left 0 to 0.45.

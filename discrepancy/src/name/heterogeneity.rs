@@ -26,7 +26,7 @@ use crate::refit::{
 use rayon::prelude::*;
 
 /// CV_B above which an effect neither comes first in a round nor stays in a model that lacks fit: right names had 0.01 to 0.24 on
-/// seed 13, a development seed, impostors 0.1 to 2.
+/// seed 13, a development seed, impostors 0.1 to 2. These figures are of the derivative that the whole response stands for since.
 const MAX_CV_IN_SEARCH: f64 = 0.3;
 /// I^2, the share of Q that is not chance, above which tau counts in a standard error: high heterogeneity in the terms of Higgins
 /// et al. 2003, BMJ 327. Windows of an exact law disagree a little too.
