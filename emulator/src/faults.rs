@@ -72,7 +72,7 @@ impl Fault {
     pub fn like(name: &str, at: Option<&str>) -> Result<Self, FaultError> {
         let spec = table::spec(name).ok_or_else(|| FaultError::Unknown(name.to_owned()))?;
         let numbers: Vec<_> =
-            spec.keys.iter().map(|key| (key.name.to_owned(), Some(key.max), String::new())).collect();
+            spec.keys.iter().map(|key| (key.name.to_string(), Some(key.max), String::new())).collect();
         Self::new(name, at, &numbers)
     }
 
@@ -96,16 +96,16 @@ impl Fault {
             FaultError::Place { fault: spec.name, at, allowed: format!("one of {reported}{more}") }
         })?;
         if let Some((key, _, value)) =
-            numbers.iter().find(|(key, ..)| spec.keys.iter().all(|known| known.name != key))
+            numbers.iter().find(|(key, ..)| spec.keys.iter().all(|known| known.name != *key))
         {
-            let known: Vec<_> = spec.keys.iter().map(|key| key.name).collect();
+            let known: Vec<_> = spec.keys.iter().map(|key| &*key.name).collect();
             let known = if known.is_empty() { "no numbers".to_owned() } else { known.join(", ") };
             let (key, value) = (key.clone(), value.clone());
             return Err(FaultError::Key { fault: spec.name, key, value, known });
         }
         let mut values = [0.0; MOST_KEYS];
         for (value, key) in values.iter_mut().zip(spec.keys) {
-            let given = numbers.iter().rev().find(|(name, ..)| name == key.name);
+            let given = numbers.iter().rev().find(|(name, ..)| *name == key.name);
             *value = match (given, key.default) {
                 (Some((_, Some(number), _)), _) if key.allows(*number) => *number,
                 (Some((name, _, written)), _) => {
@@ -115,7 +115,7 @@ impl Fault {
                 (None, Some(default)) => default,
                 (None, None) => {
                     let range = key.range();
-                    return Err(FaultError::Missing { fault: spec.name, key: key.name, range });
+                    return Err(FaultError::Missing { fault: spec.name, key: &key.name, range });
                 }
             };
         }
@@ -134,7 +134,7 @@ impl Fault {
 
     /// Its numbers by their keys.
     pub fn numbers(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.spec.keys.iter().map(|key| key.name).zip(self.values)
+        self.spec.keys.iter().map(|key| &*key.name).zip(self.values)
     }
 
     /// Its numbers, in the order of the table's keys.

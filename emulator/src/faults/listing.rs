@@ -1,12 +1,12 @@
 //! `emulator faults`: the table of faults for a person, for a program, and for the page; and a script checked.
 
 use super::script::{FaultScript, signals};
-use super::table::{FaultKey, FaultSpec, Places, all};
+use super::table::{FaultSpec, Places, all};
 use crate::cli::FaultsArguments;
 use crate::run::RunError;
 use protocol::exit::Exit;
 use runlog::run_folder::SCHEMA_VERSION;
-use runlog::telemetry;
+use runlog::telemetry::{FaultEntry, FaultKey};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -61,30 +61,17 @@ fn as_json() -> Value {
 }
 
 /// Every fault, as programs read it.
-pub fn faults() -> Vec<telemetry::FaultEntry> {
+pub fn faults() -> Vec<FaultEntry> {
     all().map(fault).collect()
 }
 
-fn fault(spec: &FaultSpec) -> telemetry::FaultEntry {
-    telemetry::FaultEntry {
+fn fault(spec: &FaultSpec) -> FaultEntry {
+    FaultEntry {
         fault: spec.name.to_owned(),
         group: spec.group,
         about: spec.about.to_owned(),
         places: spec.places.names(),
-        keys: spec.keys.iter().map(number).collect(),
-    }
-}
-
-fn number(key: &FaultKey) -> telemetry::FaultKey {
-    let FaultKey { name, unit, min, max, default, whole, meaning } = *key;
-    telemetry::FaultKey {
-        name: name.to_owned(),
-        unit: unit.to_owned(),
-        min,
-        max,
-        default,
-        whole,
-        meaning: meaning.to_owned(),
+        keys: spec.keys.to_vec(),
     }
 }
 

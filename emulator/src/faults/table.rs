@@ -9,7 +9,7 @@ mod rows;
 use plant::faults::SensorFault;
 use protocol::bus::WireNode;
 use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_SENSORS, LOAD_VALVE_COMMAND, MESSAGES};
-use runlog::telemetry::FaultGroup;
+use runlog::telemetry::{FaultGroup, FaultKey};
 
 /// Most numbers that a fault has.
 pub const MOST_KEYS: usize = 3;
@@ -25,21 +25,6 @@ pub struct FaultSpec {
     /// What happens, in a sentence.
     pub about: &'static str,
     pub kind: Kind,
-}
-
-/// A number of a fault.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FaultKey {
-    /// Ending in its unit.
-    pub name: &'static str,
-    /// Unit; `1` for a plain number.
-    pub unit: &'static str,
-    pub min: f64,
-    pub max: f64,
-    /// Value when nothing is said; without one it has to be.
-    pub default: Option<f64>,
-    pub whole: bool,
-    pub meaning: &'static str,
 }
 
 /// Where faults of a kind can be.
@@ -169,19 +154,6 @@ const COUNTED: [(&str, u16); 4] = [
     (DRIVE_VALVE_COMMAND.name, DRIVE_VALVE_COMMAND.id),
     (LOAD_VALVE_COMMAND.name, LOAD_VALVE_COMMAND.id),
 ];
-
-impl FaultKey {
-    /// Whether the value is one; a NaN lies in no range.
-    pub fn allows(&self, value: f64) -> bool {
-        (self.min..=self.max).contains(&value) && (!self.whole || value == value.trunc())
-    }
-
-    pub fn range(&self) -> String {
-        let whole = if self.whole { "whole numbers from " } else { "" };
-        let unit = if self.unit == "1" { "" } else { self.unit };
-        format!("{whole}{} to {} {unit}", self.min, self.max).trim_end().to_owned()
-    }
-}
 
 pub use rows::TABLE;
 

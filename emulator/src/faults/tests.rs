@@ -14,7 +14,7 @@ fn some(spec: &'static FaultSpec, at: &str) -> Fault {
         .keys
         .iter()
         .filter(|key| key.default.is_none())
-        .map(|key| (key.name.to_owned(), Some(0.7 * key.max), String::new()))
+        .map(|key| (key.name.to_string(), Some(0.7 * key.max), String::new()))
         .collect();
     Fault::new(spec.name, Some(at), &given).unwrap()
 }

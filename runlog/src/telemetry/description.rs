@@ -4,6 +4,7 @@
 //! A description of an earlier emulator lacks newer fields: they are read as their defaults.
 
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// The description of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -149,9 +150,9 @@ pub enum FaultGroup {
 pub struct FaultKey {
     /// Name, ending in its unit.
     #[serde(rename = "key")]
-    pub name: String,
+    pub name: Cow<'static, str>,
     /// Unit; `1` for a plain number.
-    pub unit: String,
+    pub unit: Cow<'static, str>,
     /// Smallest value.
     pub min: f64,
     /// Largest value.
@@ -161,7 +162,21 @@ pub struct FaultKey {
     /// Whether it has to be a whole number.
     pub whole: bool,
     /// Meaning, in a sentence.
-    pub meaning: String,
+    pub meaning: Cow<'static, str>,
+}
+
+impl FaultKey {
+    /// Whether the value is in the range; a NaN lies in none.
+    pub fn allows(&self, value: f64) -> bool {
+        (self.min..=self.max).contains(&value) && (!self.whole || value == value.trunc())
+    }
+
+    /// The range in words, as `whole numbers from 1 to 10`.
+    pub fn range(&self) -> String {
+        let whole = if self.whole { "whole numbers from " } else { "" };
+        let unit = if self.unit == "1" { "" } else { &self.unit };
+        format!("{whole}{} to {} {unit}", self.min, self.max).trim_end().to_owned()
+    }
 }
 
 /// Late wake-ups beyond those whose events are kept for viewers to come.

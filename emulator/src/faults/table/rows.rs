@@ -1,7 +1,8 @@
 //! The rows of the table, group by group.
 
-use super::{BusKind, Channel, FaultKey, FaultSpec, Kind, Places, SensorKind};
-use runlog::telemetry::FaultGroup;
+use super::{BusKind, Channel, FaultSpec, Kind, Places, SensorKind};
+use runlog::telemetry::{FaultGroup, FaultKey};
+use std::borrow::Cow;
 
 /// The table, group by group.
 pub const TABLE: &[&[FaultSpec]] = &[POSITION, FORCE, PRESSURE, VALVE, SUPPLY, AIR, MECHANICS, BUS];
@@ -13,6 +14,7 @@ const fn key(
     default: Option<f64>,
     meaning: &'static str,
 ) -> FaultKey {
+    let (name, unit, meaning) = (Cow::Borrowed(name), Cow::Borrowed(unit), Cow::Borrowed(meaning));
     FaultKey { name, unit, min, max, default, whole: false, meaning }
 }
 
@@ -23,11 +25,13 @@ const fn whole(
     default: f64,
     meaning: &'static str,
 ) -> FaultKey {
-    FaultKey { whole: true, ..key(name, unit, range, Some(default), meaning) }
+    let mut key = key(name, unit, range, Some(default), meaning);
+    key.whole = true;
+    key
 }
 
 const PROBABILITY: FaultKey = key("probability", "1", [0.0, 1.0], Some(1.0), "for each frame");
-const SELDOM: FaultKey = FaultKey { default: Some(0.1), ..PROBABILITY };
+const SELDOM: FaultKey = key("probability", "1", [0.0, 1.0], Some(0.1), "for each frame");
 
 /// The rows of a group: name, places, kind, what happens, numbers.
 macro_rules! rows {
