@@ -30,11 +30,11 @@ fuzz_target!(|text: &str| {
         }
         Err(error) => assert!(!error.to_string().is_empty()),
     }
-    match XcpConfig::from_toml(text) {
+    match XcpConfig::from_toml(text, Path::new("xcp.toml")) {
         Ok(config) => {
             assert!((1..=4).contains(&config.daq_packets_per_cycle));
             assert!(config.key.is_none_or(|key| (16..=64).contains(&key.len())));
         }
-        Err(problem) => assert!(!problem.is_empty()),
+        Err(error) => assert!(!error.to_string().is_empty()),
     }
 });

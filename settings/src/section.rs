@@ -3,10 +3,10 @@
 //! Every number is checked against a [`Parameter`]. A key that nobody asked for is refused by [`Section::finish`], which names
 //! those that were asked for.
 
+use crate::number;
 use crate::parameters::Parameter;
 use crate::source::{Result, SettingsError, Source};
 use crate::spelling::nearest;
-use crate::{number, written};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -145,7 +145,7 @@ impl<'a> Section<'a> {
     /// The value under `key` as it is written, on one line and cut; empty when it is absent.
     #[must_use]
     pub fn written(&self, key: &str) -> String {
-        self.entry(key).map_or_else(String::new, |value| written(self.source.text, value.span()))
+        self.entry(key).map_or_else(String::new, |value| self.source.written(value.span()))
     }
 
     /// Its name with those of the tables around it, such as `drive.change[1]`; empty for the whole file.
@@ -385,7 +385,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.entry(key) else {
             return self.wrong(&format!("{key} is missing; {problem}"));
         };
-        let written = written(self.source.text, value.span());
+        let written = self.source.written(value.span());
         self.reported(value, &format!("{key} = {written}; {problem}"))
     }
 
@@ -394,7 +394,7 @@ impl<'a> Section<'a> {
     pub fn refused_item(&self, key: &str, place: usize, problem: &str) -> SettingsError {
         let item = self.entry(key).and_then(|value| value.get_ref().as_array()?.get(place));
         let Some(item) = item else { return self.refused(key, problem) };
-        let written = written(self.source.text, item.span());
+        let written = self.source.written(item.span());
         self.reported(item, &format!("{key} has {written}; {problem}"))
     }
 
@@ -429,7 +429,7 @@ impl<'a> Section<'a> {
             let message = match value.get_ref() {
                 DeValue::Array(_) => format!("{path} must be a table and no list: write {example}"),
                 _ => {
-                    let written = written(self.source.text, value.span());
+                    let written = self.source.written(value.span());
                     format!("{path} = {written} must be a table: write {example}")
                 }
             };

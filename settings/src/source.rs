@@ -1,6 +1,7 @@
 //! A TOML file with the places of what stands in it, for messages.
 
-use crate::{Section, column_of, line_of};
+use crate::{Section, column_of, line_of, written};
+use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -29,6 +30,7 @@ pub struct Source<'a> {
     /// In place of a table that is left out.
     pub(crate) empty: DeTable<'a>,
     columns: bool,
+    holds_secrets: bool,
 }
 
 impl<'a> Source<'a> {
@@ -37,11 +39,24 @@ impl<'a> Source<'a> {
     /// # Errors
     /// [`SettingsError`] for what is no TOML.
     pub fn parse(text: &'a str, file: &'a Path) -> Result<Self> {
+        Self::new(text, file, false)
+    }
+
+    /// The same of a file with secrets: messages repeat neither its lines nor a value of another kind than the one asked for.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for what is no TOML.
+    pub fn parse_with_secrets(text: &'a str, file: &'a Path) -> Result<Self> {
+        Self::new(text, file, true)
+    }
+
+    fn new(text: &'a str, file: &'a Path, holds_secrets: bool) -> Result<Self> {
         let root = DeTable::parse(text).map_err(|error| {
             let line = line_of(text, error.span().map_or(0, |span| span.start));
-            SettingsError(format!("{}:{line}: not TOML: {}", file.display(), error.to_string().trim_end()))
+            let problem = if holds_secrets { error.message().to_owned() } else { error.to_string() };
+            SettingsError(format!("{}:{line}: not TOML: {}", file.display(), problem.trim_end()))
         })?;
-        Ok(Self { text, file, root, empty: DeTable::new(), columns: false })
+        Ok(Self { text, file, root, empty: DeTable::new(), columns: false, holds_secrets })
     }
 
     /// The same, with messages that name the column after the line.
@@ -66,6 +81,11 @@ impl<'a> Source<'a> {
     #[must_use]
     pub fn root(&self) -> Section<'_> {
         Section::new(self, String::new(), self.root.get_ref(), 0)
+    }
+
+    /// A value as it is written, on one line and cut.
+    pub(crate) fn written(&self, span: Range<usize>) -> String {
+        if self.holds_secrets { "(not shown)".into() } else { written(self.text, span) }
     }
 
     pub(crate) fn line(&self, at: usize) -> usize {

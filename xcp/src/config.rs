@@ -5,8 +5,8 @@
 //! daq_packets_per_cycle = 1    # 1 to 4; the bus has one in reserve, for all controllers together
 //! ```
 
-use serde::Deserialize;
 use settings::parameters::Parameter;
+use settings::{SettingsError, Source};
 use std::path::{Path, PathBuf};
 
 const KEY_BYTES: std::ops::RangeInclusive<usize> = 16..=64;
@@ -18,11 +18,6 @@ static DAQ_PACKETS: Parameter = Parameter::new(
     "DAQ packets that may leave in a cycle",
 )
 .whole();
-
-/// A configuration that cannot be used: the file, and what is wrong.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct ConfigError(String);
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct XcpConfig {
@@ -38,16 +33,9 @@ impl Default for XcpConfig {
     }
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    key: Option<String>,
-    daq_packets_per_cycle: Option<f64>,
-}
-
 impl XcpConfig {
     /// What the command line asks for: `None` without `--xcp`, the defaults without a file.
-    pub fn asked(asked: Option<&Option<PathBuf>>) -> Result<Option<Self>, ConfigError> {
+    pub fn asked(asked: Option<&Option<PathBuf>>) -> Result<Option<Self>, SettingsError> {
         match asked {
             None => Ok(None),
             Some(None) => Ok(Some(Self::default())),
@@ -58,29 +46,23 @@ impl XcpConfig {
     /// Reads the file.
     ///
     /// # Errors
-    /// [`ConfigError`] when it cannot be read, is no TOML of this form, or holds a value that is not allowed.
-    pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| ConfigError(format!("cannot read {}: {error}", path.display())))?;
-        Self::from_toml(&text).map_err(|problem| ConfigError(format!("{}: {problem}", path.display())))
+    /// It cannot be read, is no TOML of this form, or holds a value that is not allowed.
+    pub fn read(path: &Path) -> Result<Self, SettingsError> {
+        let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
+        Self::from_toml(&text, path)
     }
 
-    /// The configuration in a text.
+    /// The configuration in a text; `file` is for messages.
     ///
     /// # Errors
     /// What is wrong; never what the key is.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
-        // The library shows the line that is wrong, which may be the key's.
-        let File { key, daq_packets_per_cycle } =
-            toml::from_str(text).map_err(|error: toml::de::Error| {
-                let line = settings::line_of(text, error.span().map_or(0, |span| span.start));
-                format!("line {line}: {}", error.message())
-            })?;
-        let packets = DAQ_PACKETS
-            .check(daq_packets_per_cycle.unwrap_or(DAQ_PACKETS.default))
-            .map_err(|error| error.to_string())?;
-        let key = key.map(|key| bytes(&key)).transpose()?;
-        Ok(Self { key, daq_packets_per_cycle: packets as u32 })
+    pub fn from_toml(text: &str, file: &Path) -> Result<Self, SettingsError> {
+        let source = Source::parse_with_secrets(text, file)?;
+        let mut root = source.root();
+        root.allow(&["key", "daq_packets_per_cycle"])?;
+        let key = root.text("key")?.map(|key| bytes(&key.text)).transpose();
+        let key = key.map_err(|problem| root.wrong_at("key", &problem))?;
+        Ok(Self { key, daq_packets_per_cycle: root.whole_or_default(&DAQ_PACKETS)? })
     }
 }
 
@@ -107,13 +89,17 @@ mod tests {
 
     const KEY: &str = "000102030405060708090a0b0c0d0e0fF0";
 
+    fn parse(text: &str) -> Result<XcpConfig, SettingsError> {
+        XcpConfig::from_toml(text, Path::new("xcp.toml"))
+    }
+
     #[test]
     fn a_key_is_read_and_what_is_left_out_takes_its_default() {
-        let config = XcpConfig::from_toml(&format!("key = \"{KEY}\"\n")).unwrap();
+        let config = parse(&format!("key = \"{KEY}\"\n")).unwrap();
         assert_eq!(config.key.unwrap()[14..], [14, 15, 0xF0]);
         assert_eq!(config.daq_packets_per_cycle, 1);
-        assert_eq!(XcpConfig::from_toml(""), Ok(XcpConfig::default()));
-        assert_eq!(XcpConfig::from_toml("daq_packets_per_cycle = 3").unwrap().daq_packets_per_cycle, 3);
+        assert_eq!(parse(""), Ok(XcpConfig::default()));
+        assert_eq!(parse("daq_packets_per_cycle = 3").unwrap().daq_packets_per_cycle, 3);
     }
 
     #[test]
@@ -125,11 +111,15 @@ mod tests {
             ("key = \"c0ff\"".into(), "16 to 64 bytes"),
             ("daq_packets_per_cycle = 5".into(), "1 to 4"),
             ("daq_packets_per_cycle = 1.5".into(), "a whole number"),
-            (format!("daq_packets_per_cycle = 1\nkey = {bad}"), "line 2"),
+            (format!("daq_packets_per_cycle = 1\nkey = {bad}"), "xcp.toml:2: "),
+            (format!("daq_packets_per_cycle = \"{bad}\""), "allowed is a number, 1 to 4"),
+            ("key = 12345678123456781234567812345678".into(), "allowed is a text"),
             (format!("kye = \"{bad}\""), "kye"),
         ] {
-            let problem = XcpConfig::from_toml(&text).unwrap_err();
-            assert!(problem.contains(words) && !problem.contains("c0ffee"), "{text}: {problem}");
+            let problem = parse(&text).unwrap_err().to_string();
+            let hides = ["c0ffee", "12345678"].iter().all(|secret| !problem.contains(secret));
+            assert!(problem.contains(words) && hides, "{text}: {problem}");
+            assert!(problem.starts_with("xcp.toml:"), "{text}: {problem}");
         }
     }
 }
