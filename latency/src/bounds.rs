@@ -18,57 +18,45 @@ use super::kinds;
 use super::model::{BoundResult, Cause, Distribution, PercentilesNs, Ratio, Report};
 use super::ratios;
 use super::resolution::{self, Verdict};
-use serde::Deserialize;
 use serde_json::Value;
+use settings::{Section, SettingsError, Source};
+use std::path::Path;
 
 /// Figures that a message names.
 const NAMED: usize = 12;
 
-/// What is wrong with a threshold file.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum BoundsError {
-    #[error("{0}")]
-    Toml(String),
-    #[error("it holds a table [bounds] and nothing else")]
-    NoTable,
-    #[error("[bounds] {figure}: write it as {{ max = 50000 }}, {{ min = 1 }} or with both")]
-    Shape { figure: String },
-    #[error("[bounds] {figure}: no such figure; there are {known}")]
-    Unknown { figure: String, known: String },
-}
-
-/// A bound as it is written: at least one of both.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Bound {
-    min: Option<f64>,
-    max: Option<f64>,
-}
-
 /// The most that the text of a threshold file allows of a figure.
 pub(crate) fn most(text: &str, figure: &str) -> Option<f64> {
-    let file: toml::Table = text.parse().ok()?;
-    file.get("bounds")?.get(figure)?.clone().try_into::<Bound>().ok()?.max
+    let source = Source::parse(text, Path::new("")).ok()?;
+    source.root().section("bounds").ok()??.section(figure).ok()??.peek_number("max")
 }
 
-/// Judges a report by the text of a threshold file.
-pub(crate) fn judge(text: &str, report: &Report) -> Result<Vec<BoundResult>, BoundsError> {
-    let file: toml::Table =
-        text.parse().map_err(|error: toml::de::Error| BoundsError::Toml(error.to_string()))?;
-    let bounds = file.get("bounds").and_then(toml::Value::as_table).filter(|_| file.len() == 1);
-    let bounds = bounds.ok_or(BoundsError::NoTable)?;
-    bounds.iter().map(|(figure, bound)| one(figure, bound, report)).collect()
+/// Judges a report by the text of a threshold file; `file` is for messages.
+pub(crate) fn judge(text: &str, file: &Path, report: &Report) -> Result<Vec<BoundResult>, SettingsError> {
+    let source = Source::parse(text, file)?;
+    let mut root = source.root();
+    let mut bounds = root.needed_section("bounds", "a line for each figure, as figure = { max = 50000 }")?;
+    root.finish()?;
+    let mut figures = bounds.keys();
+    figures.sort_unstable();
+    figures.iter().map(|figure| one(figure, &mut bounds, report)).collect()
 }
 
-fn one(figure: &str, bound: &toml::Value, report: &Report) -> Result<BoundResult, BoundsError> {
-    let bound: Option<Bound> = bound.clone().try_into().ok();
-    let written = |bound: &Bound| {
-        let mut sides = bound.min.iter().chain(&bound.max).peekable();
-        sides.peek().is_some() && sides.all(|side| side.is_finite())
+fn one(figure: &str, bounds: &mut Section<'_>, report: &Report) -> Result<BoundResult, SettingsError> {
+    let example = format!("\"{figure}\" = {{ max = 50000 }}, {{ min = 1 }} or with both");
+    let bound = bounds.section_as(figure, Some(&example))?;
+    let (min, max) = match bound {
+        Some(mut bound) => {
+            let sides = (bound.finite("min")?, bound.finite("max")?);
+            bound.finish()?;
+            sides
+        }
+        None => (None, None),
     };
-    let Bound { min, max } =
-        bound.filter(written).ok_or_else(|| BoundsError::Shape { figure: figure.to_owned() })?;
-    let value = value(figure, report).ok_or_else(|| unknown(figure, report))?;
+    if min.is_none() && max.is_none() {
+        return Err(bounds.refused(figure, &format!("write {example}")));
+    }
+    let value = value(figure, report).ok_or_else(|| bounds.wrong_at(figure, &unknown(figure, report)))?;
     let ratio = figure.strip_prefix("ratio.").and_then(|name| ratio(name, report));
     let verdict = match ratio {
         Some(ratio) => resolution::verdict(ratio, min, max),
@@ -137,7 +125,7 @@ fn of_percentiles(key: &str) -> Option<fn(&PercentilesNs) -> Option<f64>> {
 }
 
 /// Names what there is, what looks most like the figure first.
-fn unknown(figure: &str, report: &Report) -> BoundsError {
+fn unknown(figure: &str, report: &Report) -> String {
     const KEYS: [&str; 5] = ["p50_ns", "p99_ns", "p999_ns", "max_ns", "count"];
     let of_tag = |reported: &Distribution| KEYS.map(|key| format!("{}.{key}", reported.name));
     let mut known: Vec<_> = report.distributions.iter().flat_map(of_tag).collect();
@@ -151,7 +139,7 @@ fn unknown(figure: &str, report: &Report) -> BoundsError {
     let more = known.len().saturating_sub(NAMED);
     known.truncate(NAMED);
     let more = if more > 0 { format!(" and {more} more; report.json holds them all") } else { String::new() };
-    BoundsError::Unknown { figure: figure.to_owned(), known: format!("{}{more}", known.join(", ")) }
+    format!("{figure}: no such figure; there are {}{more}", known.join(", "))
 }
 
 #[cfg(test)]
@@ -160,8 +148,8 @@ mod tests {
     use crate::made_up;
     use crate::tests::report_of;
 
-    fn judged(text: &str) -> Result<Vec<BoundResult>, BoundsError> {
-        judge(text, &report_of(vec![made_up::run(2000)]))
+    fn judged(text: &str) -> Result<Vec<BoundResult>, SettingsError> {
+        judge(text, Path::new("bounds.toml"), &report_of(vec![made_up::run(2000)]))
     }
 
     #[test]
@@ -192,7 +180,7 @@ mod tests {
             let pairs_ns = factors.map(|factor| (factor * 100, 10_000)).into();
             report.ratios = vec![ratios::ratio(name.into(), pairs_ns).unwrap()];
             let text = "[bounds]\n\"ratio.emulator-wakeup.p99\" = { max = 1.1 }";
-            judge(text, &report).unwrap().remove(0)
+            judge(text, Path::new(""), &report).unwrap().remove(0)
         };
         let bound = judged([20, 27, 60, 80, 105, 105, 200, 300, 495, 600]);
         assert_eq!((bound.value, bound.interval), (Some(1.05), Some((0.27, 4.95))));
@@ -215,14 +203,20 @@ mod tests {
         let unknown = judged("[bounds]\n\"emulator-wakeup.p98_ns\" = { max = 1 }").unwrap_err().to_string();
         assert!(unknown.contains("no such figure; there are emulator-wakeup."), "{unknown}");
         assert!(judged("[bounds]\n\"counts.nothing\" = { max = 1 }").is_err());
-        for text in [
-            "[bounds]\n\"counts.skipped\" = 3",
-            "[bounds]\n\"counts.skipped\" = { most = 3 }",
-            "[bounds]\n\"counts.skipped\" = { max = nan }",
+        for (text, words) in [
+            ("[bounds]\n\"counts.skipped\" = 3", "bounds.toml:2: bounds.counts.skipped = 3 must be a table"),
+            (
+                "[bounds]\n\"counts.skipped\" = { most = 3 }",
+                "unknown key bounds.counts.skipped.most; allowed is min, max",
+            ),
+            ("[bounds]\n\"counts.skipped\" = { max = nan }", "max = nan; allowed is a finite number"),
+            ("[bounds]\n\"counts.skipped\" = {}", "bounds.toml:2: bounds.counts.skipped = {}; write"),
+            ("max = 3", "[bounds] is missing"),
+            ("max = 3\n[bounds]", "bounds.toml:1: unknown key max; allowed is bounds"),
+            ("[bounds", "bounds.toml:1: not TOML"),
         ] {
-            assert!(matches!(judged(text), Err(BoundsError::Shape { .. })), "{text}");
+            let problem = judged(text).unwrap_err().to_string();
+            assert!(problem.contains(words), "{text}: {problem}");
         }
-        assert_eq!(judged("max = 3").unwrap_err(), BoundsError::NoTable);
-        assert!(matches!(judged("[bounds"), Err(BoundsError::Toml(_))));
     }
 }

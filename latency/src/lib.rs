@@ -68,6 +68,7 @@ use self::model::{Report, SCHEMA, SCHEMA_VERSION};
 use self::resolution::Verdict;
 use self::samples::Samples;
 use runlog::run_folder::{FileError, read_text};
+use settings::SettingsError;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -91,6 +92,8 @@ pub enum ReportError {
     Group(String),
     #[error(transparent)]
     File(#[from] FileError),
+    #[error(transparent)]
+    Bounds(#[from] SettingsError),
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
     Write { file: PathBuf, reason: String },
 }
@@ -170,8 +173,7 @@ impl Made {
     /// Holds the bounds of a threshold file against the report.
     pub fn judge(&mut self, file: &Path) -> Result<(), ReportError> {
         let text = read_text(file)?;
-        self.report.bounds =
-            bounds::judge(&text, &self.report).map_err(|error| FileError::read(file, error))?;
+        self.report.bounds = bounds::judge(&text, file, &self.report)?;
         Ok(())
     }
 

@@ -168,8 +168,8 @@ mod tests {
     fn every_claim_is_a_figure_that_a_report_can_have() {
         let names: Vec<_> =
             ratios::names().map(|name| format!("ratio.{}", ratios::short_name(&name))).collect();
-        let plain: toml::Table = CLAIMS[0].parse().unwrap();
-        let reported: Vec<_> = plain["bounds"].as_table().unwrap().keys().collect();
+        let plain = settings::Source::parse(CLAIMS[0], "bounds.toml".as_ref()).unwrap();
+        let reported = plain.root().section("bounds").unwrap().unwrap().keys();
         assert_eq!(reported.len(), 3);
         assert!(reported.iter().all(|figure| names.contains(figure)), "{reported:?}");
         assert_eq!(claimed(SPIN_CLAIM), Some(1000.0));
