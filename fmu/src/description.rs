@@ -5,6 +5,7 @@
 use crate::MODEL_IDENTIFIER;
 use crate::variables::{self, Causality, Kind, Variable};
 use crc::{CRC_64_XZ, Crc};
+use expression::mathml::escaped;
 use plant::{RigParameters, SetupError};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -108,21 +109,6 @@ fn variable(out: &mut String, place: usize, instance: &Variable) {
         let _ = write!(out, " unit=\"{}\"", escaped(instance.unit));
     }
     *out += "/>\n    </ScalarVariable>\n";
-}
-
-/// A text as an attribute's value.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '"' => out += "&quot;",
-            other => out.push(other),
-        }
-    }
-    out
 }
 
 #[cfg(test)]
