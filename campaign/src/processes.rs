@@ -12,6 +12,7 @@ use crate::shelf::CampaignInputs;
 use axis_control::experiment::Experiment;
 use figures::{SummaryError, join};
 use protocol::exit::Exit;
+use protocol::periods::CYCLE_S;
 use runlog::run_folder::FileError;
 use std::collections::BTreeMap;
 use std::fs;
@@ -130,7 +131,7 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
         }
     };
     let passed = (!summary.thresholds.is_empty()).then(|| joined.passed());
-    let simulated_s = summary.cycles.unwrap_or(0) as f64 * 1e-3;
+    let simulated_s = summary.cycles.unwrap_or(0) as f64 * CYCLE_S;
     Ok(Outcome { ended, because, simulated_s, passed, figures })
 }
 

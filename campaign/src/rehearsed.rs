@@ -18,6 +18,7 @@ use figures::{self, position, top};
 use plant::tables::{self, CycleRecord};
 use plant::{Axis, Truth};
 use protocol::frames::MainChainState;
+use protocol::periods::CYCLE_S;
 use rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
 use std::collections::BTreeMap;
 
@@ -83,7 +84,7 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
         known.chain(computed.iter()).map(|(name, value)| (name.to_owned(), Value::Number(value))).collect();
     let each = computed.by_repetition().map(|(name, values)| (name.to_owned(), values.to_vec())).collect();
     let passed = passed(inputs, &figures, &each, ended)?;
-    let simulated_s = rehearsal.cycles() as f64 * 1e-3;
+    let simulated_s = rehearsal.cycles() as f64 * CYCLE_S;
     Ok(Outcome { ended, because, simulated_s, passed, figures })
 }
 

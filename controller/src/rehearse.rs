@@ -12,6 +12,7 @@ use axis_control::setup::Inputs;
 use nominal::Axis;
 use protocol::bus::BusCounters;
 use protocol::exit::Exit;
+use protocol::periods::CYCLE_S;
 use realtime::Interrupt;
 use rehearsal::{PlantTables, Rehearsal};
 use runlog::flight_dump;
@@ -124,7 +125,7 @@ fn save(
         None => (Exit::BoundBroken, "the time asked for was over before the experiment was done".to_owned()),
     };
     let cycles = ended.rehearsal.cycles();
-    let simulated_s = cycles as f64 * 1e-3;
+    let simulated_s = cycles as f64 * CYCLE_S;
     protocol::say!(
         "controller: {ended_because}; {simulated_s} s rehearsed in {:.2} s, {:.0} times real time",
         ended.took_s,

@@ -6,6 +6,7 @@ use super::kinds::PING_PONGS;
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
+use protocol::periods::CYCLE_S;
 use realtime::Grant;
 use realtime::machine::Hypervisor;
 use runlog::conditions::Conditions;
@@ -230,7 +231,7 @@ impl RunFiles {
 
     pub fn duration_s(&self) -> f64 {
         let cycles = self.counted().cycles;
-        cycles.map_or(self.logged_until_s, |cycles| cycles as f64 * 1e-3)
+        cycles.map_or(self.logged_until_s, |cycles| cycles as f64 * CYCLE_S)
     }
 
     /// `summary.json`; empty when missing.

@@ -1,6 +1,7 @@
 //! The last minute as a record: `measurement.csv` and `bus.log` in the forms of a run, which `discrepancy check` reads.
 
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
+use protocol::periods::CYCLE_NS;
 use runlog::candump::{self, FrameRecord};
 use runlog::run_folder::LineFile;
 use runlog::telemetry::SetUp;
@@ -79,7 +80,7 @@ impl Minute {
         }
         let from = newest.saturating_sub(cycles);
         let newest_ns = self.frames.back().map_or(0, |record| record.stamp_ns);
-        let from_ns = newest_ns.saturating_sub(cycles * 1_000_000);
+        let from_ns = newest_ns.saturating_sub(cycles * CYCLE_NS);
         let SetUp { linked, added_mass_kg } = set_up;
         Saved {
             folder: folder.join(format!("saved-{}", newest_ns / 1_000_000)),

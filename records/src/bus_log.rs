@@ -15,13 +15,13 @@ use super::cycles::{self, Cycles, Logged};
 use super::{Channel, Form, LoggedBy, ReadError, Record, RigSetup, Signal};
 use plant::{Axis, PERIOD_S};
 use protocol::frames::{DecodeError, Frame, RigStatus, Sensors};
+use protocol::periods::CYCLE_NS;
 use runlog::candump;
 use runlog::run_folder::read_json;
 use runlog::summary::JoinedSummary;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const CYCLE_NS: u64 = 1_000_000;
 /// Cycles over which the begin of cycles is estimated from stamps.
 const BLOCK: u64 = 1000;
 /// Commands that arrive so shortly before an estimated begin may have come after the true one: the rig samples meanwhile.

@@ -11,10 +11,11 @@
 
 use super::ReadError;
 use protocol::frames::{ALIVE_RANGE, Frame, Tick};
+use protocol::periods;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-const CYCLE_NS: i64 = 1_000_000;
+const CYCLE_NS: i64 = periods::CYCLE_NS as i64;
 const ROUND: i64 = ALIVE_RANGE as i64;
 /// The tick counts skipped cycles modulo this.
 const SKIPPED_RANGE: u64 = 1 << 16;

@@ -1,13 +1,12 @@
 //! A bus that keeps time, with the shipped programs on it: response times below their bounds, bus-off and the way back, refusals.
 
 use protocol::frames::{BIT_RATE_PER_S, DRIVE_SENSORS};
+use protocol::periods::CYCLE_NS;
 use protocol::response_time::rig::{RigAnalysis, RigFrame};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use system_tests::{Ended, LINKED, Pace, SHORT, Scene, bus_log, count, json, shipped_experiments, turn};
-
-const CYCLE_NS: u64 = 1_000_000;
 
 /// Runs emulator and controller over a bus with these options; the emulator ends well with the controllers, or after some time.
 fn run(scene: &Scene, pace: Pace, wire: &str, options: &str) -> (Value, Ended) {

@@ -8,6 +8,7 @@ use super::observer::{Received, What, Wrong};
 use crate::junit::Case;
 use crate::soak::model::{Check, CheckResult};
 use protocol::commands::STALE_AFTER_CYCLES;
+use protocol::periods::CYCLE_NS;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -167,7 +168,7 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
             {
                 let period_ns = received.stamp_ns.saturating_sub(stamp_ns);
                 periods.push(period_ns);
-                spreads.push(period_ns.abs_diff(1_000_000));
+                spreads.push(period_ns.abs_diff(CYCLE_NS));
             }
         }
         last = Some((answered, received.stamp_ns));
