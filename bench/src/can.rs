@@ -28,7 +28,7 @@ const FIFO_PRIORITY: u8 = 1;
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 #[derive(Debug, thiserror::Error)]
-pub enum CanError {
+pub(crate) enum CanError {
     /// A bus that the kernel has itself.
     #[error("{0}: 'bench can' opens embedded buses, unix:///PATH; a program reaches {0} without it")]
     Kernels(BusUrl),
@@ -51,7 +51,7 @@ pub enum CanError {
 impl CanError {
     /// The code of the table that all programs share.
     #[must_use]
-    pub fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::Guest(GuestError::NoHost { .. }) => Exit::BusFailed,
             _ => Exit::BadInput,
@@ -61,7 +61,7 @@ impl CanError {
 
 /// Runs what the arguments say; the exit code is the program's.
 #[must_use]
-pub fn run(arguments: &CanArguments) -> ExitCode {
+pub(crate) fn run(arguments: &CanArguments) -> ExitCode {
     match try_to_run(arguments) {
         Ok(code) => ExitCode::from(u8::try_from(code).unwrap_or(u8::MAX)),
         Err(error) => {

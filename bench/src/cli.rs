@@ -21,12 +21,12 @@ use std::path::PathBuf;
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
 }
 
 /// What the bench can do.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Join what emulator and controllers left in a run's folder, judge it, draw it, and print a short table.
     Summary {
         /// The run's folder.
@@ -84,60 +84,60 @@ pub enum Command {
 
 /// Which runs to compare.
 #[derive(Args, Debug)]
-pub struct CompareArguments {
+pub(crate) struct CompareArguments {
     /// The runs' folders; changes are against the first.
     #[arg(required = true, num_args = 2.., value_name = "RUN")]
-    pub folders: Vec<PathBuf>,
+    pub(crate) folders: Vec<PathBuf>,
     /// Write a self-contained page, and its table in Markdown: a file that ends with .html, or a folder.
     #[arg(long, value_name = "FILE.html|DIR")]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Compare runs of different experiments too.
     #[arg(long)]
-    pub anyway: bool,
+    pub(crate) anyway: bool,
     /// Show each signal's difference from the first run, instead of figures and curves.
     #[arg(long)]
-    pub differences: bool,
+    pub(crate) differences: bool,
 }
 
 /// Which runs are repetitions of each other.
 #[derive(Args, Debug)]
-pub struct SpreadArguments {
+pub(crate) struct SpreadArguments {
     /// The runs' folders.
     #[arg(required = true, num_args = 2.., value_name = "RUN")]
-    pub folders: Vec<PathBuf>,
+    pub(crate) folders: Vec<PathBuf>,
     /// Write spread.md and spread.json into this folder.
     #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Take runs of different experiments too.
     #[arg(long)]
-    pub anyway: bool,
+    pub(crate) anyway: bool,
 }
 
 /// What to report on.
 #[derive(Args, Debug)]
-pub struct ReportArguments {
+pub(crate) struct ReportArguments {
     /// Folders of runs, or folders that hold some.
     #[arg(required_unless_present = "group", value_name = "RUN")]
-    pub folders: Vec<PathBuf>,
+    pub(crate) folders: Vec<PathBuf>,
     /// Write report.html, report.md, report.json, latency.hlog and jitterdebugger.json here [default: the run's folder, or
     /// `report` beside several].
     #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Heading of the report.
     #[arg(long)]
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
     /// Compare runs by the group named in their conditions.json; the first run's group is the reference. If there is only one
     /// group, each run is its own group.
     #[arg(long)]
-    pub compare: bool,
+    pub(crate) compare: bool,
     /// Put a run, or the runs in a folder, into a group to be set beside others; may be repeated.
     #[arg(long, value_name = "NAME=FOLDER")]
-    pub group: Vec<String>,
+    pub(crate) group: Vec<String>,
     /// Hold the report against the bounds of a threshold file; exit with 1 when one is broken. A ratio whose interval crosses
     /// its bound is not resolved, which is no reason for 1.
     #[arg(long, value_name = "FILE.toml")]
-    pub bounds: Option<PathBuf>,
+    pub(crate) bounds: Option<PathBuf>,
     /// Write report.md only.
     #[arg(long)]
-    pub markdown_only: bool,
+    pub(crate) markdown_only: bool,
 }

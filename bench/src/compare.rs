@@ -3,8 +3,8 @@
 //! [`overlay`] draws the curves, [`differences`] how far the others lie from the first instead. Time begins with the experiment,
 //! so that runs whose waiting took longer lie on each other.
 
-pub mod differences;
-pub mod overlay;
+pub(crate) mod differences;
+pub(crate) mod overlay;
 
 use crate::drawing::Picture;
 use crate::runs::{Run, rows};
@@ -16,7 +16,7 @@ use runlog::run_folder::FileError;
 use std::path::{Path, PathBuf};
 
 /// The table: a row for each figure that any run has, and the change against the first run.
-pub fn table(runs: &[Run]) -> Grid {
+pub(crate) fn table(runs: &[Run]) -> Grid {
     let Some((first, others)) = runs.split_first() else { return Grid::default() };
     let mut head = vec!["figure".to_owned(), first.name.clone()];
     for run in others {
@@ -55,7 +55,7 @@ fn change(first: Option<f64>, other: Option<f64>) -> String {
 }
 
 /// The page: heading, runs, table, pictures, all in one file.
-pub fn page(runs: &[Run], grid: &Grid, pictures: &[Picture]) -> Result<String, SummaryError> {
+pub(crate) fn page(runs: &[Run], grid: &Grid, pictures: &[Picture]) -> Result<String, SummaryError> {
     let pictures = pictures.iter().map(|picture| {
         picture.svg().map_err(|error| FileError::write(Path::new("the page's picture"), error))
     });
@@ -81,7 +81,12 @@ fn entry(run: &Run) -> String {
 }
 
 /// Writes the page to `out`, or to `compare.html` in it when that is a folder, with `compare.md` beside it.
-pub fn write(runs: &[Run], grid: &Grid, pictures: &[Picture], out: &Path) -> Result<PathBuf, SummaryError> {
+pub(crate) fn write(
+    runs: &[Run],
+    grid: &Grid,
+    pictures: &[Picture],
+    out: &Path,
+) -> Result<PathBuf, SummaryError> {
     let is_page = out.extension().is_some_and(|extension| extension == "html");
     let page_path = if is_page { out.into() } else { out.join("compare.html") };
     let folder = page_path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -67,7 +67,7 @@ const END_PATIENCE: Duration = Duration::from_secs(2);
 
 /// What keeps the check from being made.
 #[derive(Debug, thiserror::Error)]
-pub enum ConformanceError {
+pub(crate) enum ConformanceError {
     #[error("{0}; the check is the rig itself: end the emulator on this bus first")]
     Bus(#[from] BusError),
     #[error("the controller '{command}' does not start: {reason}")]
@@ -82,7 +82,7 @@ pub enum ConformanceError {
 }
 
 impl ConformanceError {
-    pub fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) => Exit::BusFailed,
             Self::Interrupted => Exit::Interrupted,
@@ -95,7 +95,7 @@ impl ConformanceError {
 ///
 /// # Errors
 /// [`ConformanceError`] when the check could not be made; what the controller does wrong is a result.
-pub fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
+pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
     let interrupt = Interrupt::watch().map_err(ConformanceError::System)?;
     let began = Instant::now();
     // The folder goes when the check is over.

@@ -40,7 +40,7 @@ const GAP_S: f64 = 0.05;
 const LETTER: f64 = 0.53;
 
 #[derive(Clone, Debug)]
-pub struct Curve {
+pub(crate) struct Curve {
     pub name: String,
     pub colour: RGBColor,
     /// Its width in pixels.
@@ -51,7 +51,7 @@ pub struct Curve {
 
 /// A pair of axes with its curves.
 #[derive(Clone, Debug)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// Quantity and unit.
     pub title: String,
     /// Its curves, the first undermost.
@@ -60,7 +60,7 @@ pub struct Panel {
 
 /// A named stretch of the time axis.
 #[derive(Clone, Debug)]
-pub struct Band {
+pub(crate) struct Band {
     pub label: String,
     pub span: Span,
     /// Whether it is what the picture is about, and left white.
@@ -68,7 +68,7 @@ pub struct Band {
 }
 
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub(crate) struct Picture {
     /// What stands on top, large.
     pub title: String,
     /// What stands below it, broken into lines.
@@ -87,7 +87,7 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Failure = Box<dyn std::error::Error>;
 
 impl Picture {
-    pub fn svg(&self) -> Result<String, String> {
+    pub(crate) fn svg(&self) -> Result<String, String> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|error| error.to_string())?;
         Ok(text)

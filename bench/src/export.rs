@@ -36,7 +36,7 @@ use table::Rows;
 const MOST_HELD_ROWS: u64 = 100_000_000;
 
 #[derive(Debug, thiserror::Error)]
-pub enum ExportError {
+pub(crate) enum ExportError {
     #[error(transparent)]
     Log(#[from] RecordedLogError),
     #[error(transparent)]
@@ -61,7 +61,7 @@ pub enum ExportError {
 ///
 /// # Errors
 /// [`ExportError`]; there is no file then, or the one that was there before.
-pub fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
+pub(crate) fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
     let ExportArguments { to, out, every_ms, .. } = arguments;
     if every_ms.is_some() && *to != Format::Csv {
         return Err(ExportError::EveryMs);

@@ -19,7 +19,7 @@ const PAGE: &str = include_str!("../../fmu/docs/index.html");
 
 /// What becomes an FMU.
 #[derive(Args, Debug)]
-pub struct ExportFmuArguments {
+pub(crate) struct ExportFmuArguments {
     /// The rig file, with its effects.
     #[arg(long, value_name = "FILE")]
     pub rig: PathBuf,
@@ -32,7 +32,7 @@ pub struct ExportFmuArguments {
 }
 
 #[derive(Debug, thiserror::Error)]
-pub enum ExportFmuError {
+pub(crate) enum ExportFmuError {
     #[error(transparent)]
     File(#[from] FileError),
     #[error("{0}")]
@@ -48,7 +48,7 @@ pub enum ExportFmuError {
 ///
 /// # Errors
 /// [`ExportFmuError`]; there is no file then, or the one that was there before.
-pub fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
+pub(crate) fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
     let ExportFmuArguments { rig, out, library } = arguments;
     let rig_toml = String::from_utf8(read(rig)?).map_err(|error| FileError::read(rig, error.utf8_error()))?;
     let described =

@@ -49,7 +49,7 @@ const REPORTS_KEPT: usize = 100;
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
 #[derive(Debug, thiserror::Error)]
-pub enum GatewayError {
+pub(crate) enum GatewayError {
     #[error(transparent)]
     Bus(#[from] BusError),
     #[error("cannot listen at {address}: {reason}; choose another with --listen, port 0 for a free one")]
@@ -64,7 +64,7 @@ pub enum GatewayError {
 }
 
 impl GatewayError {
-    pub fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         if matches!(self, Self::Bus(_)) { Exit::BusFailed } else { Exit::BadInput }
     }
 }
@@ -90,7 +90,7 @@ struct Report {
 }
 
 /// Opens the door and serves until a signal comes.
-pub fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
+pub(crate) fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
     let interrupt = Interrupt::watch().map_err(GatewayError::System)?;
     let mut gateway = Gateway::open(arguments)?;
     gateway.announce(arguments.read_only);

@@ -19,30 +19,31 @@
 //! | [`export`] | a log as CSV, MDF4, ASC, BLF |
 //! | [`replay`] | a log put back on a bus, by absolute time |
 //! | [`export_fmu`] | the plant as an FMU |
-//! | [`cli`] | the command line |
+//! | [`cli`], [`program`] | the command line, and what runs its commands |
 
-pub mod can;
+mod can;
 pub mod cli;
-pub mod compare;
-pub mod conformance;
+mod compare;
+mod conformance;
 mod drawing;
-pub mod export;
-pub mod export_fmu;
-pub mod gateway;
+mod export;
+mod export_fmu;
+mod gateway;
 mod junit;
-pub mod picture;
-pub mod ping_pong;
-pub mod probe;
+mod picture;
+mod ping_pong;
+mod probe;
+pub mod program;
 mod recorded_log;
-pub mod replay;
-pub mod runs;
-pub mod soak;
-pub mod spread;
+mod replay;
+mod runs;
+mod soak;
+mod spread;
 
 use std::io::Write;
 
 /// A line to standard output. A reader that has gone, as `| head` does, has seen enough.
-pub fn say(line: &str) {
+pub(crate) fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 

@@ -21,7 +21,7 @@ const AFTER_S: f64 = 0.6;
 const APART_M: f64 = 0.002;
 
 /// Draws the pictures of a run into `folder`; returns their names.
-pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
+pub(crate) fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
     let whole = whole(record);
     let mut pictures = vec![("picture.svg", whole.clone())];
     if let Some((what, at_s)) = step(record) {
@@ -43,7 +43,7 @@ pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, Summary
 }
 
 /// What steps most in a run, and when: the force, else the position.
-pub fn step(record: &Record) -> Option<(String, f64)> {
+pub(crate) fn step(record: &Record) -> Option<(String, f64)> {
     let spans = record.experiments();
     let force = largest_step(record.load.numbers("set_force_N"), &spans, 10.0)
         .map(|step| (format!("step of the force by {:.0} N", step.height_value()), step.at_s));

@@ -39,7 +39,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 const SILENCE: Duration = Duration::from_secs(10);
 
 #[derive(Debug, thiserror::Error)]
-pub enum PingPongError {
+pub(crate) enum PingPongError {
     #[error("{what}: {reason}")]
     System { what: &'static str, reason: String },
     #[error(transparent)]
@@ -51,7 +51,7 @@ pub enum PingPongError {
 }
 
 impl PingPongError {
-    pub fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::Silent(_) => Exit::BusFailed,
             Self::System { .. } | Self::File(_) => Exit::BadInput,
@@ -64,7 +64,7 @@ impl PingPongError {
 }
 
 /// Plays as asked, prints the figures, and writes them where asked.
-pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
+pub(crate) fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
     let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let interrupt = Interrupt::watch().map_err(|error| PingPongError::system("no signal handler", error))?;
     // Before anything is asked of the system for this process: the child would inherit it.
@@ -95,7 +95,7 @@ pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
 }
 
 /// Answers; the process that [`run`] starts.
-pub fn pong(arguments: &PongArguments) -> Result<Exit, PingPongError> {
+pub(crate) fn pong(arguments: &PongArguments) -> Result<Exit, PingPongError> {
     // Whoever asks may be killed; nobody would end this process then.
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
         .map_err(|errno| PingPongError::system("no signal when the parent ends", errno))?;

@@ -52,7 +52,7 @@ const MOST_ROWS: u64 = 2_000_000;
 
 /// What keeps the probe from watching.
 #[derive(Debug, thiserror::Error)]
-pub enum ProbeError {
+pub(crate) enum ProbeError {
     #[error("--cpus {0}: not a list of CPUs such as 0-3,8")]
     Cpus(String),
     #[error("CPU {cpu}: {reason}")]
@@ -77,7 +77,7 @@ struct Watched {
 }
 
 /// Watches as asked; see the module.
-pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
+pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let cpus = cpus(arguments.cpus.as_deref())?;
     let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;
     let continued = Continued::watch().map_err(ProbeError::Signals)?;

@@ -20,7 +20,7 @@ const NEAR_ZERO_S: f64 = 60.0;
 const MOST_INTERFACES: usize = 64;
 
 #[derive(Debug, thiserror::Error)]
-pub enum RecordedLogError {
+pub(crate) enum RecordedLogError {
     #[error("cannot read {file}: {reason}; give a run's folder, or a log of 'candump -L'")]
     Open { file: PathBuf, reason: String },
     #[error("{file}:{error}")]

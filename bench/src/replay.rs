@@ -34,7 +34,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 const LOOK_PERIOD: Duration = Duration::from_millis(10);
 
 #[derive(Debug, thiserror::Error)]
-pub enum ReplayError {
+pub(crate) enum ReplayError {
     #[error(transparent)]
     Log(#[from] RecordedLogError),
     #[error("{file} holds frames of {names}: choose one with --interface NAME")]
@@ -68,7 +68,7 @@ pub enum ReplayError {
 }
 
 impl ReplayError {
-    pub fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::NoBus(_) => Exit::BusFailed,
             _ => Exit::BadInput,
@@ -80,7 +80,7 @@ impl ReplayError {
 ///
 /// # Errors
 /// [`ReplayError`]: nothing was sent, save for [`ReplayError::File`].
-pub fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
+pub(crate) fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     let log = RecordedLog::read(&arguments.source, arguments.interface.as_deref())?;
     log.tell_cut_line();
     if log.interfaces.len() > 1 {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Why runs are not laid side by side.
 #[derive(Debug, thiserror::Error)]
-pub enum RunsError {
+pub(crate) enum RunsError {
     /// A folder cannot be read, or a page not written.
     #[error(transparent)]
     Summary(#[from] SummaryError),
@@ -23,7 +23,7 @@ pub enum RunsError {
 
 /// A run as it is compared.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub(crate) struct Run {
     pub folder: PathBuf,
     /// What it is called in tables and legends.
     pub name: String,
@@ -33,23 +33,23 @@ pub struct Run {
 }
 
 impl Run {
-    pub fn title(&self) -> String {
+    pub(crate) fn title(&self) -> String {
         let title = self.record.experiment.get("title").and_then(toml::Value::as_str);
         title.unwrap_or("no experiment").to_owned()
     }
 
-    pub fn figure(&self, name: &str) -> Option<f64> {
+    pub(crate) fn figure(&self, name: &str) -> Option<f64> {
         self.figures.iter().find(|(own, _)| *own == name).map(|(_, value)| *value)
     }
 
     /// The experiment's begin: the zero of the time axis when runs are laid over each other.
-    pub fn start_s(&self) -> f64 {
+    pub(crate) fn start_s(&self) -> f64 {
         self.record.experiments().first().map_or(0.0, |span| span.from_s)
     }
 }
 
 /// Reads the runs in `folders`; names that are equal are made different by their parents.
-pub fn read(folders: &[PathBuf]) -> Result<Vec<Run>, SummaryError> {
+pub(crate) fn read(folders: &[PathBuf]) -> Result<Vec<Run>, SummaryError> {
     let mut runs = folders.iter().map(|folder| read_one(folder)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<_> = runs.iter().map(|run| run.name.clone()).collect();
     for run in &mut runs {
@@ -77,14 +77,14 @@ fn read_one(folder: &Path) -> Result<Run, SummaryError> {
 }
 
 /// Names and units of all figures that runs are compared by.
-pub fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
+pub(crate) fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
     let top = TOP.iter().filter(|figure| figure.is_compared).map(|figure| (figure.name, figure.unit));
     top.chain(figures::definitions().map(|definition| (definition.name, definition.unit)))
 }
 
 /// Refuses runs that asked the rig for different things. Programs, their parameters, recording and bounds may differ:
 /// controllers are what is compared.
-pub fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
+pub(crate) fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
     let Some((first, others)) = runs.split_first() else { return Ok(()) };
     let asked_first = asked(&first.record.experiment);
     match others.iter().find(|other| asked(&other.record.experiment) != asked_first) {

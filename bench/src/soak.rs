@@ -29,7 +29,7 @@ mod memory;
 mod merged;
 pub(crate) mod model;
 mod plan;
-pub mod processes;
+pub(crate) mod processes;
 mod procfs;
 mod rotate;
 mod segment;
@@ -56,7 +56,7 @@ const GIVE_UP_AFTER: usize = 3;
 
 /// What keeps a soak from going on.
 #[derive(Debug, thiserror::Error)]
-pub enum SoakError {
+pub(crate) enum SoakError {
     #[error(transparent)]
     File(#[from] FileError),
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
@@ -83,7 +83,7 @@ impl SoakError {
 ///
 /// # Errors
 /// [`SoakError`] when it cannot begin or its results cannot be written; how it went is the exit code.
-pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
+pub(crate) fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     let bin_dir = bin_dir(arguments)?;
     let (load, load_missing_because) = load(arguments);
     let planned_s = arguments.planned_s();

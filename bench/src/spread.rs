@@ -44,7 +44,7 @@ fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
     rows().filter_map(spread).collect()
 }
 
-pub fn table(runs: &[Run]) -> Grid {
+pub(crate) fn table(runs: &[Run]) -> Grid {
     let head = ["figure", "n", "mean", "standard deviation", "least", "most"];
     let rows = spreads(runs).into_iter().map(|(name, unit, spread)| {
         let reported = |value: f64| in_use(value, unit);
@@ -63,7 +63,7 @@ pub fn table(runs: &[Run]) -> Grid {
 }
 
 /// The spreads as JSON, SI, by the figures' names.
-pub fn json(runs: &[Run]) -> Value {
+pub(crate) fn json(runs: &[Run]) -> Value {
     let figures: Map<_, _> =
         spreads(runs).into_iter().map(|(name, _, spread)| (name.to_owned(), json!(spread))).collect();
     let names: Vec<_> = runs.iter().map(|run| run.name.as_str()).collect();

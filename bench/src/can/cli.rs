@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 /// An interface for the program, and its bus.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InterfaceArgument {
+pub(crate) struct InterfaceArgument {
     /// Name of the interface.
     pub name: String,
     /// The bus that it stands for.
@@ -32,7 +32,7 @@ impl FromStr for InterfaceArgument {
 
 /// Which program on which buses.
 #[derive(Args, Debug)]
-pub struct CanArguments {
+pub(crate) struct CanArguments {
     /// The embedded bus that the program sees as vcan0.
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,

@@ -50,7 +50,7 @@ fn difference(first: &Run, run: &Run, column: &str) -> Series {
 }
 
 /// The rms of each signal's difference from the first run; changes are against the second.
-pub fn table(runs: &[Run]) -> Grid {
+pub(crate) fn table(runs: &[Run]) -> Grid {
     let Some((first, others)) = runs.split_first() else { return Grid::default() };
     let mut head = vec![format!("rms difference from {}", first.name)];
     for (place, run) in others.iter().enumerate() {
@@ -79,7 +79,7 @@ pub fn table(runs: &[Run]) -> Grid {
 }
 
 /// The picture: a panel for each signal, a curve for each run but the first.
-pub fn pictures(runs: &[Run]) -> Vec<Picture> {
+pub(crate) fn pictures(runs: &[Run]) -> Vec<Picture> {
     let Some((first, others)) = runs.split_first() else { return Vec::new() };
     let panels = shown().map(|quantity| {
         let curves = others.iter().enumerate().map(|(place, run)| Curve {

@@ -56,7 +56,7 @@ const QUANTITIES: &[Quantity] = &[
 ];
 
 /// The whole experiment, and what is around its step if it has one.
-pub fn pictures(runs: &[Run]) -> Vec<Picture> {
+pub(crate) fn pictures(runs: &[Run]) -> Vec<Picture> {
     let Some(first) = runs.first() else { return Vec::new() };
     let whole = whole(first.title(), runs, panels(runs, Run::start_s));
     let Some((what, _)) = picture::step(&first.record) else { return vec![whole] };

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// The axis whose controller is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum CheckedAxis {
+pub(crate) enum CheckedAxis {
     /// The drive, which positions.
     Drive,
     /// The load, which presses.
@@ -18,7 +18,7 @@ pub enum CheckedAxis {
 
 impl CheckedAxis {
     /// The frame of its valve commands.
-    pub fn command(self) -> &'static MessageSpec {
+    pub(crate) fn command(self) -> &'static MessageSpec {
         match self {
             Self::Drive => DRIVE_VALVE_COMMAND,
             Self::Load => LOAD_VALVE_COMMAND,
@@ -26,7 +26,7 @@ impl CheckedAxis {
     }
 
     /// The frame of its sensors.
-    pub fn sensors(self) -> &'static MessageSpec {
+    pub(crate) fn sensors(self) -> &'static MessageSpec {
         match self {
             Self::Drive => DRIVE_SENSORS,
             Self::Load => LOAD_SENSORS,
@@ -36,7 +36,7 @@ impl CheckedAxis {
 
 /// How time passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum CheckPace {
+pub(crate) enum CheckPace {
     /// One cycle each millisecond; what a foreign controller, and one on real CAN, is checked at.
     Real,
     /// Simulated time, for a controller that joins the barrier of the embedded bus.
@@ -47,7 +47,7 @@ pub enum CheckPace {
 
 /// What is checked, how, and where the result goes.
 #[derive(Args, Debug)]
-pub struct ConformanceArguments {
+pub(crate) struct ConformanceArguments {
     /// Bus on which the check is the rig: unix:///PATH is hosted here, can://IFACE must be there. No emulator may be on it
     /// [default: an embedded bus of the check's own, which needs a COMMAND].
     #[arg(long, required_unless_present = "command")]

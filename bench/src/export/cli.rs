@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// What a log becomes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
+pub(crate) enum Format {
     /// Decoded signals, a column each, in SI; a row for each time stamp.
     Csv,
     /// Decoded signals with their units, a group for each frame; read by asammdf and others.
@@ -22,7 +22,7 @@ pub enum Format {
 
 /// What is exported, into what.
 #[derive(Args, Debug)]
-pub struct ExportArguments {
+pub(crate) struct ExportArguments {
     /// A run's folder, or a log of 'candump -L'.
     #[arg(value_name = "RUN|LOG")]
     pub source: PathBuf,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// Which bus for whom.
 #[derive(Args, Debug)]
-pub struct GatewayArguments {
+pub(crate) struct GatewayArguments {
     /// Bus to serve: can://IFACE or unix:///PATH.
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// What is measured, how, and where the figures go.
 #[derive(Args, Debug)]
-pub struct PingPongArguments {
+pub(crate) struct PingPongArguments {
     /// Bus that both processes are peers of: can://IFACE, or unix:///PATH that somebody hosts ('emulator bus').
     #[arg(long, required_unless_present = "socketpair", conflicts_with = "socketpair")]
     pub bus: Option<BusUrl>,
@@ -45,7 +45,7 @@ pub struct PingPongArguments {
 
 /// How to answer.
 #[derive(Args, Debug)]
-pub struct PongArguments {
+pub(crate) struct PongArguments {
     /// The bus; without it, standard input is one of a pair of sockets.
     #[arg(long)]
     pub bus: Option<BusUrl>,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// How to watch the machine.
 #[derive(Args, Debug)]
-pub struct ProbeArguments {
+pub(crate) struct ProbeArguments {
     /// Table to write: cpu, from_ns, to_ns, another_ran.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// What is put back on which bus, and how.
 #[derive(Args, Debug)]
-pub struct ReplayArguments {
+pub(crate) struct ReplayArguments {
     /// A run's folder, or a log of 'candump -L'.
     #[arg(value_name = "RUN|LOG")]
     pub source: PathBuf,

@@ -26,7 +26,7 @@ pub(super) enum Kind {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LeftOut {
+pub(crate) enum LeftOut {
     /// All of [`Kind::Command`].
     Commands,
     /// All of [`Kind::Rig`].
@@ -38,7 +38,7 @@ pub enum LeftOut {
 /// A word that is no part of a log.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is neither 'commands' nor 'rig' nor an identifier of 3 or 8 hexadecimal digits")]
-pub struct NotToBeLeftOut(String);
+pub(crate) struct NotToBeLeftOut(String);
 
 impl Kind {
     /// Of a frame, by its identifier: a malformed frame of the rig is still one that only a rig sends.
@@ -55,7 +55,7 @@ impl Kind {
 }
 
 impl LeftOut {
-    pub fn names(self, frame: &CanFrame) -> bool {
+    pub(crate) fn names(self, frame: &CanFrame) -> bool {
         match self {
             Self::Commands => Kind::of(frame) == Kind::Command,
             Self::Rig => Kind::of(frame) == Kind::Rig,

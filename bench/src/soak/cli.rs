@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 /// How to soak.
 #[derive(Args, Clone, Debug)]
-pub struct SoakArguments {
+pub(crate) struct SoakArguments {
     /// Length of the soak in hours, what an earlier start with the same --out did included.
     #[arg(long, value_parser = length, conflicts_with = "minutes", required_unless_present = "minutes")]
     pub hours: Option<f64>,
@@ -73,7 +73,7 @@ pub struct SoakArguments {
 
 /// A program that must not outlive the one that started it.
 #[derive(Args, Clone, Debug)]
-pub struct ChildArguments {
+pub(crate) struct ChildArguments {
     /// Process number of the one that starts it.
     pub parent: i32,
     /// The program and its arguments.
@@ -83,7 +83,7 @@ pub struct ChildArguments {
 
 /// A switch whose both sides have a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum YesNo {
+pub(crate) enum YesNo {
     /// On.
     Yes,
     /// Off.

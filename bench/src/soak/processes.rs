@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 const POLL: Duration = Duration::from_millis(20);
 
 /// A program that a soak started.
-pub struct Running {
+pub(crate) struct Running {
     pub name: String,
     child: Child,
     ended: Option<ExitStatus>,
@@ -24,7 +24,7 @@ pub struct Running {
 
 impl Running {
     /// Starts a program; what it says goes to a file.
-    pub fn start(name: &str, program: &Path, arguments: &[OsString], said: &Path) -> io::Result<Self> {
+    pub(crate) fn start(name: &str, program: &Path, arguments: &[OsString], said: &Path) -> io::Result<Self> {
         let file = File::create(said)?;
         // Through this program, which binds itself to us and becomes the other one: the same process.
         let child = Command::new(std::env::current_exe()?)
@@ -41,7 +41,7 @@ impl Running {
         Ok(Self { name: name.into(), child, ended: None })
     }
 
-    pub fn pid(&self) -> u32 {
+    pub(crate) fn pid(&self) -> u32 {
         self.child.id()
     }
 
@@ -53,7 +53,7 @@ impl Running {
         self.ended.is_none()
     }
 
-    pub fn interrupt(&mut self) {
+    pub(crate) fn interrupt(&mut self) {
         self.signal(Signal::INT);
     }
 
@@ -67,7 +67,7 @@ impl Running {
     }
 
     /// Waits for its end, at most until `until`; true when it has ended.
-    pub fn wait_until(&mut self, until: Instant) -> bool {
+    pub(crate) fn wait_until(&mut self, until: Instant) -> bool {
         while self.is_running() {
             if Instant::now() >= until {
                 return false;
@@ -78,7 +78,7 @@ impl Running {
     }
 
     /// Sees to it that it ends: what it was asked for before it gets so long for, then it is killed with all that it started.
-    pub fn end(&mut self, patience: Duration) -> Option<ExitStatus> {
+    pub(crate) fn end(&mut self, patience: Duration) -> Option<ExitStatus> {
         if !self.wait_until(Instant::now() + patience) {
             self.signal(Signal::KILL);
             self.wait_until(Instant::now() + patience);
@@ -109,7 +109,7 @@ pub(crate) fn end_in_words(status: Option<ExitStatus>) -> String {
 
 /// Becomes the program, after asking for a SIGTERM when `parent` ends. Returns only when that fails.
 #[must_use]
-pub fn become_child(arguments: &ChildArguments) -> io::Error {
+pub(crate) fn become_child(arguments: &ChildArguments) -> io::Error {
     if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
         return error.into();
     }

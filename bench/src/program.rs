@@ -1,0 +1,156 @@
+//! The program: a command line taken, its command run, its exit code.
+
+use crate::cli::{Cli, Command, CompareArguments, ReportArguments, SpreadArguments};
+use crate::conformance::{self, ConformanceError};
+use crate::gateway::{self, GatewayError};
+use crate::ping_pong::{self, PingPongError};
+use crate::replay::ReplayError;
+use crate::runs::{self, Run, RunsError};
+use crate::soak::SoakError;
+use crate::soak::processes::become_child;
+use crate::{can, compare, export, export_fmu, picture, probe, replay, say, soak, spread};
+use clap::Parser;
+use figures::{SummaryError, join, table, thresholds};
+use latency::ReportError;
+use live::LiveError;
+use protocol::exit::Exit;
+use runlog::run_folder::{FileError, read_text, write_json};
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Runs the command that the process's arguments name.
+pub fn main() -> ExitCode {
+    let done: Result<Exit, Box<dyn std::error::Error>> = match Cli::parse().command {
+        Command::Summary { folder } => sum_up(&folder).map_err(Into::into),
+        Command::Compare(arguments) => compare_runs(&arguments).map_err(Into::into),
+        Command::Spread(arguments) => spread_runs(&arguments).map_err(Into::into),
+        Command::Report(arguments) => report_on(&arguments).map_err(Into::into),
+        Command::Cause { file } => name_cause(&file).map_err(Into::into),
+        Command::Figures => {
+            print(&figures::list());
+            Ok(Exit::Good)
+        }
+        Command::CheckExperiment { file } => check(&file).map_err(Into::into),
+        Command::LatencyTable(arguments) => latency::table::table(&arguments)
+            .map(|text| print(&text))
+            .map(|()| Exit::Good)
+            .map_err(Into::into),
+        Command::Replay(arguments) => return reported(replay::run(&arguments), ReplayError::exit),
+        Command::ExportFmu(arguments) => export_fmu::run(&arguments).map_err(Into::into),
+        Command::Export(arguments) => export::run(&arguments).map_err(Into::into),
+        Command::Probe(arguments) => return reported(probe::run(&arguments), |_| Exit::BadInput),
+        Command::PingPong(arguments) => return reported(ping_pong::run(&arguments), PingPongError::exit),
+        Command::Pong(arguments) => return reported(ping_pong::pong(&arguments), PingPongError::exit),
+        Command::CheckController(arguments) => {
+            return reported(conformance::run(&arguments), ConformanceError::exit);
+        }
+        Command::Gateway(arguments) => return reported(gateway::run(&arguments), GatewayError::exit),
+        Command::Can(arguments) => return can::run(&arguments),
+        Command::Watch(arguments) => return reported(live::run(&arguments), LiveError::exit),
+        Command::Soak(arguments) => return reported(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
+        Command::SoakChild(arguments) => {
+            eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));
+            return Exit::BadInput.into();
+        }
+    };
+    let exit = done.unwrap_or_else(|error| {
+        eprintln!("bench: {error}");
+        Exit::BadInput
+    });
+    exit.into()
+}
+
+/// How a command of the bench's own measuring ended.
+fn reported<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCode {
+    done.unwrap_or_else(|error| {
+        eprintln!("bench: {error}");
+        exit(&error)
+    })
+    .into()
+}
+
+fn print(text: &str) {
+    say(text.trim_end());
+}
+
+fn sum_up(folder: &Path) -> Result<Exit, SummaryError> {
+    let joined = join::join(folder)?;
+    let pictures = picture::draw(folder, &joined.record)?;
+    print(&table::table(&joined));
+    let others = if joined.is_rehearsal() { "" } else { "bus.log, " };
+    print(&format!(
+        "\n  files in {}: {}, summary.json, measurement.csv, truth.csv, {others}…",
+        folder.display(),
+        pictures.join(", ")
+    ));
+    Ok(if joined.passed() { Exit::Good } else { Exit::BoundBroken })
+}
+
+fn read_runs(folders: &[PathBuf], anyway: bool) -> Result<Vec<Run>, RunsError> {
+    let runs = runs::read(folders)?;
+    if !anyway {
+        runs::expect_one_experiment(&runs)?;
+    }
+    Ok(runs)
+}
+
+fn compare_runs(arguments: &CompareArguments) -> Result<Exit, RunsError> {
+    let runs = read_runs(&arguments.folders, arguments.anyway)?;
+    let (grid, pictures) = if arguments.differences {
+        (compare::differences::table(&runs), compare::differences::pictures(&runs))
+    } else {
+        (compare::table(&runs), compare::overlay::pictures(&runs))
+    };
+    print(&grid.markdown());
+    if let Some(out) = &arguments.out {
+        let page = compare::write(&runs, &grid, &pictures, out)?;
+        print(&format!("\n  page in {}", page.display()));
+    }
+    Ok(Exit::Good)
+}
+
+fn spread_runs(arguments: &SpreadArguments) -> Result<Exit, RunsError> {
+    let runs = read_runs(&arguments.folders, arguments.anyway)?;
+    let markdown = spread::table(&runs).markdown();
+    print(&markdown);
+    if let Some(out) = &arguments.out {
+        let (table, json) = (out.join("spread.md"), out.join("spread.json"));
+        std::fs::create_dir_all(out).map_err(|error| FileError::write(out, error))?;
+        std::fs::write(&table, markdown).map_err(|error| FileError::write(&table, error))?;
+        write_json(&json, &spread::json(&runs)).map_err(|error| FileError::write(&json, error))?;
+    }
+    Ok(Exit::Good)
+}
+
+fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
+    let chosen = latency::choice::choose(&arguments.folders, &arguments.group)?;
+    if arguments.compare && chosen.len() < 2 {
+        return Err(ReportError::OneRun);
+    }
+    let compare = arguments.compare || !arguments.group.is_empty();
+    let mut made = latency::make(&chosen, arguments.title.as_deref(), compare);
+    if let Some(file) = &arguments.bounds {
+        made.judge(file)?;
+    }
+    let out = arguments.out.clone().unwrap_or_else(|| latency::choice::default_out(&chosen));
+    latency::output::write(&made, &out, arguments.markdown_only)?;
+    print(&latency::markdown::table(&made.report));
+    print(&format!("\n  report in {}", out.display()));
+    Ok(if made.is_broken() { Exit::BoundBroken } else { Exit::Good })
+}
+
+fn name_cause(file: &Path) -> Result<Exit, ReportError> {
+    let (name, sentence) = latency::report_cause::name(&latency::report_cause::read(file)?);
+    eprintln!("{sentence}");
+    print(&name);
+    Ok(Exit::Good)
+}
+
+fn check(file: &Path) -> Result<Exit, SummaryError> {
+    let experiment: toml::Table = read_text(file)?.parse().map_err(|error| FileError::read(file, error))?;
+    let passed = experiment.get("passed").map(|passed| passed.as_table().ok_or("[passed] is no table"));
+    let passed = passed.transpose().map_err(|error| FileError::read(file, error))?;
+    passed.map_or(Ok(()), thresholds::check)?;
+    Ok(Exit::Good)
+}
