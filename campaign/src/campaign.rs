@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 #[derive(Debug)]
-pub struct Campaign {
+pub(crate) struct Campaign {
     pub file: CampaignFile,
     pub points: Points,
     /// How they are shared out.
@@ -33,7 +33,7 @@ pub struct Campaign {
 
 /// Where a campaign finds what it needs.
 #[derive(Clone, Debug)]
-pub struct Places {
+pub(crate) struct Places {
     /// Folder with the shipped `experiments` and `programs`.
     pub shipped: PathBuf,
     /// Folder of `emulator` and `controller`.
@@ -42,7 +42,7 @@ pub struct Places {
 
 /// Why a campaign cannot be run.
 #[derive(Debug, thiserror::Error)]
-pub enum CampaignError {
+pub(crate) enum CampaignError {
     #[error(transparent)]
     File(#[from] SettingsError),
     #[error(transparent)]
@@ -61,7 +61,7 @@ pub enum CampaignError {
 
 impl Campaign {
     /// Reads a campaign's file and all that it names, and tries the values at the ends of its lists.
-    pub fn read(path: &Path, places: &Places) -> Result<Self, CampaignError> {
+    pub(crate) fn read(path: &Path, places: &Places) -> Result<Self, CampaignError> {
         let mut file = CampaignFile::read(path)?;
         let folder = file.folder()?;
         if let Kind::Command(words) = &mut file.kind {
@@ -94,7 +94,7 @@ impl Campaign {
 
     /// The experiment of its runs; none for a command.
     #[must_use]
-    pub fn experiment(&self) -> Option<&ExperimentKind> {
+    pub(crate) fn experiment(&self) -> Option<&ExperimentKind> {
         match &self.file.kind {
             Kind::Experiment(kind) => Some(kind),
             Kind::Command(_) => None,
@@ -114,7 +114,7 @@ impl Campaign {
     ///
     /// # Errors
     /// [`CampaignError`] for what is no result: values that go into no file, programs that cannot be started.
-    pub fn run(&self, point: &Point, stop: &AtomicBool) -> Result<Option<Outcome>, CampaignError> {
+    pub(crate) fn run(&self, point: &Point, stop: &AtomicBool) -> Result<Option<Outcome>, CampaignError> {
         let limit = Limit::of(file::LONGEST_WALL_S, stop);
         let kind = match &self.file.kind {
             Kind::Experiment(kind) => kind,
@@ -136,7 +136,7 @@ impl Campaign {
     }
 
     /// The same once more, for somebody to see: an experiment as processes that leave their files in `folder`.
-    pub fn repeat(
+    pub(crate) fn repeat(
         &self,
         point: &Point,
         folder: &Path,
@@ -185,7 +185,7 @@ impl Campaign {
     }
 
     #[must_use]
-    pub fn row(&self, point: &Point, outcome: &Outcome) -> String {
+    pub(crate) fn row(&self, point: &Point, outcome: &Outcome) -> String {
         let passed = outcome.passed.map_or("", |passed| if passed { "1" } else { "0" });
         let mut row = format!("{},{},{}", point.run, point.draw, point.seed);
         for value in &point.values {

@@ -14,13 +14,13 @@ const PATIENCE: Duration = Duration::from_secs(5);
 
 /// A process that ends with its owner, and with it all that it started.
 #[derive(Debug)]
-pub struct Own {
+pub(crate) struct Own {
     child: Child,
 }
 
 /// Why a process did not come to its own end.
 #[derive(Debug, thiserror::Error)]
-pub enum Cut {
+pub(crate) enum Cut {
     #[error("stopped")]
     Stopped,
     #[error("took longer than {0} s, and was ended")]
@@ -32,11 +32,11 @@ pub enum Cut {
 impl Own {
     /// Starts it as a group of its own, which a Ctrl-C at the terminal does not reach: what that does to a run is for its owner
     /// to say.
-    pub fn start(command: &mut Command) -> io::Result<Self> {
+    pub(crate) fn start(command: &mut Command) -> io::Result<Self> {
         command.process_group(0).spawn().map(|child| Self { child })
     }
 
-    pub fn child(&mut self) -> &mut Child {
+    pub(crate) fn child(&mut self) -> &mut Child {
         &mut self.child
     }
 
@@ -44,7 +44,7 @@ impl Own {
     ///
     /// # Errors
     /// [`Cut`] when it was ended instead.
-    pub fn wait(&mut self, limit: Limit<'_>) -> Result<ExitStatus, Cut> {
+    pub(crate) fn wait(&mut self, limit: Limit<'_>) -> Result<ExitStatus, Cut> {
         loop {
             if let Some(status) = self.child.try_wait()? {
                 return Ok(status);
@@ -80,7 +80,7 @@ impl Drop for Own {
 
 /// How long a run may take.
 #[derive(Clone, Copy, Debug)]
-pub struct Limit<'a> {
+pub(crate) struct Limit<'a> {
     pub began: Instant,
     /// Longest time, s of the wall clock.
     pub longest_s: f64,
@@ -91,7 +91,7 @@ pub struct Limit<'a> {
 impl<'a> Limit<'a> {
     /// From now on.
     #[must_use]
-    pub fn of(longest_s: f64, stop: &'a AtomicBool) -> Self {
+    pub(crate) fn of(longest_s: f64, stop: &'a AtomicBool) -> Self {
         Self { began: Instant::now(), longest_s, stop }
     }
 }

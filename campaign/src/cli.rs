@@ -11,12 +11,12 @@ use std::path::PathBuf;
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
 }
 
 /// What to do.
 #[derive(Subcommand, Debug)]
-pub enum Command {
+pub(crate) enum Command {
     /// Tell how many runs there are, and what the first ones are made with; runs nothing.
     Plan(PlanArguments),
     /// Make the missing runs of a campaign or of one shard; a complete campaign is merged at the end.
@@ -29,72 +29,72 @@ pub enum Command {
 
 /// Where things are.
 #[derive(Args, Clone, Debug)]
-pub struct CommonArguments {
+pub(crate) struct CommonArguments {
     /// The campaign file.
-    pub file: PathBuf,
+    pub(crate) file: PathBuf,
     /// Folder with the shipped experiments and programs.
     #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../controller"))]
-    pub shipped: PathBuf,
+    pub(crate) shipped: PathBuf,
     /// Folder of the programs emulator and controller; default: that of this one.
     #[arg(long)]
-    pub programs: Option<PathBuf>,
+    pub(crate) programs: Option<PathBuf>,
 }
 
 /// Arguments of `plan`.
 #[derive(Args, Debug)]
-pub struct PlanArguments {
+pub(crate) struct PlanArguments {
     #[command(flatten)]
-    pub common: CommonArguments,
+    pub(crate) common: CommonArguments,
     /// How many of the first runs to print.
     #[arg(long, default_value_t = 5)]
-    pub first: u64,
+    pub(crate) first: u64,
     /// As JSON, for programs, on standard output.
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
 }
 
 /// Arguments of `run`.
 #[derive(Args, Debug)]
-pub struct RunArguments {
+pub(crate) struct RunArguments {
     #[command(flatten)]
-    pub common: CommonArguments,
+    pub(crate) common: CommonArguments,
     /// Folder of its parts and results; default: runs/campaigns/NAME.
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Shard to run: INDEX/COUNT, INDEX from 0; COUNT alone takes the index from Slurm or Kubernetes.
     #[arg(long, value_name = "INDEX/COUNT")]
-    pub shard: Option<Asked>,
+    pub(crate) shard: Option<Asked>,
     /// Runs at once; default: as many as there are cores.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
-    pub jobs: Option<u64>,
+    pub(crate) jobs: Option<u64>,
     /// Exit with 1 unless every run came to its end and kept its experiment's bounds.
     #[arg(long, conflicts_with = "shard")]
-    pub expect_passed: bool,
+    pub(crate) expect_passed: bool,
 }
 
 /// Arguments of `merge`.
 #[derive(Args, Debug)]
-pub struct MergeArguments {
+pub(crate) struct MergeArguments {
     #[command(flatten)]
-    pub common: CommonArguments,
+    pub(crate) common: CommonArguments,
     /// Folders with its parts; default: runs/campaigns/NAME.
-    pub folders: Vec<PathBuf>,
+    pub(crate) folders: Vec<PathBuf>,
     /// Folder of the results; default: the first of the folders.
     #[arg(long)]
-    pub to: Option<PathBuf>,
+    pub(crate) to: Option<PathBuf>,
     /// Exit with 1 unless every run came to its end and kept its experiment's bounds.
     #[arg(long)]
-    pub expect_passed: bool,
+    pub(crate) expect_passed: bool,
 }
 
 /// Arguments of `repeat`.
 #[derive(Args, Debug)]
-pub struct RepeatArguments {
+pub(crate) struct RepeatArguments {
     #[command(flatten)]
-    pub common: CommonArguments,
+    pub(crate) common: CommonArguments,
     /// Number of the run.
-    pub run: u64,
+    pub(crate) run: u64,
     /// Folder of its files; default: runs/NAME-run-NUMBER.
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
 }

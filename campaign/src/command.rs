@@ -30,18 +30,18 @@ pub const NOT_TRIED: i32 = 75;
 
 /// A program, where it runs, and what for.
 #[derive(Clone, Copy, Debug)]
-pub struct Words<'a> {
+pub(crate) struct Words<'a> {
     /// The program and its arguments.
-    pub command: &'a [String],
+    pub(crate) command: &'a [String],
     /// The folder that it runs in.
-    pub folder: &'a Path,
+    pub(crate) folder: &'a Path,
     /// Whether somebody wants to see the run once more: what the program keeps of it does not do.
-    pub again: bool,
+    pub(crate) again: bool,
 }
 
 /// Why there is no result.
 #[derive(Debug, thiserror::Error)]
-pub enum CommandError {
+pub(crate) enum CommandError {
     /// The program cannot be started, or not be waited for.
     #[error(transparent)]
     System(#[from] io::Error),
@@ -53,7 +53,7 @@ pub enum CommandError {
 ///
 /// # Errors
 /// [`CommandError`] for what is no result.
-pub fn run(
+pub(crate) fn run(
     Words { command, folder, again }: Words<'_>,
     factors: &[Factor],
     point: &Point,

@@ -10,18 +10,20 @@ use crate::outcome::Ended;
 use crate::page::page;
 use crate::parts::write_whole;
 use crate::shard::{Shard, ShardError};
+use clap::Parser as _;
 use protocol::exit::Exit;
 use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::json;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Why a command did not do what it was asked for.
 #[derive(Debug, thiserror::Error)]
-pub enum CommandError {
+enum CommandError {
     #[error(transparent)]
     Campaign(#[from] CampaignError),
     #[error(transparent)]
@@ -36,11 +38,16 @@ pub enum CommandError {
     NoSuchRun { run: u64, last: u64 },
 }
 
-/// Does what the command line asks.
-///
-/// # Errors
-/// [`CommandError`], exit code 2.
-pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
+/// The program.
+pub fn main() -> ExitCode {
+    let exit = run(&Cli::parse()).unwrap_or_else(|error| {
+        say(&error.to_string());
+        Exit::BadInput
+    });
+    exit.into()
+}
+
+fn run(cli: &Cli) -> Result<Exit, CommandError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // A second one ends the process at once; parts are whole or absent in any case.

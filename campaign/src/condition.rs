@@ -14,7 +14,7 @@ use plant::{Axis, RigParameters, Scene};
 use std::fmt::Write as _;
 
 #[derive(Debug)]
-pub struct Condition<'s> {
+pub(crate) struct Condition<'s> {
     /// The rig that controllers know.
     pub nominal: &'s RigFile,
     pub rig: RigParameters,
@@ -38,13 +38,13 @@ pub struct Condition<'s> {
 /// Values that do not go into the campaign's files.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("run {run}: {message}")]
-pub struct ConditionError {
+pub(crate) struct ConditionError {
     pub run: u64,
     /// What the file's reader says.
     pub message: String,
 }
 
-pub fn condition<'s>(
+pub(crate) fn condition<'s>(
     shelf: &'s CampaignInputs,
     points: &Points,
     point: &Point,
@@ -91,7 +91,7 @@ pub fn condition<'s>(
 impl Condition<'_> {
     /// The program of an axis that the experiment calls `written`.
     #[must_use]
-    pub fn program(&self, shelf: &CampaignInputs, axis: Axis, written: &str) -> Option<Source> {
+    pub(crate) fn program(&self, shelf: &CampaignInputs, axis: Axis, written: &str) -> Option<Source> {
         self.programs[axis.index()].or_else(|| shelf.program(written, self.experiment)).cloned()
     }
 }

@@ -18,7 +18,7 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 
 /// Why a path leads nowhere.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum EditError {
+pub(crate) enum EditError {
     #[error("is no TOML: {0}")]
     Form(String),
     #[error("{path}: {part} is {what}")]
@@ -34,7 +34,10 @@ pub enum EditError {
 ///
 /// # Errors
 /// [`EditError`] for a text that is no TOML, and for a path that does not fit it.
-pub fn with<'a>(text: &str, numbers: impl IntoIterator<Item = (&'a str, f64)>) -> Result<String, EditError> {
+pub(crate) fn with<'a>(
+    text: &str,
+    numbers: impl IntoIterator<Item = (&'a str, f64)>,
+) -> Result<String, EditError> {
     let mut numbers = numbers.into_iter().peekable();
     if numbers.peek().is_none() {
         return Ok(text.to_owned());
@@ -47,14 +50,14 @@ pub fn with<'a>(text: &str, numbers: impl IntoIterator<Item = (&'a str, f64)>) -
 }
 
 /// The files that are there and that the text at `path` names, as it names them.
-pub fn files_beside(text: &str, path: &Path) -> Result<Vec<String>, EditError> {
+pub(crate) fn files_beside(text: &str, path: &Path) -> Result<Vec<String>, EditError> {
     let mut found = Found { path, names: Vec::new() };
     found.visit_document_mut(&mut document(text)?);
     Ok(found.names)
 }
 
 /// The text at `path` as it may stand elsewhere.
-pub fn moved(text: &str, path: &Path) -> Result<String, EditError> {
+pub(crate) fn moved(text: &str, path: &Path) -> Result<String, EditError> {
     let mut document = document(text)?;
     Found { path, names: Vec::new() }.visit_document_mut(&mut document);
     Ok(document.to_string())
@@ -62,7 +65,7 @@ pub fn moved(text: &str, path: &Path) -> Result<String, EditError> {
 
 /// The file that the one at `path` calls `name`.
 #[must_use]
-pub fn beside(path: &Path, name: &str) -> PathBuf {
+pub(crate) fn beside(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name)
 }
 

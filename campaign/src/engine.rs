@@ -18,7 +18,7 @@ const TELL_EACH: Duration = Duration::from_secs(2);
 
 /// How a start went on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Done {
+pub(crate) struct Done {
     /// Runs that this start did.
     pub runs: u64,
     /// Of the rig's time, s.
@@ -31,7 +31,7 @@ pub struct Done {
 
 /// Why a start cannot go on; what is done stays.
 #[derive(Debug, thiserror::Error)]
-pub enum EngineError {
+pub(crate) enum EngineError {
     /// A run that cannot be made.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
@@ -45,7 +45,7 @@ pub enum EngineError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
-pub struct Start<'a> {
+pub(crate) struct Start<'a> {
     pub campaign: &'a Campaign,
     pub out: &'a Path,
     /// Which of them are this start's.
@@ -62,7 +62,7 @@ impl Start<'_> {
     ///
     /// # Errors
     /// [`EngineError`] with the first that went wrong; the parts that others were at stay missing.
-    pub fn run(&self) -> Result<Done, EngineError> {
+    pub(crate) fn run(&self) -> Result<Done, EngineError> {
         let parts = &self.campaign.parts;
         let own: Vec<u64> = (0..parts.count()).filter(|part| self.shard.holds(*part)).collect();
         let missing = self.missing(&own)?;
@@ -217,7 +217,7 @@ impl<'a> Progress<'a> {
 
 /// A time for people.
 #[must_use]
-pub fn in_words(seconds: f64) -> String {
+pub(crate) fn in_words(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {
         0..60 => format!("{seconds:.0} s"),

@@ -24,7 +24,7 @@ use toml::de::DeValue;
 
 /// What is varied, and through which values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Factor {
+pub(crate) struct Factor {
     /// Name of its column.
     pub name: String,
     pub changes: Changes,
@@ -32,7 +32,7 @@ pub struct Factor {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Changes {
+pub(crate) enum Changes {
     /// A number of the rig file, by its path.
     Rig(String),
     /// A number of the experiment file, by its path.
@@ -49,7 +49,7 @@ pub enum Changes {
 
 /// A number of a fault, and when it acts.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FaultNumber {
+pub(crate) struct FaultNumber {
     pub fault: String,
     /// Where; none for a fault that has one place.
     pub at: Option<String>,
@@ -62,7 +62,7 @@ pub struct FaultNumber {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FileChoice {
+pub(crate) enum FileChoice {
     Experiment,
     Rig,
     DriveProgram,
@@ -70,7 +70,7 @@ pub enum FileChoice {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Values {
+pub(crate) enum Values {
     /// Gone through.
     List(Vec<Value>),
     /// Drawn.
@@ -79,7 +79,7 @@ pub enum Values {
 
 /// What a value is drawn from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
+pub(crate) struct Range {
     pub(crate) ends: [f64; 2],
     /// Evenly in the order of magnitude, not in the value; then both ends are above 0.
     pub log: bool,
@@ -88,7 +88,7 @@ pub struct Range {
 impl Range {
     /// The value at a share of it, 0 to 1.
     #[must_use]
-    pub fn at(&self, share: f64) -> f64 {
+    pub(crate) fn at(&self, share: f64) -> f64 {
         let Range { ends: [least, most], log } = *self;
         let value = if log {
             let (low, high) = (libm::log(least), libm::log(most));
@@ -101,7 +101,7 @@ impl Range {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Value {
+pub(crate) enum Value {
     /// In the unit of the file that it goes into.
     Number(f64),
     /// Name of a file or of an effect.
@@ -121,7 +121,7 @@ impl fmt::Display for Value {
 impl Value {
     /// The number, where it is one.
     #[must_use]
-    pub fn number(&self) -> Option<f64> {
+    pub(crate) fn number(&self) -> Option<f64> {
         match self {
             Value::Number(number) => Some(*number),
             Value::Text(_) => None,
@@ -132,17 +132,11 @@ impl Value {
 impl Values {
     /// How many are gone through; 1 for those that are drawn.
     #[must_use]
-    pub fn listed(&self) -> usize {
+    pub(crate) fn listed(&self) -> usize {
         match self {
             Values::List(list) => list.len(),
             Values::Range(_) => 1,
         }
-    }
-
-    /// Whether they are drawn.
-    #[must_use]
-    pub fn drawn(&self) -> bool {
-        matches!(self, Values::Range(_))
     }
 }
 
@@ -273,7 +267,7 @@ fn check_kind(section: &Section<'_>, changes: &Changes, values: &Values) -> Resu
 }
 
 /// Name of no hidden effect.
-pub const NONE_HIDDEN: &str = "none";
+pub(crate) const NONE_HIDDEN: &str = "none";
 
 #[cfg(test)]
 mod tests {

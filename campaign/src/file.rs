@@ -32,7 +32,7 @@ use toml::de::DeValue;
 
 /// A campaign as its file asks for it; paths are from the file's folder.
 #[derive(Clone, Debug)]
-pub struct CampaignFile {
+pub(crate) struct CampaignFile {
     pub path: PathBuf,
     pub text: String,
     pub title: String,
@@ -54,7 +54,7 @@ pub struct CampaignFile {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Kind {
+pub(crate) enum Kind {
     Experiment(ExperimentKind),
     /// A program that answers with a line of JSON.
     Command(Vec<String>),
@@ -62,7 +62,7 @@ pub enum Kind {
 
 /// An experiment on the simulated rig.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ExperimentKind {
+pub(crate) struct ExperimentKind {
     /// Name or path, unless it is varied.
     pub experiment: Option<String>,
     /// Path of the rig file, unless it is varied or the shipped one.
@@ -75,7 +75,7 @@ pub struct ExperimentKind {
 
 /// How the rig is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub(crate) enum Pace {
     /// In the process of its controllers, without a bus.
     Rehearsal,
     /// Emulator and controllers as processes on an embedded bus, in lockstep.
@@ -90,7 +90,7 @@ const OTHERS: [&str; 8] =
     ["title", "command", "programs", "draws", "seed", "runs_per_part", "collect", "vary"];
 
 /// Longest that a process of a run may take, s of the wall clock.
-pub const LONGEST_WALL_S: f64 = 3600.0;
+pub(crate) const LONGEST_WALL_S: f64 = 3600.0;
 /// Longest run when nothing is said, s.
 const LONGEST_S: f64 = 600.0;
 /// Longest run that may be asked for, s: more than a day.
@@ -101,13 +101,13 @@ const MOST_DRAWS: u64 = 1_000_000_000;
 const MOST_PER_PART: u64 = 100_000;
 
 impl CampaignFile {
-    pub fn read(path: &Path) -> Result<Self, SettingsError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, SettingsError> {
         let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
         Self::from_toml(&text, path)
     }
 
     /// The same of a text; `path` is for messages and as the place that paths are from.
-    pub fn from_toml(text: &str, path: &Path) -> Result<Self, SettingsError> {
+    pub(crate) fn from_toml(text: &str, path: &Path) -> Result<Self, SettingsError> {
         let source = Source::parse(text, path)?;
         let mut root = source.root();
         root.allow(&[&OTHERS[..], &OF_AN_EXPERIMENT].concat())?;
@@ -153,7 +153,7 @@ impl CampaignFile {
     ///
     /// # Errors
     /// [`SettingsError`] where the system does not tell where this process is.
-    pub fn folder(&self) -> Result<PathBuf, SettingsError> {
+    pub(crate) fn folder(&self) -> Result<PathBuf, SettingsError> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
         std::path::absolute(folder).map_err(|error| SettingsError::unreadable(&self.path, &error))
     }
@@ -283,7 +283,7 @@ fn check_column(name: &str, taken: &[&str]) -> Result<(), String> {
 }
 
 /// Columns that every result has.
-pub const RESERVED: &[&str] = &["run", "draw", "seed", "ended", "because", "simulated_s", "passed"];
+pub(crate) const RESERVED: &[&str] = &["run", "draw", "seed", "ended", "because", "simulated_s", "passed"];
 
 #[cfg(test)]
 mod tests {

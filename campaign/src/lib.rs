@@ -29,23 +29,23 @@
 //! | [`merge`], [`page`] | results |
 //! | [`cli`], [`commands`] | the program |
 
-pub mod campaign;
-pub mod child;
+mod campaign;
+mod child;
 pub mod cli;
 pub mod command;
 pub mod commands;
-pub mod condition;
-pub mod edits;
-pub mod engine;
-pub mod factor;
-pub mod figures;
-pub mod file;
-pub mod merge;
-pub mod outcome;
-pub mod page;
+mod condition;
+mod edits;
+mod engine;
+mod factor;
+mod figures;
+mod file;
+mod merge;
+mod outcome;
+mod page;
 pub mod parts;
-pub mod points;
-pub mod processes;
-pub mod rehearsed;
-pub mod shard;
-pub mod shelf;
+mod points;
+mod processes;
+mod rehearsed;
+mod shard;
+mod shelf;

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Why parts are not merged.
 #[derive(Debug, thiserror::Error)]
-pub enum MergeError {
+pub(crate) enum MergeError {
     #[error(
         "{missing} of {all} parts are missing, the first is part {first} (runs {from} to {to}); the same 'run' does only what is missing"
     )]
@@ -32,7 +32,7 @@ pub enum MergeError {
 
 /// The table of all runs, column by column, as far as the page needs it.
 #[derive(Debug, Default)]
-pub struct Results {
+pub(crate) struct Results {
     pub runs: u64,
     /// Of the rig's time, s.
     pub simulated_s: f64,
@@ -46,7 +46,7 @@ pub struct Results {
 
 /// A run that did not come to its end.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Unfinished {
+pub(crate) struct Unfinished {
     pub run: u64,
     /// How it ended instead.
     pub ended: String,
@@ -58,7 +58,7 @@ const MOST_TOLD: usize = 100;
 
 /// A column of words, each kept once.
 #[derive(Debug, Default)]
-pub struct Words {
+pub(crate) struct Words {
     /// The different ones, in the order in which they came.
     pub known: Vec<String>,
     /// The word of each run.
@@ -79,7 +79,7 @@ impl Words {
 ///
 /// # Errors
 /// [`MergeError`]; `runs.csv` is as it was then.
-pub fn merge(campaign: &Campaign, folders: &[PathBuf], to: &Path) -> Result<Results, MergeError> {
+pub(crate) fn merge(campaign: &Campaign, folders: &[PathBuf], to: &Path) -> Result<Results, MergeError> {
     let parts = &campaign.parts;
     let places = places(parts, folders)?;
     let path = to.join("runs.csv");
@@ -191,18 +191,18 @@ impl Results {
 
     /// A column of numbers, a place for each run; NaN where a run has none.
     #[must_use]
-    pub fn numbers(&self, name: &str) -> Option<&[f64]> {
+    pub(crate) fn numbers(&self, name: &str) -> Option<&[f64]> {
         self.numbers.get(name).map(Vec::as_slice)
     }
 
     /// Whether every run is done and none broke its experiment's bounds.
     #[must_use]
-    pub fn all_passed(&self) -> bool {
+    pub(crate) fn all_passed(&self) -> bool {
         self.unfinished.is_empty() && !self.numbers("passed").unwrap_or_default().contains(&0.0)
     }
 
     #[must_use]
-    pub fn words(&self, name: &str) -> Option<&Words> {
+    pub(crate) fn words(&self, name: &str) -> Option<&Words> {
         self.words.get(name)
     }
 }

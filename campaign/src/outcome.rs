@@ -4,7 +4,7 @@ use crate::factor::Value;
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     pub ended: Ended,
     /// Why, in words; empty for a run that is done.
     pub because: String,
@@ -17,7 +17,7 @@ pub struct Outcome {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ended {
+pub(crate) enum Ended {
     /// It came to its end.
     Done,
     TimeOver,
@@ -30,7 +30,7 @@ pub enum Ended {
 impl Ended {
     /// As results call it.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Ended::Done => "done",
             Ended::TimeOver => "time-over",
@@ -42,7 +42,7 @@ impl Ended {
 
 impl Outcome {
     #[must_use]
-    pub fn failed(because: String) -> Self {
+    pub(crate) fn failed(because: String) -> Self {
         Outcome { ended: Ended::Failed, because, simulated_s: 0.0, passed: None, figures: BTreeMap::new() }
     }
 }

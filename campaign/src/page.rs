@@ -21,7 +21,7 @@ const USUAL: usize = 4;
 
 /// The page; `repeat` makes the command that repeats a run.
 #[must_use]
-pub fn page(campaign: &Campaign, results: &Results, repeat: &dyn Fn(u64) -> String) -> String {
+pub(crate) fn page(campaign: &Campaign, results: &Results, repeat: &dyn Fn(u64) -> String) -> String {
     let shown = shown(campaign, results);
     let mut body = format!("<h1>{}</h1>\n", escaped(&campaign.file.title));
     body += &lead(campaign, results);

@@ -24,20 +24,20 @@ use tempfile::NamedTempFile;
 
 /// How a campaign's runs are shared out.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parts {
+pub(crate) struct Parts {
     /// Which campaign: the hash of its file and of all that this names.
-    pub campaign: String,
+    pub(crate) campaign: String,
     /// Which program: the hash of its executables.
-    pub program: String,
-    pub columns: Vec<String>,
-    pub runs: u64,
+    pub(crate) program: String,
+    pub(crate) columns: Vec<String>,
+    pub(crate) runs: u64,
     /// How many a part has, but for the last.
-    pub runs_per_part: u64,
+    pub(crate) runs_per_part: u64,
 }
 
 /// What is wrong with a part that is there.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PartError {
+pub(crate) enum PartError {
     #[error(
         "{path}: is of another campaign, or the file or one that it names has changed since; give another --out"
     )]
@@ -53,7 +53,7 @@ pub enum PartError {
 /// A part that cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {error}; what is done is kept: make room and start again, only what is missing is done")]
-pub struct WriteError {
+pub(crate) struct WriteError {
     path: String,
     error: io::Error,
 }
@@ -64,23 +64,23 @@ const USUAL_PARTS: u64 = 1024;
 const USUAL_RUNS: Range<u64> = 8..1001;
 
 #[must_use]
-pub fn usual_runs_per_part(runs: u64) -> u64 {
+pub(crate) fn usual_runs_per_part(runs: u64) -> u64 {
     (runs / USUAL_PARTS).clamp(USUAL_RUNS.start, USUAL_RUNS.end - 1)
 }
 
 impl Parts {
     #[must_use]
-    pub fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         self.runs.div_ceil(self.runs_per_part)
     }
 
     #[must_use]
-    pub fn runs_of(&self, part: u64) -> Range<u64> {
+    pub(crate) fn runs_of(&self, part: u64) -> Range<u64> {
         part * self.runs_per_part..((part + 1) * self.runs_per_part).min(self.runs)
     }
 
     #[must_use]
-    pub fn path(&self, out: &Path, part: u64) -> PathBuf {
+    pub(crate) fn path(&self, out: &Path, part: u64) -> PathBuf {
         out.join("parts").join(format!("{part:06}.csv"))
     }
 
@@ -97,7 +97,7 @@ impl Parts {
     ///
     /// # Errors
     /// [`WriteError`], and nothing is left of it.
-    pub fn write(&self, out: &Path, part: u64, rows: &str) -> Result<(), WriteError> {
+    pub(crate) fn write(&self, out: &Path, part: u64, rows: &str) -> Result<(), WriteError> {
         let path = self.path(out, part);
         let mut text = self.head(part) + rows;
         let hash = hash(text.as_bytes());
@@ -111,7 +111,7 @@ impl Parts {
     ///
     /// # Errors
     /// [`PartError`] for one that is there and is not this campaign's, or not whole.
-    pub fn read(&self, out: &Path, part: u64) -> Result<Option<String>, PartError> {
+    pub(crate) fn read(&self, out: &Path, part: u64) -> Result<Option<String>, PartError> {
         let path = self.path(out, part);
         let unreadable =
             |what: &str| PartError::Unreadable { path: path.display().to_string(), what: what.to_owned() };
@@ -167,14 +167,14 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// A file that is to get its name when it is whole; whoever may read its folder's other files may read it.
-pub fn beside(folder: &Path) -> io::Result<NamedTempFile> {
+pub(crate) fn beside(folder: &Path) -> io::Result<NamedTempFile> {
     let readable = Permissions::from_mode(0o666); // less what the umask takes
     tempfile::Builder::new().prefix(".part-").suffix(".tmp").permissions(readable).tempfile_in(folder)
 }
 
 /// SHA-256 in hexadecimal.
 #[must_use]
-pub fn hash(bytes: &[u8]) -> String {
+pub(crate) fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

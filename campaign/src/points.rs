@@ -16,7 +16,7 @@ use rand_pcg::Pcg64;
 use sha2::{Digest, Sha256};
 
 #[derive(Clone, Debug)]
-pub struct Points {
+pub(crate) struct Points {
     factors: Vec<Factor>,
     seed: u64,
     draws: u64,
@@ -24,7 +24,7 @@ pub struct Points {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// Its number, from 0.
     pub run: u64,
     pub draw: u64,
@@ -39,16 +39,16 @@ pub struct Point {
 /// A campaign that has more runs than can be counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the lists and draws make more than {MOST_RUNS} runs; shorten a list, or draw from a range instead")]
-pub struct TooMany;
+pub(crate) struct TooMany;
 
-pub const MOST_RUNS: u64 = 1_000_000_000;
+pub(crate) const MOST_RUNS: u64 = 1_000_000_000;
 
 impl Points {
     /// The runs of these factors.
     ///
     /// # Errors
     /// [`TooMany`] beyond [`MOST_RUNS`].
-    pub fn new(factors: &[Factor], draws: u64, seed: u64) -> Result<Self, TooMany> {
+    pub(crate) fn new(factors: &[Factor], draws: u64, seed: u64) -> Result<Self, TooMany> {
         let combinations = factors
             .iter()
             .try_fold(1_u64, |product, factor| product.checked_mul(factor.values.listed() as u64))
@@ -58,18 +58,18 @@ impl Points {
     }
 
     #[must_use]
-    pub fn runs(&self) -> u64 {
+    pub(crate) fn runs(&self) -> u64 {
         self.combinations * self.draws
     }
 
     /// How many combinations of the lists.
     #[must_use]
-    pub fn combinations(&self) -> u64 {
+    pub(crate) fn combinations(&self) -> u64 {
         self.combinations
     }
 
     #[must_use]
-    pub fn factors(&self) -> &[Factor] {
+    pub(crate) fn factors(&self) -> &[Factor] {
         &self.factors
     }
 
@@ -78,7 +78,7 @@ impl Points {
     /// # Panics
     /// If there is none.
     #[must_use]
-    pub fn point(&self, run: u64) -> Point {
+    pub(crate) fn point(&self, run: u64) -> Point {
         assert!(run < self.runs(), "run {run} of {}", self.runs());
         let (mut combination, draw) = (run / self.draws, run % self.draws);
         let mut random = self.random(draw);

@@ -22,14 +22,14 @@ use std::process::{Command, Stdio};
 
 /// Programs that a run is made of.
 #[derive(Clone, Debug)]
-pub struct Programs {
+pub(crate) struct Programs {
     /// Folder of `emulator` and `controller`.
     pub folder: PathBuf,
 }
 
 /// How a run of processes went wrong for a reason that is not the run's.
 #[derive(Debug, thiserror::Error)]
-pub enum ProcessesError {
+pub(crate) enum ProcessesError {
     #[error("stopped")]
     Stopped,
     /// Values and files do not go together.
@@ -43,7 +43,7 @@ pub enum ProcessesError {
 ///
 /// # Errors
 /// [`ProcessesError`]; a rig or controllers that fail are a result.
-pub fn run(
+pub(crate) fn run(
     condition: &Condition<'_>,
     shelf: &CampaignInputs,
     (run, seconds): (u64, f64),

@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 ///
 /// # Errors
 /// [`ConditionError`] when experiment, programs and variables do not go together: not a result but a mistake in the campaign.
-pub fn rehearse(
+pub(crate) fn rehearse(
     condition: &Condition<'_>,
     shelf: &CampaignInputs,
     run: u64,

@@ -5,13 +5,13 @@ use std::str::FromStr;
 
 /// One of several starts that share a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shard {
+pub(crate) struct Shard {
     pub index: u32,
     pub count: u32,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ShardError {
+pub(crate) enum ShardError {
     #[error(
         "shard '{0}': write INDEX/COUNT with INDEX from 0 and below COUNT, as 0/4, or COUNT alone where a batch system gives the index"
     )]
@@ -31,21 +31,21 @@ pub enum ShardError {
 }
 
 /// Where batch systems tell the index: arrays of Slurm, indexed jobs of Kubernetes.
-pub const INDEX_VARIABLES: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"];
+pub(crate) const INDEX_VARIABLES: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"];
 
 /// `--shard` as it is written: the index may be left to the batch system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Asked {
+pub(crate) struct Asked {
     index: Option<u32>,
     count: u32,
 }
 
 impl Shard {
-    pub const WHOLE: Shard = Shard { index: 0, count: 1 };
+    pub(crate) const WHOLE: Shard = Shard { index: 0, count: 1 };
 
     /// Whether the part of this number is of this shard.
     #[must_use]
-    pub fn holds(self, part: u64) -> bool {
+    pub(crate) fn holds(self, part: u64) -> bool {
         part % u64::from(self.count) == u64::from(self.index)
     }
 }
@@ -55,7 +55,7 @@ impl Asked {
     ///
     /// # Errors
     /// [`ShardError`] when nobody tells an index, or one that is none.
-    pub fn shard(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, ShardError> {
+    pub(crate) fn shard(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, ShardError> {
         let count = self.count;
         if let Some(index) = self.index {
             return Ok(Shard { index, count });

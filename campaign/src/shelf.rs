@@ -15,7 +15,7 @@ const SHIPPED: &str = "shipped";
 
 /// What a campaign of experiments reads.
 #[derive(Debug)]
-pub struct CampaignInputs {
+pub(crate) struct CampaignInputs {
     /// Experiments by the name that the file gives them.
     experiments: BTreeMap<String, Text>,
     /// Rigs likewise.
@@ -64,13 +64,13 @@ impl Folders {
 }
 
 #[derive(Clone, Debug)]
-pub struct Text {
+pub(crate) struct Text {
     pub path: PathBuf,
     pub text: String,
 }
 
 #[derive(Debug)]
-pub struct RigFile {
+pub(crate) struct RigFile {
     pub file: Text,
     /// Its numbers: those that controllers know.
     pub nominal: RigParameters,
@@ -79,14 +79,18 @@ pub struct RigFile {
 /// A file that a campaign names and that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{campaign}: {message}")]
-pub struct ShelfError {
+pub(crate) struct ShelfError {
     campaign: String,
     message: String,
 }
 
 impl CampaignInputs {
     /// Reads all files; `shipped` is the folder with the shipped `experiments` and `programs`.
-    pub fn read(file: &CampaignFile, kind: &ExperimentKind, shipped: &Path) -> Result<Self, ShelfError> {
+    pub(crate) fn read(
+        file: &CampaignFile,
+        kind: &ExperimentKind,
+        shipped: &Path,
+    ) -> Result<Self, ShelfError> {
         let error = |message: String| ShelfError { campaign: file.path.display().to_string(), message };
         let own = file.path.parent().unwrap_or(Path::new("")).to_owned();
         let folders = Folders { own, shipped: shipped.to_owned() };
@@ -148,7 +152,7 @@ impl CampaignInputs {
     /// # Panics
     /// If the campaign names no such file.
     #[must_use]
-    pub fn experiment(&self, name: Option<&str>) -> &Text {
+    pub(crate) fn experiment(&self, name: Option<&str>) -> &Text {
         &self.experiments[name.unwrap_or(&self.usual[0])]
     }
 
@@ -157,13 +161,13 @@ impl CampaignInputs {
     /// # Panics
     /// If the campaign names no such file.
     #[must_use]
-    pub fn rig(&self, name: Option<&str>) -> &RigFile {
+    pub(crate) fn rig(&self, name: Option<&str>) -> &RigFile {
         &self.rigs[name.unwrap_or(&self.usual[1])]
     }
 
     /// A program that an experiment names.
     #[must_use]
-    pub fn program(&self, name: &str, experiment: &Text) -> Option<&Source> {
+    pub(crate) fn program(&self, name: &str, experiment: &Text) -> Option<&Source> {
         self.programs.get(&self.folders.program(name, &experiment.path))
     }
 
@@ -172,13 +176,13 @@ impl CampaignInputs {
     /// # Panics
     /// If the campaign names no such file.
     #[must_use]
-    pub fn chosen_program(&self, name: &str) -> &Source {
+    pub(crate) fn chosen_program(&self, name: &str) -> &Source {
         &self.programs[&self.folders.chosen_program(name)]
     }
 
     /// The hashes of all files, each behind the name of its file, in an order that does not depend on where they are.
     #[must_use]
-    pub fn hashes(&self) -> BTreeSet<(String, String)> {
+    pub(crate) fn hashes(&self) -> BTreeSet<(String, String)> {
         let experiments = self.experiments.iter().map(|(name, file)| (name.as_str(), &file.text));
         let rigs = self.rigs.iter().map(|(name, rig)| (name.as_str(), &rig.file.text));
         let programs = self.programs.iter().map(|(path, source)| {

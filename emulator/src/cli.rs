@@ -48,7 +48,7 @@ pub(crate) struct BusLoadArguments {
     /// Print a Markdown table instead: each frame's worst-case bound, the modelled response at its critical instant, and the
     /// response measured in the run of SUMMARY (a bus with a bit rate).
     #[arg(long, value_name = "SUMMARY")]
-    pub markdown: Option<PathBuf>,
+    pub(crate) markdown: Option<PathBuf>,
 }
 
 /// How to run the rig.
@@ -57,82 +57,82 @@ pub(crate) struct RunArguments {
     /// Bus: can://IFACE (SocketCAN) or unix:///PATH[?loss=P&seed=N&bitrate=1000000&…] (embedded, hosted here; all options:
     /// protocol/docs/bus-that-keeps-time.md).
     #[arg(long, default_value_t = BusUrl::default_embedded())]
-    pub bus: BusUrl,
+    pub(crate) bus: BusUrl,
     /// Rig file with the plant's numbers.
     #[arg(long)]
-    pub rig: PathBuf,
+    pub(crate) rig: PathBuf,
     /// Experiment file, of which `[rig]` is read: initial state, hands, and what people do when.
     #[arg(long)]
-    pub experiment: Option<PathBuf>,
+    pub(crate) experiment: Option<PathBuf>,
     /// Sealed file with hidden effects, from 'emulator seal'. Only the plant reads it; the effects appear in truth.csv alone.
     /// Overrides the experiment's sealed file.
     #[arg(long, value_name = "FILE")]
-    pub sealed: Option<PathBuf>,
+    pub(crate) sealed: Option<PathBuf>,
     /// Script of faults: what breaks when; 'emulator faults' lists what can, emulator/docs/faults.md tells how.
     #[arg(long, value_name = "FILE")]
-    pub faults: Option<PathBuf>,
+    pub(crate) faults: Option<PathBuf>,
     /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
     #[arg(long, default_value_os_t = run_folder::new_folder())]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// End after this much simulated time; without it, when the controllers are done.
     #[arg(long, value_parser = seconds)]
-    pub seconds: Option<f64>,
+    pub(crate) seconds: Option<f64>,
     /// real: one cycle each millisecond; lockstep: as fast as all members allow, to the byte the same every time.
     #[arg(long, default_value_t = Pace::Real)]
-    pub pace: Pace,
+    pub(crate) pace: Pace,
     /// Lockstep: controllers that will join the barrier.
     #[arg(long, default_value_t = 1)]
-    pub members: usize,
+    pub(crate) members: usize,
     /// Lockstep: foreign controllers that join by the echo in their commands; may be given twice.
     #[arg(long, value_enum)]
-    pub lockstep_echo: Vec<EchoAxis>,
+    pub(crate) lockstep_echo: Vec<EchoAxis>,
     /// Lockstep: how long to wait for the members to join, in s.
     #[arg(long, default_value = "30", value_parser = seconds)]
-    pub join_timeout: f64,
+    pub(crate) join_timeout: f64,
     /// Lockstep: how long a member may take for a cycle, in s of wall time; more for a debugger.
     #[arg(long, default_value = "5", value_parser = seconds)]
-    pub lockstep_timeout: f64,
+    pub(crate) lockstep_timeout: f64,
     /// Seed of the sensors' noise.
     #[arg(long, default_value_t = 1)]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// After a late wake-up: catch-up (compute the missed cycles, send the newest) or stop.
     #[arg(long, default_value_t = OverrunPolicy::CatchUp)]
-    pub overrun: OverrunPolicy,
+    pub(crate) overrun: OverrunPolicy,
     /// FIFO priority of the rig loop, 1 to 98; the bus host gets one more.
     #[arg(long, default_value_t = DEFAULT_FIFO_PRIORITY, value_parser = clap::value_parser!(u8).range(1..=98))]
-    pub fifo_priority: u8,
+    pub(crate) fifo_priority: u8,
     /// CPU that the rig loop is pinned to; not pinned without it.
     #[arg(long)]
-    pub cpu: Option<usize>,
+    pub(crate) cpu: Option<usize>,
     /// Wake this many microseconds early and spin until the deadline.
     #[arg(long)]
-    pub spin_us: Option<u64>,
+    pub(crate) spin_us: Option<u64>,
     /// Ask the system for no priority, no locked memory and no latency request.
     #[arg(long)]
-    pub no_realtime: bool,
+    pub(crate) no_realtime: bool,
     /// Write the time stamps of every cycle to emulator-timing.csv.
     #[arg(long)]
-    pub full_timing: bool,
+    pub(crate) full_timing: bool,
     /// Freeze the flight recorder at a wake-up later than this, an execution longer than this, or a missed cycle, in us.
     #[arg(long, default_value_t = DEFAULT_FLIGHT_LATE_US, value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
-    pub flight_late_us: u64,
+    pub(crate) flight_late_us: u64,
     /// Turn off the flight recorder.
     #[arg(long)]
-    pub no_flight: bool,
+    pub(crate) no_flight: bool,
     /// Ignore bench frames (hand force, link, weights) and send no FaultMark frames.
     #[arg(long)]
-    pub no_bench_frames: bool,
+    pub(crate) no_bench_frames: bool,
     /// Take commands from standard input, one a line: emergency stop, linkage, weights, hands, faults; 'help' lists them.
     /// Typed commands are not reproducible, not even in lockstep.
     #[arg(long)]
-    pub console: bool,
+    pub(crate) console: bool,
     /// Publish telemetry on a Unix socket at PATH: cycles, events, histograms; with --console, accept commands too.
     /// 'bench watch' displays it.
     #[arg(long, value_name = "PATH")]
-    pub telemetry: Option<PathBuf>,
+    pub(crate) telemetry: Option<PathBuf>,
     /// How long the bus may be gone before the run ends, in s.
     #[arg(long, default_value = "5", value_parser = seconds)]
-    pub bus_grace: f64,
+    pub(crate) bus_grace: f64,
 }
 
 /// What to draw.
@@ -140,16 +140,16 @@ pub(crate) struct RunArguments {
 pub(crate) struct SealArguments {
     /// Seed of the draw; whoever knows it can draw the same again.
     #[arg(long)]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// How many different effects.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
-    pub effects: u8,
+    pub(crate) effects: u8,
     /// Axis of the effects; linkage effects are drawn only with 'both'.
     #[arg(long, value_enum, default_value_t = SealedAxis::Both)]
-    pub axis: SealedAxis,
+    pub(crate) axis: SealedAxis,
     /// File to write; an existing file is refused.
     #[arg(long, default_value = "sealed.toml")]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 /// Axes that an effect is drawn for.
@@ -168,21 +168,21 @@ pub(crate) enum SealedAxis {
 pub(crate) struct EffectsArguments {
     /// Print JSON instead of text.
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
 }
 
 /// How to list the faults.
 #[derive(Args, Debug)]
-pub struct FaultsArguments {
+pub(crate) struct FaultsArguments {
     /// Print JSON instead of text.
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
     /// Print the table of emulator/docs/faults.md instead.
     #[arg(long, conflicts_with = "json")]
-    pub markdown: bool,
+    pub(crate) markdown: bool,
     /// Print nothing of the table, but check a script.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["json", "markdown"])]
-    pub check: Option<PathBuf>,
+    pub(crate) check: Option<PathBuf>,
 }
 
 /// How to host a bus.
@@ -190,10 +190,10 @@ pub struct FaultsArguments {
 pub(crate) struct BusArguments {
     /// The embedded bus: unix:///PATH[?loss=P&seed=N&bitrate=1000000&…].
     #[arg(long, default_value_t = BusUrl::default_embedded())]
-    pub bus: BusUrl,
+    pub(crate) bus: BusUrl,
     /// End after this time; without it, on Ctrl-C.
     #[arg(long, value_parser = seconds)]
-    pub seconds: Option<f64>,
+    pub(crate) seconds: Option<f64>,
 }
 
 /// An axis whose foreign controller joins the barrier by its echo.

@@ -16,19 +16,19 @@
 //! | [`mark`] | that a fault began or ended, for every log |
 //! | [`listing`] | `emulator faults`: the table for a person, a program, a page |
 
-pub mod listing;
-pub mod mark;
+pub(crate) mod listing;
+pub(crate) mod mark;
 pub mod overlay;
-pub mod schedule;
+pub(crate) mod schedule;
 pub mod script;
-pub mod table;
+pub(crate) mod table;
 
 use table::{FaultSpec, MOST_KEYS};
 
 /// A fault of the table at a place, with its numbers, each within its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    pub spec: &'static FaultSpec,
+    pub(crate) spec: &'static FaultSpec,
     /// Its place, as an index into those of the table.
     place: u8,
     /// Its numbers, in the order of the table's keys.
@@ -37,7 +37,7 @@ pub struct Fault {
 
 /// Why something is no fault of the table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FaultError {
+pub(crate) enum FaultError {
     #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are{near}", near = of_the_kind(.0))]
     Unknown(String),
     #[error("at = '{at}': {fault} is at {allowed}")]
@@ -56,7 +56,7 @@ pub enum FaultError {
 const PLACES_TOLD: usize = 12;
 
 /// Why a fault of the bus cannot be put into a run.
-pub const NEEDS_HOST: &str =
+pub(crate) const NEEDS_HOST: &str =
     "only the embedded bus that this emulator hosts can do it; use --bus unix:///PATH without another host";
 
 /// The faults that begin with the same word as a name that is none.
@@ -69,7 +69,7 @@ fn of_the_kind(name: &str) -> String {
 
 impl Fault {
     /// A fault of this name at this place, for comparisons: its numbers mean nothing.
-    pub fn like(name: &str, at: Option<&str>) -> Result<Self, FaultError> {
+    pub(crate) fn like(name: &str, at: Option<&str>) -> Result<Self, FaultError> {
         let spec = table::spec(name).ok_or_else(|| FaultError::Unknown(name.to_owned()))?;
         let numbers: Vec<_> =
             spec.keys.iter().map(|key| (key.name.to_string(), Some(key.max), String::new())).collect();
@@ -78,7 +78,7 @@ impl Fault {
 
     /// The fault of this name at this place (`None`: where it can be at one place only, or at the bus as a whole), with the
     /// numbers that are given by key: as number, and as written.
-    pub fn new(
+    pub(crate) fn new(
         name: &str,
         at: Option<&str>,
         numbers: &[(String, Option<f64>, String)],
@@ -128,7 +128,7 @@ impl Fault {
     }
 
     /// Its place among those of its kind.
-    pub fn place_index(&self) -> usize {
+    pub(crate) fn place_index(&self) -> usize {
         usize::from(self.place)
     }
 

@@ -48,7 +48,7 @@ const PROGRESS_PERIOD: Duration = Duration::from_secs(5);
 
 /// What keeps a run from starting.
 #[derive(Debug, thiserror::Error)]
-pub enum RunError {
+pub(crate) enum RunError {
     /// A file cannot be read, or says something that is not allowed.
     #[error("{0}")]
     Input(String),
@@ -60,7 +60,7 @@ pub enum RunError {
 }
 
 impl RunError {
-    pub fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Input(_)
             | Self::Output { .. }

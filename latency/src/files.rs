@@ -240,7 +240,7 @@ impl RunFiles {
     }
 
     /// `run.json`; empty when missing.
-    pub fn description(&self) -> RunDescription {
+    pub(crate) fn description(&self) -> RunDescription {
         typed(&self.run)
     }
 

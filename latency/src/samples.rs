@@ -7,7 +7,7 @@ use realtime::histogram::BOUND_NS;
 /// Bins to a decade of the logarithmic axis: each is 26 % wider than the one before.
 const BINS_PER_DECADE: i32 = 10;
 
-pub type Pick = fn(&PercentilesNs) -> Option<u64>;
+pub(crate) type Pick = fn(&PercentilesNs) -> Option<u64>;
 
 /// Samples in ns, in a histogram of three significant digits up to [`BOUND_NS`]; what is longer stands in its last bin.
 #[derive(Clone)]

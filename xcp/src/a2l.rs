@@ -33,7 +33,7 @@ pub struct Described<'a> {
 }
 
 /// The texts that a slave hands out.
-pub struct Description {
+pub(crate) struct Description {
     pub bytes: Vec<u8>,
     pub texts: Texts,
 }
@@ -66,7 +66,7 @@ pub fn file_name(axis: Axis) -> String {
 }
 
 /// The texts that a slave hands out, the A2L file among them.
-pub fn description(described: &Described<'_>) -> Result<Description, A2lError> {
+pub(crate) fn description(described: &Described<'_>) -> Result<Description, A2lError> {
     let mut bytes = Vec::new();
     let mut place = |text: &str| {
         let at = bytes.len() as u32;

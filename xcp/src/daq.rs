@@ -18,14 +18,14 @@ use crate::packet::{BYTES, LAST_PID, Packet, Refusal};
 use std::collections::VecDeque;
 
 /// Most lists.
-pub const LISTS: usize = 8;
+pub(crate) const LISTS: usize = 8;
 /// Most ODTs of all lists together; each has one packet.
-pub const ODTS: usize = 32;
+pub(crate) const ODTS: usize = 32;
 /// Most entries of an ODT.
-pub const ENTRIES: usize = 7;
+pub(crate) const ENTRIES: usize = 7;
 /// Longest entry, bytes.
-pub const LONGEST_ENTRY: u8 = 7;
-pub const STAMP_BYTES: usize = 2;
+pub(crate) const LONGEST_ENTRY: u8 = 7;
+pub(crate) const STAMP_BYTES: usize = 2;
 /// Packets that may wait to leave.
 const ROOM: usize = 2 * ODTS;
 
@@ -39,7 +39,7 @@ const _: () = assert!(ODTS <= LAST_PID as usize, "an ODT's number is its packet'
 
 /// A piece of memory.
 #[derive(Clone, Copy, Default)]
-pub struct Entry {
+pub(crate) struct Entry {
     pub address: u32,
     /// Bytes; 0 for an entry that was not written.
     pub size: u8,
@@ -77,7 +77,7 @@ enum Made {
 
 /// All lists, and the packets that wait to leave.
 #[derive(Clone, Default)]
-pub struct Daq {
+pub(crate) struct Daq {
     pub(crate) per_cycle: u32,
     made: Made,
     lists: [List; LISTS],
@@ -91,7 +91,7 @@ pub struct Daq {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ListMode {
+pub(crate) struct ListMode {
     /// Bits as they stand in the response.
     pub mode: u8,
     /// A packet each so many cycles.
@@ -102,11 +102,11 @@ pub struct ListMode {
 
 impl Daq {
     /// No lists; so many packets may leave in a cycle.
-    pub fn new(per_cycle: u32) -> Self {
+    pub(crate) fn new(per_cycle: u32) -> Self {
         Self { per_cycle, waiting: VecDeque::with_capacity(ROOM), ..Self::default() }
     }
 
-    pub fn runs(&self) -> bool {
+    pub(crate) fn runs(&self) -> bool {
         self.lists[..self.count].iter().any(|list| list.running)
     }
 
@@ -115,7 +115,7 @@ impl Daq {
     }
 
     /// Gives all lists back; those that run stop.
-    pub fn free(&mut self) {
+    pub(crate) fn free(&mut self) {
         let mut waiting = std::mem::take(&mut self.waiting);
         waiting.clear();
         let Self { per_cycle, dropped, .. } = *self;
@@ -126,7 +126,7 @@ impl Daq {
     ///
     /// # Errors
     /// [`Refusal::Sequence`] out of order, [`Refusal::MemoryOverflow`] beyond [`LISTS`].
-    pub fn alloc_lists(&mut self, count: u16) -> Result<(), Refusal> {
+    pub(crate) fn alloc_lists(&mut self, count: u16) -> Result<(), Refusal> {
         self.in_order(Made::Freed, Made::Freed, Made::Lists)?;
         if usize::from(count) > LISTS {
             return Err(Refusal::MemoryOverflow);
@@ -141,7 +141,7 @@ impl Daq {
     /// # Errors
     /// [`Refusal::Sequence`] out of order or again, [`Refusal::OutOfRange`] for no such list, [`Refusal::MemoryOverflow`] beyond
     /// [`ODTS`].
-    pub fn alloc_odts(&mut self, list: u16, count: u8) -> Result<(), Refusal> {
+    pub(crate) fn alloc_odts(&mut self, list: u16, count: u8) -> Result<(), Refusal> {
         let place = self.list(list)?;
         if self.lists[place].odts > 0 {
             return Err(Refusal::Sequence);
@@ -160,7 +160,7 @@ impl Daq {
     ///
     /// # Errors
     /// As [`Daq::alloc_odts`]; [`Refusal::DaqActive`] while a list runs.
-    pub fn alloc_entries(&mut self, list: u16, odt: u8, count: u8) -> Result<(), Refusal> {
+    pub(crate) fn alloc_entries(&mut self, list: u16, odt: u8, count: u8) -> Result<(), Refusal> {
         self.idle()?;
         let odt = self.odt(list, odt)?;
         self.in_order(Made::Odts, Made::Entries, Made::Entries)?;
@@ -190,7 +190,7 @@ impl Daq {
     }
 
     /// Empties the entries of a list; it stops.
-    pub fn clear(&mut self, list: u16) -> Result<(), Refusal> {
+    pub(crate) fn clear(&mut self, list: u16) -> Result<(), Refusal> {
         let place = self.list(list)?;
         let List { first, odts, .. } = self.lists[place];
         (self.lists[place].running, self.lists[place].selected) = (false, false);
@@ -202,7 +202,7 @@ impl Daq {
     ///
     /// # Errors
     /// [`Refusal::OutOfRange`] for no such entry, [`Refusal::DaqActive`] while a list runs.
-    pub fn point(&mut self, list: u16, odt: u8, entry: u8) -> Result<(), Refusal> {
+    pub(crate) fn point(&mut self, list: u16, odt: u8, entry: u8) -> Result<(), Refusal> {
         self.idle()?;
         self.pointer = None;
         let odt = self.odt(list, odt)?;
@@ -218,7 +218,7 @@ impl Daq {
     /// # Errors
     /// [`Refusal::Sequence`] with none pointed at; [`Refusal::OutOfRange`] for a size that no packet holds, alone or with the
     /// others of its ODT; [`Refusal::AccessDenied`] for memory that is not there; [`Refusal::DaqActive`] while a list runs.
-    pub fn write(&mut self, image: &Image, entry: Entry) -> Result<(), Refusal> {
+    pub(crate) fn write(&mut self, image: &Image, entry: Entry) -> Result<(), Refusal> {
         self.idle()?;
         let (odt, place) = self.pointer.ok_or(Refusal::Sequence)?;
         if entry.size == 0 || entry.size > LONGEST_ENTRY {
@@ -239,7 +239,7 @@ impl Daq {
     ///
     /// # Errors
     /// [`Refusal::Sequence`] with none pointed at.
-    pub fn read(&mut self) -> Result<Entry, Refusal> {
+    pub(crate) fn read(&mut self) -> Result<Entry, Refusal> {
         let (odt, place) = self.pointer.ok_or(Refusal::Sequence)?;
         self.go_on(odt, place);
         Ok(self.odts[odt].entries[place])
@@ -253,7 +253,7 @@ impl Daq {
     ///
     /// # Errors
     /// [`Refusal::OutOfRange`] for anything that is not offered, [`Refusal::DaqActive`] while the list runs.
-    pub fn set_mode(&mut self, list: u16, event: u16, asked: ListMode) -> Result<(), Refusal> {
+    pub(crate) fn set_mode(&mut self, list: u16, event: u16, asked: ListMode) -> Result<(), Refusal> {
         let place = self.list(list)?;
         if self.lists[place].running {
             return Err(Refusal::DaqActive);
@@ -266,7 +266,7 @@ impl Daq {
         Ok(())
     }
 
-    pub fn mode(&self, list: u16) -> Result<ListMode, Refusal> {
+    pub(crate) fn mode(&self, list: u16) -> Result<ListMode, Refusal> {
         let List { mode, prescaler, priority, selected, running, .. } = self.lists[self.list(list)?];
         let bit = |is: bool, bit: u8| if is { bit } else { 0 };
         let mode = mode | bit(selected, SELECTED) | bit(running, RUNNING);
@@ -278,7 +278,7 @@ impl Daq {
     /// # Errors
     /// [`Refusal::DaqConfig`] for a list that has nothing to send, whose packets do not hold it, or with which more packets would
     /// come than may leave.
-    pub fn start_stop(&mut self, mode: u8, list: u16) -> Result<u8, Refusal> {
+    pub(crate) fn start_stop(&mut self, mode: u8, list: u16) -> Result<u8, Refusal> {
         let place = self.list(list)?;
         match mode {
             0 => self.lists[place].running = false,
@@ -300,7 +300,7 @@ impl Daq {
     ///
     /// # Errors
     /// As [`Daq::start_stop`]; none is started then.
-    pub fn start_stop_selected(&mut self, mode: u8) -> Result<(), Refusal> {
+    pub(crate) fn start_stop_selected(&mut self, mode: u8) -> Result<(), Refusal> {
         match mode {
             0 => self.stop(),
             1 => {
@@ -327,7 +327,7 @@ impl Daq {
         Ok(())
     }
 
-    pub fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         self.lists.iter_mut().for_each(|list| (list.running, list.selected) = (false, false));
     }
 
@@ -364,7 +364,7 @@ impl Daq {
     }
 
     /// Takes what is due in a cycle.
-    pub fn cycle(&mut self, cycle: u64, image: &Image) {
+    pub(crate) fn cycle(&mut self, cycle: u64, image: &Image) {
         for place in 0..self.count {
             let list = &mut self.lists[place];
             if !list.running {
@@ -409,7 +409,7 @@ impl Daq {
         }
     }
 
-    pub fn next_packet(&mut self) -> Option<Packet> {
+    pub(crate) fn next_packet(&mut self) -> Option<Packet> {
         self.waiting.pop_front()
     }
 }

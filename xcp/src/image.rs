@@ -20,20 +20,20 @@ use crate::trace::{self, ARM, CAPACITY, CHANNELS, CONTROLS, LOAD_SET, TOLD, Trac
 use axis_control::program::Variable;
 
 /// First addresses of the regions.
-pub const DESCRIPTION: u32 = 0x0001_0000;
-pub const PARAMETERS: u32 = 0x1000_0000;
-pub const CONTROL: u32 = 0x2000_0000;
-pub const SIGNAL: u32 = 0x3000_0000;
-pub const TRACE_TOLD: u32 = 0x4000_0000;
-pub const TRACE_CYCLES: u32 = 0x5000_0000;
+pub(crate) const DESCRIPTION: u32 = 0x0001_0000;
+pub(crate) const PARAMETERS: u32 = 0x1000_0000;
+pub(crate) const CONTROL: u32 = 0x2000_0000;
+pub(crate) const SIGNAL: u32 = 0x3000_0000;
+pub(crate) const TRACE_TOLD: u32 = 0x4000_0000;
+pub(crate) const TRACE_CYCLES: u32 = 0x5000_0000;
 /// That of the first channel; from channel to channel it is [`CHANNEL_STEP`].
-pub const TRACE_CHANNELS: u32 = 0x5100_0000;
-pub const CHANNEL_STEP: u32 = 0x0100_0000;
+pub(crate) const TRACE_CHANNELS: u32 = 0x5100_0000;
+pub(crate) const CHANNEL_STEP: u32 = 0x0100_0000;
 
 /// Bytes from parameter to parameter, and from control to control.
-pub const WIDE: u32 = 8;
+pub(crate) const WIDE: u32 = 8;
 /// Bytes from signal to signal.
-pub const NARROW: u32 = 4;
+pub(crate) const NARROW: u32 = 4;
 
 /// What acts on what was written.
 pub trait ParameterActions {
@@ -79,7 +79,7 @@ pub struct Image {
 
 impl Image {
     /// A memory for a program with these variables and values, before its first cycle.
-    pub fn new(description: Vec<u8>, variables: Vec<Variable>, values: &[f64]) -> Self {
+    pub(crate) fn new(description: Vec<u8>, variables: Vec<Variable>, values: &[f64]) -> Self {
         Self {
             description,
             variables,
@@ -92,13 +92,13 @@ impl Image {
     }
 
     /// Takes what a cycle left: signals, and parameters that others may have changed.
-    pub fn refresh(&mut self, cycle: u64, signals: &[f64; COUNT], parameters: &[f64]) {
+    pub(crate) fn refresh(&mut self, cycle: u64, signals: &[f64; COUNT], parameters: &[f64]) {
         self.signals = *signals;
         self.parameters.copy_from_slice(parameters);
         self.trace.take(cycle, signals);
     }
 
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.trace.restart();
     }
 
@@ -106,12 +106,13 @@ impl Image {
         &self.parameters
     }
 
-    pub fn description(&self) -> &[u8] {
+    #[cfg(test)]
+    pub(crate) fn description(&self) -> &[u8] {
         &self.description
     }
 
     /// Forgets the beginning of a value.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.begun = None;
     }
 
@@ -119,7 +120,7 @@ impl Image {
     ///
     /// # Errors
     /// [`Refusal::AccessDenied`] where nothing is, or beyond the end of a region.
-    pub fn read(&self, address: u32, into: &mut [u8]) -> Result<(), Refusal> {
+    pub(crate) fn read(&self, address: u32, into: &mut [u8]) -> Result<(), Refusal> {
         let (region, mut offset) = self.reach(address, into.len() as u32)?;
         if region == Region::Description {
             let from = offset as usize;
@@ -140,7 +141,7 @@ impl Image {
     }
 
     /// Whether so many bytes can be read from `address` on.
-    pub fn check_readable(&self, address: u32, count: u32) -> Result<(), Refusal> {
+    pub(crate) fn check_readable(&self, address: u32, count: u32) -> Result<(), Refusal> {
         self.reach(address, count).map(|_| ())
     }
 
@@ -186,7 +187,7 @@ impl Image {
     /// [`Refusal::AccessDenied`] where nothing is; [`Refusal::WriteProtected`] for what is only read, or read at the start only;
     /// [`Refusal::OutOfRange`] for a value that its parameter does not allow; [`Refusal::Sequence`] for the rest of a value that
     /// nobody began, and for arming with a pre-trigger as long as the buffer. Nothing of the block is taken then.
-    pub fn write(
+    pub(crate) fn write(
         &mut self,
         address: u32,
         bytes: &[u8],

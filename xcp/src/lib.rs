@@ -15,24 +15,24 @@
 pub mod a2l;
 pub mod alone;
 pub mod config;
-pub mod daq;
+mod daq;
 pub mod image;
 pub mod lock;
-pub mod packet;
+mod packet;
 pub mod parameter_files;
 pub mod port;
 pub mod signals;
 pub mod slave;
-pub mod trace;
+mod trace;
 
 use nominal::Axis;
 use protocol::frames::{DRIVE_XCP_COMMAND, DRIVE_XCP_RESPONSE, LOAD_XCP_COMMAND, LOAD_XCP_RESPONSE};
 
 /// Name of the only event: a cycle was answered.
-pub const EVENT_NAME: &str = "cycle of 1 ms";
+pub(crate) const EVENT_NAME: &str = "cycle of 1 ms";
 
 /// Identifiers of an axis: commands to it, and what comes from it.
-pub fn identifiers(axis: Axis) -> (u16, u16) {
+pub(crate) fn identifiers(axis: Axis) -> (u16, u16) {
     match axis {
         Axis::Drive => (DRIVE_XCP_COMMAND.id, DRIVE_XCP_RESPONSE.id),
         Axis::Load => (LOAD_XCP_COMMAND.id, LOAD_XCP_RESPONSE.id),

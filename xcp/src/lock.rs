@@ -15,15 +15,15 @@ use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
 
 /// Bytes of a seed, and of a key.
-pub const BYTES: usize = 8;
+pub(crate) const BYTES: usize = 8;
 /// Bytes of seed or key in a packet.
-pub const IN_PACKET: usize = 6;
+pub(crate) const IN_PACKET: usize = 6;
 /// Cycles after a wrong key in which no seed is given out.
-pub const PAUSE: u64 = 1000;
+pub(crate) const PAUSE: u64 = 1000;
 
 /// The lock in front of all writing.
 #[derive(Clone, Default)]
-pub struct Lock {
+pub(crate) struct Lock {
     secret: Option<Vec<u8>>,
     start: [u8; 16],
     seeds: u64,
@@ -39,7 +39,7 @@ pub struct Lock {
 
 /// What became of a part of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turned {
+pub(crate) enum Turned {
     /// More of it is to come.
     Halfway,
     Open,
@@ -49,19 +49,19 @@ pub enum Turned {
 
 impl Lock {
     /// A shut lock. `start` is random; in simulated time it is not, and seeds come again in the next run.
-    pub fn new(secret: Option<Vec<u8>>, start: [u8; 16]) -> Self {
+    pub(crate) fn new(secret: Option<Vec<u8>>, start: [u8; 16]) -> Self {
         Self { secret, start, ..Self::default() }
     }
 
-    pub fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.open
     }
 
-    pub fn shut(&mut self) {
+    pub(crate) fn shut(&mut self) {
         (self.open, self.given, self.had) = (false, None, 0);
     }
 
-    pub fn cycle(&mut self) {
+    pub(crate) fn cycle(&mut self) {
         self.pause = self.pause.saturating_sub(1);
     }
 
@@ -69,7 +69,7 @@ impl Lock {
     ///
     /// # Errors
     /// [`Refusal::AccessDenied`] without a secret and in the pause; [`Refusal::Sequence`] for a rest without a beginning.
-    pub fn seed(&mut self, rest: bool) -> Result<(u8, [u8; IN_PACKET]), Refusal> {
+    pub(crate) fn seed(&mut self, rest: bool) -> Result<(u8, [u8; IN_PACKET]), Refusal> {
         let Some(secret) = self.secret.as_ref().filter(|_| self.pause == 0) else {
             return Err(Refusal::AccessDenied);
         };
@@ -98,7 +98,7 @@ impl Lock {
     ///
     /// # Errors
     /// [`Refusal::Sequence`] without a seed that was given out whole, and for a `left` that is not what is left.
-    pub fn turn(&mut self, left: u8, part: &[u8]) -> Result<Turned, Refusal> {
+    pub(crate) fn turn(&mut self, left: u8, part: &[u8]) -> Result<Turned, Refusal> {
         let Some(secret) = self.secret.as_ref().filter(|_| self.given == Some(BYTES)) else {
             return Err(Refusal::Sequence);
         };

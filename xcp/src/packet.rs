@@ -5,59 +5,59 @@
 //! Source: ASAM MCD-1 XCP 1.1, part 2 (protocol layer) and part 3 (XCP on CAN).
 
 /// Bytes of a packet: MAX_CTO and MAX_DTO.
-pub const BYTES: usize = 8;
-pub type Packet = [u8; BYTES];
+pub(crate) const BYTES: usize = 8;
+pub(crate) type Packet = [u8; BYTES];
 
 /// First byte of a good answer.
-pub const RESPONSE: u8 = 0xFF;
+pub(crate) const RESPONSE: u8 = 0xFF;
 /// First byte of a refusal.
-pub const ERROR: u8 = 0xFE;
+pub(crate) const ERROR: u8 = 0xFE;
 /// First byte of an event.
-pub const EVENT: u8 = 0xFD;
+pub(crate) const EVENT: u8 = 0xFD;
 /// Event: the parameter set was stored.
-pub const EVENT_STORED: u8 = 0x03;
+pub(crate) const EVENT_STORED: u8 = 0x03;
 /// Highest first byte of a DAQ packet.
-pub const LAST_PID: u8 = 0xFB;
+pub(crate) const LAST_PID: u8 = 0xFB;
 
 /// Commands by their first byte, under the names of the standard.
-pub mod command {
-    pub const CONNECT: u8 = 0xFF;
-    pub const DISCONNECT: u8 = 0xFE;
-    pub const GET_STATUS: u8 = 0xFD;
-    pub const SYNCH: u8 = 0xFC;
-    pub const GET_COMM_MODE_INFO: u8 = 0xFB;
-    pub const GET_ID: u8 = 0xFA;
-    pub const SET_REQUEST: u8 = 0xF9;
-    pub const GET_SEED: u8 = 0xF8;
-    pub const UNLOCK: u8 = 0xF7;
-    pub const SET_MTA: u8 = 0xF6;
-    pub const UPLOAD: u8 = 0xF5;
-    pub const SHORT_UPLOAD: u8 = 0xF4;
-    pub const BUILD_CHECKSUM: u8 = 0xF3;
-    pub const DOWNLOAD: u8 = 0xF0;
-    pub const DOWNLOAD_NEXT: u8 = 0xEF;
-    pub const CLEAR_DAQ_LIST: u8 = 0xE3;
-    pub const SET_DAQ_PTR: u8 = 0xE2;
-    pub const WRITE_DAQ: u8 = 0xE1;
-    pub const SET_DAQ_LIST_MODE: u8 = 0xE0;
-    pub const GET_DAQ_LIST_MODE: u8 = 0xDF;
-    pub const START_STOP_DAQ_LIST: u8 = 0xDE;
-    pub const START_STOP_SYNCH: u8 = 0xDD;
-    pub const GET_DAQ_CLOCK: u8 = 0xDC;
-    pub const READ_DAQ: u8 = 0xDB;
-    pub const GET_DAQ_PROCESSOR_INFO: u8 = 0xDA;
-    pub const GET_DAQ_RESOLUTION_INFO: u8 = 0xD9;
-    pub const GET_DAQ_EVENT_INFO: u8 = 0xD7;
-    pub const FREE_DAQ: u8 = 0xD6;
-    pub const ALLOC_DAQ: u8 = 0xD5;
-    pub const ALLOC_ODT: u8 = 0xD4;
-    pub const ALLOC_ODT_ENTRY: u8 = 0xD3;
+pub(crate) mod command {
+    pub(crate) const CONNECT: u8 = 0xFF;
+    pub(crate) const DISCONNECT: u8 = 0xFE;
+    pub(crate) const GET_STATUS: u8 = 0xFD;
+    pub(crate) const SYNCH: u8 = 0xFC;
+    pub(crate) const GET_COMM_MODE_INFO: u8 = 0xFB;
+    pub(crate) const GET_ID: u8 = 0xFA;
+    pub(crate) const SET_REQUEST: u8 = 0xF9;
+    pub(crate) const GET_SEED: u8 = 0xF8;
+    pub(crate) const UNLOCK: u8 = 0xF7;
+    pub(crate) const SET_MTA: u8 = 0xF6;
+    pub(crate) const UPLOAD: u8 = 0xF5;
+    pub(crate) const SHORT_UPLOAD: u8 = 0xF4;
+    pub(crate) const BUILD_CHECKSUM: u8 = 0xF3;
+    pub(crate) const DOWNLOAD: u8 = 0xF0;
+    pub(crate) const DOWNLOAD_NEXT: u8 = 0xEF;
+    pub(crate) const CLEAR_DAQ_LIST: u8 = 0xE3;
+    pub(crate) const SET_DAQ_PTR: u8 = 0xE2;
+    pub(crate) const WRITE_DAQ: u8 = 0xE1;
+    pub(crate) const SET_DAQ_LIST_MODE: u8 = 0xE0;
+    pub(crate) const GET_DAQ_LIST_MODE: u8 = 0xDF;
+    pub(crate) const START_STOP_DAQ_LIST: u8 = 0xDE;
+    pub(crate) const START_STOP_SYNCH: u8 = 0xDD;
+    pub(crate) const GET_DAQ_CLOCK: u8 = 0xDC;
+    pub(crate) const READ_DAQ: u8 = 0xDB;
+    pub(crate) const GET_DAQ_PROCESSOR_INFO: u8 = 0xDA;
+    pub(crate) const GET_DAQ_RESOLUTION_INFO: u8 = 0xD9;
+    pub(crate) const GET_DAQ_EVENT_INFO: u8 = 0xD7;
+    pub(crate) const FREE_DAQ: u8 = 0xD6;
+    pub(crate) const ALLOC_DAQ: u8 = 0xD5;
+    pub(crate) const ALLOC_ODT: u8 = 0xD4;
+    pub(crate) const ALLOC_ODT_ENTRY: u8 = 0xD3;
 }
 
 /// Why a command is refused; the number crosses the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Refusal {
+pub(crate) enum Refusal {
     /// The answer to SYNCH: the command processor begins anew.
     Synch = 0x00,
     /// What was asked for before is not done yet.
@@ -79,30 +79,30 @@ pub enum Refusal {
 }
 
 #[derive(Clone, Copy)]
-pub struct Fields<'a>(pub &'a [u8]);
+pub(crate) struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
     /// Byte `at`.
     ///
     /// # Errors
     /// [`Refusal::Syntax`] when the packet is shorter; so for all fields.
-    pub fn byte(self, at: usize) -> Result<u8, Refusal> {
+    pub(crate) fn byte(self, at: usize) -> Result<u8, Refusal> {
         self.0.get(at).copied().ok_or(Refusal::Syntax)
     }
 
     /// The two bytes from `at` on.
-    pub fn word(self, at: usize) -> Result<u16, Refusal> {
+    pub(crate) fn word(self, at: usize) -> Result<u16, Refusal> {
         Ok(u16::from_le_bytes([self.byte(at)?, self.byte(at + 1)?]))
     }
 
     /// The four bytes from `at` on.
-    pub fn long(self, at: usize) -> Result<u32, Refusal> {
+    pub(crate) fn long(self, at: usize) -> Result<u32, Refusal> {
         let [low, high] = [self.word(at)?, self.word(at + 2)?];
         Ok(u32::from(low) | u32::from(high) << 16)
     }
 
     /// So many bytes from `at` on.
-    pub fn bytes(self, at: usize, count: usize) -> Result<&'a [u8], Refusal> {
+    pub(crate) fn bytes(self, at: usize, count: usize) -> Result<&'a [u8], Refusal> {
         self.0.get(at..at + count).ok_or(Refusal::Syntax)
     }
 }
@@ -111,14 +111,14 @@ impl<'a> Fields<'a> {
 ///
 /// # Panics
 /// With more than 7 bytes, which no command here has.
-pub fn response(bytes: &[u8]) -> Packet {
+pub(crate) fn response(bytes: &[u8]) -> Packet {
     let mut packet = [0; BYTES];
     packet[0] = RESPONSE;
     packet[1..=bytes.len()].copy_from_slice(bytes);
     packet
 }
 
-pub fn refusal(why: Refusal) -> Packet {
+pub(crate) fn refusal(why: Refusal) -> Packet {
     [ERROR, why as u8, 0, 0, 0, 0, 0, 0]
 }
 

@@ -25,9 +25,9 @@ use protocol::frames::{Sensors, ValveCommand};
 use std::collections::VecDeque;
 
 /// Commands that wait at most: more than the longest block has packets.
-pub const INBOX: usize = 64;
+pub(crate) const INBOX: usize = 64;
 /// Commands that are answered at a time.
-pub const COMMANDS: usize = 8;
+pub(crate) const COMMANDS: usize = 8;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PortCounters {

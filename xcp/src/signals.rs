@@ -10,7 +10,7 @@ use settings::parameters::Parameter;
 
 /// How a value lies in memory; Intel byte order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub(crate) enum Format {
     Byte,
     Long,
     Float,
@@ -18,7 +18,7 @@ pub enum Format {
 }
 
 impl Format {
-    pub const fn bytes(self) -> usize {
+    pub(crate) const fn bytes(self) -> usize {
         match self {
             Self::Byte => 1,
             Self::Long | Self::Float => 4,
@@ -27,7 +27,7 @@ impl Format {
     }
 
     /// `value` as it lies in memory, in the first bytes; counts wrap, as the rig's cycle does after 49.7 days.
-    pub fn encode(self, value: f64) -> [u8; 8] {
+    pub(crate) fn encode(self, value: f64) -> [u8; 8] {
         let mut bytes = [0; 8];
         match self {
             Self::Byte => bytes[0] = value as u8,
@@ -39,7 +39,7 @@ impl Format {
     }
 
     /// The value that lies in the first bytes.
-    pub fn decode(self, bytes: [u8; 8]) -> f64 {
+    pub(crate) fn decode(self, bytes: [u8; 8]) -> f64 {
         let [a, b, c, d, ..] = bytes;
         match self {
             Self::Byte => f64::from(a),
@@ -51,21 +51,21 @@ impl Format {
 }
 
 /// A cycle as the signals see it.
-pub struct View<'a> {
+pub(crate) struct View<'a> {
     /// What its program was given.
-    pub ready: &'a Ready,
-    pub sensors: &'a Sensors,
+    pub(crate) ready: &'a Ready,
+    pub(crate) sensors: &'a Sensors,
     /// The row of its record.
-    pub record: AxisRecord,
+    pub(crate) record: AxisRecord,
 }
 
 /// A number that can be measured.
-pub struct Signal {
+pub(crate) struct Signal {
     /// Name, unit, range and meaning; its default is that before the first cycle.
-    pub about: Parameter,
-    pub format: Format,
+    pub(crate) about: Parameter,
+    pub(crate) format: Format,
     /// Names of its values, for one that is a state.
-    pub values: &'static [&'static str],
+    pub(crate) values: &'static [&'static str],
     of: fn(&View<'_>) -> f64,
 }
 
@@ -100,7 +100,7 @@ const NO_YES: &[&str] = &["no", "yes"];
 pub const COUNT: usize = SIGNALS.len();
 
 /// All signals; a place in this table is what the trigger buffer calls a source or a channel.
-pub static SIGNALS: [Signal; 24] = [
+pub(crate) static SIGNALS: [Signal; 24] = [
     Signal {
         about: Parameter::new(("cycle", ""), [0.0, 4_294_967_295.0], 0.0, "the rig's cycle, 1 ms each")
             .whole(),
@@ -197,7 +197,7 @@ pub static SIGNALS: [Signal; 24] = [
 ];
 
 /// All signals of a cycle, in the order of [`SIGNALS`].
-pub fn sample(view: &View<'_>) -> [f64; COUNT] {
+pub(crate) fn sample(view: &View<'_>) -> [f64; COUNT] {
     std::array::from_fn(|place| (SIGNALS[place].of)(view))
 }
 

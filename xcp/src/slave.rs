@@ -32,7 +32,7 @@ const BLOCK: usize = 255;
 /// Data bytes of a packet that writes.
 const WRITE_BYTES: usize = BYTES - 2;
 /// Packets of the longest block.
-pub const BLOCK_PACKETS: u8 = BLOCK.div_ceil(WRITE_BYTES) as u8;
+pub(crate) const BLOCK_PACKETS: u8 = BLOCK.div_ceil(WRITE_BYTES) as u8;
 /// Type of the checksum: CRC-32 of IEEE 802.3.
 const CHECKSUM_CRC_32: u8 = 0x09;
 /// Most bytes of a checksum; more would be felt in the cycle.
@@ -50,7 +50,7 @@ static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Where the texts of the description lie, within it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Texts {
+pub(crate) struct Texts {
     /// The A2L file: offset and bytes.
     pub a2l: (u32, u32),
     /// Its name, without the path.
@@ -60,7 +60,7 @@ pub struct Texts {
     pub event: (u32, u32),
 }
 
-pub struct SlaveParts {
+pub(crate) struct SlaveParts {
     pub image: Image,
     pub texts: Texts,
     pub lock: Lock,
@@ -105,7 +105,7 @@ pub struct Slave {
 
 impl Slave {
     /// A slave without a session.
-    pub fn new(parts: SlaveParts) -> Self {
+    pub(crate) fn new(parts: SlaveParts) -> Self {
         let SlaveParts { image, texts, lock, daq_per_cycle } = parts;
         Self {
             image,
@@ -129,7 +129,7 @@ impl Slave {
         self.lock.is_open()
     }
 
-    pub fn counters(&self) -> &SlaveCounters {
+    pub(crate) fn counters(&self) -> &SlaveCounters {
         &self.counters
     }
 
@@ -144,7 +144,7 @@ impl Slave {
         self.daq.cycle(cycle, &self.image);
     }
 
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.image.restart();
     }
 
@@ -155,7 +155,7 @@ impl Slave {
     }
 
     /// The parameter set was stored: the event that tells so.
-    pub fn stored(&mut self) -> Option<Packet> {
+    pub(crate) fn stored(&mut self) -> Option<Packet> {
         self.storing = false;
         self.connected.then_some([EVENT, EVENT_STORED, 0, 0, 0, 0, 0, 0])
     }

@@ -16,28 +16,28 @@ use crate::signals::{COUNT, Format};
 use settings::parameters::Parameter;
 
 /// Samples that the buffer holds at most.
-pub const CAPACITY: usize = 4096;
+pub(crate) const CAPACITY: usize = 4096;
 /// Signals that it records.
-pub const CHANNELS: usize = 4;
+pub(crate) const CHANNELS: usize = 4;
 
 /// Places in [`CONTROLS`], which says what each is.
-pub const SOURCE: usize = 0;
-pub const THRESHOLD: usize = 1;
-pub const SLOPE: usize = 2;
-pub const PRE_TRIGGER: usize = 3;
-pub const LENGTH: usize = 4;
-pub const EVERY: usize = 5;
+pub(crate) const SOURCE: usize = 0;
+pub(crate) const THRESHOLD: usize = 1;
+pub(crate) const SLOPE: usize = 2;
+pub(crate) const PRE_TRIGGER: usize = 3;
+pub(crate) const LENGTH: usize = 4;
+pub(crate) const EVERY: usize = 5;
 /// The first of the channels.
-pub const CHANNEL: usize = 6;
-pub const ARM: usize = CHANNEL + CHANNELS;
-pub const LOAD_SET: usize = ARM + 1;
+pub(crate) const CHANNEL: usize = 6;
+pub(crate) const ARM: usize = CHANNEL + CHANNELS;
+pub(crate) const LOAD_SET: usize = ARM + 1;
 
 /// Last place of the table of signals.
 const LAST: f64 = (COUNT - 1) as f64;
 
 /// What can be written besides the parameters of the program. Whole numbers lie in memory as counts of four bytes, others as
 /// floats of eight.
-pub static CONTROLS: [Parameter; LOAD_SET + 1] = [
+pub(crate) static CONTROLS: [Parameter; LOAD_SET + 1] = [
     signal("trace.source", 17.0, "signal that is compared with the threshold, by its place"),
     Parameter::new(("trace.threshold", ""), [-1e9, 1e9], 0.0, "threshold, in the unit of the source"),
     Parameter::new(("trace.slope", ""), [0.0, 3.0], 0.0, "0 rising, 1 falling, 2 either, 3 at once").whole(),
@@ -71,17 +71,17 @@ const fn signal(name: &'static str, default: f64, meaning: &'static str) -> Para
 }
 
 /// How a control lies in memory.
-pub fn control_format(place: usize) -> Format {
+pub(crate) fn control_format(place: usize) -> Format {
     if CONTROLS[place].whole { Format::Long } else { Format::Double }
 }
 
 /// Names of the states.
-pub const STATES: &[&str] = &["idle", "filling", "armed", "triggered", "ready"];
+pub(crate) const STATES: &[&str] = &["idle", "filling", "armed", "triggered", "ready"];
 
 /// What the buffer does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum State {
+pub(crate) enum State {
     /// Nothing; what it holds stays.
     Idle = 0,
     /// It takes the samples before the trigger.
@@ -93,7 +93,7 @@ pub enum State {
 }
 
 /// What it tells of itself, each a count of four bytes, in this order.
-pub const TOLD: [(&str, &str); 4] = [
+pub(crate) const TOLD: [(&str, &str); 4] = [
     ("trace.state", "what the trigger buffer does"),
     ("trace.samples", "samples that can be read"),
     ("trace.trigger_cycle", "the rig's cycle of the trigger; 0 before it"),
@@ -114,7 +114,7 @@ struct Settings {
 
 /// The trigger buffer.
 #[derive(Clone)]
-pub struct Trace {
+pub(crate) struct Trace {
     settings: Settings,
     state: State,
     cycles: Vec<u32>,
@@ -166,34 +166,34 @@ impl Settings {
 
 impl Trace {
     /// Whether it can be armed so: the pre-trigger leaves room for the trigger.
-    pub fn can_arm(controls: &[f64; CONTROLS.len()]) -> bool {
+    pub(crate) fn can_arm(controls: &[f64; CONTROLS.len()]) -> bool {
         controls[PRE_TRIGGER] < controls[LENGTH]
     }
 
     /// Begins anew with these settings, whose ranges were checked; what it held is gone.
-    pub fn arm(&mut self, controls: &[f64; CONTROLS.len()]) {
+    pub(crate) fn arm(&mut self, controls: &[f64; CONTROLS.len()]) {
         self.settings = Settings::of(controls);
         self.state = State::Filling;
         (self.next, self.held, self.before, self.due, self.trigger_cycle) = (0, 0, None, 0, 0);
     }
 
     /// Stops, and keeps what it has.
-    pub fn disarm(&mut self) {
+    pub(crate) fn disarm(&mut self) {
         self.state = State::Idle;
     }
 
     /// The rig's time began again: what was being recorded is of another time.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         if self.runs() {
             self.disarm();
         }
     }
 
-    pub fn runs(&self) -> bool {
+    pub(crate) fn runs(&self) -> bool {
         matches!(self.state, State::Filling | State::Armed | State::Triggered)
     }
 
-    pub fn take(&mut self, cycle: u64, signals: &[f64; COUNT]) {
+    pub(crate) fn take(&mut self, cycle: u64, signals: &[f64; COUNT]) {
         if !self.runs() || cycle < self.due {
             return;
         }
@@ -243,12 +243,12 @@ impl Trace {
     }
 
     /// What it tells of itself, in the order of [`TOLD`].
-    pub fn reported(&self) -> [u32; TOLD.len()] {
+    pub(crate) fn reported(&self) -> [u32; TOLD.len()] {
         [self.state as u32, self.samples() as u32, self.trigger_cycle, self.triggers]
     }
 
     /// Samples that can be read: none before the trigger.
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         if self.trigger_cycle_known() { self.held } else { 0 }
     }
 
@@ -258,12 +258,12 @@ impl Trace {
     }
 
     /// Cycle of sample `number`, the oldest being 0; 0 for one that is not there.
-    pub fn cycle(&self, number: usize) -> u32 {
+    pub(crate) fn cycle(&self, number: usize) -> u32 {
         self.place(number).map_or(0, |place| self.cycles[place])
     }
 
     /// Value of sample `number` of a channel; 0 for one that is not there.
-    pub fn value(&self, channel: usize, number: usize) -> f64 {
+    pub(crate) fn value(&self, channel: usize, number: usize) -> f64 {
         self.place(number).map_or(0.0, |place| self.values[channel][place])
     }
 

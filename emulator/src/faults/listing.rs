@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 
 /// Prints the table, or checks a script.
-pub fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
+pub(crate) fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
     let text = if let Some(path) = &arguments.check {
         let text = std::fs::read_to_string(path)
             .map_err(|error| RunError::Input(format!("cannot read {}: {error}", path.display())))?;
@@ -61,7 +61,7 @@ fn as_json() -> Value {
 }
 
 /// Every fault, as programs read it.
-pub fn faults() -> Vec<FaultEntry> {
+pub(crate) fn faults() -> Vec<FaultEntry> {
     all().map(fault).collect()
 }
 

@@ -5,11 +5,11 @@ use runlog::event::{FaultChange, FaultMark};
 use std::fmt;
 use std::io::{self, Write};
 
-pub const COLUMNS: &str = "time_s,number,what,fault,at,numbers,cause";
+pub(crate) const COLUMNS: &str = "time_s,number,what,fault,at,numbers,cause";
 
 /// Who asked for a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
+pub(crate) enum Cause {
     Script {
         /// Line, from 1.
         line: u32,
@@ -19,7 +19,7 @@ pub enum Cause {
 
 /// A fault that began, ended, or did not.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mark {
+pub(crate) struct Mark {
     /// Its number in this run; the script's are those of the file, from 1.
     pub number: u16,
     pub what: FaultChange,
@@ -45,7 +45,7 @@ impl Mark {
     }
 
     /// Writes a row of `faults.csv`.
-    pub fn write(&self, out: &mut impl Write, cycle: u64) -> io::Result<()> {
+    pub(crate) fn write(&self, out: &mut impl Write, cycle: u64) -> io::Result<()> {
         let Self { number, what, fault, cause } = self;
         let (name, at, numbers) = (fault.spec.name, fault.place(), self.numbers(";"));
         let (s, ms) = (cycle / 1000, cycle % 1000);

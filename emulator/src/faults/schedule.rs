@@ -39,7 +39,7 @@ struct Entry {
 }
 
 /// All faults of a run.
-pub struct FaultSchedule {
+pub(crate) struct FaultSchedule {
     entries: Vec<Entry>,
     room: usize,
     /// Whether something waits or is active.
@@ -54,7 +54,7 @@ pub struct FaultSchedule {
 }
 
 /// What a cycle's faults act on.
-pub struct Broken<'a> {
+pub(crate) struct Broken<'a> {
     /// The plant at the cycle's start.
     pub plant: &'a mut Plant,
     pub sensors: &'a mut Sensors,
@@ -65,7 +65,7 @@ pub struct Broken<'a> {
 impl FaultSchedule {
     /// The faults of a script, and room for those of people when `by_hand`. `orders` is the way to the bus's host, where there
     /// is one.
-    pub fn new(script: Option<&FaultScript>, by_hand: bool, orders: Option<WireOrders>) -> Self {
+    pub(crate) fn new(script: Option<&FaultScript>, by_hand: bool, orders: Option<WireOrders>) -> Self {
         let planned = script.map_or(&[][..], |script| &script.faults);
         let possible = script.is_some() || by_hand;
         let room = planned.len() + if by_hand { MOST_BY_HAND } else { 0 };
@@ -89,23 +89,18 @@ impl FaultSchedule {
         }
     }
 
-    /// None, and none to come.
-    pub fn none() -> Self {
-        Self::new(None, false, None)
-    }
-
     /// Whether there can be any in this run.
-    pub fn possible(&self) -> bool {
+    pub(crate) fn possible(&self) -> bool {
         self.possible
     }
 
     /// Seed of everything that is random.
-    pub fn seed(&self) -> u64 {
+    pub(crate) fn seed(&self) -> u64 {
         self.seed
     }
 
     /// Number of active faults.
-    pub fn active(&self) -> usize {
+    pub(crate) fn active(&self) -> usize {
         if !self.busy {
             return 0;
         }
@@ -113,17 +108,17 @@ impl FaultSchedule {
     }
 
     /// What is pushed from outside, in +x.
-    pub fn hands(&self) -> HandForces {
+    pub(crate) fn hands(&self) -> HandForces {
         self.overlay.hands
     }
 
     /// The next mark for the bench's frame: number of the fault, and whether it begins.
-    pub fn next_to_tell(&mut self) -> Option<(u16, bool)> {
+    pub(crate) fn next_to_tell(&mut self) -> Option<(u16, bool)> {
         self.to_tell.pop_front()
     }
 
     /// Lets begin and end what is due in `cycle`, before the sensors are sampled.
-    pub fn begin_cycle(&mut self, cycle: u64, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+    pub(crate) fn begin_cycle(&mut self, cycle: u64, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
         if !self.busy {
             return;
         }
@@ -168,7 +163,7 @@ impl FaultSchedule {
     }
 
     /// Breaks something by hand, from this cycle on.
-    pub fn break_by_hand(&mut self, fault: Fault, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+    pub(crate) fn break_by_hand(&mut self, fault: Fault, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
         let (number, cause) = (self.next_number, Cause::Console);
         self.entries.retain(|entry| entry.state != State::Over || entry.cause != Cause::Console);
         let wire = on_wire(&fault).is_none() || self.orders.is_some();
@@ -184,7 +179,7 @@ impl FaultSchedule {
     }
 
     /// Mends what is active, whoever broke it: all of it, or the faults that are `like` this one by name and place.
-    pub fn mend(&mut self, like: Option<&Fault>, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+    pub(crate) fn mend(&mut self, like: Option<&Fault>, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
         for place in 0..self.entries.len() {
             let Entry { fault, state, .. } = self.entries[place];
             let meant = like.is_none_or(|like| {

@@ -55,12 +55,12 @@ pub struct Planned {
     /// What has to hold as well.
     pub when: Option<Condition>,
     /// `None`: never.
-    pub until: Option<Until>,
+    pub(crate) until: Option<Until>,
 }
 
 /// When a fault ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Until {
+pub(crate) enum Until {
     Cycle(u64),
     /// So many cycles after it began.
     After(u64),

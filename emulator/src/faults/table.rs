@@ -12,11 +12,11 @@ use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_SENSORS, LOAD_VA
 use runlog::telemetry::{FaultGroup, FaultKey};
 
 /// Most numbers that a fault has.
-pub const MOST_KEYS: usize = 3;
+pub(crate) const MOST_KEYS: usize = 3;
 
 /// A row of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FaultSpec {
+pub(crate) struct FaultSpec {
     /// Name, as in scripts and at the console.
     pub name: &'static str,
     pub group: FaultGroup,
@@ -29,7 +29,7 @@ pub struct FaultSpec {
 
 /// Where faults of a kind can be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Places {
+pub(crate) enum Places {
     /// `drive` or `load`.
     Axis,
     /// A chamber, or its sensor.
@@ -45,7 +45,7 @@ pub enum Places {
 
 /// What a fault is to the code.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Of a sensor: which channel of the axis, or that of the chamber.
     Sensor(Channel, SensorKind),
     ValveStuck,
@@ -71,7 +71,7 @@ pub enum Kind {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Channel {
+pub(crate) enum Channel {
     Position,
     Force,
     /// Pressure of the chamber that the place names.
@@ -80,7 +80,7 @@ pub enum Channel {
 
 /// What is broken in a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SensorKind {
+pub(crate) enum SensorKind {
     Stuck,
     /// An error that grows.
     Drift,
@@ -96,7 +96,7 @@ pub enum SensorKind {
 
 /// What is broken on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BusKind {
+pub(crate) enum BusKind {
     Loss,
     Delay,
     Duplication,
@@ -109,14 +109,14 @@ pub enum BusKind {
 }
 
 /// Nodes in the order of their places.
-pub const NODES: [(&str, WireNode); 3] = [
+pub(crate) const NODES: [(&str, WireNode); 3] = [
     ("rig", WireNode::Rig),
     ("drive-controller", WireNode::DriveController),
     ("load-controller", WireNode::LoadController),
 ];
 
 impl Places {
-    pub fn names(self) -> Vec<String> {
+    pub(crate) fn names(self) -> Vec<String> {
         let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         let frame = |name: &str| format!("bus.{name}");
         match self {
@@ -134,12 +134,12 @@ impl Places {
     }
 
     /// Whether the first place is meant when none is named.
-    pub fn has_usual_place(self) -> bool {
+    pub(crate) fn has_usual_place(self) -> bool {
         matches!(self, Self::Supply | Self::Linkage | Self::Bus | Self::Frames)
     }
 
     /// The identifier that a place of frames names; `None` for all frames.
-    pub fn frame_id(self, place: usize) -> Option<u16> {
+    pub(crate) fn frame_id(self, place: usize) -> Option<u16> {
         match self {
             Self::Frames => place.checked_sub(1).map(|message| MESSAGES[message].id),
             Self::Counted => Some(COUNTED[place].1),
@@ -155,13 +155,13 @@ const COUNTED: [(&str, u16); 4] = [
     (LOAD_VALVE_COMMAND.name, LOAD_VALVE_COMMAND.id),
 ];
 
-pub use rows::TABLE;
+pub(crate) use rows::TABLE;
 
-pub fn all() -> impl Iterator<Item = &'static FaultSpec> {
+pub(crate) fn all() -> impl Iterator<Item = &'static FaultSpec> {
     TABLE.iter().flat_map(|rows| rows.iter())
 }
 
-pub fn spec(name: &str) -> Option<&'static FaultSpec> {
+pub(crate) fn spec(name: &str) -> Option<&'static FaultSpec> {
     all().find(|spec| spec.name == name)
 }
 

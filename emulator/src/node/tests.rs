@@ -46,7 +46,7 @@ fn node(scene: &str) -> (EmulatorNode, Records) {
         plant: Plant::new(&rig, &scene.setup()).unwrap(),
         sensors: Sensors::new(&rig, 1),
         people: People::new(&scene),
-        faults: FaultSchedule::none(),
+        faults: FaultSchedule::new(None, false, None),
         console: None,
         recorder,
         bench_frames: true,

@@ -5,7 +5,7 @@ use runlog::telemetry::{FaultGroup, FaultKey};
 use std::borrow::Cow;
 
 /// The table, group by group.
-pub const TABLE: &[&[FaultSpec]] = &[POSITION, FORCE, PRESSURE, VALVE, SUPPLY, AIR, MECHANICS, BUS];
+pub(crate) const TABLE: &[&[FaultSpec]] = &[POSITION, FORCE, PRESSURE, VALVE, SUPPLY, AIR, MECHANICS, BUS];
 
 const fn key(
     name: &'static str,
