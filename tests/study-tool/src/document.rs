@@ -3,6 +3,7 @@
 use crate::classes::{Classes, TWIN_COSINE};
 use crate::folder::{FolderError, read, write_whole};
 use crate::limits::{Limit, Limits};
+use model_fit::stats::median;
 use plant::effects::SHEETS;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -92,8 +93,7 @@ pub fn twin_table(classes: &Classes) -> String {
     );
     for sheet in SHEETS {
         let Some(row) = rows.get_mut(sheet.name) else { continue };
-        row.largest.sort_by(f64::total_cmp);
-        let median = row.largest[row.largest.len() / 2];
+        let median = median(&mut row.largest).expect("a row has a draw");
         let twins: Vec<_> = row.twins.iter().map(|(name, count)| format!("{name} {count}")).collect();
         let _ = writeln!(
             table,

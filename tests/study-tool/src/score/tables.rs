@@ -4,6 +4,7 @@ use super::{CLEAR, Case};
 use crate::draws::Kind;
 use crate::interval::Rate;
 use crate::judge::{HiddenJudged, NumberJudged};
+use model_fit::stats::quantile;
 use plant::effects::SHEETS;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -106,10 +107,9 @@ pub struct Spread {
 impl Spread {
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.into_iter().collect();
-        values.sort_by(f64::total_cmp);
-        let Some(last) = values.len().checked_sub(1) else { return Spread::default() };
-        let at = |share: f64| values[(share * last as f64).round() as usize];
-        Spread { of: values.len(), quantiles: Some([at(0.0), at(0.5), at(0.9), at(1.0)]) }
+        let all = [0.0, 0.5, 0.9, 1.0].map(|share| quantile(&mut values, share));
+        let [Some(least), Some(median), Some(high), Some(largest)] = all else { return Spread::default() };
+        Spread { of: values.len(), quantiles: Some([least, median, high, largest]) }
     }
 }
 
