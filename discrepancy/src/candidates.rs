@@ -25,16 +25,6 @@ const FAR: f64 = 10.0;
 /// Largest coordinate of a fit, three times the strongest that is drawn: one standard deviation of the prior.
 const FARTHEST: f64 = 3.0;
 
-/// Effects whose traces are nonlinear in the amplitude.
-const NONLINEAR_IN_AMPLITUDE: [&str; 6] = [
-    "valve-dead-zone",
-    "valve-hysteresis",
-    "spool-rate-limit",
-    "stribeck-friction",
-    "end-cushion",
-    "silencer-back-pressure",
-];
-
 /// Keys of a sheet at most.
 const MOST_KEYS: usize = 6;
 
@@ -264,7 +254,7 @@ impl Candidate {
             vec![at(0, 0.3)]
         } else if self.is_two_sided() {
             vec![at(0, 0.2), at(0, -0.2)]
-        } else if self.vanishes_at_zero_amplitude() && NONLINEAR_IN_AMPLITUDE.contains(&self.sheet.name) {
+        } else if self.vanishes_at_zero_amplitude() && self.sheet.nonlinear_in_amplitude {
             vec![at(0, 0.1), at(0, 0.5)]
         } else if self.vanishes_at_zero_amplitude() {
             vec![at(0, 0.25)]
@@ -274,13 +264,10 @@ impl Candidate {
         for key in (1..keys).filter(|key| !self.is_shape(*key)) {
             probes.push(at(key, 0.4));
         }
-        if self.sheet.name == "position-dependent-friction" {
-            // A bump elsewhere does not resemble the one in the middle.
-            for centre in [-0.45, 0.45] {
-                let mut coordinates = at(0, 0.3);
-                coordinates[1] = centre;
-                probes.push(coordinates);
-            }
+        for second in self.sheet.also_screened {
+            let mut coordinates = at(0, 0.3);
+            coordinates[1] = *second;
+            probes.push(coordinates);
         }
         probes
     }

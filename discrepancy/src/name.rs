@@ -73,9 +73,6 @@ const MIN_LOSS_SHARE_FIRST: f64 = 0.1;
 const MIN_LOSS_SHARE_FURTHER: f64 = 0.3;
 /// Smallest amplitude, as a share of the smallest change that occurs.
 const MIN_AMPLITUDE_RATIO: f64 = 0.85;
-/// Effects defined by their first number alone: a check valve without cracking pressure is a line resistance, and on linked rods
-/// damping alone absorbs the errors of the start states.
-const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
 
 /// An effect that explains the records as well as one of the model.
 #[derive(Clone, Debug)]
@@ -315,7 +312,7 @@ fn leading_key(placed: &EffectEstimate) -> usize {
 /// The keys that are amplitudes, each over its floor.
 fn amplitude_ratios(placed: &EffectEstimate) -> impl Iterator<Item = (usize, f64)> {
     let candidate = &placed.candidate;
-    let keys = if DEFINED_BY_FIRST.contains(&candidate.sheet.name) { 1 } else { placed.coordinates.len() };
+    let keys = if candidate.sheet.defined_by_first { 1 } else { placed.coordinates.len() };
     (0..keys)
         .filter(|key| !candidate.is_shape(*key))
         .map(|key| (key, placed.coordinates[key].abs() / least_coordinate(candidate, key)))

@@ -87,10 +87,10 @@ impl Suspect {
                 _ => Group::Motion,
             },
             place: target.kind(),
-            laws: &[],
             law: kept(format!("adds {} to {}", declared.expression(), declared.place())),
             source: "a file of suspects",
             keys: Box::leak(declared.numbers().iter().map(key).collect::<Vec<_>>().into_boxed_slice()),
+            ..Sheet::USUAL
         };
         let place = declared.at();
         Suspect { declared, sheet, place }

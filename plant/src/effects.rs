@@ -299,14 +299,6 @@ fn channel(element: Option<Element>) -> usize {
     }
 }
 
-impl Sheet {
-    /// The place of this kind that a rig file calls so, as `drive` or `drive.a`.
-    #[must_use]
-    pub fn place_named(&self, name: &str) -> Option<Place> {
-        self.place.places().iter().copied().find(|place| place.to_string() == name)
-    }
-}
-
 impl PlaceKind {
     /// The names of its places.
     #[must_use]

@@ -41,10 +41,8 @@ const RELINEARISED: usize = 3;
 const MAY_BE_BEST: f64 = 0.8;
 /// Fits are close when their losses differ by less than this share of the best gain.
 const CLOSE: f64 = 0.02;
-/// The backlash of the linkage. Screening underrates it, since the start states were estimated without it.
-const BACKLASH: &str = "coupling-backlash";
-/// Effects of a model from which on no other widths of it are tried: what is left is small by then, and each width has start
-/// states of its own.
+/// Effects of a model from which on no other widths of a backlash are tried: what is left is small by then, and each width has
+/// start states of its own.
 const BACKLASH_BESIDE: usize = 2;
 
 struct Contenders {
@@ -78,7 +76,7 @@ impl Contenders {
                 .first()
                 .is_some_and(|best| gain(best) > MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold))
         };
-        let is_backlash = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
+        let is_backlash = |screened: &&Screened| columns.candidates[screened.at].sheet.moves_start_states;
         let backlash = if engine.is_linked() { large.iter().find(is_backlash).cloned() } else { None };
         let share = if lacks_fit(engine, null_loss) { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
         let most = [&large, &small].map(|all| all.first().map_or(0.0, gain));

@@ -25,7 +25,7 @@
 //! Source: two resistances in series, ISO 6358-3:2014; spring of the non-return valve, Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -42,10 +42,11 @@ impl Effect for CheckValveRestriction {
     const SHEET: Sheet = Sheet {
         name: "check-valve-restriction",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "a non-return valve at each chamber port needs a pressure to crack and restricts as a second orifice",
         source: "ISO 6358-3:2014, Beater 2007; range: textbook prior",
+        // Without cracking pressure it is a line resistance.
+        defined_by_first: true,
         keys: &[
             EffectKey {
                 name: "cracking_pressure_bar",
@@ -67,6 +68,7 @@ impl Effect for CheckValveRestriction {
                 meaning: "K_V of the orifice in series; 100 is none",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

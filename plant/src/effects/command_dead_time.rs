@@ -12,7 +12,7 @@
 //!
 //! Source: dead time of sampled loops, Astrom and Wittenmark, Computer-Controlled Systems, 1997; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -26,7 +26,6 @@ impl Effect for CommandDeadTime {
     const SHEET: Sheet = Sheet {
         name: "command-dead-time",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Spool],
         law: "the command acts a fixed time late",
         source: "dead time of sampled loops, Astrom and Wittenmark 1997; range: textbook prior",
@@ -38,6 +37,7 @@ impl Effect for CommandDeadTime {
             meaning: "time from the command to its effect on the spool, beside the period it is latched in",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -28,9 +28,9 @@ impl Effect for CouplingBacklash {
         name: "coupling-backlash",
         group: Group::Motion,
         place: PlaceKind::Linkage,
-        laws: &[],
         law: "the gap of the eye differs from the file",
         source: "rig-model.md, Masses and linkage; range: effects.md, textbook prior",
+        moves_start_states: true,
         keys: &[EffectKey {
             name: "gap_mm",
             unit: Unit::Millimetre,
@@ -40,6 +40,7 @@ impl Effect for CouplingBacklash {
             meaning: "s, gap in all, in place of linkage.gap_mm",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -30,9 +30,10 @@ impl Effect for CouplingCompliance {
         name: "coupling-compliance",
         group: Group::Motion,
         place: PlaceKind::Linkage,
-        laws: &[],
         law: "stiffness and damping of the linkage differ from the file",
         source: "rig-model.md, Masses and linkage; range: effects.md, textbook prior",
+        // Damping alone absorbs the errors of the start states.
+        defined_by_first: true,
         keys: &[
             EffectKey {
                 name: "stiffness_n_per_m",
@@ -55,6 +56,7 @@ impl Effect for CouplingCompliance {
                 ..EffectKey::USUAL
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -20,7 +20,7 @@
 //! Source: ISO 6358-1:2013, flow-rate characteristics of components, with subsonic index m = 0.5; range: textbook prior for
 //! valves of this size (Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7).
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::single_edge_flow;
@@ -34,7 +34,6 @@ impl Effect for CriticalPressureRatio {
     const SHEET: Sheet = Sheet {
         name: "critical-pressure-ratio",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "an edge's flow is the ellipse of ISO 6358 with its own critical pressure ratio b instead of 0.5",
         source: "ISO 6358-1:2013; range: textbook prior (Beater 2007)",
@@ -48,6 +47,7 @@ impl Effect for CriticalPressureRatio {
             meaning: "b, the pressure ratio below which the flow is choked",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -14,7 +14,7 @@
 //! Source: inactive volume at the ends of the stroke, Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336; range:
 //! textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -27,8 +27,6 @@ impl Effect for DeadVolume {
     const SHEET: Sheet = Sheet {
         name: "dead-volume",
         group: Group::Chamber,
-        place: PlaceKind::Axis,
-        laws: &[],
         law: "dead volume and hose of the axis' chambers differ from the file",
         source: "inactive volume, Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
         keys: &[EffectKey {
@@ -41,6 +39,7 @@ impl Effect for DeadVolume {
             meaning: "V_own of each chamber, in place of cylinder.dead_volume_cm3",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

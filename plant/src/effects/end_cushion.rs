@@ -26,7 +26,7 @@
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; adjusting screw and check valve as makers of cylinders draw
 //! them; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -43,10 +43,10 @@ impl Effect for EndCushion {
     const SHEET: Sheet = Sheet {
         name: "end-cushion",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Air, Law::Force],
         law: "near both ends the chamber that is emptied vents through a cushion orifice; an elastic stop ends the stroke",
         source: "eq. (4) for the orifice; range: effects.md, textbook prior",
+        nonlinear_in_amplitude: true,
         keys: &[
             EffectKey {
                 name: "cushion_kv_m3_per_h",
@@ -81,6 +81,7 @@ impl Effect for EndCushion {
                 meaning: "k_stop of the elastic stop over the last millimetre",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -11,7 +11,7 @@
 //! Source: none, it is made for the tests.
 
 use super::OpenBalance;
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -25,7 +25,6 @@ impl Effect for Example {
     const SHEET: Sheet = Sheet {
         name: "example",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Air, Law::StoredAir, Law::Friction, Law::Force],
         law: "a constant in every open balance",
         source: "none, made for the tests",
@@ -39,6 +38,7 @@ impl Effect for Example {
             meaning: "size of the terms",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

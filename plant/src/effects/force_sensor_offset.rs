@@ -12,7 +12,7 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -25,8 +25,6 @@ impl Effect for ForceSensorOffset {
     const SHEET: Sheet = Sheet {
         name: "force-sensor-offset",
         group: Group::Sensor,
-        place: PlaceKind::Axis,
-        laws: &[],
         law: "the force sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {
@@ -39,6 +37,7 @@ impl Effect for ForceSensorOffset {
             meaning: "o, what it reads too much",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

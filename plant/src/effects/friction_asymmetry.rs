@@ -15,7 +15,7 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); viscous friction that differs with the
 //! direction was found on the EMPS axis [Janot, Gautier, Brunot 2019]; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,7 +28,6 @@ impl Effect for FrictionAsymmetry {
     const SHEET: Sheet = Sheet {
         name: "friction-asymmetry",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Friction],
         law: "sliding, break-away and viscous friction differ with the direction",
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); range: effects.md, textbook prior",
@@ -42,6 +41,7 @@ impl Effect for FrictionAsymmetry {
             meaning: "a: times 1 + a as the rod extends, times 1 - a as it retracts",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

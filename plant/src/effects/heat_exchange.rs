@@ -23,7 +23,7 @@
 //! Almeida 2006, Reduced-order thermodynamic models for servo-pneumatic actuator chambers, Proc. IMechE I 220; range:
 //! textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -52,7 +52,6 @@ impl Effect for HeatExchange {
     const SHEET: Sheet = Sheet {
         name: "heat-exchange",
         group: Group::Chamber,
-        place: PlaceKind::Axis,
         laws: &[Law::StoredAir],
         law: "the gas of each chamber has its own temperature and exchanges heat with the wall",
         source: "energy balance, Beater 2007, Carneiro and de Almeida 2006; range: textbook prior",
@@ -66,6 +65,7 @@ impl Effect for HeatExchange {
             meaning: "h, heat transfer coefficient to the wetted wall",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

@@ -14,7 +14,7 @@
 //!
 //! Source: Newton's second law; range: effects.md, textbook prior (5 kg at 45 degrees are 35 N, added weights more).
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -27,7 +27,6 @@ impl Effect for Inclination {
     const SHEET: Sheet = Sheet {
         name: "inclination",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Force],
         law: "a constant force along x: gravity on an inclined axis, a hanging load",
         source: "gravity along the axis; range: effects.md, textbook prior",
@@ -41,6 +40,7 @@ impl Effect for Inclination {
             meaning: "F_g, force in +x of the rig",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

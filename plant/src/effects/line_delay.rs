@@ -15,7 +15,7 @@
 //! Source: Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336, connecting tubes (delay l / a and attenuation); range:
 //! textbook prior, tubes of 0.5 to 4 m.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,7 +28,6 @@ impl Effect for LineDelay {
     const SHEET: Sheet = Sheet {
         name: "line-delay",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "what passes the valve reaches the chambers one acoustic travel time later",
         source: "Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
@@ -40,6 +39,7 @@ impl Effect for LineDelay {
             meaning: "l, length of each line between valve and chamber; 2.9 ms per metre",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -18,7 +18,7 @@
 //! Source: Darcy and Weisbach for gases, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, tubes; range:
 //! textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -33,7 +33,6 @@ impl Effect for LineResistance {
     const SHEET: Sheet = Sheet {
         name: "line-resistance",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "the lines between valve and chambers are resistances: the drop grows with the flow squared and with 1/p",
         source: "pipe friction, Beater 2007; range: textbook prior",
@@ -45,6 +44,7 @@ impl Effect for LineResistance {
             meaning: "dp, drop at the full flow of the supply edge into a chamber at half the supply pressure",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

@@ -16,7 +16,7 @@
 //! chambers also in Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior.
 
 use super::laminar_gap::LaminarGap;
-use super::sheet::{Effect, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,11 +28,11 @@ impl Effect for PistonLeakage {
     const SHEET: Sheet = Sheet {
         name: "piston-leakage",
         group: Group::Chamber,
-        place: PlaceKind::Axis,
         laws: &[Law::StoredAir],
         law: "laminar leakage past the piston seal, from chamber to chamber",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
         keys: &[LaminarGap::KEY],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -18,7 +18,7 @@
 //! effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -35,7 +35,6 @@ impl Effect for PositionDependentForce {
     const SHEET: Sheet = Sheet {
         name: "position-dependent-force",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Force],
         law: "a force over x that does not flip with the velocity: hose or cable spring, cogging",
         source: "Hooke's law, cogging as a sine of its pitch; range: effects.md, textbook prior",
@@ -62,6 +61,7 @@ impl Effect for PositionDependentForce {
             },
             Ripple::PITCH,
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

@@ -23,7 +23,7 @@
 //! and range: effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -43,10 +43,11 @@ impl Effect for PositionDependentFriction {
     const SHEET: Sheet = Sheet {
         name: "position-dependent-friction",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Friction],
         law: "friction has a bump, a slope or a ripple over the stroke and flips with the velocity",
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); shapes and range: effects.md, textbook prior",
+        // A bump elsewhere does not resemble the one in the middle.
+        also_screened: &[-0.45, 0.45],
         keys: &[
             EffectKey {
                 name: "bump_n",
@@ -101,6 +102,7 @@ impl Effect for PositionDependentFriction {
             },
             Ripple::PITCH,
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

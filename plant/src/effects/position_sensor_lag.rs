@@ -18,7 +18,7 @@
 //! Source: first-order lag, filter of the transducer; range 0.5 to 8 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -31,7 +31,6 @@ impl Effect for PositionSensorLag {
     const SHEET: Sheet = Sheet {
         name: "position-sensor-lag",
         group: Group::Sensor,
-        place: PlaceKind::Axis,
         laws: &[Law::PastReadings],
         law: "the position sensor is a first-order lag",
         source: "first-order lag, filter of the transducer; range: effects.md, textbook prior",
@@ -43,6 +42,7 @@ impl Effect for PositionSensorLag {
             meaning: "tau, time constant of the position sensor",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

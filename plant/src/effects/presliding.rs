@@ -57,7 +57,7 @@
 //! state elastoplastic friction models", IEEE Trans. Automatic Control 47(5). Fading form of s_1: ours, the simplest that is
 //! passive and gives psi in closed form. v_s and the range of s_0: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -106,7 +106,6 @@ impl Effect for Presliding {
     const SHEET: Sheet = Sheet {
         name: "presliding",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Friction],
         law: "bristles hold the piston: before it breaks away it moves elastically (LuGre)",
         source: "Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3); range: effects.md, textbook prior",
@@ -120,6 +119,7 @@ impl Effect for Presliding {
             meaning: "s_0, stiffness of the bristles",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

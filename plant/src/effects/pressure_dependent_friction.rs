@@ -15,7 +15,7 @@
 //! Source: growth of a pneumatic cylinder's friction with its pressures, measured: Tran, Yanada, "Dynamic friction behaviors
 //! of pneumatic cylinders", Intelligent Control and Automation 4(2), 2013; linear form and range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,7 +29,6 @@ impl Effect for PressureDependentFriction {
     const SHEET: Sheet = Sheet {
         name: "pressure-dependent-friction",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Friction],
         law: "friction grows with the sum of the gauge pressures that press the seals on",
         source: "Tran, Yanada 2013, Intelligent Control and Automation 4(2); linear form and range: effects.md, textbook prior",
@@ -41,6 +40,7 @@ impl Effect for PressureDependentFriction {
             meaning: "c, friction force per bar of the sum",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

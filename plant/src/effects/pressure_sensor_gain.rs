@@ -26,7 +26,6 @@ impl Effect for PressureSensorGain {
         name: "pressure-sensor-gain",
         group: Group::Sensor,
         place: PlaceKind::Chamber,
-        laws: &[],
         law: "the pressure sensor reads too much by a share",
         source: "gain error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {
@@ -39,6 +38,7 @@ impl Effect for PressureSensorGain {
             meaning: "g, what it reads too much, of the absolute pressure",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

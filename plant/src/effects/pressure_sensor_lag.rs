@@ -43,6 +43,7 @@ impl Effect for PressureSensorLag {
             meaning: "tau, time constant of the pressure sensor",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -26,7 +26,6 @@ impl Effect for PressureSensorOffset {
         name: "pressure-sensor-offset",
         group: Group::Sensor,
         place: PlaceKind::Chamber,
-        laws: &[],
         law: "the pressure sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {
@@ -39,6 +38,7 @@ impl Effect for PressureSensorOffset {
             meaning: "o, what it reads too much",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -17,7 +17,7 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, on rising static friction; logarithmic growth:
 //! Dieterich, "Time-dependent friction in rocks", J. Geophysical Research 77(20), 1972; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -33,7 +33,6 @@ impl Effect for RestTimeDependentBreakAway {
     const SHEET: Sheet = Sheet {
         name: "rest-time-dependent-break-away",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Friction],
         law: "the break-away force grows with the logarithm of the time at rest",
         source: "Armstrong-Helouvry et al. 1994, Automatica 30(7); Dieterich 1972; range: effects.md, textbook prior",
@@ -58,6 +57,7 @@ impl Effect for RestTimeDependentBreakAway {
                 meaning: "t_0 of ln(1 + t / t_0), after which the growth is logarithmic",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

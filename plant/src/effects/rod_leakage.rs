@@ -31,6 +31,7 @@ impl Effect for RodLeakage {
         law: "laminar leakage to the atmosphere: past the rod seal out of b, past the cap's static seal out of a",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
         keys: &[LaminarGap::KEY],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

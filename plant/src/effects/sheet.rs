@@ -27,6 +27,37 @@ pub struct Sheet {
     pub source: &'static str,
     /// Its numbers; the first one is its amplitude.
     pub keys: &'static [EffectKey],
+    /// Whether traces are nonlinear in the amplitude.
+    pub nonlinear_in_amplitude: bool,
+    /// Whether the first number alone makes it this effect.
+    pub defined_by_first: bool,
+    /// Whether the states from which linked rods start depend on it: screening underrates it, with states estimated without it.
+    pub moves_start_states: bool,
+    /// Values of the second number that screening tries beside the default, as differences to it in widths of `drawn`.
+    pub also_screened: &'static [f64],
+}
+
+impl Sheet {
+    /// What most effects have alike.
+    pub const USUAL: Sheet = Sheet {
+        name: "",
+        group: Group::Motion,
+        place: PlaceKind::Axis,
+        laws: &[],
+        law: "",
+        source: "",
+        keys: &[],
+        nonlinear_in_amplitude: false,
+        defined_by_first: false,
+        moves_start_states: false,
+        also_screened: &[],
+    };
+
+    /// The place of this kind that a rig file calls so, as `drive` or `drive.a`.
+    #[must_use]
+    pub fn place_named(&self, name: &str) -> Option<Place> {
+        self.place.places().iter().copied().find(|place| place.to_string() == name)
+    }
 }
 
 /// One number of an effect, in the file's unit.

@@ -17,7 +17,7 @@
 //! 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::node::Node;
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -31,10 +31,10 @@ impl Effect for SilencerBackPressure {
     const SHEET: Sheet = Sheet {
         name: "silencer-back-pressure",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "both exhausts of a cylinder end in one volume that vents through a silencer",
         source: "eq. (4) for the silencer, Beater 2007; range: textbook prior",
+        nonlinear_in_amplitude: true,
         keys: &[
             EffectKey {
                 name: "silencer_kv_ratio",
@@ -58,6 +58,7 @@ impl Effect for SilencerBackPressure {
                 meaning: "volume between the exhaust edges and the silencer",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

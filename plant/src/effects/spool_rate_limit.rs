@@ -14,7 +14,7 @@
 //!
 //! Source: slew rate of saturated actuators, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,10 +28,10 @@ impl Effect for SpoolRateLimit {
     const SHEET: Sheet = Sheet {
         name: "spool-rate-limit",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Spool],
         law: "the spool moves no faster than its actuator can",
         source: "saturated actuators, Merritt 1967 ch. 7; range: textbook prior",
+        nonlinear_in_amplitude: true,
         keys: &[EffectKey {
             name: "rate_per_s",
             unit: Unit::PerSecond,
@@ -42,6 +42,7 @@ impl Effect for SpoolRateLimit {
             meaning: "largest |ds/dt|; full opening counts 1",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -20,7 +20,7 @@
 //! Source: Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, valves with position-controlled spool; range:
 //! textbook prior around the 100 Hz of the rig's valve.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -35,7 +35,6 @@ impl Effect for SpoolSecondOrder {
     const SHEET: Sheet = Sheet {
         name: "spool-second-order",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Spool],
         law: "the spool is a second-order system in place of the first-order lag",
         source: "Beater 2007, position-controlled spools; range: textbook prior",
@@ -62,6 +61,7 @@ impl Effect for SpoolSecondOrder {
                 meaning: "z, share of critical damping",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -16,7 +16,7 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit, "A survey of models, analysis tools and compensation methods for the
 //! control of machines with friction", Automatica 30(7), 1994, with d = 1 and 2 in use; range of v_s: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -33,10 +33,10 @@ impl Effect for StribeckFriction {
     const SHEET: Sheet = Sheet {
         name: "stribeck-friction",
         group: Group::Motion,
-        place: PlaceKind::Axis,
         laws: &[Law::Friction],
         law: "sliding friction falls from the break-away force to its level as the speed grows",
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); range: effects.md, textbook prior",
+        nonlinear_in_amplitude: true,
         keys: &[
             EffectKey {
                 name: "velocity_mm_per_s",
@@ -59,6 +59,7 @@ impl Effect for StribeckFriction {
                 meaning: "d, how sharply it falls: 1 exponential, 2 Gaussian",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

@@ -59,6 +59,7 @@ impl Effect for SupplyDroop {
                 meaning: "volume of the node",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {

@@ -40,6 +40,7 @@ impl Effect for TimeSkew {
             meaning: "d, how old the value is when it is sampled",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -19,7 +19,7 @@
 //! Source: flow gain of a spool with shaped or round ports, Merritt, Hydraulic Control Systems, 1967, chapter 5; bend and
 //! ratio are this catalogue's own shape; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -35,7 +35,6 @@ impl Effect for ValveCharacteristic {
     const SHEET: Sheet = Sheet {
         name: "valve-characteristic",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "the K_V tables are bent over the opening, or supply and exhaust edges stand in another ratio",
         source: "spool port shapes, Merritt 1967 ch. 5; range: textbook prior",
@@ -62,6 +61,7 @@ impl Effect for ValveCharacteristic {
                 meaning: "r: supply edges times 1 + r/2, exhaust edges times 1 - r/2",
             },
         ],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -15,7 +15,7 @@
 //! Source: lapped spool, Merritt, Hydraulic Control Systems, 1967, chapter 5; Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,10 +29,10 @@ impl Effect for ValveDeadZone {
     const SHEET: Sheet = Sheet {
         name: "valve-dead-zone",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "the spool overlaps its edges: nothing opens below d, and the rest of the way is stretched",
         source: "lapped spool, Merritt 1967 ch. 5; range: textbook prior (Beater 2007)",
+        nonlinear_in_amplitude: true,
         keys: &[EffectKey {
             name: "dead_zone_percent",
             unit: Unit::Percent,
@@ -41,6 +41,7 @@ impl Effect for ValveDeadZone {
             meaning: "d, of full opening, beside the tables' own dead band",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -14,7 +14,7 @@
 //!
 //! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,10 +28,10 @@ impl Effect for ValveHysteresis {
     const SHEET: Sheet = Sheet {
         name: "valve-hysteresis",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Spool],
         law: "a play of half-width h lies between command and spool",
         source: "play operator, Krasnosel'skii and Pokrovskii 1989; range: textbook prior",
+        nonlinear_in_amplitude: true,
         keys: &[EffectKey {
             name: "half_width_percent",
             unit: Unit::Percent,
@@ -40,6 +40,7 @@ impl Effect for ValveHysteresis {
             meaning: "h, of full command",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

@@ -15,7 +15,7 @@
 //! Source: centre leakage of a spool with clearance, Merritt, Hydraulic Control Systems, 1967, chapter 5; range: textbook
 //! prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,7 +29,6 @@ impl Effect for ValveNullLeakage {
     const SHEET: Sheet = Sheet {
         name: "valve-null-leakage",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Air],
         law: "every edge keeps a floor of its largest K_V",
         source: "spool clearance, Merritt 1967 ch. 5; range: textbook prior",
@@ -41,6 +40,7 @@ impl Effect for ValveNullLeakage {
             meaning: "floor of each edge, of its own largest K_V",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {

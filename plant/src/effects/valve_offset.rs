@@ -12,7 +12,7 @@
 //!
 //! Source: null bias, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -26,7 +26,6 @@ impl Effect for ValveOffset {
     const SHEET: Sheet = Sheet {
         name: "valve-offset",
         group: Group::Flow,
-        place: PlaceKind::Axis,
         laws: &[Law::Spool],
         law: "the spool's null lies beside the command's",
         source: "null bias, Merritt 1967 ch. 7; range: textbook prior",
@@ -40,6 +39,7 @@ impl Effect for ValveOffset {
             meaning: "u_0, of full command",
             ..EffectKey::USUAL
         }],
+        ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
