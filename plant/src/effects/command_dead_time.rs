@@ -29,6 +29,7 @@ impl Effect for CommandDeadTime {
         laws: &[Law::Spool],
         law: "the command acts a fixed time late",
         source: "dead time of sampled loops, Astrom and Wittenmark 1997; range: textbook prior",
+        has_memory: true,
         keys: &[EffectKey {
             name: "delay_ms",
             unit: Unit::Millisecond,

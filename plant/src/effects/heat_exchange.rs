@@ -55,6 +55,7 @@ impl Effect for HeatExchange {
         laws: &[Law::StoredAir],
         law: "the gas of each chamber has its own temperature and exchanges heat with the wall",
         source: "energy balance, Beater 2007, Carneiro and de Almeida 2006; range: textbook prior",
+        has_memory: true,
         keys: &[EffectKey {
             name: "coefficient_w_per_m2_k",
             unit: Unit::WattPerSquareMetreKelvin,

@@ -31,6 +31,7 @@ impl Effect for LineDelay {
         laws: &[Law::Air],
         law: "what passes the valve reaches the chambers one acoustic travel time later",
         source: "Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
+        has_memory: true,
         keys: &[EffectKey {
             name: "length_m",
             unit: Unit::Metre,

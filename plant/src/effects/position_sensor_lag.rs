@@ -34,6 +34,7 @@ impl Effect for PositionSensorLag {
         laws: &[Law::PastReadings],
         law: "the position sensor is a first-order lag",
         source: "first-order lag, filter of the transducer; range: effects.md, textbook prior",
+        has_memory: true,
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,

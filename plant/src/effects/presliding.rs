@@ -109,6 +109,7 @@ impl Effect for Presliding {
         laws: &[Law::Friction],
         law: "bristles hold the piston: before it breaks away it moves elastically (LuGre)",
         source: "Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3); range: effects.md, textbook prior",
+        has_memory: true,
         keys: &[EffectKey {
             name: "stiffness_n_per_m",
             unit: Unit::NewtonPerMetre,

@@ -35,6 +35,7 @@ impl Effect for PressureSensorLag {
         laws: &[Law::PastReadings],
         law: "the pressure sensor sits at the end of a sense line: a first-order lag",
         source: "first-order lag, sense line as one resistance and one volume; range: effects.md, textbook prior",
+        has_memory: true,
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,

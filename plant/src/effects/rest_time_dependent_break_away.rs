@@ -36,6 +36,7 @@ impl Effect for RestTimeDependentBreakAway {
         laws: &[Law::Friction],
         law: "the break-away force grows with the logarithm of the time at rest",
         source: "Armstrong-Helouvry et al. 1994, Automatica 30(7); Dieterich 1972; range: effects.md, textbook prior",
+        has_memory: true,
         keys: &[
             EffectKey {
                 name: "growth_percent",

@@ -35,6 +35,8 @@ pub struct Sheet {
     pub moves_start_states: bool,
     /// Values of the second number that screening tries beside the default, as differences to it in widths of `drawn`.
     pub also_screened: &'static [f64],
+    /// Whether the plant keeps something of it from step to step.
+    pub has_memory: bool,
 }
 
 impl Sheet {
@@ -51,6 +53,7 @@ impl Sheet {
         defined_by_first: false,
         moves_start_states: false,
         also_screened: &[],
+        has_memory: false,
     };
 
     /// The place of this kind that a rig file calls so, as `drive` or `drive.a`.

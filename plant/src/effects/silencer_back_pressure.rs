@@ -35,6 +35,7 @@ impl Effect for SilencerBackPressure {
         law: "both exhausts of a cylinder end in one volume that vents through a silencer",
         source: "eq. (4) for the silencer, Beater 2007; range: textbook prior",
         nonlinear_in_amplitude: true,
+        has_memory: true,
         keys: &[
             EffectKey {
                 name: "silencer_kv_ratio",

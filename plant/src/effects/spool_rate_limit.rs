@@ -32,6 +32,7 @@ impl Effect for SpoolRateLimit {
         law: "the spool moves no faster than its actuator can",
         source: "saturated actuators, Merritt 1967 ch. 7; range: textbook prior",
         nonlinear_in_amplitude: true,
+        has_memory: true,
         keys: &[EffectKey {
             name: "rate_per_s",
             unit: Unit::PerSecond,

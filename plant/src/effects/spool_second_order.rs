@@ -38,6 +38,7 @@ impl Effect for SpoolSecondOrder {
         laws: &[Law::Spool],
         law: "the spool is a second-order system in place of the first-order lag",
         source: "Beater 2007, position-controlled spools; range: textbook prior",
+        has_memory: true,
         keys: &[
             EffectKey {
                 name: "natural_frequency_hz",

@@ -38,6 +38,7 @@ impl Effect for SupplyDroop {
         laws: &[Law::Supply],
         law: "the supply node is a volume fed through a regulator that gives way under flow",
         source: "ISO 6953-2:2015, Beater 2007; range: textbook prior",
+        has_memory: true,
         keys: &[
             EffectKey {
                 name: "droop_bar",

@@ -32,6 +32,7 @@ impl Effect for TimeSkew {
         laws: &[Law::PastReadings],
         law: "a channel shows the truth of a fixed time before",
         source: "definition; range: effects.md, textbook prior",
+        has_memory: true,
         keys: &[EffectKey {
             name: "delay_ms",
             unit: Unit::Millisecond,

@@ -32,6 +32,7 @@ impl Effect for ValveHysteresis {
         law: "a play of half-width h lies between command and spool",
         source: "play operator, Krasnosel'skii and Pokrovskii 1989; range: textbook prior",
         nonlinear_in_amplitude: true,
+        has_memory: true,
         keys: &[EffectKey {
             name: "half_width_percent",
             unit: Unit::Percent,

@@ -21,6 +21,7 @@
 use crate::classes::DrawClasses;
 use crate::draws::{Draw, axis_of};
 use crate::report::{Report, Verdict};
+use plant::effects::sheet;
 use plant::effects::sheet::Place;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,23 +29,6 @@ use std::collections::{BTreeMap, BTreeSet};
 pub mod tables;
 
 pub use tables::Tables;
-
-/// Effects for which the plant keeps something from step to step.
-pub const WITH_MEMORY: [&str; 13] = [
-    "valve-hysteresis",
-    "spool-second-order",
-    "spool-rate-limit",
-    "line-delay",
-    "silencer-back-pressure",
-    "supply-droop",
-    "command-dead-time",
-    "heat-exchange",
-    "presliding",
-    "rest-time-dependent-break-away",
-    "position-sensor-lag",
-    "pressure-sensor-lag",
-    "time-skew",
-];
 
 /// Variables of a report that are looked at.
 const FIRST: usize = 2;
@@ -120,7 +104,7 @@ pub fn judge(
         balance,
         variable_right,
         variables,
-        with_memory: hidden.is_some_and(|hidden| WITH_MEMORY.contains(&hidden.name)),
+        with_memory: hidden.and_then(|hidden| sheet(hidden.name)).is_some_and(|sheet| sheet.has_memory),
     }
 }
 
@@ -163,7 +147,7 @@ mod tests {
     /// A draw of this effect at its first place, or at one of the load.
     fn draw(effect: &str, place: &str) -> Draw {
         let shape = Shape { each: 1, ..Shape::NO_DRAW };
-        let sheet = plant::effects::sheet(effect).unwrap();
+        let sheet = sheet(effect).unwrap();
         let mut draw = draws(1, &shape).into_iter().find(|draw| draw.kind == Kind::Single).unwrap();
         let numbers = sheet.keys.iter().map(|key| key.drawn[1]).collect();
         draw.recipe.hidden =
@@ -182,10 +166,9 @@ mod tests {
     }
 
     #[test]
-    fn every_effect_of_the_catalogue_has_an_expectation_and_memory_is_told_of_real_ones() {
+    fn every_effect_of_the_catalogue_has_an_expectation() {
         let table = expectations();
         assert!(SHEETS.iter().all(|sheet| table.contains_key(sheet.name)) && table.len() == SHEETS.len());
-        assert!(WITH_MEMORY.iter().all(|name| plant::effects::sheet(name).is_some()));
     }
 
     #[test]
