@@ -10,7 +10,8 @@
 
 use crate::gridded_record::{AxisState, GriddedRecord};
 use plant::effects::declared::{Declared, Target};
-use plant::effects::sheet::{Element, Part};
+use plant::effects::sheet;
+use plant::effects::sheet::{Element, Part, SensorError};
 use plant::{Axis, PERIOD_S, RigParameters};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,29 +44,21 @@ impl SensorInverse {
     pub(crate) fn of(rig: &RigParameters) -> Self {
         let mut axes = [[Reading::TRUE; 3]; 2];
         for effect in rig.effects() {
-            let axis = match effect.place.part {
-                Part::Drive => 0,
-                Part::Load => 1,
-                Part::Linkage | Part::Supply => continue,
+            let sheet = sheet(effect.name).expect("an effect that is on has a sheet");
+            let Some((error, sensor)) = sheet.sensor_error else { continue };
+            let [position, a, b] = &mut axes[usize::from(effect.place.part == Part::Load)];
+            let reading = match effect.place.element.or(sensor) {
+                Some(Element::Position) => position,
+                Some(Element::A) => a,
+                Some(Element::B) => b,
+                Some(Element::Force) | None => continue,
             };
-            let pressure = match effect.place.element {
-                Some(Element::A) => 1,
-                Some(Element::B) => 2,
-                _ => 0,
-            };
-            let number = effect.numbers[0];
-            let reading = &mut axes[axis];
-            match effect.name {
-                "position-sensor-lag" => reading[0].delay_s += number * 1e-3,
-                "pressure-sensor-lag" => reading[pressure].delay_s += number * 1e-3,
-                "time-skew" if effect.place.element != Some(Element::Force) => {
-                    reading[pressure].delay_s += number * 1e-3;
-                }
-                "position-sensor-offset" => reading[0].offset += number * 1e-3,
-                "position-sensor-gain" => reading[0].gain += number * 1e-2,
-                "pressure-sensor-offset" => reading[pressure].offset += number * 1e2,
-                "pressure-sensor-gain" => reading[pressure].gain += number * 1e-2,
-                _ => {}
+            // In SI by a product, whose rounding is not that of `to_si`.
+            let size = effect.numbers[0] * sheet.keys[0].unit.to_si(1.0);
+            match error {
+                SensorError::Delay => reading.delay_s += size,
+                SensorError::Gain => reading.gain += size,
+                SensorError::Offset => reading.offset += size,
             }
         }
         let of_readings = [Target::Position, Target::PressureA, Target::PressureB];

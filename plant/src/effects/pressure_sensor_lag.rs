@@ -18,7 +18,7 @@
 //! Source: first-order lag, sense line as one resistance and one volume; range 1 to 10 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -36,6 +36,7 @@ impl Effect for PressureSensorLag {
         law: "the pressure sensor sits at the end of a sense line: a first-order lag",
         source: "first-order lag, sense line as one resistance and one volume; range: effects.md, textbook prior",
         has_memory: true,
+        sensor_error: Some((SensorError::Delay, None)),
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,

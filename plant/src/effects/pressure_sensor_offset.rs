@@ -12,7 +12,7 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,6 +28,7 @@ impl Effect for PressureSensorOffset {
         place: PlaceKind::Chamber,
         law: "the pressure sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
+        sensor_error: Some((SensorError::Offset, None)),
         keys: &[EffectKey {
             name: "offset_mbar",
             unit: Unit::Millibar,

@@ -37,6 +37,8 @@ pub struct Sheet {
     pub also_screened: &'static [f64],
     /// Whether the plant keeps something of it from step to step.
     pub has_memory: bool,
+    /// The error of a sensor that the first number is; the sensor, where the place names none.
+    pub sensor_error: Option<(SensorError, Option<Element>)>,
 }
 
 impl Sheet {
@@ -54,6 +56,7 @@ impl Sheet {
         moves_start_states: false,
         also_screened: &[],
         has_memory: false,
+        sensor_error: None,
     };
 
     /// The place of this kind that a rig file calls so, as `drive` or `drive.a`.
@@ -137,6 +140,17 @@ pub enum Law {
     Force,
     /// Readings that depend on earlier instants.
     PastReadings,
+}
+
+/// Errors of a sensor that shows y(t) = (1 + g) x(t - d) + o of x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SensorError {
+    /// d; smooth motion takes a lag for it.
+    Delay,
+    /// g.
+    Gain,
+    /// o.
+    Offset,
 }
 
 /// Where effects of a kind can be.

@@ -15,7 +15,7 @@
 //!
 //! Source: definition; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -33,6 +33,7 @@ impl Effect for TimeSkew {
         law: "a channel shows the truth of a fixed time before",
         source: "definition; range: effects.md, textbook prior",
         has_memory: true,
+        sensor_error: Some((SensorError::Delay, None)),
         keys: &[EffectKey {
             name: "delay_ms",
             unit: Unit::Millisecond,
