@@ -7,7 +7,7 @@
 //!
 //! Effects of the linkage and the force sensor's gain are run linked: a force controller on the load presses and pulls in turns.
 
-use plant::effects::sheet::Sheet;
+use plant::effects::sheet::{Excitation, Sheet};
 use plant::{Inputs, Plant, RigParameters, Setup};
 
 /// Position, force, pressure a and pressure b of the drive as its sensors show them without noise.
@@ -62,16 +62,14 @@ const TURN_MS: usize = 1100;
 impl Experiment {
     /// The experiment that excites an effect.
     pub(crate) fn of(sheet: &Sheet, kind: Kind) -> Self {
-        let linked = matches!(sheet.name, "coupling-backlash" | "coupling-compliance" | "force-sensor-gain");
-        let start_m = match (sheet.name, kind) {
-            // Near the end, where the chamber is small.
-            ("dead-volume", Kind::Step) => 0.01,
+        let start_m = match (sheet.excited_by, kind) {
+            (Excitation::NearEnd, Kind::Step) => 0.01,
             // The step ends in the cushion.
-            ("end-cushion", Kind::Step) => 0.43,
-            ("end-cushion", Kind::SlowStroke) => 0.199,
+            (Excitation::IntoEnd, Kind::Step) => 0.43,
+            (Excitation::IntoEnd, Kind::SlowStroke) => 0.199,
             _ => 0.1,
         };
-        Experiment { kind, linked, start_m }
+        Experiment { kind, linked: sheet.excited_by == Excitation::LinkedRods, start_m }
     }
 
     /// In words, for the page.

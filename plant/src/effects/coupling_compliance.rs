@@ -15,7 +15,7 @@
 //!
 //! Source: Kelvin-Voigt contact of rig-model.md, Masses and linkage; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -34,6 +34,7 @@ impl Effect for CouplingCompliance {
         source: "rig-model.md, Masses and linkage; range: effects.md, textbook prior",
         // Damping alone absorbs the errors of the start states.
         defined_by_first: true,
+        excited_by: Excitation::LinkedRods,
         keys: &[
             EffectKey {
                 name: "stiffness_n_per_m",

@@ -12,7 +12,7 @@
 //!
 //! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Element, Group, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Element, Excitation, Group, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -27,6 +27,7 @@ impl Effect for ForceSensorGain {
         group: Group::Sensor,
         law: "the force sensor reads too much by a share",
         source: "gain error of a transducer; range: effects.md, textbook prior",
+        excited_by: Excitation::LinkedRods,
         sensor_error: Some((SensorError::Gain, Some(Element::Force))),
         keys: &[EffectKey {
             name: "gain_percent",

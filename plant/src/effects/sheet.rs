@@ -37,6 +37,8 @@ pub struct Sheet {
     pub also_screened: &'static [f64],
     /// Whether the plant keeps something of it from step to step.
     pub has_memory: bool,
+    /// Motion that excites it.
+    pub excited_by: Excitation,
     /// The error of a sensor that the first number is; the sensor, where the place names none.
     pub sensor_error: Option<(SensorError, Option<Element>)>,
 }
@@ -56,6 +58,7 @@ impl Sheet {
         moves_start_states: false,
         also_screened: &[],
         has_memory: false,
+        excited_by: Excitation::Any,
         sensor_error: None,
     };
 
@@ -140,6 +143,23 @@ pub enum Law {
     Force,
     /// Readings that depend on earlier instants.
     PastReadings,
+}
+
+/// Motions that excite effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Excitation {
+    /// Any stroke.
+    Any,
+    /// Slow enough for friction to matter.
+    Creeping,
+    /// Fast enough for the exhausts to be below the speed of sound, where the pressure behind them counts.
+    Fast,
+    /// From near an end, where a chamber is small.
+    NearEnd,
+    /// Into an end.
+    IntoEnd,
+    /// Linked rods that press and pull.
+    LinkedRods,
 }
 
 /// Errors of a sensor that shows y(t) = (1 + g) x(t - d) + o of x.

@@ -1,8 +1,8 @@
 //! The plant's smooth effects against an independent solver: motions, who is on in them, and the differences.
 //!
 //! [`equations`] is the rig with its effects as one system of ordinary differential equations, [`solution`] lets ode_solvers
-//! solve it, and here both follow the same commands from the same state. Smooth is what such a system can have: 35 of the 38
-//! effects. Left out are `spool-rate-limit` (a corner of its own), `line-delay` (an equation with a delay) and
+//! solve it, and here both follow the same commands from the same state. Smooth is what such a system can have: all effects but
+//! `spool-rate-limit` (a corner of its own), `line-delay` (an equation with a delay) and
 //! `rest-time-dependent-break-away` (acts on what rests).
 
 #![allow(dead_code)] // each user needs a part of it
@@ -13,7 +13,7 @@ mod solution;
 
 use numbers::Numbers;
 use plant::effects::SHEETS;
-use plant::effects::sheet::{EffectKey, Sheet};
+use plant::effects::sheet::{EffectKey, Excitation, Sheet};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
 use solution::{Seen, solve};
 
@@ -180,13 +180,12 @@ pub(crate) fn is_smooth(sheet: &Sheet) -> bool {
 }
 
 pub(crate) fn motion_of(sheet: &Sheet) -> Motion {
-    match sheet.name {
-        "stribeck-friction" | "presliding" => CREEPING,
-        "end-cushion" => INTO_THE_END,
-        // Fast enough for the exhausts to be below the speed of sound, where the pressure behind them counts.
-        "silencer-back-pressure" => SWEEP,
-        "coupling-backlash" | "coupling-compliance" | "force-sensor-gain" => PUSHING,
-        _ => EXTENDING,
+    match sheet.excited_by {
+        Excitation::Creeping => CREEPING,
+        Excitation::IntoEnd => INTO_THE_END,
+        Excitation::Fast => SWEEP,
+        Excitation::LinkedRods => PUSHING,
+        Excitation::Any | Excitation::NearEnd => EXTENDING,
     }
 }
 
