@@ -3,109 +3,59 @@
 //! Source: effects.md, the column of twins; discrepancy-notes.md, 11 and pipeline 9.
 
 use super::Explanation;
+use plant::effects::sheet;
+use plant::effects::sheet::ByHand;
 
-/// Effects that a measurement discriminates, and the measurement.
-struct Remedy {
-    among: &'static [&'static str],
-    what: &'static str,
-}
-
-/// The first entry that contains both sides of a pair counts.
-const REMEDIES: &[Remedy] = &[
-    Remedy {
-        among: &[
-            "pressure-sensor-offset",
-            "pressure-sensor-gain",
-            "parameter:supply-pressure",
-            "parameter:piston-area",
-        ],
-        what: "venting both chambers to the atmosphere, where the pressure is known, and a gauge at the supply",
-    },
-    Remedy {
-        among: &[
-            "inclination",
-            "friction-asymmetry",
-            "pressure-sensor-offset",
-            "pressure-sensor-gain",
-            "force-sensor-offset",
-            "position-dependent-force",
-            "parameter:sliding-friction",
-        ],
-        what: "tilting the rig by a known angle: gravity along the rod changes with it, offsets of sensors and friction do not",
-    },
-    Remedy {
-        among: &["force-sensor-gain", "force-sensor-offset", "parameter:mass", "inclination"],
-        what: "uncoupling the rods and hanging a known weight on the force sensor",
-    },
-    Remedy {
-        among: &["position-sensor-lag", "time-skew"],
-        what: "a second position sensor without filter, or samples faster than 1 kHz: at 1 kHz a short lag is a delay",
-    },
-    Remedy {
-        among: &["pressure-sensor-lag", "time-skew", "line-delay", "parameter:flow-lag", "line-resistance"],
-        what: "a fast pressure sensor at the chamber's port beside the rig's own",
-    },
-    Remedy {
-        among: &[
-            "spool-second-order",
-            "spool-rate-limit",
-            "command-dead-time",
-            "line-delay",
-            "valve-hysteresis",
-            "parameter:spool-time-constant",
-            "parameter:flow-lag",
-        ],
-        what: "the spool's own position signal, or steps of the valve on a locked piston",
-    },
-    Remedy {
-        among: &["piston-leakage", "rod-leakage", "valve-null-leakage", "valve-offset", "heat-exchange"],
-        what: "locking the piston, shutting the supply, and holding for minutes with the valve's ports plugged",
-    },
-    Remedy {
-        among: &[
-            "critical-pressure-ratio",
-            "valve-characteristic",
-            "valve-dead-zone",
-            "heat-exchange",
-            "dead-volume",
-            "parameter:kv-scale",
-            "line-resistance",
-            "check-valve-restriction",
-            "silencer-back-pressure",
-            "supply-droop",
-            "parameter:supply-pressure",
-        ],
-        what: "locking the piston at several places and filling and venting a chamber at constant volume",
-    },
-    Remedy {
-        among: &["dead-volume", "position-sensor-offset", "position-sensor-gain", "end-cushion"],
-        what: "pressing the piston against both ends by hand: the stroke is known",
-    },
-    Remedy {
-        among: &[
-            "coupling-backlash",
-            "coupling-compliance",
-            "time-skew",
-            "position-sensor-offset",
-            "presliding",
-        ],
-        what: "uncoupling the rods: what stays is not the linkage",
-    },
-    Remedy {
-        among: &[
-            "stribeck-friction",
-            "presliding",
-            "friction-asymmetry",
-            "pressure-dependent-friction",
-            "position-dependent-friction",
-            "position-dependent-force",
-            "rest-time-dependent-break-away",
-            "parameter:viscous-friction",
-            "parameter:sliding-friction",
-            "parameter:break-away-force",
-        ],
-        what: "uncoupling the rods and pulling the vented piston by hand with a force gauge",
-    },
+/// Measurements that sheets of effects name, each with parameters that it discriminates too, and in words. The first that
+/// discriminates both sides of a pair counts.
+const REMEDIES: &[(ByHand, &[&str], &str)] = &[
+    (
+        ByHand::Venting,
+        &["parameter:supply-pressure", "parameter:piston-area"],
+        "venting both chambers to the atmosphere, where the pressure is known, and a gauge at the supply",
+    ),
+    (
+        ByHand::Tilting,
+        &["parameter:sliding-friction"],
+        "tilting the rig by a known angle: gravity along the rod changes with it, offsets of sensors and friction do not",
+    ),
+    (
+        ByHand::KnownWeight,
+        &["parameter:mass"],
+        "uncoupling the rods and hanging a known weight on the force sensor",
+    ),
+    (
+        ByHand::PositionSensor,
+        &[],
+        "a second position sensor without filter, or samples faster than 1 kHz: at 1 kHz a short lag is a delay",
+    ),
+    (
+        ByHand::PortPressure,
+        &["parameter:flow-lag"],
+        "a fast pressure sensor at the chamber's port beside the rig's own",
+    ),
+    (
+        ByHand::SpoolSignal,
+        &["parameter:spool-time-constant", "parameter:flow-lag"],
+        "the spool's own position signal, or steps of the valve on a locked piston",
+    ),
+    (
+        ByHand::LockedHold,
+        &[],
+        "locking the piston, shutting the supply, and holding for minutes with the valve's ports plugged",
+    ),
+    (
+        ByHand::ConstantVolume,
+        &["parameter:kv-scale", "parameter:supply-pressure"],
+        "locking the piston at several places and filling and venting a chamber at constant volume",
+    ),
+    (ByHand::PressedEnds, &[], "pressing the piston against both ends by hand: the stroke is known"),
+    (ByHand::Uncoupling, &[], "uncoupling the rods: what stays is not the linkage"),
+    (
+        ByHand::Pulling,
+        &["parameter:viscous-friction", "parameter:sliding-friction", "parameter:break-away-force"],
+        "uncoupling the rods and pulling the vented piston by hand with a force gauge",
+    ),
 ];
 
 /// Fallback.
@@ -130,11 +80,12 @@ pub(crate) fn of_pair(one: &[String], other: &[String]) -> &'static str {
         these.iter().filter(|name| !those.contains(name)).map(effect).collect()
     };
     let (left, right) = (only(one, other), only(other, one));
-    let knows = |remedy: &&Remedy, side: &[String]| {
-        !side.is_empty() && side.iter().all(|effect| remedy.among.contains(&effect.as_str()))
+    let knows = |(by, parameters, _): &(ByHand, &[&str], &str), side: &[String]| {
+        let of_sheet = |name: &str| sheet(name).is_some_and(|sheet| sheet.told_apart_by.contains(by));
+        !side.is_empty() && side.iter().all(|name| parameters.contains(&name.as_str()) || of_sheet(name))
     };
     let remedy = REMEDIES.iter().find(|remedy| knows(remedy, &left) && knows(remedy, &right));
-    remedy.map_or(ELSE, |remedy| remedy.what)
+    remedy.map_or(ELSE, |(.., what)| what)
 }
 
 #[cfg(test)]
@@ -143,10 +94,14 @@ mod tests {
     use plant::effects::SHEETS;
 
     #[test]
-    fn every_effect_of_a_remedy_is_one_of_the_catalogue() {
-        for name in REMEDIES.iter().flat_map(|remedy| remedy.among) {
-            let known = name.starts_with("parameter:") || SHEETS.iter().any(|sheet| sheet.name == *name);
-            assert!(known, "{name}");
+    fn every_measurement_of_a_sheet_has_words_and_tells_several_apart() {
+        let named = |by| SHEETS.iter().filter(|sheet| sheet.told_apart_by.contains(by)).count();
+        for by in SHEETS.iter().flat_map(|sheet| sheet.told_apart_by) {
+            assert!(REMEDIES.iter().any(|(own, ..)| own == by), "{by:?}");
+        }
+        for (by, parameters, _) in REMEDIES {
+            assert!(named(by) + parameters.len() > 1, "{by:?}");
+            assert!(parameters.iter().all(|name| name.starts_with("parameter:")), "{by:?}");
         }
     }
 

@@ -12,7 +12,7 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Element, Group, SensorError, Sheet};
+use super::sheet::{ByHand, Effect, EffectKey, Element, Group, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,6 +28,7 @@ impl Effect for ForceSensorOffset {
         law: "the force sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Offset, Some(Element::Force))),
+        told_apart_by: &[ByHand::Tilting, ByHand::KnownWeight],
         keys: &[EffectKey {
             name: "offset_n",
             unit: Unit::Newton,

@@ -18,7 +18,7 @@
 //! Source: first-order lag, filter of the transducer; range 0.5 to 8 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Element, Group, Law, SensorError, Sheet};
+use super::sheet::{ByHand, Effect, EffectKey, Element, Group, Law, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -36,6 +36,7 @@ impl Effect for PositionSensorLag {
         source: "first-order lag, filter of the transducer; range: effects.md, textbook prior",
         has_memory: true,
         sensor_error: Some((SensorError::Delay, Some(Element::Position))),
+        told_apart_by: &[ByHand::PositionSensor],
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,

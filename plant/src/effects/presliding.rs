@@ -57,7 +57,7 @@
 //! state elastoplastic friction models", IEEE Trans. Automatic Control 47(5). Fading form of s_1: ours, the simplest that is
 //! passive and gives psi in closed form. v_s and the range of s_0: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Excitation, Group, Law, Sheet};
+use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, Law, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -111,6 +111,7 @@ impl Effect for Presliding {
         source: "Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3); range: effects.md, textbook prior",
         has_memory: true,
         excited_by: Excitation::Creeping,
+        told_apart_by: &[ByHand::Uncoupling, ByHand::Pulling],
         keys: &[EffectKey {
             name: "stiffness_n_per_m",
             unit: Unit::NewtonPerMetre,

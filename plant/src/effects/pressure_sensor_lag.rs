@@ -18,7 +18,7 @@
 //! Source: first-order lag, sense line as one resistance and one volume; range 1 to 10 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, SensorError, Sheet};
+use super::sheet::{ByHand, Effect, EffectKey, Group, Law, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -37,6 +37,7 @@ impl Effect for PressureSensorLag {
         source: "first-order lag, sense line as one resistance and one volume; range: effects.md, textbook prior",
         has_memory: true,
         sensor_error: Some((SensorError::Delay, None)),
+        told_apart_by: &[ByHand::PortPressure],
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,

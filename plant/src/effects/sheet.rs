@@ -41,6 +41,8 @@ pub struct Sheet {
     pub excited_by: Excitation,
     /// The error of a sensor that the first number is; the sensor, where the place names none.
     pub sensor_error: Option<(SensorError, Option<Element>)>,
+    /// Measurements by hand that discriminate it from its twins.
+    pub told_apart_by: &'static [ByHand],
 }
 
 impl Sheet {
@@ -60,6 +62,7 @@ impl Sheet {
         has_memory: false,
         excited_by: Excitation::Any,
         sensor_error: None,
+        told_apart_by: &[],
     };
 
     /// The place of this kind that a rig file calls so, as `drive` or `drive.a`.
@@ -171,6 +174,33 @@ pub enum SensorError {
     Gain,
     /// o.
     Offset,
+}
+
+/// Measurements by hand, for effects that no experiment discriminates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ByHand {
+    /// Both chambers at the atmosphere, a gauge at the supply.
+    Venting,
+    /// A known angle of the rig.
+    Tilting,
+    /// A weight on the force sensor.
+    KnownWeight,
+    /// A second, faster position sensor.
+    PositionSensor,
+    /// A fast pressure sensor at a chamber's port.
+    PortPressure,
+    /// The position of the spool.
+    SpoolSignal,
+    /// The piston locked for minutes, ports plugged, supply shut.
+    LockedHold,
+    /// A chamber filled and vented, the piston locked.
+    ConstantVolume,
+    /// The piston at both ends of its stroke.
+    PressedEnds,
+    /// The rods apart.
+    Uncoupling,
+    /// A force gauge at the vented piston.
+    Pulling,
 }
 
 /// Where effects of a kind can be.
