@@ -162,8 +162,8 @@ pub struct FindEffectArguments {
     #[arg(long, value_name = "N", default_value = "1", value_parser = |text: &str| whole(text, 1, 1000))]
     pub count: u64,
     /// Number of different effects in each
-    #[arg(long, value_name = "K", default_value = "1", value_parser = |text: &str| whole(text, 0, MOST_EFFECTS))]
-    pub effects: u64,
+    #[arg(long, value_name = "K", default_value = "1")]
+    pub effects: u8,
     /// Where effects are drawn
     #[arg(long, value_name = "WHICH", default_value = "both", value_parser = ["drive", "load", "both"])]
     pub axis: String,
@@ -195,9 +195,6 @@ pub struct FindEffectArguments {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
-
-/// Effects of the catalogue.
-const MOST_EFFECTS: u64 = 38;
 
 /// A whole number in a range.
 fn whole(text: &str, least: u64, most: u64) -> Result<u64, String> {

@@ -126,7 +126,8 @@ impl Search<'_> {
             Some(text) => {
                 fs::write(&sealed, text).map_err(|error| FrontError::output(&sealed, &error))?;
             }
-            None => self.draw(seed, &sealed)?,
+            // Nothing is measured: the folder stays free for another try.
+            None => self.draw(seed, &sealed).inspect_err(|_| drop(fs::remove_dir_all(&folder)))?,
         }
         for ((name, file), noise) in self.experiments.clone().iter().zip([1000, 2000]) {
             say(&format!("measuring {name} on the sealed rig …"));
@@ -171,7 +172,14 @@ impl Search<'_> {
         let mut seal = Command::new(&self.emulator);
         seal.args(["seal", "--seed", &seed.to_string(), "--effects", &self.arguments.effects.to_string()]);
         seal.args(["--axis", &self.arguments.axis, "--out"]).arg(sealed).stdout(Stdio::null());
-        self.called(&mut seal, "emulator seal failed")
+        let code = self.children.call(&mut seal)?;
+        self.expect_going_on()?;
+        match code {
+            0 => Ok(()),
+            // It knows the catalogue, and has said what there is.
+            2 => Err(FrontError::Input(format!("--effects {}: cannot be drawn", self.arguments.effects))),
+            _ => Err(FrontError::Process("emulator seal failed".into())),
+        }
     }
 
     /// A run of the rig that the folder's seal hides something in.

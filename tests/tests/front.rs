@@ -69,8 +69,9 @@ fn an_unknown_command_is_answered_with_the_commands_that_there_are() {
 fn find_effect_hides_at_most_as_many_effects_as_the_catalogue_has() {
     let all = plant::effects::SHEETS.len();
     let one_more = (all + 1).to_string();
-    let refused = Prefix::made().run(&["find-effect", "--effects", &one_more]);
-    let _ = refused.expect_code(2).expect_said(&[&format!("must be a whole number from 0 to {all}")]);
+    let refused =
+        Prefix::made().run(&["find-effect", "--held-out", "identification", "--effects", &one_more]);
+    let _ = refused.expect_code(2).expect_said(&[&format!("allowed are 0 to {all} here")]);
 }
 
 #[test]
