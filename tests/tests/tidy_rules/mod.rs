@@ -37,6 +37,7 @@ pub(crate) const RULES: &[&Rule] = &[
     &rust::CRATE_EDGES,
     &rust::PURE_PLANT,
     &rust::EFFECTS,
+    &rust::EFFECTS_BY_NAME,
     &rust::UNITS_IN_NAMES,
     &rust::LINE_LENGTH,
     &text::FILE_LENGTH,

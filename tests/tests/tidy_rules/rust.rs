@@ -1,6 +1,8 @@
 //! Rules for Rust and for what the rooms may know of each other.
 
 use super::{Problem, Rule};
+use plant::effects::SHEETS;
+use plant::effects::sheet::Sheet;
 use std::str::SplitWhitespace;
 
 fn is_rust(path: &str) -> bool {
@@ -174,6 +176,33 @@ pub(super) const EFFECTS: Rule = Rule {
     good: &[
         ("plant/src/effects/a.rs", "//! A.\n//! Source: b.\nconst SHEET: Sheet = Sheet {};\n#[cfg(test)]\n"),
         ("plant/src/effects/a.rs", "//! Machinery.\n"),
+    ],
+};
+
+/// What reads the sheets of effects names none, so that a new effect needs no line there.
+pub(super) const EFFECTS_BY_NAME: Rule = Rule {
+    name: "effects-by-name",
+    applies: |path| {
+        let reads = ["campaign/src/", "discrepancy/src/", "front/src/", "tests/study-tool/src/"];
+        // Each far form of the record maker is of one effect.
+        let others = ["tests.rs", "/page/samples.rs", "study-tool/src/forms.rs"];
+        let is_other = others.iter().any(|end| path.ends_with(end));
+        is_rust(path) && !is_other && reads.iter().any(|folder| path.starts_with(folder))
+    },
+    check: |file| {
+        let mut in_tests = false;
+        file.each_line(|line| {
+            in_tests |= line == "#[cfg(test)]";
+            let is_code = !in_tests && !line.trim_start().starts_with("//");
+            let named = |sheet: &&Sheet| is_code && line.contains(&format!("\"{}\"", sheet.name));
+            let name = SHEETS.iter().find(named)?.name;
+            Some(format!("state in the sheet of {name} what is true of it (plant/src/effects/sheet.rs)"))
+        })
+    },
+    bad: &[("front/src/a.rs", "//! A.\nconst SLOW: &str = \"line-delay\";\n", 2)],
+    good: &[
+        ("front/src/a.rs", "//! As \"line-delay\".\n#[cfg(test)]\nconst SLOW: &str = \"line-delay\";\n"),
+        ("plant/src/effects/a.rs", "name: \"line-delay\",\n"),
     ],
 };
 
