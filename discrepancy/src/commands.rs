@@ -24,7 +24,6 @@ use crate::{locate, page, verify};
 use model_fit::{is_model_file, successor};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
-use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -32,6 +31,9 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Instant;
 use text::{in_words, quantity_in_words, significant};
+
+/// Keys without which the report of a rig file says nothing of an extended one.
+const OF_RIG: [&str; 3] = ["named", "parameters", "inputs"];
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
@@ -317,6 +319,7 @@ fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
         any_plant::extended_text(&arguments.rig, &text, &arguments.report)?
     } else {
         let report = any_plant::report_of(&arguments.report, false)?;
+        let report = any_plant::with_keys((&arguments.report, report), &OF_RIG)?;
         workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?
     };
     spare(&arguments.out, &[&arguments.rig, &arguments.report])?;
@@ -371,7 +374,7 @@ struct VerifiedFile<'a> {
 
 fn next_command(arguments: &NextArguments) -> Result<Exit, CommandError> {
     let rig_file = RigFile::read(&arguments.rig)?;
-    let report = read_report(&arguments.report)?;
+    let report = any_plant::with_keys((&arguments.report, read_report(&arguments.report)?), &OF_RIG)?;
     let Some(proposal) = workflow::proposal(&rig_file, &report, &mut progress()) else {
         print("The report names nothing that cannot be told apart.\n")?;
         return Ok(Exit::Good);
@@ -404,7 +407,7 @@ fn gridded_records(arguments: &RecordArguments) -> Result<(RigFile, Vec<GriddedR
     Ok((rig_file, all))
 }
 
-fn read_report<T: DeserializeOwned>(path: &Path) -> Result<T, CommandError> {
+fn read_report(path: &Path) -> Result<serde_json::Value, CommandError> {
     let bytes = std::fs::read(path).map_err(|why| CommandError::File { file: path.to_owned(), why })?;
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }

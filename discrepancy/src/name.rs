@@ -36,7 +36,7 @@ pub use decision::NotExplained;
 use decision::{Decision, Searched, decide};
 use elimination::Selection;
 pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, same};
-pub use explanations::{Explanation, ExplanationKind, Features};
+pub use explanations::Explanation;
 use explanations::{Fits, explanations};
 use gauss_newton::{fit_selected, shrink_parameters};
 use heterogeneity::{

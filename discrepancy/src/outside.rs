@@ -78,22 +78,20 @@ pub fn outside(
     best.map(|(_, tests)| tests.report(located.filter(|located| located.balance == tests.series.balance)))
 }
 
-impl LocatedTerm {
-    /// The places of its variables among [`VARIABLES`], taken out of `order`.
-    fn places(&self, order: &mut Vec<usize>) -> Vec<usize> {
-        let place = |name: &str| VARIABLES.iter().position(|known| known.name == name);
-        let places: Vec<usize> =
-            self.variables.iter().take(LOCATED).filter_map(|variable| place(&variable.variable)).collect();
-        order.retain(|variable| !places.contains(variable));
-        places
-    }
+/// The places of its variables among [`VARIABLES`], taken out of `order`.
+fn places(located: &LocatedTerm, order: &mut Vec<usize>) -> Vec<usize> {
+    let place = |name: &str| VARIABLES.iter().position(|known| known.name == name);
+    let places: Vec<usize> =
+        located.variables.iter().take(LOCATED).filter_map(|variable| place(&variable.variable)).collect();
+    order.retain(|variable| !places.contains(variable));
+    places
 }
 
 impl BalanceTests<'_> {
     fn report(&self, located: Option<&LocatedTerm>) -> Outside {
         let (mut order, mut pair) = self.order();
         if let Some(located) = located {
-            let first = located.places(&mut order);
+            let first = places(located, &mut order);
             pair = pair.filter(|pair| pair.iter().all(|variable| first.contains(variable)));
             order.splice(0..0, first);
         }

@@ -9,6 +9,7 @@
 //! coordinate of 1. That is a scale: the standard deviation of the prior distribution is three times it. The smallest amplitude
 //! that is named is `MIN_AMPLITUDE_RATIO` of a tenth of it. A number with a value is a shape, which starts there.
 
+use crate::report::{DeclaredSuspect, place_of};
 use model::{Change, EntryParameter, Library};
 use plant::effects::declared::{Declared, Number};
 use plant::effects::sheet::{EffectKey, Group, Place, PlaceKind, Sheet};
@@ -94,6 +95,18 @@ impl Suspect {
         };
         let place = declared.at();
         Suspect { declared, sheet, place }
+    }
+
+    /// As a report has it.
+    pub(crate) fn reported(&self) -> DeclaredSuspect {
+        DeclaredSuspect {
+            effect: self.declared.name().to_owned(),
+            place: place_of(self.place),
+            adds_to: self.declared.place(),
+            add: self.declared.expression().to_owned(),
+            twins: self.declared.twins().to_vec(),
+            declaration: self.declared.toml("suspects"),
+        }
     }
 }
 

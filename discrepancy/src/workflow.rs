@@ -10,7 +10,6 @@
 mod explained;
 mod findings;
 mod proposal;
-mod reported;
 
 use crate::check::{Checked, check};
 use crate::discrepancy_term::{Beside, located_term};
@@ -23,21 +22,19 @@ use crate::outside::outside;
 use crate::page::Pictures;
 use crate::parameters::{COUNT, with_factors};
 use crate::refit::{Refit, rig_of};
-use crate::report::{self, InputFiles, LocatedTerm, NamedEffect, Report, Verdict};
+use crate::report::{self, DeclaredSuspect, InputFiles, LocatedTerm, NamedEffect, Report, Verdict};
 use crate::suspects::Suspect;
 use crate::tabulate::{tables, tabulate};
 use crate::verify::{drawn, verify};
 pub use explained::explained;
 use explained::searched_for;
 pub(crate) use findings::empty;
-pub(crate) use findings::place_name;
 use findings::{report_of, summary};
 use model_fit::is_model_file;
 use plant::{Axis, ParameterError, RigParameters};
 pub use proposal::proposal;
 use proposal::proposal_for;
 use records::{ReadError, ReadOptions};
-pub use reported::Reported;
 use std::path::{Path, PathBuf};
 
 /// Inputs of the workflow.
@@ -183,7 +180,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     let mut report = report_of(&engine, &found);
     report.inputs = inputs;
     report.checks = checks;
-    report.suspects = task.suspects.iter().map(|suspect| report::DeclaredSuspect::of(suspect)).collect();
+    report.suspects = task.suspects.iter().map(|suspect| suspect.reported()).collect();
     progress("locating");
     // Under the rig file's own values, whatever the verdict: parameters that were fitted without the effect absorb it.
     let located = locate(rig, &records, progress);
@@ -216,16 +213,15 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
         let unknowns = rig.filter(|_| linked).map(|rig| locate(&rig, &records, progress).unknowns);
         report.remaining = term_beside(&engine, &beside, &unknowns.unwrap_or_default(), progress);
     }
-    let reported = Reported::from(&report);
     let mut experiment = None;
     if report.verdict == Verdict::Ambiguous
-        && let Some(proposal) = proposal_for(&rig_file, &reported, Some(&engine), progress)
+        && let Some(proposal) = proposal_for(&rig_file, &report, Some(&engine), progress)
     {
         experiment = proposal.experiment_toml;
         report.next = Some(proposal.next);
     }
     report.summary = summary(&report);
-    let text = extended(&rig_file, &reported)?;
+    let text = extended(&rig_file, &report)?;
     let after = RigParameters::from_toml(&text, "extended rig.toml")?;
     // The findings stand whatever the held-out record is like.
     let (pictures, not_judged) = match held_out(task, rig, &after, &records, &mut report, progress) {
@@ -333,15 +329,15 @@ fn is_copy(one: &Path, other: &Path) -> bool {
 ///
 /// # Errors
 /// [`ExtendError`] when it names what a rig cannot have.
-pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, ExtendError> {
+pub fn extended(rig_file: &RigFile, reported: &Report) -> Result<String, ExtendError> {
     let effects = || reported.named.iter().chain(&reported.small);
     let suspect = |effect: &NamedEffect| reported.suspects.iter().find(|own| own.is(effect));
     let of_catalogue = effects().filter(|effect| suspect(effect).is_none());
     let additions: Vec<Addition> = of_catalogue.map(addition).collect();
-    let terms: Vec<(&NamedEffect, &report::DeclaredSuspect)> =
+    let terms: Vec<(&NamedEffect, &DeclaredSuspect)> =
         effects().filter_map(|effect| Some((effect, suspect(effect)?))).collect();
     let changed = [&reported.parameters[..], &reported.insignificant].concat();
-    let mass_axis = mass_axis(reported.measured());
+    let mass_axis = mass_axis(measured(reported));
     let text =
         extend(&rig_file.text, &rig_file.file, &additions, &changed, mass_axis, &reported.inputs.train)?;
     let text = add_terms(&text, &rig_file.file, &terms, &reported.inputs.train)?;
@@ -361,6 +357,11 @@ fn open_all(
             open(path, &task.options, rig)
         })
         .collect()
+}
+
+/// Which axes the training records of a report showed.
+fn measured(reported: &Report) -> [bool; 2] {
+    Axis::ALL.map(|axis| reported.inputs.axes.iter().any(|name| name == axis.name()))
 }
 
 /// Restricts records to their common axes. No axis of linked rods can be left out, since they move together.
@@ -395,13 +396,12 @@ fn bad_data(inputs: InputFiles, checks: Vec<report::RecordCheck>) -> Outcome {
 }
 
 fn addition(named: &NamedEffect) -> Addition {
-    let place = place_name(&named.place);
     let numbers = named
         .parameters
         .iter()
         .map(|number| (number.name.clone(), number.value, number.standard_error))
         .collect();
-    Addition { effect: named.effect.clone(), place, numbers }
+    Addition { effect: named.effect.clone(), place: named.place.to_string(), numbers }
 }
 
 #[cfg(test)]

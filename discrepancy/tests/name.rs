@@ -3,8 +3,9 @@
 use crate::record::{both_gridded, gridded, gridded_briefly, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
-use discrepancy::name::{ExplanationKind, SelectionResult, is_large, name};
+use discrepancy::name::{SelectionResult, is_large, name};
 use discrepancy::parameters::{COUNT, with_factors};
+use discrepancy::report::ExplanationKind;
 use plant::RigParameters;
 
 fn found(hidden: &RigParameters, without: &[&str]) -> SelectionResult {

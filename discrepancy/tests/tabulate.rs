@@ -1,8 +1,8 @@
 //! What no effect of the catalogue explains is added to the model as a table, and closes the gap on another record.
 
 use crate::record::{STROKES_RAD_PER_S, hiding, measurement};
-use discrepancy::report::Verdict;
-use discrepancy::workflow::{Outcome, Reported, RigFile, Task, close, extended};
+use discrepancy::report::{Report, Verdict};
+use discrepancy::workflow::{Outcome, RigFile, Task, close, extended};
 use plant::RigParameters;
 
 /// Closes on two records of a rig with something hidden in it that is no candidate.
@@ -55,7 +55,7 @@ fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
     assert_eq!(rig.tabulated()[0].value, outside.tables[0].value);
     assert!(text.contains("# Found from ") && text.contains("train.csv"));
     let written = serde_json::to_string(report).expect("a report is JSON");
-    let reported: Reported = serde_json::from_str(&written).expect("what other steps read");
+    let reported: Report = serde_json::from_str(&written).expect("what other steps read");
     assert_eq!(extended(&rig_file, &reported).expect("the same"), text);
 }
 

@@ -15,7 +15,7 @@
 //!
 //! Source: Björck, Numerical Methods for Least Squares Problems, SIAM 1996, chapter 9 (damped Gauss-Newton, variable projection).
 
-use serde::Serialize;
+pub use runlog::discrepancy_report::{Convergence, Outcome};
 
 /// Options of a fit.
 #[derive(Clone, Copy, Debug)]
@@ -63,52 +63,6 @@ pub const RELINEARISED: Options =
     Options { steps: 4, converged: 1.0, converged_share: OF_INEXACT, fractions: &[1.0] };
 /// New linearisations of the parameters alone, from the rig file's values to a supply or a mass that is a tenth off.
 pub const CALIBRATION: Options = Options { steps: 7, ..RELINEARISED };
-
-/// How a fit ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Outcome {
-    /// The last step lowered the loss by less than the tolerance, or none promised more.
-    #[default]
-    Converged,
-    /// No step leads further, and a number is at the end of its range.
-    Bound,
-    /// The linearised model promised more, and no step lowered the simulated loss.
-    Stalled,
-    /// The steps were used up.
-    StepLimit,
-}
-
-/// How a fit ended and what it took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Convergence {
-    pub outcome: Outcome,
-    /// Accepted steps.
-    pub iterations: usize,
-    /// Simulations of the records for the loss; derivatives are not counted.
-    pub evaluations: usize,
-}
-
-impl Convergence {
-    /// What to doubt about it, in words.
-    pub fn doubt(self) -> Option<&'static str> {
-        match self.outcome {
-            Outcome::Converged => None,
-            Outcome::Bound => Some("its fit ended at the end of a range"),
-            Outcome::Stalled => Some("its fit stalled: no step lowered the simulated loss"),
-            Outcome::StepLimit => Some("its fit used up its steps"),
-        }
-    }
-
-    /// Of one fit after another.
-    pub fn then(self, next: Self) -> Self {
-        Convergence {
-            outcome: next.outcome,
-            iterations: self.iterations + next.iterations,
-            evaluations: self.evaluations + next.evaluations,
-        }
-    }
-}
 
 /// A simulated model.
 pub trait Iterate {

@@ -39,7 +39,6 @@
 //! | `extended` | the model file with what was found |
 //! | [`estimator`] | Gauss-Newton of every nonlinear fit, that of the rig too: options, globalisation, outcome |
 //! | [`stats`], [`quantum`], [`equal_runs`] | order statistics and means; rounding and stuck values of a column |
-//! | `verdict` | what is concluded |
 //!
 //! Held-out records are read and checked before a fit starts, and no value of theirs enters one: they wait until the terms are
 //! chosen and fitted. Keys: `docs/model-files.md`; figures: `docs/model-records.md`.
@@ -81,7 +80,6 @@ mod structure;
 mod term_curves;
 mod typeset;
 mod unit_row;
-mod verdict;
 
 pub use adequacy::Residual;
 pub use begin::{NewError, NewModel, Roles, new_model};
@@ -92,8 +90,8 @@ pub use held_out::{JudgeError, WORSE};
 pub use processing::SPARSEST;
 pub use record::RecordError;
 pub use report::{Left, ModelReport, Number, OfAlternative};
+pub use runlog::discrepancy_report::Verdict;
 pub use simulate::{Simulated, SimulatedOutput, simulate};
-pub use verdict::Verdict;
 
 use held_out::Traces;
 use model::{Failure, Model};

@@ -1,10 +1,11 @@
-//! The files and records of a run: each is written and read by one type.
+//! The files and records of a run, and the report of `discrepancy close`: each is written and read by one type.
 
 #![warn(missing_docs)] // an interface of other crates
 
 pub mod candump;
 pub mod conditions;
 pub mod controller_report;
+pub mod discrepancy_report;
 pub mod event;
 pub mod flight_dump;
 pub mod golden;

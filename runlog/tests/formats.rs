@@ -2,6 +2,7 @@
 
 use runlog::conditions::Conditions;
 use runlog::controller_report::ControllerReport;
+use runlog::discrepancy_report::Report;
 use runlog::flight_dump::Event;
 use runlog::golden;
 use runlog::ping_pong::PingPongFile;
@@ -35,6 +36,38 @@ fn the_files_of_a_run_go_through_their_types() {
 fn ping_pongs_go_through_their_type() {
     let again = serde_json::to_value(read::<PingPongFile>("ping-pong.json")).unwrap();
     assert_eq!(again, read::<Value>("ping-pong.json"));
+}
+
+#[test]
+fn what_is_read_of_the_report_of_close_is_written_as_it_was() {
+    let document = include_str!("../../discrepancy/docs/report.md");
+    let example = document.split("```").find_map(|part| part.strip_prefix("json")).unwrap();
+    let read: Report = serde_json::from_str(example).unwrap();
+    let [first, again]: [Value; 2] =
+        [serde_json::from_str(example).unwrap(), serde_json::to_value(&read).unwrap()];
+    for key in [
+        "schema_version",
+        "verdict",
+        "summary",
+        "inputs",
+        "named",
+        "small",
+        "parameters",
+        "carried",
+        "adequate",
+    ] {
+        assert_eq!(first[key], again[key], "{key}");
+    }
+    for key in ["gap", "not_excited", "outside", "next"] {
+        assert_eq!(first[key], again[key], "{key}");
+    }
+    for pointer in ["/explanations/0/sets", "/location/dependence/balance", "/verification/chi2_null"] {
+        assert!(
+            first.pointer(pointer).is_some() && first.pointer(pointer) == again.pointer(pointer),
+            "{pointer}"
+        );
+    }
+    assert!(serde_json::from_str::<Report>("{}").is_err(), "a report has a verdict");
 }
 
 #[test]

@@ -8,7 +8,8 @@ use model_fit::{
     close_with, explained, extended, look, new_model, read, simulate,
 };
 use pagekit::significant;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
+use serde_json::{Error, Value};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -84,15 +85,16 @@ fn no_options_of_a_rig(read: &ReadArguments, without: &[String]) -> Result<(), C
 
 /// `extend`: the text of a model file with what its report names.
 pub(super) fn extended_text(model: &Path, text: &str, report: &Path) -> Result<String, CommandError> {
-    let report: ReportedModel = report_of(report, true)?;
+    let report: ReportedModel =
+        with_keys((report, report_of(report, true)?), &["schema_version", "named", "parameters"])?;
     let is_of = report.is_of(&read(model)?);
     let extended = is_of.and_then(|()| extended(text, model.parent().unwrap_or(Path::new("")), &report));
     extended.map_err(|why| CommandError::BadData(format!("{}: {why}", model.display())))
 }
 
 /// Reads the report of a model file, or of a rig file, and refuses one of the other.
-pub(super) fn report_of<T: DeserializeOwned>(file: &Path, is_of_model: bool) -> Result<T, CommandError> {
-    let report: serde_json::Value = read_report(file)?;
+pub(super) fn report_of(file: &Path, is_of_model: bool) -> Result<Value, CommandError> {
+    let report = read_report(file)?;
     if report.get("headline").is_some() != is_of_model && report.get("schema_version").is_some() {
         let [is, should] = if is_of_model { ["rig", "model"] } else { ["model", "rig"] };
         return Err(CommandError::BadData(format!(
@@ -100,7 +102,17 @@ pub(super) fn report_of<T: DeserializeOwned>(file: &Path, is_of_model: bool) -> 
             file.display()
         )));
     }
-    serde_json::from_value(report).map_err(|why| CommandError::Report { file: file.to_owned(), why })
+    Ok(report)
+}
+
+/// A report with all of these keys, which each version of a close wrote.
+pub(super) fn with_keys<T: DeserializeOwned>(
+    (file, report): (&Path, Value),
+    keys: &[&'static str],
+) -> Result<T, CommandError> {
+    let missing = keys.iter().find(|key| report.get(key).is_none());
+    let read = missing.map_or_else(|| serde_json::from_value(report), |key| Err(Error::missing_field(key)));
+    read.map_err(|why| CommandError::Report { file: file.to_owned(), why })
 }
 
 /// `simulate`: a model file beside a record, with the values of the file.
@@ -226,7 +238,7 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         let read = |text: &str, is_of_model| {
             std::fs::write(file.path(), text).unwrap();
-            report_of::<serde_json::Value>(file.path(), is_of_model).map_err(|why| why.to_string())
+            report_of(file.path(), is_of_model).map_err(|why| why.to_string())
         };
         let of_rig = r#"{"schema_version": 1, "summary": ""}"#;
         let of_model = r#"{"schema_version": 1, "headline": ""}"#;

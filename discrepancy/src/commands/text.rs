@@ -1,7 +1,6 @@
 //! What the commands print: verdict, effects and numbers in a few lines.
 
 use crate::report::{NamedEffect, Objection, Quantity, Report, decimals};
-use crate::workflow;
 use std::fmt::Write as _;
 
 /// The verdict and the names in a few lines.
@@ -37,9 +36,8 @@ pub(super) fn in_words(report: &Report) -> String {
 }
 
 fn effect_in_words(named: &NamedEffect) -> String {
-    let place = workflow::place_name(&named.place);
     let numbers: Vec<String> = named.parameters.iter().map(quantity_in_words).collect();
-    format!("{} {place}: {}", named.effect, numbers.join(", "))
+    format!("{} {}: {}", named.effect, named.place, numbers.join(", "))
 }
 
 /// Four digits that count.

@@ -366,7 +366,7 @@ const EDDY: &str = "[[suspects]]\nname = \"eddy\"\nplace = \"drive.force\"\nadd 
 
 /// The report's words for the suspect with these numbers.
 fn eddy(c0: f64, c1: f64) -> (NamedEffect, DeclaredSuspect) {
-    let suspect = DeclaredSuspect::of(crate::suspects::read(EDDY, "s.toml").expect("good")[0]);
+    let suspect = crate::suspects::read(EDDY, "s.toml").expect("good")[0].reported();
     let number = |name: &str, value, unit: &str| quantity(name, value, unit, Some(0.0));
     let effect = NamedEffect {
         effect: suspect.effect.clone(),

@@ -13,13 +13,14 @@
 //! than [`MAX_PARAMETERS_OFF`] parameters are off beside it, unless an effect of it joined as a homogeneous one.
 
 use super::elimination::Selection;
-use super::explanations::{Explanation, ExplanationKind};
+use super::explanations::Explanation;
 use super::heterogeneity::parameter_spread;
 use super::needed_parameters::{off, with_needed};
 use super::{axes_of, is_large, loss_on, same};
 use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit, linearise};
+use crate::report::ExplanationKind;
 
 /// Probability from which on an explanation decides: it is right more often than all others together.
 const DECIDES: f64 = 0.5;

@@ -17,46 +17,13 @@ use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, parameter_precisions};
+use crate::report::{ExplanationKind, Features};
 use crate::screen::Columns;
 
 /// Number of sets of effects, alike ones counted once.
 const SETS: usize = 4;
 /// Cosine above which the responses to two effects are alike; that of the study's classes.
 const ALIKE_COSINE: f64 = 0.95;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ExplanationKind {
-    /// The rig file as it is.
-    Nothing,
-    /// Parameters of the rig file that are off.
-    Parameters,
-    /// Effects of the catalogue, parameters beside them.
-    Effects,
-    /// Other effects of the catalogue, other sets of them, or what it does not have.
-    NoneOfThese,
-}
-
-/// What the records say about an explanation; `evidence` in the report.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
-pub struct Features {
-    /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included; on the axes
-    /// that its effects act on, where both are recorded and the rods are not linked.
-    pub loss_per_dof: f64,
-    /// Loss above that of the best explanation.
-    pub behind: f64,
-    /// Number of parameters off the rig file's values, each counted by x^2 / (x^2 + tolerance^2) of its relative deviation x.
-    pub parameters_moved: f64,
-    /// Largest coefficient of variation of its effects' amplitudes between windows; null without effects, or where no derivative
-    /// exists.
-    pub amplitude_variation: Option<f64>,
-    /// Smallest amplitude of its effects over the smallest that is named; null without effects.
-    pub smallest_amplitude: Option<f64>,
-    /// Number of effects beside them that are too small to be named.
-    pub small_beside: usize,
-    /// Share of the loss under parameters alone that it removes, on the same axes.
-    pub share: f64,
-}
 
 /// An explanation and its features; none of these has none.
 #[derive(Clone, Debug)]

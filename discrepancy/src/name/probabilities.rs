@@ -6,7 +6,8 @@
 //! known; its function `regressors` gives the same x. What they say holds where nothing, parameters and effects are as frequent
 //! as in those draws.
 
-use super::explanations::{Explanation, ExplanationKind};
+use super::explanations::Explanation;
+use crate::report::ExplanationKind;
 use serde::Deserialize;
 use std::sync::LazyLock;
 
@@ -91,8 +92,8 @@ fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::explanations::Features;
     use super::*;
+    use crate::report::Features;
 
     fn explanation(kind: ExplanationKind, loss_per_dof: f64, behind: f64) -> Explanation {
         let features = Features {

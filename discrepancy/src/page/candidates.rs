@@ -3,7 +3,6 @@
 use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as text_cell};
 use super::words;
 use crate::report::{Candidate, Report};
-use crate::workflow::place_name;
 use model_fit::estimator::Convergence;
 use pagekit::plot::{Bar, bars, figure};
 
@@ -15,7 +14,7 @@ pub(super) fn candidates(report: &Report) -> String {
         return String::new();
     }
     let bar = |one: &Candidate| Bar {
-        label: format!("{} {}", one.effect, place_name(&one.place)),
+        label: format!("{} {}", one.effect, one.place),
         value: one.score,
         text: words::short(one.score),
         is_full: one.score > 1.0,

@@ -2,8 +2,7 @@
 
 use super::markup::{number, paragraph, table, words as text_cell};
 use super::words;
-use crate::name::{ExplanationKind, Features};
-use crate::report::{EffectPlace, Explanation, Report, listed};
+use crate::report::{EffectPlace, Explanation, ExplanationKind, Features, Report, listed};
 use pagekit::plot::{Bar, figure, share_bars};
 
 pub(super) fn explanations(report: &Report) -> String {

@@ -1,7 +1,6 @@
 //! Made-up reports, one for each verdict, as like real ones as made-up ones can be.
 
 use super::{Pictures, Trace};
-use crate::name::{ExplanationKind, Features};
 use crate::report::*;
 use plant::effects::SHEETS;
 use std::collections::BTreeMap;
@@ -188,7 +187,7 @@ fn candidates(size: f64) -> Vec<Candidate> {
         .iter()
         .enumerate()
         .map(|(at_place, sheet)| {
-            let place = sheet.place.places()[0].into();
+            let place = place_of(sheet.place.places()[0]);
             Candidate {
                 effect: sheet.name.to_owned(),
                 place,
@@ -273,7 +272,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             .take(30)
             .map(|sheet| DetectionLimit {
                 effect: sheet.name.to_owned(),
-                place: sheet.place.places()[0].into(),
+                place: place_of(sheet.place.places()[0]),
                 name: sheet.keys[0].name.to_owned(),
                 value: 0.1 * sheet.keys[0].drawn[0],
                 unit: sheet.keys[0].unit.name().to_owned(),

@@ -6,7 +6,7 @@ use crate::name::{SelectionResult, is_large, off, same, share_removed};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
-    self, DetectionLimit, EffectPlace, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, Where,
+    self, DetectionLimit, EffectPlace, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, place_of,
     strongest,
 };
 
@@ -118,7 +118,7 @@ fn named_effect(
         .collect();
     NamedEffect {
         effect: candidate.sheet.name.to_owned(),
-        place: Where::from(candidate.place),
+        place: place_of(candidate.place),
         parameters,
         share_explained: share,
         amplitude_variation: None,
@@ -168,7 +168,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             };
             report::Candidate {
                 effect: candidate.sheet.name.to_owned(),
-                place: Where::from(candidate.place),
+                place: place_of(candidate.place),
                 score: (null_loss - screened.loss) / found.threshold.max(1e-9),
                 share_explained: share,
                 fit: alone.map(|fit| fit.convergence),
@@ -183,7 +183,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
 pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> {
     let effect = |placed: &EffectEstimate| EffectPlace {
         effect: placed.candidate.sheet.name.to_owned(),
-        place: Where::from(placed.candidate.place),
+        place: place_of(placed.candidate.place),
     };
     let all = found.explanations.iter().map(|explanation| report::Explanation {
         kind: explanation.kind,
@@ -199,7 +199,7 @@ fn limits(found: &SelectionResult) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
     let mut not_excited = Vec::new();
     let mut limits = Vec::new();
     for (candidate, limit) in found.columns.candidates.iter().zip(&found.limits) {
-        let place = Where::from(candidate.place);
+        let place = place_of(candidate.place);
         let effect = candidate.sheet.name.to_owned();
         match limit {
             Some(z) if *z <= 1.0 => {
@@ -229,7 +229,7 @@ pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
 
 /// The verdict in a sentence or two.
 pub(super) fn summary(report: &Report) -> String {
-    let one = |effect: &NamedEffect| format!("{} ({})", effect.effect, place_name(&effect.place));
+    let one = |effect: &NamedEffect| format!("{} ({})", effect.effect, effect.place);
     let parameters =
         report.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>().join(", ");
     let off =
@@ -292,13 +292,5 @@ pub(super) fn summary(report: &Report) -> String {
             }
         }
         Verdict::BadData => report.summary.clone(),
-    }
-}
-
-/// Name of a place in rig files.
-pub(crate) fn place_name(place: &Where) -> String {
-    match &place.element {
-        Some(element) => format!("{}.{element}", place.axis),
-        None => place.axis.clone(),
     }
 }

@@ -1,11 +1,11 @@
 //! The next experiment of an ambiguous report: its explanations, as rigs.
 
-use super::{Reported, RigFile, extended, on_shared_axes, open, parts, place_name};
+use super::{RigFile, extended, measured, on_shared_axes, open, parts};
 use crate::engine::Engine;
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::next::noise::ReadingNoise;
 use crate::next::{self, Explanation, Proposal, Question};
-use crate::report::{NamedEffect, Next};
+use crate::report::{NamedEffect, Next, Report};
 use plant::RigParameters;
 use records::ReadOptions;
 use std::path::Path;
@@ -14,14 +14,14 @@ use std::path::Path;
 ///
 /// Noise and errors of the model are those of the training records, where they can still be read as the report names them;
 /// else the noise is the rig file's, and the explanations are taken as exact.
-pub fn proposal(rig_file: &RigFile, reported: &Reported, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
+pub fn proposal(rig_file: &RigFile, reported: &Report, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
     let records = training(rig_file, reported).unwrap_or_default();
     let engine = (!records.is_empty()).then(|| Engine::new(&records, &rig_file.rig));
     proposal_for(rig_file, reported, engine.as_ref(), progress)
 }
 
 /// The part of the training records that was searched.
-fn training(rig_file: &RigFile, reported: &Reported) -> Option<Vec<GriddedRecord>> {
+fn training(rig_file: &RigFile, reported: &Report) -> Option<Vec<GriddedRecord>> {
     let read = |file: &String| open(Path::new(file), &ReadOptions::default(), &rig_file.rig).ok()?.gridded;
     let mut records: Vec<GriddedRecord> = reported.inputs.train.iter().map(read).collect::<Option<_>>()?;
     on_shared_axes(&mut records).ok()?;
@@ -31,7 +31,7 @@ fn training(rig_file: &RigFile, reported: &Reported) -> Option<Vec<GriddedRecord
 
 pub(super) fn proposal_for(
     rig_file: &RigFile,
-    reported: &Reported,
+    reported: &Report,
     training: Option<&Engine<'_>>,
     progress: &mut dyn FnMut(&str),
 ) -> Option<Proposal> {
@@ -64,7 +64,7 @@ pub(super) fn proposal_for(
     let question = Question {
         baseline,
         explanations: &explanations,
-        axes_measured: reported.measured(),
+        axes_measured: measured(reported),
         noise: &noise,
         training,
     };
@@ -72,7 +72,7 @@ pub(super) fn proposal_for(
 }
 
 fn name(effect: &NamedEffect) -> String {
-    format!("{} {}", effect.effect, place_name(&effect.place))
+    format!("{} {}", effect.effect, effect.place)
 }
 
 fn errors(effect: &NamedEffect) -> Vec<Option<f64>> {

@@ -4,6 +4,7 @@
 //! more is named than is hidden; and where nothing is hidden, nothing outside the catalogue is reported.
 
 use crate::FrontError;
+use runlog::discrepancy_report::{NamedEffect, Quantity, Report, Verdict, Where};
 use runlog::run_folder::read_json;
 use serde::Deserialize;
 use std::fmt::{self, Display, Formatter};
@@ -11,40 +12,6 @@ use std::path::Path;
 
 /// The most effects that a named one may stand for.
 const MOST_ALTERNATIVES: usize = 2;
-
-/// What is read of a report: `discrepancy/docs/report.md`.
-#[derive(Debug, Deserialize)]
-pub(super) struct Report {
-    verdict: String,
-    named: Vec<Effect>,
-    #[serde(default)]
-    not_excited: Vec<Effect>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Effect {
-    effect: String,
-    #[serde(rename = "where")]
-    place: Place,
-    #[serde(default)]
-    parameters: Vec<Parameter>,
-    #[serde(default)]
-    alternatives: Vec<Effect>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Place {
-    axis: Option<String>,
-    element: Option<String>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Parameter {
-    name: String,
-    value: Option<f64>,
-    unit: Option<String>,
-    standard_error: Option<f64>,
-}
 
 /// What a person is told, and whether all was right.
 #[derive(Debug, PartialEq)]
@@ -69,20 +36,22 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judged, FrontError>
     if hidden.is_empty() {
         lines.push("hidden: nothing".into());
     }
-    lines.extend(report.named.iter().map(|effect| told("named", &effect.name(), &effect.numbers())));
+    lines.extend(report.named.iter().map(|effect| told("named", &name(effect), &numbers(effect))));
     if report.named.is_empty() {
-        lines.push(format!("named: nothing ({})", report.verdict));
+        lines.push(format!("named: nothing ({})", report.verdict.name()));
     }
-    let alternatives: Vec<&Effect> = report.named.iter().flat_map(|effect| &effect.alternatives).collect();
+    let alternatives: Vec<&NamedEffect> =
+        report.named.iter().flat_map(|effect| &effect.alternatives).collect();
     if !alternatives.is_empty() {
-        let names: Vec<String> = alternatives.iter().map(|effect| effect.name()).collect();
+        let names: Vec<String> = alternatives.iter().map(|effect| name(effect)).collect();
         lines.push(format!("not to be told apart by this record: {}", names.join(", ")));
     }
-    let is_named = |hidden: &&Hidden| report.named.iter().any(|effect| hidden.is(effect));
+    let is_named =
+        |hidden: &&Hidden| report.named.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
     let mut verdict = "right";
     let mut right = true;
     for hidden in hidden.iter().filter(|hidden| !is_named(hidden)) {
-        let indistinguishable = alternatives.iter().any(|effect| hidden.is(effect));
+        let indistinguishable = alternatives.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
         if indistinguishable && alternatives.len() <= MOST_ALTERNATIVES {
             verdict = if verdict == "right" {
                 "right, among those that this record cannot tell apart"
@@ -92,7 +61,7 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judged, FrontError>
             continue;
         }
         right = false;
-        let unexcited = report.not_excited.iter().any(|effect| hidden.is(effect));
+        let unexcited = report.not_excited.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
         verdict = match (indistinguishable, unexcited) {
             (true, _) => "wrong, it is one of too many that this record cannot tell apart",
             (false, true) => "wrong, and the report says that this experiment does not excite it",
@@ -102,7 +71,7 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judged, FrontError>
     if report.named.len() > hidden.len() {
         (right, verdict) = (false, "wrong, more was named than hidden");
     }
-    if hidden.is_empty() && report.verdict == "outside-catalogue" {
+    if hidden.is_empty() && report.verdict == Verdict::OutsideCatalogue {
         (right, verdict) = (false, "wrong, nothing was hidden");
     }
     lines.push(verdict.into());
@@ -168,12 +137,12 @@ impl Hidden {
     }
 
     /// Whether it is this effect of a report, which gives the axis of a term, and the element of a reading or a flow.
-    fn is(&self, effect: &Effect) -> bool {
-        let axis = self.place.split('.').next();
-        match self.is_term {
-            true => effect.effect == self.name && effect.place.axis.as_deref() == axis,
-            false => effect.name() == self.to_string(),
-        }
+    fn is(&self, effect: &str, place: &Where) -> bool {
+        let is_there = match self.is_term {
+            true => self.place.split('.').next() == Some(&place.axis),
+            false => self.place == place.to_string(),
+        };
+        effect == self.name && is_there
     }
 }
 
@@ -183,26 +152,18 @@ impl Display for Hidden {
     }
 }
 
-impl Effect {
-    fn name(&self) -> String {
-        let element = self.place.element.as_ref().map(|element| format!(".{element}")).unwrap_or_default();
-        format!("{} at {}{element}", self.effect, self.place.axis.as_deref().unwrap_or_default())
-    }
+fn name(effect: &NamedEffect) -> String {
+    format!("{} at {}", effect.effect, effect.place)
+}
 
-    fn numbers(&self) -> String {
-        let written = |parameter: &Parameter| {
-            let error = parameter.standard_error.map(|error| format!(" +- {}", significant(error, 2)));
-            let unit = parameter.unit.as_ref().filter(|unit| !unit.is_empty()).map(|unit| format!(" {unit}"));
-            let value = significant(parameter.value?, 4);
-            Some(format!(
-                "{} {value}{}{}",
-                parameter.name,
-                error.unwrap_or_default(),
-                unit.unwrap_or_default()
-            ))
-        };
-        self.parameters.iter().map_while(written).collect::<Vec<_>>().join(", ")
-    }
+fn numbers(effect: &NamedEffect) -> String {
+    let written = |parameter: &Quantity| {
+        let error =
+            parameter.standard_error.map_or(String::new(), |error| format!(" +- {}", significant(error, 2)));
+        let value = significant(parameter.value, 4);
+        format!("{} {value}{error} {}", parameter.name, parameter.unit).trim_end().to_owned()
+    };
+    effect.parameters.iter().map(written).collect::<Vec<_>>().join(", ")
 }
 
 /// A number with so many significant digits, without zeros at its end; with an exponent where it is far from 1.

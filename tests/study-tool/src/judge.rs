@@ -241,7 +241,7 @@ fn hidden_judged(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> Hid
             continue;
         };
         let off = (reported.value - truth).abs();
-        let error = reported.error_value.filter(|error| *error >= 0.0);
+        let error = reported.standard_error.filter(|error| *error >= 0.0);
         numbers.push(NumberJudged {
             name: key.name,
             amplitude: at == 0,

@@ -20,7 +20,7 @@
 
 use crate::classes::DrawClasses;
 use crate::draws::{Draw, axis_of};
-use crate::report::{Report, Verdict};
+use crate::report::Report;
 use plant::effects::sheet;
 use plant::effects::sheet::Place;
 use serde::{Deserialize, Serialize};
@@ -97,7 +97,7 @@ pub fn judge(
         .is_some_and(|own| variables.iter().take(FIRST).any(|reported| own.variables.contains(reported)));
     LeftOut {
         without: without.to_vec(),
-        verdict: report.map_or("error", |report| verdict_name(report.verdict)),
+        verdict: report.map_or("error", |report| report.verdict.name()),
         no_wrong_name: report.is_some_and(|report| report.named.is_empty()),
         formula: outside.and_then(|outside| outside.formula.clone()),
         balance_right: hidden.and_then(|hidden| balance_right(hidden.place)).unwrap_or(false),
@@ -116,17 +116,6 @@ fn is_expected(balance: &str, place: Place, expected: &[String]) -> bool {
         _ => true,
     };
     on_axis && expected.iter().any(|own| own == name)
-}
-
-fn verdict_name(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::NothingMissing => "nothing-missing",
-        Verdict::ParametersOnly => "parameters-only",
-        Verdict::Named => "named",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::OutsideCatalogue => "outside-catalogue",
-        Verdict::BadData => "bad-data",
-    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@
 use crate::classes::Member;
 use crate::draws::{Draw, Kind};
 use crate::interval::wilson;
-use crate::report::{ExplainingEffect, Explanation, ExplanationKind, Report};
+use crate::report::Report;
+use discrepancy::report::{EffectPlace, Explanation, ExplanationKind};
 use record_maker::Hidden;
 use serde::Serialize;
 
@@ -55,7 +56,7 @@ pub fn judge(draw: &Draw, classes: &[Vec<Member>], left_out: bool, report: &Repo
 }
 
 /// Whether each effect of a set stands for one that is hidden, and none is over.
-fn stand_for(set: &[ExplainingEffect], hidden: &[Hidden], classes: &[Vec<Member>]) -> bool {
+fn stand_for(set: &[EffectPlace], hidden: &[Hidden], classes: &[Vec<Member>]) -> bool {
     let Some(first) = set.first().filter(|_| set.len() == hidden.len()) else { return hidden.is_empty() };
     (0..hidden.len()).any(|at| {
         let (mut others, mut twins) = (hidden.to_vec(), classes.to_vec());
@@ -65,8 +66,8 @@ fn stand_for(set: &[ExplainingEffect], hidden: &[Hidden], classes: &[Vec<Member>
     })
 }
 
-fn stands_for(named: &ExplainingEffect, hidden: &Hidden, class: &[Member]) -> bool {
-    let place = named.place();
+fn stands_for(named: &EffectPlace, hidden: &Hidden, class: &[Member]) -> bool {
+    let place = named.place.to_string();
     let twin = |member: &Member| member.is_twin() && member.effect == named.effect && member.place == place;
     named.effect == hidden.name && place == hidden.place.to_string() || class.iter().any(twin)
 }

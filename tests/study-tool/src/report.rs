@@ -5,8 +5,10 @@
 //! study does not judge are not looked at.
 
 pub use discrepancy::report::Verdict;
+use discrepancy::report::{
+    self, Explanation, LocatedTerm, Misfit, NamedEffect, Next, Outside, Quantity, Verification,
+};
 use plant::effects::sheet::{Place, Sheet};
-use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -16,8 +18,8 @@ pub struct Report {
     pub verdict: Verdict,
     /// What is missing, the best first.
     pub named: Vec<Named>,
-    pub parameters: Vec<Parameter>,
-    pub gap: BTreeMap<String, Gap>,
+    pub parameters: Vec<Quantity>,
+    pub misfit: BTreeMap<String, Misfit>,
     /// What is missing that the catalogue does not have.
     pub outside: Option<Outside>,
     /// What the rig file's own model lacks, whatever the verdict.
@@ -28,172 +30,14 @@ pub struct Report {
     pub next: Option<Next>,
 }
 
-#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
-pub struct Next {
-    /// File of an experiment, beside the report.
-    pub experiment: Option<String>,
-    /// What would tell where no experiment on this rig does.
-    pub otherwise: Option<String>,
-}
-
+/// An effect of the catalogue, at one of its places.
 #[derive(Debug, Clone)]
 pub struct Named {
     pub sheet: &'static Sheet,
     pub place: Place,
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<Quantity>,
     /// What explains the record as well.
     pub alternatives: Vec<Named>,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-pub struct Parameter {
-    /// Key of the effect's sheet, or name of a parameter of the baseline.
-    pub name: String,
-    pub value: f64,
-    pub unit: String,
-    /// Its standard error, in its unit; some programs have none.
-    #[serde(rename = "standard_error")]
-    pub error_value: Option<f64>,
-    /// The rig file's value, of a parameter of the baseline.
-    #[serde(default)]
-    pub before: Option<f64>,
-}
-
-/// What may be the case, and how probable the program says it is.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Explanation {
-    pub kind: ExplanationKind,
-    /// Of effects: sets that the record does not tell apart.
-    pub sets: Vec<Vec<ExplainingEffect>>,
-    /// In [0, 1]; all of a report add up to one.
-    pub probability: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ExplanationKind {
-    Nothing,
-    Parameters,
-    Effects,
-    NoneOfThese,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-pub struct ExplainingEffect {
-    pub effect: String,
-    #[serde(rename = "where")]
-    place: RawPlace,
-}
-
-impl ExplainingEffect {
-    /// As `drive.a`.
-    pub fn place(&self) -> String {
-        self.place.name()
-    }
-}
-
-/// The gap of one signal; all in one unit, which is the program's choice.
-#[derive(Debug, Clone, Copy, Deserialize)]
-pub struct Gap {
-    #[serde(rename = "before")]
-    pub before_value: Option<f64>,
-    #[serde(rename = "after")]
-    pub after_value: Option<f64>,
-    #[serde(rename = "floor")]
-    pub floor_value: Option<f64>,
-    /// Share of the gap to the noise floor that was closed, as the program claims.
-    #[serde(rename = "closed")]
-    pub closed_ratio: Option<f64>,
-}
-
-/// A disagreement that the catalogue does not explain.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Outside {
-    /// As `drive.flow-a`, or `linkage`.
-    pub balance: String,
-    /// What it depends on, the strongest first.
-    #[serde(default)]
-    pub variables: Vec<Dependence>,
-    pub formula: Option<String>,
-}
-
-/// A balance that disagrees, and what it depends on, the strongest first.
-#[derive(Debug, Clone, Deserialize)]
-pub struct LocatedTerm {
-    pub balance: String,
-    pub variables: Vec<LocatedVariable>,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-pub struct LocatedVariable {
-    pub variable: String,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-pub struct Dependence {
-    /// Its name, as in `outside-expected.json`.
-    pub variable: String,
-    /// Share of the variance that it explains.
-    #[serde(rename = "r2")]
-    pub r2_ratio: f64,
-    #[serde(rename = "p_value")]
-    pub p_value_ratio: f64,
-}
-
-/// What a program says of its model on the held-out record.
-#[derive(Debug, Clone, Copy, Deserialize)]
-pub struct Verification {
-    /// Windowed chi2 per degree of freedom of the extended model.
-    #[serde(rename = "chi2_after")]
-    pub chi2_after_ratio: f64,
-    /// 95 % range of the same when nothing is missing.
-    #[serde(rename = "chi2_null")]
-    pub chi2_null_ratio: [f64; 2],
-}
-
-#[derive(Deserialize)]
-struct RawReport {
-    verdict: Verdict,
-    #[serde(default)]
-    named: Vec<RawNamed>,
-    #[serde(default)]
-    parameters: Vec<Parameter>,
-    #[serde(default)]
-    gap: Option<BTreeMap<String, Gap>>,
-    outside: Option<Outside>,
-    verification: Option<Verification>,
-    #[serde(default)]
-    location: Option<Location>,
-    explanations: Option<Vec<Explanation>>,
-    next: Option<Next>,
-}
-
-#[derive(Default, Deserialize)]
-struct Location {
-    dependence: Option<LocatedTerm>,
-}
-
-#[derive(Deserialize)]
-struct RawNamed {
-    effect: String,
-    #[serde(rename = "where")]
-    place: RawPlace,
-    #[serde(default)]
-    parameters: Vec<Parameter>,
-    #[serde(default)]
-    alternatives: Vec<RawNamed>,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-struct RawPlace {
-    axis: String,
-    element: Option<String>,
-}
-
-impl RawPlace {
-    fn name(&self) -> String {
-        self.element.as_ref().map_or_else(|| self.axis.clone(), |element| format!("{}.{element}", self.axis))
-    }
 }
 
 /// Reads a report; says what is wrong with it.
@@ -206,7 +50,8 @@ pub fn read(path: &Path) -> Result<Report, String> {
 }
 
 pub fn parse(bytes: &[u8]) -> Result<Report, String> {
-    let raw: RawReport = serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
+    let raw: report::Report =
+        serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
     let named = raw.named.into_iter().map(known).collect::<Result<Vec<_>, _>>()?;
     let says_names = matches!(raw.verdict, Verdict::Named | Verdict::Ambiguous);
     if says_names && named.is_empty() {
@@ -220,17 +65,15 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     if raw.verdict == Verdict::ParametersOnly && raw.parameters.is_empty() {
         return Err("verdict ParametersOnly without a parameter".to_owned());
     }
-    let gap = raw.gap.unwrap_or_default();
     let dependence = raw.location.and_then(|location| location.dependence);
-    let explanations = raw.explanations.unwrap_or_default();
-    let RawReport { verdict, parameters, outside, verification, next, .. } = raw;
-    Ok(Report { verdict, named, parameters, gap, outside, dependence, verification, explanations, next })
+    let report::Report { verdict, parameters, misfit, outside, verification, explanations, next, .. } = raw;
+    Ok(Report { verdict, named, parameters, misfit, outside, dependence, verification, explanations, next })
 }
 
-fn known(raw: RawNamed) -> Result<Named, String> {
+fn known(raw: NamedEffect) -> Result<Named, String> {
     let sheet = plant::effects::sheet(&raw.effect)
         .ok_or_else(|| format!("names '{}', which is not in the catalogue", raw.effect))?;
-    let place = raw.place.name();
+    let place = raw.place.to_string();
     let place = sheet.place_named(&place).ok_or_else(|| format!("{} cannot be at '{place}'", sheet.name))?;
     let alternatives = raw.alternatives.into_iter().map(known).collect::<Result<_, _>>()?;
     Ok(Named { sheet, place, parameters: raw.parameters, alternatives })
@@ -246,7 +89,7 @@ impl Report {
 
     /// Smallest share of the gap that the program claims to have closed, over the signals it tells one for.
     pub fn claimed_closed(&self) -> Option<f64> {
-        self.gap.values().filter_map(|gap| gap.closed_ratio).reduce(f64::min)
+        self.misfit.values().filter_map(|misfit| misfit.closed).reduce(f64::min)
     }
 
     /// Share of the gap that went, all signals together, each in units of its noise: one that was hardly off counts for little.
@@ -258,19 +101,19 @@ impl Report {
     /// `None` when no signal has all three, or there was no gap.
     pub fn claimed_joint(&self) -> Option<f64> {
         let mut excess = [0.0, 0.0];
-        for gap in self.gap.values() {
-            let Some(floor) = gap.floor_value.filter(|floor| *floor > 0.0) else { continue };
-            let Some(values) = gap.before_value.zip(gap.after_value) else { continue };
-            excess[0] += (values.0 / floor).powi(2) - 1.0;
-            excess[1] += (values.1 / floor).powi(2) - 1.0;
+        let is_whole =
+            |misfit: &&Misfit| misfit.floor > 0.0 && !misfit.before.is_nan() && !misfit.after.is_nan();
+        for Misfit { before, after, floor, .. } in self.misfit.values().filter(is_whole) {
+            excess[0] += (before / floor).powi(2) - 1.0;
+            excess[1] += (after / floor).powi(2) - 1.0;
         }
         (excess[0] > 0.0).then(|| 1.0 - excess[1] / excess[0])
     }
 
     /// Whether the program claims that its model leaves no more on the held-out record than nothing missing would.
     pub fn claimed_white(&self) -> Option<bool> {
-        let Verification { chi2_after_ratio, chi2_null_ratio: [low, high] } = self.verification?;
-        Some((low..=high).contains(&chi2_after_ratio))
+        let Verification { chi2_after, chi2_null: [low, high], .. } = self.verification.as_ref()?;
+        Some((low..=high).contains(&chi2_after))
     }
 }
 

@@ -8,8 +8,9 @@ use crate::leave_out::{self, Expectations, LeftOut};
 use crate::limits::Limits;
 use crate::probability::{self, Said};
 use crate::program::Identity;
-use crate::report::{self, Parameter, Report};
+use crate::report::{self, Report};
 use crate::step::{RunResult, read_result};
+use discrepancy::report::Quantity;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -284,7 +285,7 @@ fn with_nearest_laws(draw: &Draw, classes: Option<&DrawClasses>) -> Draw {
 fn parameters_off(draw: &Draw, report: &Report) -> Vec<f64> {
     let wrong = |name: &str| draw.recipe.wrong_parameters.iter().any(|(own, _)| own == name);
     // A program that does not tell the file's value has reported it all the same.
-    let off = |own: &Parameter| own.before.map_or(0.0, |before| (own.value / before - 1.0).abs());
+    let off = |own: &Quantity| own.before.map_or(0.0, |before| (own.value / before - 1.0).abs());
     report.parameters.iter().filter(|own| !wrong(&own.name)).map(off).collect()
 }
 

@@ -15,11 +15,10 @@ use clap::Parser;
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::parameters::PARAMETERS;
-use discrepancy::report::{Quantity, Verdict, Where};
+use discrepancy::report::{NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, place_of};
 use discrepancy::workflow::{RigFile, open};
 use rig_fit::{Fit, RigProblem, Term};
 use selection::{Problem, Selected, select};
-use serde::Serialize;
 use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
@@ -46,25 +45,6 @@ enum Cli {
     },
 }
 
-/// What the study reads of a report.
-#[derive(Serialize)]
-struct Report {
-    schema_version: u32,
-    verdict: Verdict,
-    named: Vec<Entry>,
-    parameters: Vec<Quantity>,
-    next: Option<()>,
-}
-
-#[derive(Serialize)]
-struct Entry {
-    effect: &'static str,
-    #[serde(rename = "where")]
-    place: Where,
-    parameters: Vec<Quantity>,
-    alternatives: Vec<Entry>,
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let Cli::Close { rig, train, out, threads, .. } = Cli::parse();
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
@@ -74,13 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         records.extend(open(path, &records::ReadOptions::default(), &rig)?.gridded);
     }
     let report = if records.len() < train.len() {
-        Report {
-            schema_version: 1,
-            verdict: Verdict::BadData,
-            named: Vec::new(),
-            parameters: Vec::new(),
-            next: None,
-        }
+        Report { schema_version: SCHEMA_VERSION, verdict: Verdict::BadData, ..Report::default() }
     } else {
         let measured = records[0].measured;
         if records.iter().any(|record| record.measured != measured) {
@@ -148,14 +122,19 @@ fn report_of(
     let verdict = match (named.is_empty(), parameters.is_empty()) {
         (true, true) => Verdict::NothingMissing,
         (true, false) => Verdict::ParametersOnly,
-        _ if named.iter().any(|entry: &Entry| !entry.alternatives.is_empty()) => Verdict::Ambiguous,
+        _ if named.iter().any(|entry: &NamedEffect| !entry.alternatives.is_empty()) => Verdict::Ambiguous,
         _ => Verdict::Named,
     };
-    Report { schema_version: 1, verdict, named, parameters, next: None }
+    Report { schema_version: SCHEMA_VERSION, verdict, named, parameters, ..Report::default() }
 }
 
 /// An effect with its numbers, in the units of its sheet; without errors where none are given.
-fn entry(candidate: &Candidate, coordinates: &[f64], errors: &[f64], alternatives: Vec<Entry>) -> Entry {
+fn entry(
+    candidate: &Candidate,
+    coordinates: &[f64],
+    errors: &[f64],
+    alternatives: Vec<NamedEffect>,
+) -> NamedEffect {
     let values = candidate.effect_parameters(coordinates);
     let number = |(key, value): (usize, &f64)| Quantity {
         name: candidate.sheet.keys[key].name.to_owned(),
@@ -168,5 +147,12 @@ fn entry(candidate: &Candidate, coordinates: &[f64], errors: &[f64], alternative
         before: candidate.baseline(key),
     };
     let parameters = values.iter().enumerate().map(number).collect();
-    Entry { effect: candidate.sheet.name, place: candidate.place.into(), parameters, alternatives }
+    NamedEffect {
+        effect: candidate.sheet.name.to_owned(),
+        place: place_of(candidate.place),
+        parameters,
+        share_explained: f64::NAN, // null: not computed
+        amplitude_variation: None,
+        alternatives,
+    }
 }

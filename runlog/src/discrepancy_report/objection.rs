@@ -4,7 +4,7 @@ use super::{Report, Verdict};
 
 /// What the held-out record holds against a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Objection {
+pub enum Objection {
     /// A signal gets worse with the extended model.
     Worse,
     /// The finding does not improve it significantly.
@@ -17,12 +17,14 @@ pub(crate) enum Objection {
 
 impl Report {
     /// Whether the rig file explains the records as it is, insignificant changes of its parameters aside.
-    pub(crate) fn is_rig_file_enough(&self) -> bool {
+    #[must_use]
+    pub fn is_rig_file_enough(&self) -> bool {
         self.verdict == Verdict::NothingMissing && self.small.is_empty()
     }
 
     /// What the held-out record holds against the report; `None` without one, and of records that cannot be used.
-    pub(crate) fn objection(&self) -> Option<Objection> {
+    #[must_use]
+    pub fn objection(&self) -> Option<Objection> {
         let held_out = self.verification.as_ref().filter(|_| self.verdict != Verdict::BadData)?;
         let found = !self.is_rig_file_enough();
         match () {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+/// The verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -19,4 +20,19 @@ pub enum Verdict {
     OutsideCatalogue,
     /// A record cannot be used.
     BadData,
+}
+
+impl Verdict {
+    /// As it is written.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Verdict::NothingMissing => "nothing-missing",
+            Verdict::ParametersOnly => "parameters-only",
+            Verdict::Named => "named",
+            Verdict::Ambiguous => "ambiguous",
+            Verdict::OutsideCatalogue => "outside-catalogue",
+            Verdict::BadData => "bad-data",
+        }
+    }
 }

@@ -1,14 +1,17 @@
 //! The next experiment.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-#[derive(Clone, Debug, Default, Serialize)]
+/// What to measure next.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Next {
+    /// Why.
     pub reason: String,
     /// File of the experiment beside the report; null when none discriminates.
     pub experiment: Option<String>,
     /// Expected divergence of the alternatives, in squared standard deviations; the target is 25.
-    pub(crate) divergence: Option<f64>,
+    pub divergence: Option<f64>,
     /// Share of the rehearsed records of the best experiment that tell the alternatives apart.
     pub probability: Option<f64>,
     /// Its interval of 95 %.
@@ -22,11 +25,12 @@ pub struct Next {
 }
 
 /// An experiment after the first.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SecondExperiment {
     /// Its name in the menu.
     pub experiment: String,
     /// Probability that one of the two, or both together, tell the alternatives apart.
     pub probability: f64,
+    /// Its interval of 95 %.
     pub probability_interval: [f64; 2],
 }

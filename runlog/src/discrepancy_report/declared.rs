@@ -1,7 +1,6 @@
 //! Suspects of a file beside the rig file, as a report holds them: with all that an extended rig file needs.
 
 use super::{NamedEffect, Where};
-use crate::suspects::Suspect;
 use serde::{Deserialize, Serialize};
 
 /// A suspect of the file.
@@ -9,6 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct DeclaredSuspect {
     /// Its name; named effects and candidates have it as their effect.
     pub effect: String,
+    /// Where it acts.
     #[serde(rename = "where")]
     pub place: Where,
     /// What it adds to, as `drive.force`.
@@ -22,20 +22,9 @@ pub struct DeclaredSuspect {
 }
 
 impl DeclaredSuspect {
-    pub(crate) fn of(suspect: &Suspect) -> Self {
-        let declared = &suspect.declared;
-        DeclaredSuspect {
-            effect: declared.name().to_owned(),
-            place: Where::from(suspect.place),
-            adds_to: declared.place(),
-            add: declared.expression().to_owned(),
-            twins: declared.twins().to_vec(),
-            declaration: declared.toml("suspects"),
-        }
-    }
-
     /// Whether an effect of the report is this suspect.
-    pub(crate) fn is(&self, effect: &NamedEffect) -> bool {
+    #[must_use]
+    pub fn is(&self, effect: &NamedEffect) -> bool {
         self.effect == effect.effect && self.place == effect.place
     }
 }

@@ -1,0 +1,54 @@
+//! What explains the training records, and how probable it is.
+
+use super::{EffectPlace, null_is_nan};
+use serde::{Deserialize, Serialize};
+
+/// What is the case, if an explanation is right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExplanationKind {
+    /// The rig file as it is.
+    Nothing,
+    /// Parameters of the rig file that are off.
+    Parameters,
+    /// Effects of the catalogue, parameters beside them.
+    Effects,
+    /// Other effects of the catalogue, other sets of them, or what it does not have.
+    NoneOfThese,
+}
+
+/// What the records say about an explanation; `evidence` in the report.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Features {
+    /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included; on the axes
+    /// that its effects act on, where both are recorded and the rods are not linked.
+    pub loss_per_dof: f64,
+    /// Loss above that of the best explanation.
+    pub behind: f64,
+    /// Number of parameters off the rig file's values, each counted by x^2 / (x^2 + tolerance^2) of its relative deviation x.
+    pub parameters_moved: f64,
+    /// Largest coefficient of variation of its effects' amplitudes between windows; null without effects, or where no derivative
+    /// exists.
+    pub amplitude_variation: Option<f64>,
+    /// Smallest amplitude of its effects over the smallest that is named; null without effects.
+    pub smallest_amplitude: Option<f64>,
+    /// Number of effects beside them that are too small to be named.
+    pub small_beside: usize,
+    /// Share of the loss under parameters alone that it removes, on the same axes.
+    pub share: f64,
+}
+
+/// An explanation of the training records.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Explanation {
+    /// What it says.
+    pub kind: ExplanationKind,
+    /// Sets of effects that the records cannot tell apart, the best first; empty without effects.
+    pub sets: Vec<Vec<EffectPlace>>,
+    /// Those of all explanations sum to one.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub probability: f64,
+    /// What the records say about it; null for none of these.
+    #[serde(skip_deserializing)]
+    pub evidence: Option<Features>,
+}

@@ -1,0 +1,52 @@
+//! How fits ended.
+
+use serde::Serialize;
+
+/// How a fit ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// The last step lowered the loss by less than the tolerance, or none promised more.
+    #[default]
+    Converged,
+    /// No step leads further, and a number is at the end of its range.
+    Bound,
+    /// The linearised model promised more, and no step lowered the simulated loss.
+    Stalled,
+    /// The steps were used up.
+    StepLimit,
+}
+
+/// How a fit ended and what it took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Convergence {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Accepted steps.
+    pub iterations: usize,
+    /// Simulations of the records for the loss; derivatives are not counted.
+    pub evaluations: usize,
+}
+
+impl Convergence {
+    /// What to doubt about it, in words.
+    #[must_use]
+    pub fn doubt(self) -> Option<&'static str> {
+        match self.outcome {
+            Outcome::Converged => None,
+            Outcome::Bound => Some("its fit ended at the end of a range"),
+            Outcome::Stalled => Some("its fit stalled: no step lowered the simulated loss"),
+            Outcome::StepLimit => Some("its fit used up its steps"),
+        }
+    }
+
+    /// Of one fit after another.
+    #[must_use]
+    pub fn then(self, next: Self) -> Self {
+        Convergence {
+            outcome: next.outcome,
+            iterations: self.iterations + next.iterations,
+            evaluations: self.evaluations + next.evaluations,
+        }
+    }
+}
