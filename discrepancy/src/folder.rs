@@ -2,6 +2,7 @@
 //! result stays beside a new one.
 
 use crate::next::menu::MENU;
+use model_fit::ModelReport;
 use runlog::run_folder::write_whole;
 use serde::Serialize;
 use std::fs;
@@ -66,10 +67,9 @@ impl Folder {
     /// The file of a model of any plant that an earlier close wrote here.
     fn earlier_model(&self) -> Option<PathBuf> {
         let text = fs::read_to_string(self.path.join("report.json")).ok()?;
-        let report: serde_json::Value = serde_json::from_str(&text).ok()?;
-        let wrote = |key: &str| report[key].as_array().is_some_and(|all| !all.is_empty());
-        let name = Path::new(report["model"].as_str()?).file_name()?;
-        (wrote("named") || wrote("discovered")).then(|| PathBuf::from(name))
+        let ModelReport { model, named, discovered, .. } = serde_json::from_str(&text).ok()?;
+        let name = Path::new(&model).file_name()?;
+        (!named.is_empty() || !discovered.is_empty()).then(|| PathBuf::from(name))
     }
 
     fn remove(&self, name: &Path) -> Result<(), FolderError> {

@@ -4,9 +4,9 @@
 //! with the model in the next run.
 
 use super::declared::declared;
-use super::report::{SCHEMA_VERSION, equations};
+use super::discover::DiscoveredTerm;
+use super::report::{ModelReport, Named, SCHEMA_VERSION, equations};
 use model::{Found, Library, Model};
-use serde::Deserialize;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, value};
 
@@ -30,27 +30,7 @@ pub enum ExtendError {
     Form,
 }
 
-/// What a report of a model file says of the extended model.
-#[derive(Debug, Deserialize)]
-pub struct ReportedModel {
-    schema_version: u32,
-    named: Vec<ReportedName>,
-    /// Absent in reports of before 0.1.0.
-    #[serde(default)]
-    discovered: Vec<ReportedTerm>,
-    parameters: Vec<ReportedNumber>,
-    /// Absent in reports of before 0.1.0.
-    #[serde(default)]
-    taken_back: bool,
-    /// Absent in reports of before 0.1.0.
-    #[serde(default)]
-    equations: Vec<String>,
-    /// Absent in reports of before 0.1.0.
-    #[serde(default)]
-    declared: Vec<String>,
-}
-
-impl ReportedModel {
+impl ModelReport {
     /// Whether it is the report of this model, and of this version of its file: only values from which a fit starts may differ.
     ///
     /// # Errors
@@ -78,56 +58,11 @@ impl ReportedModel {
     }
 }
 
-/// The first line that one of both lacks; none where the report has none at all.
+/// The first line that one of both lacks; none where the report, which is of before 0.1.0, has none at all.
 fn difference(reported: &[String], in_file: &[String]) -> Option<String> {
     let unknown = reported.iter().find(|line| !in_file.contains(line));
     let added = in_file.iter().find(|line| !reported.contains(line));
     unknown.or(added).filter(|_| !reported.is_empty()).cloned()
-}
-
-#[derive(Debug, Deserialize)]
-struct ReportedName {
-    suspect: String,
-}
-
-#[derive(Debug, Deserialize)]
-struct ReportedTerm {
-    name: String,
-    text: String,
-}
-
-#[derive(Debug, Deserialize)]
-struct ReportedNumber {
-    name: String,
-    #[serde(default)]
-    suspect: Option<String>,
-    value: f64,
-    is_at_bound: bool,
-}
-
-impl From<&super::ModelReport> for ReportedModel {
-    fn from(report: &super::ModelReport) -> Self {
-        let named = report.named.iter().map(|named| ReportedName { suspect: named.suspect.clone() });
-        let parameters = report.parameters.iter().map(|number| ReportedNumber {
-            name: number.name.clone(),
-            suspect: number.suspect.clone(),
-            value: number.value,
-            is_at_bound: number.is_at_bound,
-        });
-        let discovered = report
-            .discovered
-            .iter()
-            .map(|one| ReportedTerm { name: one.name.clone(), text: one.text.clone() });
-        Self {
-            schema_version: report.schema_version,
-            named: named.collect(),
-            discovered: discovered.collect(),
-            parameters: parameters.collect(),
-            taken_back: report.taken_back,
-            equations: report.equations.clone(),
-            declared: report.declared.clone(),
-        }
-    }
 }
 
 /// The text of a model file, which stands in this folder, with what its report names. A library of the user is named by its whole
@@ -135,7 +70,7 @@ impl From<&super::ModelReport> for ReportedModel {
 ///
 /// # Errors
 /// A text that is no TOML, or a report of another model.
-pub fn extended(text: &str, folder: &Path, report: &ReportedModel) -> Result<String, ExtendError> {
+pub fn extended(text: &str, folder: &Path, report: &ModelReport) -> Result<String, ExtendError> {
     let mut document: DocumentMut = text.parse()?;
     put(document.as_table_mut(), report, (None, folder));
     let terms = document.get_mut("terms").and_then(Item::as_array_of_tables_mut);
@@ -143,7 +78,7 @@ pub fn extended(text: &str, folder: &Path, report: &ReportedModel) -> Result<Str
         let name = name_of(term, folder);
         put(term, report, (name.as_deref(), folder));
     }
-    for ReportedName { suspect } in &report.named {
+    for Named { suspect, .. } in &report.named {
         let suspects = document.get_mut("suspects").and_then(Item::as_array_of_tables_mut);
         let suspects = suspects.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
         let is_it = |table: &Table| name_of(table, folder).as_ref() == Some(suspect);
@@ -154,7 +89,7 @@ pub fn extended(text: &str, folder: &Path, report: &ReportedModel) -> Result<Str
         put(&mut term, report, (Some(suspect), folder));
         push(&mut document, report.marked(term))?;
     }
-    for ReportedTerm { name, text } in &report.discovered {
+    for DiscoveredTerm { name, text, .. } in &report.discovered {
         let text: DocumentMut = text.parse()?;
         let first = text.get("suspects").and_then(Item::as_array_of_tables).and_then(|all| all.get(0));
         let mut term = first.ok_or(ExtendError::Form)?.clone();
@@ -199,7 +134,7 @@ fn name_of(table: &dyn TableLike, folder: &Path) -> Option<String> {
 }
 
 /// Writes fitted numbers over the values of a table's parameters. One at an end of its range keeps that of the file.
-fn put(table: &mut dyn TableLike, report: &ReportedModel, (suspect, folder): (Option<&str>, &Path)) {
+fn put(table: &mut dyn TableLike, report: &ModelReport, (suspect, folder): (Option<&str>, &Path)) {
     let numbers = report.parameters.iter().filter(|number| number.suspect.as_deref() == suspect);
     // Numbers that stand in a library get a place of their own.
     let library = library_of(table, folder);
@@ -233,6 +168,7 @@ fn put(table: &mut dyn TableLike, report: &ReportedModel, (suspect, folder): (Op
 
 #[cfg(test)]
 mod tests {
+    use super::super::report::Number;
     use super::*;
 
     const MODEL: &str = r#"
@@ -246,7 +182,7 @@ parameters.k = { value = [1, 2], range = [0, 9] }
 name = "offset"
 "#;
 
-    fn report(suspect: &str) -> ReportedModel {
+    fn report(suspect: &str) -> ModelReport {
         let text = format!(
             r#"{{"schema_version": 1, "named": [{{"suspect": "{suspect}"}}], "parameters": [
                 {{"name": "mass", "suspect": null, "value": 1.5, "is_at_bound": false}},
@@ -255,10 +191,10 @@ name = "offset"
         serde_json::from_str(&text).unwrap()
     }
 
-    impl ReportedModel {
+    impl ModelReport {
         fn with(mut self, name: &str, value: f64) -> Self {
             let suspect = Some("drag".to_owned());
-            self.parameters.push(ReportedNumber { name: name.into(), suspect, value, is_at_bound: false });
+            self.parameters.push(Number { name: name.into(), suspect, value, ..Number::default() });
             self
         }
     }
@@ -292,7 +228,7 @@ name = "offset"
         .unwrap();
         assert!(again.contains("3.5") && !again.contains("2.5"), "{again}");
         // Without a name of its own it is called as in the library.
-        let reported: ReportedModel = serde_json::from_value(serde_json::json!({
+        let reported: ModelReport = serde_json::from_value(serde_json::json!({
             "schema_version": 1,
             "named": [{"suspect": "turbulent"}],
             "parameters": [{"name": "c", "suspect": "turbulent", "value": 4.5, "is_at_bound": false}],
@@ -307,7 +243,7 @@ name = "offset"
     fn a_term_that_was_taken_back_is_marked() {
         let plain = extended(MODEL, Path::new(""), &report("drag")).unwrap();
         let marked =
-            extended(MODEL, Path::new(""), &ReportedModel { taken_back: true, ..report("drag") }).unwrap();
+            extended(MODEL, Path::new(""), &ModelReport { taken_back: true, ..report("drag") }).unwrap();
         assert!(marked.contains(&format!("{TAKEN_BACK}\n[[terms]]\nname = \"drag\"")), "{marked}");
         assert_eq!(marked.replace(&format!("{TAKEN_BACK}\n"), ""), plain);
     }

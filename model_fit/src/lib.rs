@@ -85,7 +85,7 @@ pub use adequacy::Residual;
 pub use begin::{NewError, NewModel, Roles, new_model};
 pub use discover::{DiscoveredTerm, Located, Place};
 pub use explain::{Explained, explain, explained};
-pub use extended::{ExtendError, ReportedModel, extended};
+pub use extended::{ExtendError, extended};
 pub use held_out::{JudgeError, WORSE};
 pub use processing::SPARSEST;
 pub use record::RecordError;
@@ -255,8 +255,7 @@ pub fn close_with(
     let page = page::page(models, &report, (&traces, &curves), not_judged.as_deref());
     let folder = file.parent().unwrap_or(Path::new(""));
     let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
-    let extended =
-        is_named.then(|| extended(model.text(), folder, &ReportedModel::from(&report)).ok()).flatten();
+    let extended = is_named.then(|| extended(model.text(), folder, &report).ok()).flatten();
     Ok(ClosedModel { report, not_judged, page, extended })
 }
 

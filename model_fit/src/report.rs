@@ -15,14 +15,16 @@ use crate::Verdict;
 use crate::estimator::Outcome;
 use crate::held_out::WORSE;
 use model::{Change, Model};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Version of `report.json` of a model file.
 pub(super) const SCHEMA_VERSION: u32 = 1;
 
-/// `report.json`.
-#[derive(Clone, Debug, Default, Serialize)]
+/// `report.json`. Fields with `skip_deserializing` are for people and for other languages: no program here reads them back. Those
+/// of before 0.1.0 lack some.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ModelReport {
     pub schema_version: u32,
     /// Path of the model file as it was given.
@@ -39,22 +41,29 @@ pub struct ModelReport {
     /// Whether the reported model leaves no more than noise and declared error on the training records.
     pub adequate: bool,
     /// What it leaves of each output, and its noise.
+    #[serde(skip_deserializing)]
     pub residuals: Vec<Residual>,
     /// Numbers of the extended model, with what they were beside the model alone.
     pub parameters: Vec<Number>,
     /// What is left on the training records.
+    #[serde(skip_deserializing)]
     pub training: Vec<Left>,
     /// What is left on each held-out record.
+    #[serde(skip_deserializing)]
     pub held_out: Vec<Left>,
     /// The same with each alternative in place of what was named.
+    #[serde(skip_deserializing)]
     pub held_out_alternatives: Vec<OfAlternative>,
     pub named: Vec<Named>,
     /// Where nothing was named and a search found some: terms that no suspect describes.
     pub discovered: Vec<DiscoveredTerm>,
     /// Where what the model alone leaves comes from, whatever the suspects are; `None` where no place explains enough of it.
+    #[serde(skip_deserializing)]
     pub located: Option<Located>,
     /// Every suspect beside the model alone, the most likely first.
+    #[serde(skip_deserializing)]
     pub suspects: Vec<Judgement>,
+    #[serde(skip_deserializing)]
     pub structure: Structure,
     pub notes: Vec<String>,
     /// How many of them, the first, say that the model explains nothing of an output.
@@ -67,11 +76,12 @@ pub struct ModelReport {
 }
 
 /// A number with its unit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Number {
     pub name: String,
     /// The term or suspect that it belongs to; `None` for a number of the model.
     pub suspect: Option<String>,
+    #[serde(default)]
     pub unit: String,
     pub value: f64,
     /// By coloured residuals or by blocks of time, the larger, and by a law that is only near; `None` where the records do not
@@ -111,16 +121,20 @@ pub struct OfAlternative {
 }
 
 /// A suspect that is missing in the model.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Named {
     pub suspect: String,
     /// What it is one form of.
     pub effect: Option<String>,
+    #[serde(default)]
     pub place: String,
     /// How it stands there.
+    #[serde(default)]
     pub term: String,
+    #[serde(default)]
     pub share_explained: f64,
     /// Others that explain the records as well, also where they fail another gate than the likelihood.
+    #[serde(default)]
     pub alternatives: Vec<String>,
 }
 

@@ -1,7 +1,7 @@
 //! What is said of the numbers of a model file, and of a report that is another model's.
 
 use crate::closing::{close, file, number};
-use model_fit::{ClosedModel, ReportedModel, explain, read};
+use model_fit::{ClosedModel, ModelReport, explain, read};
 use serde_json::Value;
 use std::path::Path;
 
@@ -97,7 +97,7 @@ fn a_held_out_record_that_is_left_much_worse_is_remarked_with_the_ratio() {
 
 /// Whether a report is of a model file of this text, or why not.
 fn is_of(reported: &Value, folder: &Path, text: &str) -> Result<(), String> {
-    let reported: ReportedModel = serde_json::from_value(reported.clone()).unwrap();
+    let reported: ModelReport = serde_json::from_value(reported.clone()).unwrap();
     let model = read(&file(folder, "other.toml", text)).unwrap();
     reported.is_of(&model).map_err(|error| error.to_string())
 }

@@ -141,7 +141,7 @@ with.v = "v"
     let text = model_fit::extended(
         &fs::read_to_string(folder.path().join("pulled.toml")).unwrap(),
         folder.path(),
-        &model_fit::ReportedModel::from(report),
+        report,
     )
     .unwrap();
     let path = file(folder.path(), "extended.toml", &text);

@@ -4,8 +4,8 @@ use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress,
 use crate::cli::{ExplainArguments, NewArguments, ReadArguments, SimulateArguments};
 use crate::folder::{self, Folder};
 use model_fit::{
-    ClosedModel, Explained, ModelReport, NewModel, OfAlternative, ReportedModel, Roles, Search, Verdict,
-    close_with, explained, extended, look, new_model, read, simulate,
+    ClosedModel, Explained, ModelReport, NewModel, OfAlternative, Roles, Search, Verdict, close_with,
+    explained, extended, look, new_model, read, simulate,
 };
 use pagekit::significant;
 use serde::de::{DeserializeOwned, Error as _};
@@ -85,7 +85,7 @@ fn no_options_of_a_rig(read: &ReadArguments, without: &[String]) -> Result<(), C
 
 /// `extend`: the text of a model file with what its report names.
 pub(super) fn extended_text(model: &Path, text: &str, report: &Path) -> Result<String, CommandError> {
-    let report: ReportedModel =
+    let report: ModelReport =
         with_keys((report, report_of(report, true)?), &["schema_version", "named", "parameters"])?;
     let is_of = report.is_of(&read(model)?);
     let extended = is_of.and_then(|()| extended(text, model.parent().unwrap_or(Path::new("")), &report));

@@ -3,22 +3,28 @@
 use super::super::report::{ModelReport, Number, place, term};
 use super::Discovery;
 use crate::Verdict;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A term that a search found, which no suspect describes.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DiscoveredTerm {
     /// What `parameters` call the suspect of its numbers.
     pub name: String,
+    #[serde(default)]
     pub place: String,
     /// How it stands there; its coefficient `k_found` is among `parameters`.
+    #[serde(default)]
     pub term: String,
     /// Inputs and states that it reads.
+    #[serde(default)]
     pub variables: Vec<String>,
+    #[serde(default)]
     pub share_explained: f64,
     /// Share of halves of the records in which the best term is one like it.
+    #[serde(default)]
     pub stability: f64,
     /// Other terms of the search that explain the records as well.
+    #[serde(default)]
     pub alternatives: Vec<String>,
     /// As `[[suspects]]` of a model file, before it was fitted.
     pub text: String,
