@@ -192,8 +192,7 @@ impl Term {
             places.extend(part.starts().iter().map(|start| (part.record(), *start)));
             from = to;
         }
-        let mut values =
-            [0, 1].map(|axis| UnknownKind::ALL.map(|kind| values_of(&places, axis, kind.place())));
+        let mut values = [0, 1].map(|axis| UnknownKind::ALL.map(|kind| values_of(&places, axis, kind)));
         simulated_forces(engine, &simulated, &mut values);
         Some(Term {
             nuisance: engine.products(&residual, &columns),
@@ -312,9 +311,9 @@ impl Term {
 /// The variables of a window's blocks.
 type BlockValues = Vec<[f64; VARIABLES.len()]>;
 
-fn values_of(places: &[(&GriddedRecord, usize)], axis: usize, balance: usize) -> Vec<BlockValues> {
+fn values_of(places: &[(&GriddedRecord, usize)], axis: usize, kind: UnknownKind) -> Vec<BlockValues> {
     let window = |(record, start): &(&GriddedRecord, usize)| {
-        (0..BLOCKS).map(|block| variables(record, axis, start + block * BLOCK, balance)).collect()
+        (0..BLOCKS).map(|block| variables(record, axis, start + block * BLOCK, kind)).collect()
     };
     places.iter().map(window).collect()
 }

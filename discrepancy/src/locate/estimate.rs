@@ -26,23 +26,64 @@ use super::{UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
 use crate::gridded_record::memory::Memory;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 use crate::unknown_inputs::NORMAL_LITRES_PER_MINUTE;
+use crate::windows::{FORCE, UnknownKind};
 use nalgebra::{SMatrix, SVector};
 use plant::{Axis, PERIOD_S, RigParameters};
 
-/// Parameters of a window and axis: start state and unknown inputs.
-const THETA_LEN: usize = 9;
-/// Indices among them.
-const FORCE: usize = 4;
-const FLOW_A: usize = 6;
-const FLOW_B: usize = 7;
-const OFFSET: usize = 8;
-/// Index of the opposite force nudge.
-const OPPOSITE: usize = OFFSET + 1;
-/// Steps of finite differences: m, m/s, Pa, Pa, N, N, m^3/s, m^3/s; the sensitivity to the offset is known.
-const NUDGES: [f64; OFFSET] = [1e-5, 5e-4, 200.0, 200.0, 1.0, 1.0, 3e-5, 3e-5];
-/// Standard deviations of the weak priors, in the same units. A guess: some ten times the errors of points and the size of
-/// effects.
-const PRIORS: [f64; THETA_LEN] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 100.0];
+/// What is estimated of a window and axis: start state and unknown inputs. The place of a number is its index in vectors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Number {
+    Extension,
+    Velocity,
+    PressureA,
+    PressureB,
+    Force,
+    Ramp,
+    FlowA,
+    FlowB,
+    /// Of the force sensor.
+    Offset,
+}
+
+/// Step of the force, N.
+const FORCE_STEP_N: f64 = 1.0;
+/// Of each number the standard deviation of its weak prior and the step of its finite differences, in m, m/s, Pa, N, m^3/s. The
+/// sensitivity to the offset is known. Priors are a guess: some ten times the errors of points and the size of effects.
+const NUMBERS: [(Number, f64, Option<f64>); COUNT] = [
+    (Number::Extension, 1e-4, Some(1e-5)),
+    (Number::Velocity, 2e-2, Some(5e-4)),
+    (Number::PressureA, 5e3, Some(200.0)),
+    (Number::PressureB, 5e3, Some(200.0)),
+    (Number::Force, 300.0, Some(FORCE_STEP_N)),
+    (Number::Ramp, 300.0, Some(1.0)),
+    (Number::FlowA, 2e-3, Some(3e-5)),
+    (Number::FlowB, 2e-3, Some(3e-5)),
+    (Number::Offset, 100.0, None),
+];
+const COUNT: usize = Number::Offset as usize + 1;
+const _: () = {
+    let mut at = 0;
+    while at < COUNT {
+        assert!(NUMBERS[at].0 as usize == at, "in the order of the numbers");
+        at += 1;
+    }
+};
+
+impl Number {
+    fn of(self, theta: &Theta) -> f64 {
+        theta[self as usize]
+    }
+
+    fn prior(self) -> f64 {
+        NUMBERS[self as usize].1
+    }
+
+    /// Whether it is 0 under the null.
+    fn is_unknown_input(self) -> bool {
+        self as usize >= Number::Force as usize
+    }
+}
+
 /// Prior of the force sensor's offset in the solution without one, N.
 const NO_OFFSET_N: f64 = 1e-3;
 /// Ratio of posterior to prior above which an input is not observable.
@@ -54,14 +95,14 @@ const FILLING: usize = 5;
 /// Threshold of significant offsets of the force sensor.
 const OFFSET_OVER_NOISE: f64 = 1.15;
 
-type Normal = SMatrix<f64, THETA_LEN, THETA_LEN>;
-type Theta = SVector<f64, THETA_LEN>;
+type Normal = SMatrix<f64, COUNT, COUNT>;
+type Theta = SVector<f64, COUNT>;
 
 /// Collected unknown inputs of all balances.
 #[derive(Debug, Default)]
 pub(super) struct Unknowns {
-    /// flow-a, flow-b, force, force-sensor of each axis.
-    axes: [[Vec<UnknownPoint>; 4]; 2],
+    /// Of each axis, in the order of [`UnknownKind::ALL`].
+    axes: [[Vec<UnknownPoint>; UnknownKind::ALL.len()]; 2],
     linkage: Vec<UnknownPoint>,
 }
 
@@ -75,10 +116,9 @@ impl Unknowns {
             }
         };
         for (axis, balances) in Axis::ALL.into_iter().zip(self.axes) {
-            let names = ["flow-a", "flow-b", "force", "force-sensor"];
-            let units = ["Nl/min", "Nl/min", "N", "N"];
-            for ((points, name), unit) in balances.into_iter().zip(names).zip(units) {
-                series(format!("{}.{name}", axis.name()), unit, points);
+            for (points, kind) in balances.into_iter().zip(UnknownKind::ALL) {
+                let unit = if kind.is_flow() { "Nl/min" } else { "N" };
+                series(format!("{}.{}", axis.name(), kind.name()), unit, points);
             }
         }
         series("linkage".to_owned(), "N", self.linkage);
@@ -112,7 +152,6 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     let axes: Vec<usize> = (0..2).filter(|axis| gridded.measured[*axis]).collect();
     let ar1_coefficients = [0, 1]
         .map(|axis| if gridded.measured[axis] { ar1_coefficients(gridded, axis) } else { [0.0; CHANNELS] });
-    let nudges = nudges();
     let mut solved: [Vec<Solved>; 2] = [Vec::new(), Vec::new()];
     let mut filled = 0;
     // The last window needs one more period.
@@ -121,7 +160,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
         let whole = !gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap);
         filled = if whole { filled + 1 } else { 0 };
         if filled > FILLING
-            && let Some(perturbed_outputs) = pass.simulate_window(from, &nudges)
+            && let Some(runs) = Runs::of(&pass, from)
         {
             for axis in &axes {
                 let window = LinearisedWindow {
@@ -129,7 +168,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
                     axis: *axis,
                     from,
                     ar1_coefficients: &ar1_coefficients[*axis],
-                    perturbed_outputs: &perturbed_outputs,
+                    runs: &runs,
                 };
                 solved[*axis].extend(window.solve());
             }
@@ -148,20 +187,48 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     );
 }
 
-/// The baseline, a nudge of each number but the last, and the force's nudge the other way.
-fn nudges() -> Vec<Nudge> {
-    let mut nudges = vec![Nudge::default(); OPPOSITE + 1];
-    for axis in 0..2 {
-        for start in 0..4 {
-            nudges[1 + start].start[axis][start] = NUDGES[start];
-        }
-        nudges[1 + FORCE].force_n[axis] = NUDGES[FORCE];
-        nudges[2 + FORCE].ramp_n[axis] = NUDGES[FORCE + 1];
-        nudges[1 + FLOW_A].flows_m3_per_s[axis][0] = NUDGES[FLOW_A];
-        nudges[1 + FLOW_B].flows_m3_per_s[axis][1] = NUDGES[FLOW_B];
-        nudges[OPPOSITE].force_n[axis] = -NUDGES[FORCE];
+/// Simulations of a window.
+struct Runs {
+    baseline: Readings,
+    /// With a nudge each, in the order of [`NUMBERS`].
+    nudged: Vec<Readings>,
+    /// With that of the force the other way.
+    opposite: Readings,
+}
+
+impl Runs {
+    /// `None` for a state that the rig cannot have.
+    fn of(pass: &Pass<'_>, from: usize) -> Option<Self> {
+        let nudges = NUMBERS.iter().filter_map(|(number, _, step)| Some(nudge(*number, (*step)?)));
+        Some(Runs {
+            baseline: pass.run(from, &Nudge::default())?,
+            nudged: nudges.map(|nudge| pass.run(from, &nudge)).collect::<Option<_>>()?,
+            opposite: pass.run(from, &nudge(Number::Force, -FORCE_STEP_N))?,
+        })
     }
-    nudges
+
+    fn nudged(&self, number: Number) -> &Readings {
+        &self.nudged[number as usize]
+    }
+}
+
+/// The same nudge of both axes.
+fn nudge(number: Number, step: f64) -> Nudge {
+    let mut nudge = Nudge::default();
+    for axis in 0..2 {
+        match number {
+            Number::Extension => nudge.start[axis][0] = step,
+            Number::Velocity => nudge.start[axis][1] = step,
+            Number::PressureA => nudge.start[axis][2] = step,
+            Number::PressureB => nudge.start[axis][3] = step,
+            Number::Force => nudge.force_n[axis] = step,
+            Number::Ramp => nudge.ramp_n[axis] = step,
+            Number::FlowA => nudge.flows_m3_per_s[axis][0] = step,
+            Number::FlowB => nudge.flows_m3_per_s[axis][1] = step,
+            Number::Offset => {}
+        }
+    }
+    nudge
 }
 
 /// A window of an axis with its nudged simulations.
@@ -170,7 +237,7 @@ struct LinearisedWindow<'a> {
     axis: usize,
     from: usize,
     ar1_coefficients: &'a [f64; CHANNELS],
-    perturbed_outputs: &'a [Readings],
+    runs: &'a Runs,
 }
 
 impl LinearisedWindow<'_> {
@@ -180,7 +247,7 @@ impl LinearisedWindow<'_> {
         let mut right = Theta::zeros();
         let mut pressure = [Theta::zeros(), Theta::zeros()];
         let (mut squares, mut used) = (0.0, 0);
-        for channel in (0..CHANNELS).filter(|channel| *channel != 1 || !self.force_is_input()) {
+        for channel in (0..CHANNELS).filter(|channel| *channel != FORCE || !self.force_is_input()) {
             let phi = self.ar1_coefficients[channel];
             let white = (1.0 - phi * phi).sqrt();
             let mut before: Option<(Theta, f64)> = None;
@@ -209,15 +276,15 @@ impl LinearisedWindow<'_> {
             return None;
         }
         normal.fill_upper_triangle_with_lower_triangle();
-        let equations = Equations { normal, right, squares, dof: (used - THETA_LEN) as f64, pressure };
+        let equations = Equations { normal, right, squares, dof: (used - COUNT) as f64, pressure };
         let bound = equations.solve(NO_OFFSET_N)?;
-        let forces_n = self.perturbed_outputs[0][self.axis].iter().map(|reading| reading[1]);
+        let forces_n = self.runs.baseline[self.axis].iter().map(|reading| reading[FORCE]);
         let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
         Some(Solved {
             from: self.from,
             baseline_force_n,
             smooth: self.is_smooth(),
-            free: equations.solve(PRIORS[OFFSET])?,
+            free: equations.solve(Number::Offset.prior())?,
             bound,
         })
     }
@@ -227,30 +294,30 @@ impl LinearisedWindow<'_> {
         let sample = self.gridded.samples[self.from + at][self.axis][channel]?;
         let rests = self.gridded.points[self.from][self.axis].rod_velocity_m_per_s == 0.0;
         let weight = 1.0 / self.noise(channel);
-        let baseline = self.perturbed_outputs[0][self.axis][at][channel];
+        let baseline = self.runs.baseline[self.axis][at][channel];
         let mut row = Theta::zeros();
-        for number in 0..OFFSET {
+        for (number, _, step) in NUMBERS {
             // A speed known to be 0 is not estimated.
-            if number != 1 || !rests {
-                row[number] = (self.perturbed_outputs[number + 1][self.axis][at][channel] - baseline)
-                    / NUDGES[number]
-                    * weight;
+            if let Some(step) = step.filter(|_| number != Number::Velocity || !rests) {
+                let nudged = self.runs.nudged(number)[self.axis][at][channel];
+                row[number as usize] = (nudged - baseline) / step * weight;
             }
         }
-        if channel == 1 {
-            row[OFFSET] = weight;
+        if channel == FORCE {
+            row[Number::Offset as usize] = weight;
         }
         Some((row, (sample - baseline) * weight))
     }
 
     /// Whether the responses to a small force and its opposite are antisymmetric.
     fn is_smooth(&self) -> bool {
+        let Runs { baseline, opposite, .. } = self.runs;
         let (mut sum, mut difference) = (0.0, 0.0);
         for at in 0..WINDOW {
             for channel in 0..CHANNELS {
-                let of =
-                    |run: usize| self.perturbed_outputs[run][self.axis][at][channel] / self.noise(channel);
-                let (plus, minus) = (of(1 + FORCE) - of(0), of(OPPOSITE) - of(0));
+                let of = |run: &Readings| run[self.axis][at][channel] / self.noise(channel);
+                let nudged = self.runs.nudged(Number::Force);
+                let (plus, minus) = (of(nudged) - of(baseline), of(opposite) - of(baseline));
                 sum += (plus + minus).powi(2);
                 difference += (plus - minus).powi(2);
             }
@@ -279,17 +346,19 @@ struct Equations {
 
 impl Equations {
     fn solve(&self, offset_prior_n: f64) -> Option<Solution> {
-        let prior = |number: usize| if number == OFFSET { offset_prior_n } else { PRIORS[number] };
-        let precision = Theta::from_fn(|number, _| prior(number).powi(-2));
+        let prior = |number: Number| if number == Number::Offset { offset_prior_n } else { number.prior() };
+        let precision = Theta::from_fn(|at, _| prior(NUMBERS[at].0).powi(-2));
         let p = (self.normal + Normal::from_diagonal(&precision)).cholesky()?.inverse();
         let theta = p * self.right;
         // Remaining residuals widen the deviations.
         let left = self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
         let birge = (left / self.dof).max(1.0).sqrt();
         let mut deviation = Theta::zeros();
-        for number in 0..THETA_LEN {
+        let unknown = || NUMBERS.iter().map(|one| one.0).filter(|number| number.is_unknown_input());
+        for number in 0..COUNT {
             // Under the null, unknown inputs are 0 and start values vary within their priors.
-            let unknown: f64 = (FORCE..THETA_LEN).map(|at| (p[(number, at)] / prior(at)).powi(2)).sum();
+            let unknown: f64 =
+                unknown().map(|other| (p[(number, other as usize)] / prior(other)).powi(2)).sum();
             deviation[number] = (p[(number, number)] - unknown).max(0.0).sqrt() * birge;
         }
         Some(Solution {
@@ -307,35 +376,40 @@ fn gather(
     gridded: &GriddedRecord,
     axis: usize,
     solved: &[Solved],
-    balances: &mut [Vec<UnknownPoint>; 4],
+    balances: &mut [Vec<UnknownPoint>; UnknownKind::ALL.len()],
 ) {
     let offsets: Vec<f64> = solved
         .iter()
-        .filter(|solved| is_informative(&solved.free, OFFSET))
-        .map(|solved| solved.free.theta[OFFSET] / solved.free.deviation[OFFSET])
+        .filter(|solved| is_informative(&solved.free, Number::Offset))
+        .map(|Solved { free, .. }| Number::Offset.of(&free.theta) / Number::Offset.of(&free.deviation))
         .collect();
     let squares = offsets.iter().map(|offset| offset * offset).sum::<f64>() / offsets.len().max(1) as f64;
     let faulty = squares.sqrt() > OFFSET_OVER_NOISE;
     for Solved { from, smooth, baseline_force_n, free, bound } in solved {
         let best = if faulty { free } else { bound };
         let regimes = Regimes::of(rig, gridded, axis, *from);
-        let places = [(best, FLOW_A), (best, FLOW_B), (best, FORCE), (free, OFFSET)];
-        for (balance, (solution, number)) in places.into_iter().enumerate() {
-            if !is_informative(solution, number) || !smooth && number != OFFSET {
+        for kind in UnknownKind::ALL {
+            let (solution, number) = match kind {
+                UnknownKind::FlowA => (best, Number::FlowA),
+                UnknownKind::FlowB => (best, Number::FlowB),
+                UnknownKind::Force => (best, Number::Force),
+                UnknownKind::ForceSensor => (free, Number::Offset),
+            };
+            if !is_informative(solution, number) || !smooth && kind != UnknownKind::ForceSensor {
                 continue;
             }
-            let mut variables = variables(gridded, axis, *from, balance);
-            if balance == 3 {
+            let mut variables = variables(gridded, axis, *from, kind);
+            if kind == UnknownKind::ForceSensor {
                 // Its own reading would correlate with every error of the sensor.
                 variables[super::FORCE] = *baseline_force_n;
             }
-            let scale = if balance < 2 { NORMAL_LITRES_PER_MINUTE } else { 1.0 };
-            balances[balance].push(UnknownPoint {
+            let scale = if kind.is_flow() { NORMAL_LITRES_PER_MINUTE } else { 1.0 };
+            balances[kind.place()].push(UnknownPoint {
                 window: from / WINDOW,
-                value: solution.theta[number] * scale,
-                deviation: solution.deviation[number] * scale,
+                value: number.of(&solution.theta) * scale,
+                deviation: number.of(&solution.deviation) * scale,
                 variables,
-                per_pressure_offset: solution.per_pressure_offset.map(|change| change[number] * scale),
+                per_pressure_offset: solution.per_pressure_offset.map(|change| number.of(&change) * scale),
                 regimes,
             });
         }
@@ -343,8 +417,8 @@ fn gather(
 }
 
 /// Whether an unknown input is observable in a window.
-fn is_informative(solution: &Solution, number: usize) -> bool {
-    solution.posterior[number] < OBSERVABLE_RATIO * PRIORS[number] && solution.deviation[number] > 0.0
+fn is_informative(solution: &Solution, number: Number) -> bool {
+    number.of(&solution.posterior) < OBSERVABLE_RATIO * number.prior() && number.of(&solution.deviation) > 0.0
 }
 
 /// The variables of a window, in the order of [`VARIABLES`].
@@ -352,7 +426,7 @@ pub(crate) fn variables(
     gridded: &GriddedRecord,
     axis: usize,
     from: usize,
-    balance: usize,
+    kind: UnknownKind,
 ) -> [f64; VARIABLES.len()] {
     let points = &gridded.points[from..from + WINDOW];
     let n = WINDOW as f64;
@@ -365,14 +439,14 @@ pub(crate) fn variables(
     let before = from.saturating_sub(1);
     let rate = (command(from + WINDOW - 1) - command(before)) / (n * PERIOD_S);
     let forces: Vec<f64> =
-        gridded.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][1]).collect();
+        gridded.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][FORCE]).collect();
     let force = if forces.is_empty() { 0.0 } else { forces.iter().sum::<f64>() / forces.len() as f64 };
     let end = &gridded.points[(from + WINDOW).min(gridded.points.len() - 1)][axis];
     let slope =
         |chamber: usize| (end.pressures_pa[chamber] - points[0][axis].pressures_pa[chamber]) / (n * PERIOD_S);
-    let dp = match balance {
-        0 => slope(0),
-        1 => slope(1),
+    let dp = match kind {
+        UnknownKind::FlowA => slope(0),
+        UnknownKind::FlowB => slope(1),
         _ => slope(0) - slope(1),
     };
     let sign = if v == 0.0 { 0.0 } else { v.signum() };
@@ -385,9 +459,9 @@ pub(crate) fn variables(
     let [brief, long] = [0, 1].map(|time: usize| {
         remembered(&|memory| {
             let [a, b] = memory.pressure_changes_pa[time];
-            match balance {
-                0 => a,
-                1 => b,
+            match kind {
+                UnknownKind::FlowA => a,
+                UnknownKind::FlowB => b,
                 _ => a - b,
             }
         })

@@ -14,6 +14,7 @@ use super::noise_colour::ar1_se_factor;
 use super::regime::Regimes;
 use super::{UnknownPoint, VARIABLES, WINDOW};
 use crate::gridded_record::GriddedRecord;
+use crate::windows::UnknownKind;
 use plant::{PERIOD_S, RigParameters};
 
 /// Force of certain contact, over the noise of its sensor.
@@ -63,7 +64,7 @@ pub(super) fn gather(
         let slope_noise_m_per_s = noise_m * (12.0 / (n * n * n)).sqrt() / PERIOD_S;
         let stiff_n = linkage.stiffness_n_per_m * noise_m / n.sqrt();
         let damped_n = linkage.damping_n_s_per_m * slope_noise_m_per_s;
-        let mut variables: [f64; VARIABLES.len()] = variables(gridded, 0, from, 2);
+        let mut variables: [f64; VARIABLES.len()] = variables(gridded, 0, from, UnknownKind::Force);
         variables[super::FORCE] = forces.iter().sum::<f64>() / WINDOW as f64;
         points.push(UnknownPoint {
             window,

@@ -55,12 +55,8 @@ impl<'a> Pass<'a> {
         &self.contact_n
     }
 
-    /// Readings of the window at a period with each nudge; `None` for a state that the rig cannot have.
-    pub(super) fn simulate_window(&self, from: usize, nudges: &[Nudge]) -> Option<Vec<Readings>> {
-        nudges.iter().map(|nudge| self.run(from, nudge)).collect()
-    }
-
-    fn run(&self, from: usize, nudge: &Nudge) -> Option<Readings> {
+    /// Readings of the window at a period with a nudge; `None` for a state that the rig cannot have.
+    pub(super) fn run(&self, from: usize, nudge: &Nudge) -> Option<Readings> {
         let mut plant = self.plant.clone();
         let points = [0, 1].map(|axis| {
             let mut point = self.record.points[from][axis];

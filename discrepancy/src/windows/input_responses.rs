@@ -40,6 +40,11 @@ impl UnknownKind {
         self as usize
     }
 
+    /// Whether it is a flow into a chamber, in Nl/min; N otherwise.
+    pub(crate) fn is_flow(self) -> bool {
+        matches!(self, UnknownKind::FlowA | UnknownKind::FlowB)
+    }
+
     /// As a part of [`crate::report::BalanceBar::balance`].
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -189,7 +194,7 @@ impl Windows<'_> {
                 }
             }
             plant.step(&inputs);
-            if acts && matches!(kind, UnknownKind::FlowA | UnknownKind::FlowB) {
+            if acts && kind.is_flow() {
                 add_air(&mut plant, &flows_m3_per_s).ok()?;
             }
         }
