@@ -9,7 +9,9 @@
 //! Of equally good ones the shorter comes first, then the one that stays farther from the ends of the stroke. Losses of
 //! independent records add up: k repetitions, or a second experiment after the first, sum the differences of their trials.
 //!
-//! Source: issue 32, 6. Wilson 1927, J. Am. Stat. Assoc. 22(158): interval of a proportion.
+//! A share of records, with its interval, says what a user asks before an experiment: how likely it decides.
+//!
+//! Source: Wilson 1927, J. Am. Stat. Assoc. 22(158): interval of a proportion.
 
 use super::MOST_REPETITIONS;
 use super::menu::Entry;

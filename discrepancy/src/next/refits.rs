@@ -10,7 +10,9 @@
 //! are those of naming; the numbers of the effects are held by their standard errors in the report, which stand for the training
 //! records. A declared term of the user keeps its numbers.
 //!
-//! Source: issue 32, 6. Chernoff 1959, Ann. Math. Stat. 30(3): sequential design of experiments.
+//! A rival that may move its parameters absorbs a part of what T counts as its distance, and coloured noise hides another.
+//!
+//! Source: Chernoff 1959, Ann. Math. Stat. 30(3): sequential design of experiments.
 
 use super::Explanation;
 use super::closed_loop::{ClosedLoopRun, drive};
