@@ -14,7 +14,7 @@
 //! | `candidates` | ranking, what is not excited, detection limits |
 //! | `held_out` | gap and verification |
 //! | `checks` | the records |
-//! | `markup`, `words` | headings, numbers with units |
+//! | `words` | numbers with units |
 
 mod candidates;
 mod checks;
@@ -22,12 +22,12 @@ mod explanations;
 mod finding;
 mod held_out;
 mod location;
-mod markup;
 mod pictures;
 mod verdict;
 mod words;
 
 use crate::report::{Report, Verdict};
+use pagekit::markup::section;
 use pagekit::page::{document, escaped};
 
 /// Numbers of one signal over time, in the unit that stands beside them; what is missing is not finite.
@@ -86,8 +86,7 @@ pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
         .iter()
         .map(|(name, title, _)| format!("<li><a href=\"#{name}\">{}</a></li>\n", escaped(title)))
         .collect();
-    let body: String =
-        sections.iter().map(|(name, title, inside)| markup::section(name, title, inside)).collect();
+    let body: String = sections.iter().map(|(name, title, inside)| section(name, title, inside)).collect();
     document(
         verdict::title(report),
         &format!(

@@ -160,9 +160,18 @@ pub fn list(sentences: &[String], nothing: &str) -> String {
     format!("<ul>\n{items}</ul>\n")
 }
 
-/// Something that is opened by who wants to see it.
+/// A heading within a section.
+#[must_use]
+pub fn heading(text: &str) -> String {
+    format!("<h3>{}</h3>\n", escaped(text))
+}
+
+/// Something that is opened by who wants to see it; empty without content.
 #[must_use]
 pub fn folded(summary: &str, markup: &str) -> String {
+    if markup.is_empty() {
+        return String::new();
+    }
     format!("<details>\n<summary>{}</summary>\n{markup}</details>\n", escaped(summary))
 }
 

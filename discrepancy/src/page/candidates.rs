@@ -1,9 +1,9 @@
 //! The ranking of candidates, effects that are not excited, and detection limits.
 
-use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as text_cell};
 use super::words;
 use crate::report::{Candidate, Report};
 use model_fit::estimator::Convergence;
+use pagekit::markup::{Cell, charts, folded, heading, number, paragraph, table, words as text_cell};
 use pagekit::plot::{Bar, bars, figure};
 
 /// Candidates that are drawn; all stand in the table.

@@ -1,8 +1,8 @@
 //! The records: usability, findings, noise and quantum of channels.
 
-use super::markup::{Cell, folded, heading, number, table, words as text_cell};
 use super::words;
 use crate::report::{ChannelCheck, Finding, RecordCheck, Report};
+use pagekit::markup::{Cell, folded, heading, number, table, words as text_cell};
 use pagekit::page::escaped;
 
 pub(super) fn checks(report: &Report) -> String {

@@ -1,8 +1,8 @@
 //! The explanations that the search compared: how probable each is, what speaks for it and against it.
 
-use super::markup::{number, paragraph, table, words as text_cell};
 use super::words;
 use crate::report::{EffectPlace, Explanation, ExplanationKind, Features, Report, listed};
+use pagekit::markup::{number, paragraph, table, words as text_cell};
 use pagekit::plot::{Bar, figure, share_bars};
 
 pub(super) fn explanations(report: &Report) -> String {

@@ -1,7 +1,6 @@
 //! Findings in full: effects with numbers and alternatives, parameters, terms outside the catalogue, next experiment.
 
 use super::candidates;
-use super::markup::{Cell, charts, heading, number, paragraph, table, words as text_cell};
 use super::words;
 use crate::outside::SHIFTS;
 use crate::report::{
@@ -9,6 +8,7 @@ use crate::report::{
     Verdict, listed,
 };
 use model_fit::estimator::Convergence;
+use pagekit::markup::{Cell, charts, heading, number, paragraph, table, words as text_cell};
 use pagekit::plot::{Plot, Sample, figure, range};
 use plant::effects::sheet;
 

@@ -1,8 +1,8 @@
 //! What the held-out record says: the gap of each signal, and whether the extended model is confirmed.
 
-use super::markup::{Cell, number, paragraph, table, words as text_cell};
 use super::words;
 use crate::report::{BeforeAfter, Misfit, Report};
+use pagekit::markup::{Cell, number, paragraph, table, words as text_cell};
 use std::collections::BTreeMap;
 
 pub(super) fn misfit(report: &Report) -> String {

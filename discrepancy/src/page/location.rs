@@ -1,10 +1,10 @@
 //! Where the disagreement is: bars over the balances, cells over the regimes, maps over variables, unknown inputs over time.
 
 use super::finding::{curve_figure, located_variables};
-use super::markup::{Cell, charts, folded, heading, paragraph, table, words as text_cell};
 use super::words;
 use crate::locate::regime::REGIMES;
 use crate::report::{Location, Report, UnknownInput};
+use pagekit::markup::{Cell, charts, folded, heading, paragraph, table, words as text_cell};
 use pagekit::plot::{Bar, Plot, Sample, bars, figure, range};
 use pagekit::plot::{COLUMNS, columns};
 

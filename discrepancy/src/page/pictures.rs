@@ -3,10 +3,10 @@
 //! The difference is drawn in units of the sensor's noise, since a gap that nobody would see beside the whole stroke may be a
 //! hundred times the sensor noise. Before and after share their axes.
 
-use super::markup::{charts, folded, paragraph};
 use super::words;
 use super::{Pictures, Trace};
 use crate::report::{Report, Verdict};
+use pagekit::markup::{charts, folded, paragraph};
 use pagekit::plot::{COLUMNS, columns};
 use pagekit::plot::{Plot, Sample, figure, range};
 use std::ops::Range;
