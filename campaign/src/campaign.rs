@@ -4,7 +4,6 @@ use crate::child::Limit;
 use crate::command::{self, CommandError, Words};
 use crate::condition::{self, Condition, ConditionError};
 use crate::factor::Value;
-use crate::figures;
 use crate::file;
 use crate::file::{CampaignFile, ExperimentKind, Kind, Pace, RESERVED};
 use crate::outcome::{Ended, Outcome};
@@ -13,6 +12,7 @@ use crate::points::{Point, Points, TooMany};
 use crate::processes::{self, ProcessesError, Programs};
 use crate::rehearsed;
 use crate::shelf::{CampaignInputs, ShelfError};
+use figures::top::POSITIONS;
 use settings::SettingsError;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
@@ -216,7 +216,11 @@ fn push_cell(row: &mut String, text: &str) {
 }
 
 fn collected(file: &CampaignFile) -> Vec<String> {
-    if file.figures.is_empty() { figures::all() } else { file.figures.clone() }
+    if !file.figures.is_empty() {
+        return file.figures.clone();
+    }
+    let definitions = figures::definitions().map(|definition| definition.name);
+    POSITIONS.into_iter().chain(definitions).map(str::to_owned).collect()
 }
 
 fn columns(file: &CampaignFile) -> Vec<String> {

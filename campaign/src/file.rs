@@ -24,7 +24,7 @@
 //! in its turn: results of another version of one of them are none of this campaign's.
 
 use crate::factor::{self, Changes, Factor, FileChoice};
-use crate::figures;
+use figures::top::POSITIONS;
 use settings::{Section, SettingsError, Source};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -169,7 +169,7 @@ impl CampaignFile {
         for (place, name) in self.figures.iter().enumerate() {
             let refused = |problem: String| collect.refused_item("figures", place, &problem);
             check_column(name, &taken).map_err(refused)?;
-            if experiment && !figures::is_known(name) {
+            if experiment && !is_figure(name) {
                 return Err(refused(format!("no figure {name}; `bench figures` lists them")));
             }
             taken.push(name);
@@ -182,7 +182,7 @@ impl CampaignFile {
         let own = |name: &String| {
             self.figures.contains(name)
                 || self.factors.iter().any(|factor| factor.name == *name)
-                || (matches!(self.kind, Kind::Experiment(_)) && figures::is_known(name))
+                || (matches!(self.kind, Kind::Experiment(_)) && is_figure(name))
         };
         let worst = self.worst.iter().map(std::slice::from_ref).enumerate().map(|item| ("worst", item));
         let confusion = self.confusion.iter().map(|pair| &pair[..]).enumerate();
@@ -194,6 +194,11 @@ impl CampaignFile {
         }
         Ok(())
     }
+}
+
+/// Whether an experiment has a figure of this name: those of `bench figures`, and those of the position in a summary.
+pub(crate) fn is_figure(name: &str) -> bool {
+    POSITIONS.contains(&name) || figures::definition(name).is_some()
 }
 
 /// Pairs of columns of truth and answer.
@@ -245,7 +250,7 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
         return Err(format!("name: {name} is varied twice; give one of them another name, or leave one out"));
     }
     check_column(name, RESERVED).map_err(|reported| format!("name = {reported}"))?;
-    if figures::is_known(name) {
+    if is_figure(name) {
         return Err(format!("name = \"{name}\": a figure has this name, choose another"));
     }
     match (kind, changes) {

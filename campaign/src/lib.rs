@@ -23,7 +23,7 @@
 //! | [`condition`] | what a run is made with |
 //! | [`rehearsed`], [`processes`], [`command`] | the three ways in which a run is made |
 //! | [`child`] | processes that end when they have to |
-//! | [`figures`], [`outcome`] | what a run comes to |
+//! | [`outcome`] | what a run comes to |
 //! | [`campaign`] | all of it together |
 //! | [`shard`], [`parts`], [`engine`] | who does what, on disk, on all cores |
 //! | [`merge`], [`page`] | results |
@@ -38,7 +38,6 @@ mod condition;
 mod edits;
 mod engine;
 mod factor;
-mod figures;
 mod file;
 mod merge;
 mod outcome;

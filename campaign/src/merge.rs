@@ -4,9 +4,8 @@
 
 use crate::campaign::Campaign;
 use crate::factor::Values;
-use crate::figures::TOP;
+use crate::file::is_figure;
 use crate::parts::{PartError, Parts, beside};
-use figures::definition;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -156,9 +155,8 @@ impl Results {
         }
         // Of a command nobody knows beforehand what is a number; of an experiment all figures are.
         for name in &campaign.parts.columns {
-            let is_figure = TOP.contains(&name.as_str()) || definition(name).is_some();
             let is_collected = campaign.file.figures.contains(name) && !results.words.contains_key(name);
-            if is_figure || is_collected {
+            if is_figure(name) || is_collected {
                 results.numbers.insert(name.clone(), Vec::new());
             }
         }

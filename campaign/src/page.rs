@@ -8,9 +8,10 @@ mod heat;
 mod worst;
 
 use crate::campaign::Campaign;
-use crate::figures::TOP;
+use crate::file::is_figure;
 use crate::merge::Results;
 use figures::definition;
+use figures::top::POSITIONS;
 use pagekit::grid::Grid;
 use pagekit::number::{in_use, short, without_unit};
 use pagekit::page::{document, escaped};
@@ -43,9 +44,7 @@ fn shown(campaign: &Campaign, results: &Results) -> Vec<String> {
     let measured = |name: &&String| {
         let column = results.numbers(name).unwrap_or_default();
         (campaign.file.figures.contains(name) || campaign.file.figures.is_empty())
-            && (TOP.contains(&name.as_str())
-                || definition(name).is_some()
-                || campaign.file.figures.contains(name))
+            && (is_figure(name) || campaign.file.figures.contains(name))
             && column.iter().any(|value| value.is_finite())
     };
     campaign.parts.columns.iter().filter(measured).take(USUAL).cloned().collect()
@@ -109,7 +108,7 @@ fn name(figure: &str) -> String {
 fn value(figure: &str, number: f64) -> String {
     let unit = match definition(figure) {
         Some(definition) => definition.unit,
-        None if TOP.contains(&figure) => "m",
+        None if POSITIONS.contains(&figure) => "m",
         None => "1",
     };
     in_use(number, unit)

@@ -6,10 +6,10 @@ use crate::child::{Cut, Limit, Own};
 use crate::condition::{Condition, ConditionError};
 use crate::edits;
 use crate::factor::Value;
-use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
 use crate::shelf::CampaignInputs;
 use axis_control::experiment::Experiment;
+use figures::top::POSITIONS;
 use figures::{SummaryError, join};
 use protocol::exit::Exit;
 use protocol::periods::CYCLE_S;
@@ -113,7 +113,8 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
     let summary = &joined.summary;
     let of_table = summary.figures.iter().map(|(name, value)| (name.clone(), *value));
     let errors = [summary.position_error_dynamic_m, summary.position_error_static_m];
-    let at_top = TOP.into_iter().zip(errors).filter_map(|(name, error_m)| Some((name.to_owned(), error_m?)));
+    let at_top =
+        POSITIONS.into_iter().zip(errors).filter_map(|(name, error_m)| Some((name.to_owned(), error_m?)));
     let figures: BTreeMap<_, _> =
         at_top.chain(of_table).map(|(name, value)| (name, Value::Number(value))).collect();
     let controller = summary.by_controllers.as_ref().and_then(|all| all.controller.as_ref());

@@ -5,7 +5,6 @@
 
 use crate::condition::{Condition, ConditionError};
 use crate::factor::Value;
-use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
 use crate::shelf::CampaignInputs;
 use axis_control::axis::{AxisController, AxisRecord};
@@ -14,6 +13,7 @@ use figures::record::{MEASURED, Record, TRUE};
 use figures::series::Series;
 use figures::tables_read::{StateSpan, Table, enter};
 use figures::thresholds::{self, ByRepetition, Found};
+use figures::top::POSITIONS;
 use figures::{self, position, top};
 use plant::tables::{self, CycleRecord};
 use plant::{Axis, Truth};
@@ -79,7 +79,7 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
         drive.and_then(|figures| figures.static_m()).or_else(|| position::error_static_m(record)),
     ];
     let computed = figures::of(record);
-    let known = TOP.into_iter().zip(top).filter_map(|(name, value)| Some((name, value?)));
+    let known = POSITIONS.into_iter().zip(top).filter_map(|(name, value)| Some((name, value?)));
     let figures: BTreeMap<_, _> =
         known.chain(computed.iter()).map(|(name, value)| (name.to_owned(), Value::Number(value))).collect();
     let each = computed.by_repetition().map(|(name, values)| (name.to_owned(), values.to_vec())).collect();
