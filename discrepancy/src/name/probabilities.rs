@@ -41,7 +41,6 @@ struct Weights {
     excess: f64,
     /// What effects leave: the laws of a catalogue are never exact.
     excess_of_effects: f64,
-    moved: f64,
     parameters_alone: f64,
     variation: f64,
     amplitude: f64,
@@ -85,7 +84,6 @@ fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
     of_kind
         + weights.behind * (features.behind / BEHIND_SCALE).ln_1p()
         + (weights.excess + of_effects) * (features.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
-        + weights.moved * features.parameters_moved
         + weights.variation * (variation / VARIATION_SCALE).ln_1p()
         + weights.amplitude * smallest.clamp(1.0, LARGEST_RATIO).ln()
 }
