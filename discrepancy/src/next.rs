@@ -25,9 +25,9 @@
 //! | [`nuisance`] | baseline parameters that are refitted jointly |
 //! | [`remedies`] | what would separate effects where no experiment does |
 //!
-//! Which entry separates which twins: `discrepancy/docs/next.md`. Of eight pairs of twins there the largest T told none apart, the
-//! rehearsals five. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner 1965; Atkinson and Fedorov 1975, Biometrika 62(1):
-//! T-optimality.
+//! Which entry separates which twins: `discrepancy/docs/next.md`. Of eight pairs of twins there the largest T told none apart,
+//! the rehearsals five. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner 1965; Atkinson and Fedorov 1975, Biometrika
+//! 62(1): T-optimality.
 
 pub mod choice;
 pub mod closed_loop;
