@@ -65,7 +65,8 @@ fn next_writes_an_experiment_that_tells_apart_what_a_report_could_not() {
     let other = effect("valve-dead-zone", "dead_zone_percent", 0.4, "");
     let named = effect("command-dead-time", "delay_ms", 0.6, &other);
     let inputs = r#"{ "rig": "rig.toml", "train": ["a.csv"], "axes": ["drive"], "searched_share": 1.0 }"#;
-    let reported = format!(r#"{{ "inputs": {inputs}, "named": [{named}], "parameters": [] }}"#);
+    let reported =
+        format!(r#"{{ "verdict": "ambiguous", "inputs": {inputs}, "named": [{named}], "parameters": [] }}"#);
     fs::write(&report, reported).expect("a report");
     let next =
         discrepancy(&[&"next", &"--rig", &rig(), &"--report", &report, &"--out", &out]).expect_code(GOOD);
