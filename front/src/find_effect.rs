@@ -126,8 +126,11 @@ impl Search<'_> {
             Some(text) => {
                 fs::write(&sealed, text).map_err(|error| FrontError::output(&sealed, &error))?;
             }
-            // Nothing is measured: the folder stays free for another try.
-            None => self.draw(seed, &sealed).inspect_err(|_| drop(fs::remove_dir_all(&folder)))?,
+            // Nothing is measured: the folder is free for another try, but for what somebody else put there.
+            None => self.draw(seed, &sealed).inspect_err(|_| {
+                drop(fs::remove_dir_all(&hidden));
+                drop(fs::remove_dir(&folder));
+            })?,
         }
         for ((name, file), noise) in self.experiments.clone().iter().zip([1000, 2000]) {
             say(&format!("measuring {name} on the sealed rig …"));
