@@ -42,7 +42,7 @@ pub(crate) enum Command {
     Report(ReportArguments),
     /// Name the one cause that a latency report gives for what went wrong in its runs: on stdout its name, or `nothing`.
     Cause {
-        /// The report.json.
+        /// Written by `bench report`.
         #[arg(value_name = "REPORT.json")]
         file: PathBuf,
     },

@@ -38,7 +38,6 @@ enum CommandError {
     NoSuchRun { run: u64, last: u64 },
 }
 
-/// The program.
 pub fn main() -> ExitCode {
     let exit = run(&Cli::parse()).unwrap_or_else(|error| {
         say(&error.to_string());

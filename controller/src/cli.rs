@@ -42,7 +42,7 @@ pub struct A2lArguments {
     /// What is controlled.
     #[command(flatten)]
     pub files: FileArguments,
-    /// The axis.
+    /// Axis that the file describes.
     #[arg(long, value_enum)]
     pub axis: OneAxis,
 }
@@ -50,9 +50,9 @@ pub struct A2lArguments {
 /// One of the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum OneAxis {
-    /// The drive.
+    /// Position controlled.
     Drive,
-    /// The load.
+    /// Force controlled.
     Load,
 }
 

@@ -22,7 +22,7 @@ pub const MOST_REGISTERS: usize = 96;
 pub struct Variable<'a> {
     /// Its name in the expression; empty where a parameter has taken it.
     pub name: &'a str,
-    /// Its dimension.
+    /// Powers of the base units.
     pub dimension: Dimension,
     /// Its smallest and largest value, in SI.
     pub range: Range,
@@ -33,7 +33,7 @@ pub struct Variable<'a> {
 pub struct Known<'a> {
     /// What it is over.
     pub variables: &'a [Variable<'a>],
-    /// Its numbers.
+    /// What stays the same over a run.
     pub parameters: &'a [Variable<'a>],
     /// Curves that it may read.
     pub tables: &'a [Table],

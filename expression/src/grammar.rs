@@ -154,7 +154,7 @@ impl Nodes {
         self.push(Kind::Binary(Binary::Multiply, left, right), at)
     }
 
-    /// A name.
+    /// Appends an operand that is called by a name.
     ///
     /// # Errors
     /// [`Wrong`] at byte `at` where there are too many.

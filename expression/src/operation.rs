@@ -90,7 +90,7 @@ impl Code {
         )
     }
 
-    /// Its value.
+    /// Result for these operands.
     #[inline]
     pub(crate) fn value(self, [a, b, c]: [f64; 3], around: &Around<'_>) -> f64 {
         let truth = |is_true: bool| f64::from(u8::from(is_true));

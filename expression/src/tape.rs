@@ -19,7 +19,7 @@ pub use crate::operation::Code;
 use crate::past::{NONE, Past};
 use std::collections::HashMap;
 
-/// A register.
+/// Place of an intermediate result.
 pub type Register = u32;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

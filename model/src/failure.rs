@@ -26,7 +26,7 @@ pub enum Failure {
     Drives {
         /// File, line and column of its sliding force.
         place: String,
-        /// Its name.
+        /// As the file calls it.
         name: String,
     },
     /// Steps that would never end.

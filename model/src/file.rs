@@ -121,7 +121,7 @@ pub struct Input {
 pub struct Smoothing {
     /// Edge of a zero-phase Butterworth, Hz; 0 for none.
     pub low_pass_hz: f64,
-    /// Its order.
+    /// Order of the Butterworth.
     pub low_pass_order: usize,
     /// Samples of a mean around each, odd; 1 for none.
     pub moving_average: usize,
@@ -283,7 +283,7 @@ pub struct Output {
 pub enum Part {
     /// An input, with what changes it.
     Input(usize),
-    /// A state.
+    /// A state, by its place in the file.
     State(usize),
     /// The expression of a suspect, before it acts on its place.
     Suspect(usize),
@@ -296,7 +296,7 @@ pub enum Target {
     Input(usize),
     /// The equation of a state.
     State(usize),
-    /// A definition.
+    /// A definition, by its place in the file.
     Definition(usize),
     /// The value that an output reports.
     Output(usize),

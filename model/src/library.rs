@@ -46,7 +46,7 @@ pub struct Library {
     pub place: Unit,
     /// Variables that a model binds to its names.
     pub variables: Vec<Variable>,
-    /// Its suspects.
+    /// Suspects, in the order of the file.
     pub entries: Vec<Entry>,
 }
 
@@ -78,9 +78,9 @@ pub struct Entry {
     pub effect: Option<String>,
     /// It acts in a part of what folds go over.
     pub is_local: bool,
-    /// Its numbers.
+    /// Numbers that a fit estimates.
     pub parameters: Vec<EntryParameter>,
-    /// Its states.
+    /// Differential states that it adds to the model.
     pub states: Vec<EntryState>,
     /// What it keeps over a step.
     pub memories: Vec<EntryMemory>,
@@ -100,9 +100,9 @@ pub struct Quantity {
 /// A number of a suspect of a library.
 #[derive(Clone, Debug)]
 pub struct EntryParameter {
-    /// Its name.
+    /// As expressions of the entry write it.
     pub name: String,
-    /// Its unit.
+    /// Unit, and of which variables it is made.
     pub quantity: Quantity,
     /// Values from which a fit starts, in SI.
     pub values_si: Vec<f64>,
@@ -115,9 +115,9 @@ pub struct EntryParameter {
 /// A state of a suspect of a library.
 #[derive(Clone, Debug)]
 pub struct EntryState {
-    /// Its name.
+    /// As expressions of the entry write it.
     pub name: String,
-    /// Its unit.
+    /// Unit, and of which variables it is made.
     pub quantity: Quantity,
     /// It starts at 0, or where the input or output at the place of the suspect starts.
     pub is_zero_at_start: bool,
@@ -128,9 +128,9 @@ pub struct EntryState {
 /// What a suspect of a library keeps over a step; it starts at 0.
 #[derive(Clone, Debug)]
 pub struct EntryMemory {
-    /// Its name.
+    /// As expressions of the entry write it.
     pub name: String,
-    /// Its unit.
+    /// Unit, and of which variables it is made.
     pub quantity: Quantity,
     /// Its value after a step.
     pub update: String,
@@ -141,7 +141,7 @@ pub struct EntryMemory {
 pub struct EntryFriction {
     /// What its force is called.
     pub name: String,
-    /// Its unit.
+    /// Unit, and of which variables it is made.
     pub quantity: Quantity,
     /// The variable that it holds at rest; a model binds it to a state.
     pub velocity: String,

@@ -367,7 +367,7 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Its unit.
+    /// Unit in which the model file writes an unknown.
     pub(crate) fn unit_of(&self, unknown: &Unknown) -> &'a Unit {
         match unknown.what {
             What::Shared(index) | What::OfRecord(index, _) => &self.model.parameters[index].unit,

@@ -58,7 +58,7 @@ fn an_event_at_a_position_waits_for_the_carriage_from_its_time_on() {
     assert_eq!(play(&scene(&late), 1000, |_| [1.0, 0.0]).reported.len(), 1);
 }
 
-// The file.
+// Reading the section [rig] of an experiment file.
 
 #[test]
 fn without_a_rig_section_all_is_default_and_other_tables_are_not_looked_at() {

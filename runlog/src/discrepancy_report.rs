@@ -34,13 +34,13 @@ pub use verification::{BeforeAfter, Misfit, Verification};
 /// Version of the schema; a new optional field does not change it.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// The file.
+/// What the workflow found in records of a rig, and how far the extended model agrees with a held-out record.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
-    /// See [`SCHEMA_VERSION`].
+    /// [`SCHEMA_VERSION`] of the program that wrote it; 0 where it wrote none.
     #[serde(default)]
     pub schema_version: u32,
-    /// What the workflow concludes.
+    /// Of the training records alone.
     pub verdict: Verdict,
     /// The verdict in a sentence or two.
     #[serde(default)]
@@ -98,7 +98,7 @@ pub struct Report {
     pub detection_limits: Vec<DetectionLimit>,
     /// Where model and records disagree.
     pub location: Option<Location>,
-    /// Fitness of the records.
+    /// Whether each record can be used, and what is odd about it.
     #[serde(skip_deserializing)]
     pub checks: Vec<RecordCheck>,
     /// The experiment that resolves the ambiguity, or why there is none.
@@ -108,9 +108,9 @@ pub struct Report {
 /// Files of a run of the workflow.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct InputFiles {
-    /// The rig file.
+    /// File name as given.
     pub rig: String,
-    /// Training records.
+    /// File names as given, in their order.
     pub train: Vec<String>,
     /// Axes that all of them show, drive or load; empty for a model of one balance and for records that cannot be used.
     #[serde(default)]
@@ -163,7 +163,7 @@ impl Display for Where {
 pub struct Quantity {
     /// Key of the effect's sheet, or `parameter:…`.
     pub name: String,
-    /// In `unit`.
+    /// Estimate, in `unit`.
     pub value: f64,
     /// Unit of the rig file; empty for a plain number.
     pub unit: String,
@@ -200,17 +200,17 @@ pub struct NamedEffect {
 pub struct EffectPlace {
     /// As of a [`NamedEffect`].
     pub effect: String,
-    /// The same.
+    /// As of a [`NamedEffect`].
     #[serde(rename = "where")]
     pub place: Where,
 }
 
-/// An effect that may be missing, and how it did.
+/// An effect that was screened, and how far it got.
 #[derive(Clone, Debug, Serialize)]
 pub struct Candidate {
     /// As of a [`NamedEffect`].
     pub effect: String,
-    /// The same.
+    /// As of a [`NamedEffect`].
     #[serde(rename = "where")]
     pub place: Where,
     /// Screened gain over the null threshold of the final model; above 1 it exceeds what chance gives the best candidate; no test
@@ -224,7 +224,7 @@ pub struct Candidate {
     pub amplitude: f64,
     /// Unit of the amplitude.
     pub unit: String,
-    /// Outcome, in words.
+    /// Why it is named or not, in words.
     #[serde(rename = "fate")]
     pub decision: String,
 }
@@ -234,7 +234,7 @@ pub struct Candidate {
 pub struct DetectionLimit {
     /// As of a [`NamedEffect`].
     pub effect: String,
-    /// The same.
+    /// As of a [`NamedEffect`].
     #[serde(rename = "where")]
     pub place: Where,
     /// Key of the amplitude.

@@ -83,7 +83,7 @@ pub enum GuestError {
          'emulator run' and 'emulator bus'; --pair opens one without a rig"
     )]
     NoHost {
-        /// The interface.
+        /// Of the CAN interface.
         name: String,
         /// Where its bus was looked for.
         path: String,

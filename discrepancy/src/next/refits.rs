@@ -41,7 +41,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Its rivals.
+    /// Each explanation but the truth, with how far it is behind.
     pub(super) fn rivals(&self) -> impl Iterator<Item = (usize, f64)> {
         let truth = self.truth;
         self.behind.iter().copied().enumerate().filter(move |(rival, _)| *rival != truth)

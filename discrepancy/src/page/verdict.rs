@@ -5,7 +5,7 @@ use crate::report::{NamedEffect, Objection, Report, Verdict, listed};
 use model_fit::WORSE;
 use pagekit::page::escaped;
 
-/// The headline.
+/// What the page says first: the doubt of the held-out record, where there is one, in place of the verdict.
 pub(super) fn title(report: &Report) -> &'static str {
     doubt(report).unwrap_or(match report.verdict {
         Verdict::NothingMissing if report.small.is_empty() => "Nothing is missing",

@@ -12,13 +12,13 @@ use std::path::Path;
 /// A suspect with its library.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// The library.
+    /// Where it stands.
     pub library: Cow<'static, Library>,
     place: usize,
 }
 
 impl Found {
-    /// The suspect.
+    /// The suspect in its library.
     #[must_use]
     pub fn entry(&self) -> &Entry {
         &self.library.entries[self.place]

@@ -212,7 +212,7 @@ impl Declared {
         format!("{}.{}", self.axis.name(), self.target.name())
     }
 
-    /// The expression.
+    /// As the rig file writes it.
     #[must_use]
     pub fn expression(&self) -> &str {
         &self.add

@@ -43,7 +43,7 @@ pub struct LawVariable {
 /// A number of a law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LawNumber {
-    /// Its name.
+    /// As the law writes it.
     pub name: String,
     /// Unit that it usually has.
     pub unit: String,

@@ -19,7 +19,7 @@ pub type NodeId = usize;
 pub enum WireEvent {
     /// A frame was sent to its end: for everyone but its sender and the deaf.
     Delivered {
-        /// The frame.
+        /// As it was sent.
         frame: CanFrame,
         /// Who sent it.
         from: NodeId,

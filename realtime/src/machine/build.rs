@@ -17,7 +17,7 @@ pub struct Build {
     pub profile: BuildProfile,
     /// Checks that only tests and debugging want.
     pub debug_assertions: bool,
-    /// The compiler.
+    /// Version of the compiler, as `rustc --version` prints it.
     pub rustc: Cow<'static, str>,
     /// What it was built for.
     pub target: Cow<'static, str>,

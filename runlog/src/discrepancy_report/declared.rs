@@ -3,7 +3,7 @@
 use super::{NamedEffect, Where};
 use serde::{Deserialize, Serialize};
 
-/// A suspect of the file.
+/// A term that a file of suspects declares beside the catalogue.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DeclaredSuspect {
     /// Its name; named effects and candidates have it as their effect.
@@ -13,7 +13,7 @@ pub struct DeclaredSuspect {
     pub place: Where,
     /// What it adds to, as `drive.force`.
     pub adds_to: String,
-    /// The expression.
+    /// Expression of the term that is added.
     pub add: String,
     /// Effects or suspects that are known to do the same.
     pub twins: Vec<String>,

@@ -38,10 +38,10 @@ pub struct Features {
     pub share: f64,
 }
 
-/// An explanation of the training records.
+/// What may explain the training records, and how probable it is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Explanation {
-    /// What it says.
+    /// What is the case if it is right.
     pub kind: ExplanationKind,
     /// Sets of effects that the records cannot tell apart, the best first; empty without effects.
     pub sets: Vec<Vec<EffectPlace>>,

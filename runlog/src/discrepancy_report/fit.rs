@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// How a fit ended.
+/// Why a fit took no further step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
@@ -20,7 +20,7 @@ pub enum Outcome {
 /// How a fit ended and what it took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Convergence {
-    /// How it ended.
+    /// Why no further step was taken.
     pub outcome: Outcome,
     /// Accepted steps.
     pub iterations: usize,
@@ -40,7 +40,7 @@ impl Convergence {
         }
     }
 
-    /// Of one fit after another.
+    /// Of two fits in turn: the outcome of the second, the steps and simulations of both.
     #[must_use]
     pub fn then(self, next: Self) -> Self {
         Convergence {

@@ -31,9 +31,9 @@ pub struct BalanceBar {
     pub balance: String,
     /// rms of the unknown input over its propagated noise; 1 for a closed balance.
     pub over_noise: f64,
-    /// rms of the unknown input.
+    /// rms of the unknown input, in `unit`.
     pub rms: f64,
-    /// Its unit, N or Nl/min.
+    /// N or Nl/min.
     pub unit: String,
 }
 
@@ -55,11 +55,11 @@ pub struct RegimeCell {
 pub struct UnknownInput {
     /// As in [`BalanceBar::balance`].
     pub balance: String,
-    /// Unit of its values.
+    /// N or Nl/min.
     pub unit: String,
-    /// Times of its values.
+    /// Of each value; thinned out.
     pub time_s: Vec<f64>,
-    /// The values.
+    /// At `time_s`, in `unit`.
     pub value: Vec<f64>,
     /// Propagated noise, one standard deviation.
     pub noise: f64,

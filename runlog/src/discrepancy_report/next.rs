@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Next {
-    /// Why.
+    /// Why this experiment, or why none, in a sentence.
     pub reason: String,
     /// File of the experiment beside the report; null when none discriminates.
     pub experiment: Option<String>,
@@ -14,7 +14,7 @@ pub struct Next {
     pub divergence: Option<f64>,
     /// Share of the rehearsed records of the best experiment that tell the alternatives apart.
     pub probability: Option<f64>,
-    /// Its interval of 95 %.
+    /// Interval of `probability`, 95 %.
     pub probability_interval: Option<[f64; 2]>,
     /// How many records were rehearsed.
     pub rehearsals: Option<usize>,
@@ -31,6 +31,6 @@ pub struct SecondExperiment {
     pub experiment: String,
     /// Probability that one of the two, or both together, tell the alternatives apart.
     pub probability: f64,
-    /// Its interval of 95 %.
+    /// Interval of `probability`, 95 %.
     pub probability_interval: [f64; 2],
 }

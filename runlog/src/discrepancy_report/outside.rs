@@ -38,11 +38,11 @@ pub struct TableTerm {
     pub balance: String,
     /// x, v, |v|, sign(v), u, p_a, p_b, p_a-p_b or x sign(v).
     pub variable: String,
-    /// Its unit.
+    /// Unit of `at`; empty for a plain number.
     pub variable_unit: String,
     /// Unit of the term, N or Nl/min.
     pub unit: String,
-    /// Points, growing.
+    /// Points of the table, growing.
     pub at: Vec<f64>,
     /// The term there; a straight line between points, constant beyond them.
     pub value: Vec<f64>,
@@ -65,24 +65,24 @@ pub struct Dependence {
 /// A smooth curve with a band.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Curve {
-    /// Its variable.
+    /// As in [`Dependence::variable`].
     pub variable: String,
-    /// Unit of the variable.
+    /// Unit of `at`.
     pub variable_unit: String,
     /// Unit of the term.
     pub unit: String,
     /// Values of the variable.
     pub at: Vec<f64>,
-    /// The term there.
+    /// The term at each place of `at`, in `unit`.
     pub value: Vec<f64>,
-    /// Two standard errors of it.
+    /// Two standard errors of `value`.
     pub band: Vec<f64>,
 }
 
 /// A surface over two variables with a band; null where too few points are.
 #[derive(Clone, Debug, Serialize)]
 pub struct Surface {
-    /// Its variables.
+    /// As in [`Dependence::variable`].
     pub variables: [String; 2],
     /// Their units.
     pub variable_units: [String; 2],
@@ -92,6 +92,6 @@ pub struct Surface {
     pub at: [Vec<f64>; 2],
     /// The term there: a row for each value of the second variable.
     pub value: Vec<Vec<Option<f64>>>,
-    /// Two standard errors of it.
+    /// Two standard errors of `value`.
     pub band: Vec<Vec<Option<f64>>>,
 }

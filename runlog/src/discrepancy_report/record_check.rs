@@ -3,14 +3,14 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Fitness of a record.
+/// Whether the workflow can use a record, and what is odd about it.
 #[derive(Clone, Debug, Serialize)]
 pub struct RecordCheck {
     /// The record as it was given.
     pub file: String,
     /// Whether the workflow can use it.
     pub usable: bool,
-    /// Samples and length.
+    /// Number of samples.
     pub rows: usize,
     /// Last time minus first, s.
     pub length_s: f64,
@@ -35,7 +35,7 @@ pub struct Finding {
     pub text: String,
 }
 
-/// What a channel is like.
+/// Noise, resolution and lost samples of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ChannelCheck {
     /// Standard deviation of its noise, in SI; null when unknown.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The verdict.
+/// What the training records say of the rig file, or of a model file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -23,7 +23,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// As it is written.
+    /// Its spelling in reports, which is that of serde.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -30,10 +30,10 @@ pub struct Verification {
     /// Windowed chi2 per degree of freedom of the baseline.
     #[serde(skip_deserializing)]
     pub chi2_before: f64,
-    /// Of the extended model.
+    /// Windowed chi2 per degree of freedom of the extended model.
     #[serde(deserialize_with = "null_is_nan")]
     pub chi2_after: f64,
-    /// 95 % null range of the same.
+    /// 95 % null range of `chi2_after`.
     pub chi2_null: [f64; 2],
     /// Per signal: normalised rms error of a free run, in percent of the signal's range.
     #[serde(skip_deserializing)]
@@ -60,11 +60,11 @@ pub struct Verification {
     pub more_missing: bool,
 }
 
-/// A figure of both models.
+/// A figure of the held-out record for the rig file as given and for the extended one.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct BeforeAfter {
-    /// Baseline.
+    /// Of the rig file as given.
     pub before: f64,
-    /// Extended model.
+    /// Of the extended rig file.
     pub after: f64,
 }

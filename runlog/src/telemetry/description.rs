@@ -123,7 +123,7 @@ pub struct FaultEntry {
     pub about: String,
     /// Places where it can be.
     pub places: Vec<String>,
-    /// Its numbers.
+    /// Numbers that an order may give it.
     pub keys: Vec<FaultKey>,
 }
 

@@ -34,6 +34,7 @@ pub(crate) struct Rule {
 /// All rules that look at one file at a time.
 pub(crate) const RULES: &[&Rule] = &[
     &rust::PURPOSE,
+    &rust::SAYING_COMMENTS,
     &rust::CRATE_EDGES,
     &rust::PURE_PLANT,
     &rust::EFFECTS,

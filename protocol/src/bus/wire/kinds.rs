@@ -53,7 +53,7 @@ pub enum WireFault {
     },
     /// A node says the same over and over.
     Babbling {
-        /// Its identifier.
+        /// Identifier of the frame that it repeats.
         id: u16,
         /// How often.
         frames_per_ms: f64,
