@@ -11,8 +11,8 @@
 //!
 //! Normal equations are kept for each window, so that any selection of columns is solved without the samples.
 //!
-//! Source: discrepancy-notes.md, 3, 6 (clustered scores, weights on windows and not on samples). Lange, Little, Taylor 1989, JASA
-//! 84(408): likelihood with unknown scale.
+//! Source: discrepancy-notes.md, 3, 6 (clustered scores, weights on windows and not on samples). Ljung 1999, System
+//! Identification, 15.3, and Seber, Wild 1989, Nonlinear Regression, 2.2.3: likelihood concentrated over variances.
 
 mod errors;
 

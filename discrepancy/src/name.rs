@@ -30,7 +30,7 @@ use crate::calibrate::calibrate;
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::parameters::{COUNT, with_factors};
-use crate::refit::{EffectEstimate, Linearisation, Refit, derivative, linearise, rig_of};
+use crate::refit::{EffectEstimate, Linearisation, Refit, coordinates, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 pub use decision::NotExplained;
 use decision::{Decision, Searched, decide};
@@ -348,9 +348,9 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
     let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);
     let residual = engine.residual(&simulated);
-    let model_sensitivities: Vec<Vec<f64>> = (0..model.placed.len())
+    let model_sensitivities: Vec<Vec<f64>> = coordinates(&model.placed)
         .into_par_iter()
-        .filter_map(|at| derivative(engine, &model.factors, &model.placed, &simulated, at, 0))
+        .filter_map(|(at, key)| derivative(engine, &model.factors, &model.placed, &simulated, at, key))
         .collect();
     columns.screen(engine, &linearisation, &residual, &model_sensitivities)
 }

@@ -110,8 +110,8 @@ impl BalanceTests<'_> {
         });
         let is_constant = mean > MIN_MEAN_Z && constant > explained * (1.0 - constant);
         if located_at.is_some() || located.is_none() && is_constant {
-            // No permutation p value: a circular shift leaves the mean unchanged. The z test above decides, and the smallest p
-            // value of the other variables stands for it.
+            // No permutation p value: a circular shift leaves the mean unchanged. The z test above decides; the smallest p value
+            // that shifts can give stands for it. Its share is in sample and of the raw sum of squares.
             let p_value = 1.0 / (SHIFTS as f64 + 1.0);
             let by_share = usize::from(explained > R2_BEFORE_CONSTANT);
             let place = located_at.unwrap_or(by_share).min(variables.len());

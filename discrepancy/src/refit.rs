@@ -49,7 +49,8 @@ pub struct Refit {
     pub(crate) squares: Vec<f64>,
     /// Standard errors of all coordinates, in the order of the effects and their keys, then of the factors; clustered by windows.
     pub errors: Vec<f64>,
-    /// Design effect: cluster-robust over model-based variance of the first amplitude; at least 1.
+    /// Design effect: cluster-robust over model-based variance of the last effect's amplitude; at least 1. Fits of a round differ
+    /// in their last effect.
     pub(crate) design_effect: f64,
     /// How the fit ended.
     pub(crate) convergence: Convergence,
@@ -161,7 +162,7 @@ pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[EffectEstimate]
 }
 
 /// All coordinates of the effects: place in `placed`, and key.
-fn coordinates(placed: &[EffectEstimate]) -> Vec<(usize, usize)> {
+pub(crate) fn coordinates(placed: &[EffectEstimate]) -> Vec<(usize, usize)> {
     placed
         .iter()
         .enumerate()
@@ -283,9 +284,10 @@ pub(crate) fn refit_steps(
     let plain = plain.try_inverse();
     let error =
         |at: usize| covariance.as_ref().map_or(f64::INFINITY, |matrix| matrix[(at, at)].max(0.0).sqrt());
+    let newest = coordinates.iter().position(|(at, _)| at + 1 == start.len()).map_or(COUNT, |at| COUNT + at);
     let design_effect = match (&covariance, &plain) {
         (Some(clustered), Some(plain)) if !coordinates.is_empty() => {
-            (clustered[(COUNT, COUNT)] / plain[(COUNT, COUNT)]).max(1.0)
+            (clustered[(newest, newest)] / plain[(newest, newest)]).max(1.0)
         }
         _ => 1.0,
     };
@@ -372,8 +374,8 @@ pub(crate) fn derivative(
     let change = if coordinate + size > most { -size } else { size };
     let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;
-    let coordinates = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);
-    let mut column = engine.difference(&coordinates, simulated);
+    let readings = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);
+    let mut column = engine.difference(&readings, simulated);
     column.iter_mut().for_each(|value| *value /= change);
     Some(column)
 }

@@ -312,9 +312,9 @@ fn knots(sorted_samples: &[f64], count: usize) -> Vec<f64> {
     let width = most - least;
     let mut at = vec![*least];
     for (rank, value) in sorted_samples.iter().enumerate() {
-        let line_search = 0.5 * rank as f64 / sorted_samples.len() as f64 + 0.5 * (value - least) / width;
+        let progress_along = 0.5 * rank as f64 / sorted_samples.len() as f64 + 0.5 * (value - least) / width;
         let apart = value - at[at.len() - 1] > 0.2 * width / count as f64;
-        if line_search >= at.len() as f64 / (count - 1) as f64 && apart {
+        if progress_along >= at.len() as f64 / (count - 1) as f64 && apart {
             at.push(*value);
         }
     }

@@ -139,12 +139,12 @@ impl Estimator {
         while iterations < self.options.steps {
             let next = match step(&mut self, &point) {
                 Step::Taken(next) => next,
-                Step::Refused { promised } if promised > self.tolerance(point.loss()) => {
-                    outcome = Outcome::Stalled;
+                Step::Refused { promised } if promised <= self.tolerance(point.loss()) => {
+                    outcome = Outcome::Converged;
                     break;
                 }
                 Step::Refused { .. } | Step::Impossible => {
-                    outcome = Outcome::Converged;
+                    outcome = Outcome::Stalled;
                     break;
                 }
             };

@@ -168,7 +168,7 @@ pub struct Quantity {
     /// Unit of the rig file; empty for a plain number.
     pub unit: String,
     /// One standard error; null when the records do not bound the number. Of the final model it is half of the half-width of a
-    /// calibrated 95.4 % interval: one-step jackknife with frozen window weights, widened by a Student t factor.
+    /// nominal 95.4 % interval: one-step jackknife with frozen window weights, widened by a Student t factor.
     pub standard_error: Option<f64>,
     /// Value in the rig file; null where it has none.
     pub before: Option<f64>,

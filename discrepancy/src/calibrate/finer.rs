@@ -38,7 +38,8 @@ struct TableEntry {
     prior_std: f64,
 }
 
-/// All factors, and the linear fit there, whose loss is that of the next iterate but for what is not linear.
+/// All factors, and the linear fit there. Its loss is that of the next iterate but for what is not linear, so that a step counts
+/// by the loss of the fit and not of a simulation, unlike in other fits.
 struct Linearised {
     factors: Vec<f64>,
     products: Products,

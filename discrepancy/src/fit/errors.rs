@@ -73,10 +73,11 @@ impl Products {
     }
 
     /// One-step delete-one-window jackknife errors with frozen window weights. Where few windows determine a coefficient,
-    /// residuals understate its error. A Student t factor widens each error to half of the half-width of a calibrated 95.4 %
-    /// interval: two of them cover as two of a normal distribution do, and one is no plain standard error. Source: Bell,
-    /// McCaffrey 2002, Survey Methodology 28(2): jackknife variance with Student's distribution and Satterthwaite degrees of
-    /// freedom.
+    /// residuals understate its error. A Student t factor widens each error to half of the half-width of a nominal 95.4 %
+    /// interval, and one is no plain standard error. Its degrees of freedom come from the fourth moment of the changes and are 3
+    /// at least, 6 of two equal windows: two errors hold the truth in 82, 90 and 93 % where 2, 3 and 4 windows know a coefficient
+    /// alike. The degrees of freedom of the design (Bell, McCaffrey 2002, Survey Methodology 28(2); here 1, 2, 3) cover by errors
+    /// five times as wide at 2 windows, which determine nothing then.
     pub(crate) fn jackknife(&self, chosen: &[usize], fit: &Fit, precisions: &[f64]) -> Option<Vec<f64>> {
         let each: Vec<[usize; 1]> = (0..chosen.len()).map(|at| [at]).collect();
         self.jackknife_of_sums(chosen, fit, precisions, &each)
@@ -130,5 +131,5 @@ impl Products {
 /// Factor on a standard error of few degrees of freedom that gives two of them the coverage of two normal ones.
 fn t_factor(dof: f64) -> f64 {
     let share = Normal::standard().cdf(2.0);
-    StudentsT::new(0.0, 1.0, dof.max(1.0)).map_or(1.0, |student| student.inverse_cdf(share) / 2.0)
+    StudentsT::new(0.0, 1.0, dof).map_or(1.0, |student| student.inverse_cdf(share) / 2.0)
 }

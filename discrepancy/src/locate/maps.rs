@@ -141,7 +141,7 @@ pub(crate) fn few_bins(values: &[f64], most: usize) -> Vec<usize> {
     values.iter().zip(bins(values)).map(place).collect()
 }
 
-/// Weighted variance between the bins of a variable over that of the series.
+/// Weighted sum of squares between the bins of a variable.
 fn between(series: &UnknownSeries, variable: usize) -> f64 {
     let places = bins(&series.points.iter().map(|point| point.variables[variable]).collect::<Vec<_>>());
     let (mut sums, mut weights) = ([0.0; BINS], [0.0; BINS]);
@@ -151,13 +151,13 @@ fn between(series: &UnknownSeries, variable: usize) -> f64 {
         weights[bin] += weight;
     }
     let whole = sums.iter().sum::<f64>().powi(2) / weights.iter().sum::<f64>();
-    let within: f64 = sums
+    let between: f64 = sums
         .iter()
         .zip(weights)
         .filter(|(_, weight)| *weight > 0.0)
         .map(|(sum, weight)| sum * sum / weight)
         .sum();
-    within - whole
+    between - whole
 }
 
 #[cfg(test)]

@@ -27,8 +27,8 @@ pub(super) fn misfit(report: &Report) -> String {
         return table;
     }
     paragraph(
-        "Rms of measured minus simulated over windows of the held-out record. Closed: the share of its power above the noise \
-         that went; a tick from 95 % on.",
+        "Noise-equivalent rms of measured minus simulated: noise times the root of the whitened windows' variance ratio. Closed: \
+         the share of its power above the noise that went; a tick from 95 % on.",
     ) + &table
 }
 

@@ -14,8 +14,9 @@ const DRAWS: u64 = 60;
 const RECORDS: u64 = 8;
 /// Fixed seed: the range is a result and has the same bits in each run.
 const SEED: u64 = 0x7e1d_0c7a_11ed_0006;
-/// 97.5th percentile of the standard normal.
+/// 97.5th percentiles of the standard normal, and of Student's t with the degrees of freedom of the synthetic records.
 const Z_975: f64 = 1.96;
+const T_975: f64 = 2.365;
 
 #[derive(Debug)]
 pub(super) struct NullPower {
@@ -25,8 +26,7 @@ pub(super) struct NullPower {
     pub(super) lower_decile: Vec<f64>,
     /// Standard deviation of each output's pooled power.
     pub(super) spreads: Vec<f64>,
-    /// 95 % range of chi2 per degree of freedom. Where the spread of the synthetic records decides, it is too narrow: their eight
-    /// draws have 7 degrees of freedom, whose t quantile is 2.36 and not 1.96.
+    /// 95 % range of chi2 per degree of freedom: of the draws of noise or of the synthetic records, whichever is wider.
     pub(super) range: [f64; 2],
 }
 
@@ -42,8 +42,8 @@ impl NullPower {
                 (mean, deviation * (part.windows.count() as f64 / model.windows.count() as f64).sqrt())
             }
         };
-        let deviation = of_noise.max(of_records) * (1.0 + 1.0 / RECORDS as f64).sqrt();
-        null.range = [mean - Z_975 * deviation, mean + Z_975 * deviation];
+        let half = (Z_975 * of_noise).max(T_975 * of_records) * (1.0 + 1.0 / RECORDS as f64).sqrt();
+        null.range = [mean - half, mean + half];
         null
     }
 

@@ -11,7 +11,7 @@ pub enum Outcome {
     Converged,
     /// No step leads further, and a number is at the end of its range.
     Bound,
-    /// The linearised model promised more, and no step lowered the simulated loss.
+    /// The linearised model promised more, and no step lowered the simulated loss or was possible.
     Stalled,
     /// The steps were used up.
     StepLimit,
