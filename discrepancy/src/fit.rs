@@ -15,6 +15,7 @@
 //! Identification, 15.3, and Seber, Wild 1989, Nonlinear Regression, 2.2.3: likelihood concentrated over variances.
 
 mod errors;
+pub(crate) mod evidence;
 
 use crate::windows::dot;
 use nalgebra::{DMatrix, DVector};

@@ -19,6 +19,7 @@ mod elimination;
 mod explanations;
 mod gauss_newton;
 mod heterogeneity;
+mod marginal;
 mod needed_parameters;
 mod null_distribution;
 mod pitch;
@@ -194,7 +195,8 @@ pub fn name(
     // Its parameters were shrunk to start the next round: the fit that its loss is of has others.
     let as_fitted = fitted.iter().find(|fit| fit.loss == model.loss).unwrap_or(model);
     let fits = Fits { parameters: calibrated, model: as_fitted, fitted: &fitted };
-    let explanations = explanations(here, &linearisation, &columns, &fits);
+    let mut explanations = explanations(here, &linearisation, &columns, &fits);
+    marginal::weigh(here, calibrated, columns.candidates.len(), &mut explanations);
     let searched = Searched { selection, all_rounds, lacks_fit, any_homogeneous };
     let decision = decide(here, &explanations, searched);
     let Decision { selection, lacks_fit, shares, is_named, explained } = decision;

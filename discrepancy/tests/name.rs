@@ -23,6 +23,17 @@ fn names(found: &SelectionResult) -> Vec<String> {
     found.model.placed.iter().map(|placed| placed.candidate.name()).collect()
 }
 
+/// The explanation that is most probable by the marginal likelihoods, which sum to one.
+fn most_probable_by_marginal(found: &SelectionResult) -> usize {
+    let all: Vec<f64> = found
+        .explanations
+        .iter()
+        .map(|one| one.marginal.expect("of rods that are not linked").probability)
+        .collect();
+    assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{all:?}");
+    (0..all.len()).max_by(|one, other| all[*one].total_cmp(&all[*other])).expect("one at least")
+}
+
 /// Factors of the parameters with their errors.
 fn factors(found: &SelectionResult) -> Vec<(f64, f64)> {
     let errors = &found.model.errors[found.model.errors.len() - COUNT..];
@@ -57,6 +68,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     assert_eq!(found.not_explained, None);
     let kinds: Vec<ExplanationKind> = found.explanations.iter().map(|explanation| explanation.kind).collect();
     assert_eq!(kinds, [ExplanationKind::Nothing, ExplanationKind::Parameters, ExplanationKind::NoneOfThese]);
+    assert_eq!(most_probable_by_marginal(&found), 0);
     let nothing = found.explanations[0].features.expect("of the rig file");
     assert!(nothing.loss_per_dof.abs() < 0.08 && nothing.parameters_moved == 0.0, "{nothing:?}");
     for (at, (factor, error)) in factors(&found).into_iter().enumerate() {
@@ -114,6 +126,7 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
     let explanation = &found.explanations[2];
     assert_eq!(explanation.sets[0][0].candidate.name(), "rod-leakage drive.b");
+    assert_eq!(most_probable_by_marginal(&found), 2);
     let features = explanation.features.expect("of the leak");
     assert!(features.behind == 0.0 && features.amplitude_variation < Some(0.1), "{features:?}");
     for other in &found.explanations[..2] {

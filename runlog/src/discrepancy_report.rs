@@ -18,7 +18,7 @@ mod verdict;
 mod verification;
 
 pub use declared::DeclaredSuspect;
-pub use explanation::{Explanation, ExplanationKind, Features};
+pub use explanation::{Explanation, ExplanationKind, Features, Marginal};
 pub use fit::{Convergence, Outcome};
 pub use location::{BalanceBar, LocatedTerm, LocatedVariable, Location, RegimeCell, UnknownInput, strongest};
 pub use next::{Next, SecondExperiment};

@@ -208,8 +208,14 @@ mod tests {
             design_effect: 1.0,
             convergence: Default::default(),
         };
-        let one =
-            |kind, sets, probability| Explanation { kind, sets, features: None, fit: None, probability };
+        let one = |kind, sets, probability| Explanation {
+            kind,
+            sets,
+            features: None,
+            fit: None,
+            probability,
+            marginal: None,
+        };
         let improbable = |nothing: f64, set: f64| {
             let sets = vec![vec![placed("piston-leakage", 1.0)], vec![placed("inclination", 0.9)]];
             is_improbable(

@@ -17,7 +17,7 @@ use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, parameter_precisions};
-use crate::report::{ExplanationKind, Features};
+use crate::report::{ExplanationKind, Features, Marginal};
 use crate::screen::Columns;
 
 /// Number of sets of effects, alike ones counted once.
@@ -36,6 +36,8 @@ pub struct Explanation {
     pub(super) fit: Option<Refit>,
     /// All sum to one.
     pub(crate) probability: f64,
+    /// The second rule; none for linked rods.
+    pub marginal: Option<Marginal>,
 }
 
 /// The fits that explanations are made of.
@@ -73,8 +75,14 @@ pub(super) fn explanations(
         small_beside: 0,
         share: share_removed(fits.parameters.loss, loss),
     };
-    let without_effects =
-        |kind, features| Explanation { kind, sets: Vec::new(), features, fit: None, probability: 0.0 };
+    let without_effects = |kind, features| Explanation {
+        kind,
+        sets: Vec::new(),
+        features,
+        fit: None,
+        probability: 0.0,
+        marginal: None,
+    };
     let mut all = vec![
         without_effects(ExplanationKind::Nothing, Some(features(nothing, &[1.0; COUNT]))),
         without_effects(
@@ -105,6 +113,7 @@ pub(super) fn explanations(
             features: Some(features),
             fit: Some(best.clone()),
             probability: 0.0,
+            marginal: None,
         }
     }));
     all.push(without_effects(ExplanationKind::NoneOfThese, None));

@@ -104,7 +104,7 @@ mod tests {
             share: 0.0,
         };
         let features = (kind != ExplanationKind::NoneOfThese).then_some(features);
-        Explanation { kind, sets: Vec::new(), features, fit: None, probability: 0.0 }
+        Explanation { kind, sets: Vec::new(), features, fit: None, probability: 0.0, marginal: None }
     }
 
     #[test]

@@ -7,27 +7,32 @@ use pagekit::plot::{Bar, figure, share_bars};
 
 pub(super) fn explanations(report: &Report) -> String {
     let row = |explanation: &Explanation| {
-        let evidence = explanation.evidence?;
         let optional =
             |value: Option<f64>| number(value.map_or_else(|| words::NOTHING.to_owned(), words::percent));
-        Some(vec![
+        let of_evidence = |value: fn(&Features) -> f64| {
+            let value = explanation.evidence.as_ref().map(value);
+            number(value.map_or_else(|| words::NOTHING.to_owned(), words::short))
+        };
+        vec![
             text_cell(name(explanation)),
             number(words::percent(explanation.probability)),
-            number(words::short(noise_ratio(&evidence))),
-            number(words::short(evidence.behind)),
-            number(words::short(evidence.parameters_moved)),
-            optional(evidence.amplitude_variation),
-        ])
+            optional(explanation.marginal.map(|own| own.probability)),
+            of_evidence(noise_ratio),
+            of_evidence(|evidence| evidence.behind),
+            of_evidence(|evidence| evidence.parameters_moved),
+            optional(explanation.evidence.and_then(|evidence| evidence.amplitude_variation)),
+        ]
     };
     let heads = [
         "explanation",
         "probability",
+        "by marginal likelihood",
         "leaves, times noise",
         "loss behind the best",
         "parameters moved",
         "amplitude differs by",
     ];
-    let table = table("Explanations", &heads, report.explanations.iter().filter_map(row));
+    let table = table("Explanations", &heads, report.explanations.iter().map(row));
     if table.is_empty() {
         return table;
     }
@@ -35,7 +40,7 @@ pub(super) fn explanations(report: &Report) -> String {
         + &probabilities(&report.explanations)
         + &paragraph(
             "The right explanation leaves about 1 times the noise, moves few parameters, and all stretches of the records agree \
-             on its amplitude.",
+             on its amplitude. The column by marginal likelihood is a second rule, which decides nothing.",
         )
         + &table
 }

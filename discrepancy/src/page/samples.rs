@@ -233,7 +233,15 @@ fn explanations() -> Vec<Explanation> {
         small_beside: 0,
         share: 0.968,
     };
-    let of = |kind, probability, sets, evidence| Explanation { kind, probability, sets, evidence };
+    let of = |kind, probability, sets, evidence| {
+        let marginal = Marginal {
+            log_likelihood: 10.0 * probability,
+            probability,
+            probability_range: [0.9 * probability, probability],
+            by_quadrature: false,
+        };
+        Explanation { kind, probability, sets, evidence, marginal: Some(marginal) }
+    };
     let leakages = ["piston-leakage", "valve-null-leakage"];
     vec![
         of(ExplanationKind::Nothing, 0.0, Vec::new(), Some(evidence(3.1, 4200.0, None))),

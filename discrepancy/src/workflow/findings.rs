@@ -190,6 +190,7 @@ pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> 
         probability: explanation.probability,
         sets: explanation.sets.iter().map(|set| set.iter().map(effect).collect()).collect(),
         evidence: explanation.features,
+        marginal: explanation.marginal,
     });
     all.collect()
 }

@@ -38,6 +38,21 @@ pub struct Features {
     pub share: f64,
 }
 
+/// How probable an explanation is by its marginal likelihood: a second rule, which decides nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Marginal {
+    /// Log marginal likelihood, tempered, up to a constant of the records.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub log_likelihood: f64,
+    /// Those of all explanations sum to one.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub probability: f64,
+    /// Smallest and largest with the scale of the amplitude priors as it is, a third of it and three times it.
+    pub probability_range: [f64; 2],
+    /// Whether an amplitude was integrated by quadrature, and not by Laplace.
+    pub by_quadrature: bool,
+}
+
 /// What may explain the training records, and how probable it is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Explanation {
@@ -51,4 +66,7 @@ pub struct Explanation {
     /// What the records say about it; null for none of these.
     #[serde(skip_deserializing)]
     pub evidence: Option<Features>,
+    /// The second rule; null for linked rods, and where an explanation has no mode.
+    #[serde(default)]
+    pub marginal: Option<Marginal>,
 }
