@@ -21,12 +21,22 @@ const LEAST_IN_BIN: usize = 60;
 /// Share of the weight that records with nothing hidden have.
 const NULL_SHARE: f64 = 1.0 / 3.0;
 const CONFIDENCE: f64 = 0.95;
+/// What a log loss takes a smaller probability for: one that is 0 would be the whole mean.
+const LEAST_PROBABILITY: f64 = 1e-6;
 
 /// One explanation of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Said {
     pub probability: f64,
+    /// By the marginal likelihood, where the report has it.
+    pub marginal: Option<f64>,
     pub right: bool,
+}
+
+/// The explanations of a report with the probabilities of the marginal likelihood; `None` where it has none.
+pub fn by_marginal(said: &[Said]) -> Option<Vec<Said>> {
+    let own = |said: &Said| Some(Said { probability: said.marginal?, ..*said });
+    said.iter().map(own).collect::<Option<Vec<Said>>>().filter(|said| !said.is_empty())
 }
 
 /// Judges the explanations of a report about a draw.
@@ -44,6 +54,7 @@ pub fn judge(draw: &Draw, classes: &[Vec<Member>], left_out: bool, report: &Repo
     };
     let said = |explanation: &Explanation| Said {
         probability: explanation.probability,
+        marginal: explanation.marginal.map(|own| own.probability),
         right: is_right(explanation),
     };
     let mut judged: Vec<Said> = report.explanations.iter().map(said).collect();
@@ -90,7 +101,8 @@ pub struct Bin {
 fn events(said: &[Said]) -> impl Iterator<Item = Said> {
     let wrong = said.iter().copied().filter(|said| !said.right);
     let right = said.iter().filter(|said| said.right).map(|said| said.probability);
-    wrong.chain(right.reduce(|one, other| one + other).map(|probability| Said { probability, right: true }))
+    let both = right.reduce(|one, other| one + other);
+    wrong.chain(both.map(|probability| Said { probability, marginal: None, right: true }))
 }
 
 /// Reliability of the probabilities of all reports, and the expected calibration error.
@@ -101,6 +113,8 @@ pub struct Reliability {
     pub calibration_error: f64,
     /// Reports whose most probable explanation is right, and all.
     pub first_right: [usize; 2],
+    /// Mean over the reports of -ln of the probability of what is right; `None` without reports.
+    pub log_loss: Option<f64>,
 }
 
 impl Reliability {
@@ -126,10 +140,16 @@ impl Reliability {
         let first =
             |said: &[Said]| said.iter().copied().max_by(|a, b| a.probability.total_cmp(&b.probability));
         let right = given.iter().filter(|(_, said)| first(said).is_some_and(|said| said.right)).count();
+        let loss = |said: &[Said]| {
+            let of_right = events(said).filter(|event| event.right).map(|event| event.probability);
+            -of_right.sum::<f64>().max(LEAST_PROBABILITY).ln()
+        };
+        let losses: f64 = given.iter().map(|(_, said)| loss(said)).sum();
         Reliability {
             calibration_error: errors.sum::<f64>() / weight_of(&all),
             bins,
             first_right: [right, given.len()],
+            log_loss: (!given.is_empty()).then(|| losses / given.len() as f64),
         }
     }
 }
@@ -176,6 +196,21 @@ mod tests {
             .unwrap()
     }
 
+    fn said(probability: f64, right: bool) -> Said {
+        Said { probability, marginal: Some(0.5), right }
+    }
+
+    #[test]
+    fn a_log_loss_is_of_what_is_right_by_each_rule() {
+        let report = [said(0.1, true), said(0.7, false), said(0.2, true)];
+        let loss = |said: &[Said]| Reliability::of(&[(Kind::Single, said)]).log_loss.unwrap();
+        assert!((loss(&report) + 0.3_f64.ln()).abs() < 1e-12);
+        assert!(loss(&by_marginal(&report[..2]).unwrap()) - 2.0_f64.ln() < 1e-12);
+        assert!(loss(&[said(0.0, true), said(1.0, false)]) < 14.0);
+        let without = Said { marginal: None, ..report[0] };
+        assert!(by_marginal(&[report[1], without]).is_none() && by_marginal(&[]).is_none());
+    }
+
     #[test]
     fn an_explanation_is_right_when_each_effect_stands_for_a_hidden_one() {
         let all = draws(1, &Shape::SMALL);
@@ -215,7 +250,7 @@ mod tests {
             (0..80)
                 .map(|at| {
                     let first = at % 4 < right;
-                    vec![Said { probability: 0.75, right: first }, Said { probability: 0.25, right: !first }]
+                    vec![said(0.75, first), said(0.25, !first)]
                 })
                 .collect()
         };
@@ -238,7 +273,6 @@ mod tests {
 
     #[test]
     fn explanations_that_are_right_together_are_one_event() {
-        let said = |probability, right| Said { probability, right };
         let background = [said(0.3, true), said(0.1, false), said(0.6, true)];
         let events: Vec<Said> = events(&background).collect();
         assert_eq!(events.len(), 2);
@@ -247,7 +281,7 @@ mod tests {
 
     #[test]
     fn a_third_of_the_weight_is_of_records_with_nothing_hidden() {
-        let [right, wrong] = [true, false].map(|right| vec![Said { probability: 0.5, right }]);
+        let [right, wrong] = [true, false].map(|right| vec![said(0.5, right)]);
         let mut reports: Vec<(Kind, &[Said])> = vec![(Kind::Null, &right); 90];
         reports.extend(vec![(Kind::Single, &wrong[..]); 10]);
         let bins = Reliability::of(&reports).bins;

@@ -6,7 +6,7 @@ use crate::interval::Rate;
 use crate::judge::NumberJudged;
 use crate::leave_out::LeftOut;
 use crate::leave_out::tables::STILL_CLOSED;
-use crate::probability::Reliability;
+use crate::probability::{Reliability, Said, by_marginal};
 use crate::score::tables::{Spread, hidden, is_clear, over_limit};
 use crate::score::{Case, Score};
 use serde::Serialize;
@@ -28,6 +28,8 @@ pub struct Worlds {
     pub left_out: usize,
     /// Exact world, world with a background; draws with effects left out included.
     pub reliability: [Reliability; 2],
+    /// The same of those reports that have marginal likelihoods: by the rule that decides, and by these.
+    pub rules: [[Reliability; 2]; 2],
     pub wall_s: [Spread; 2],
     pub errors: usize,
     /// Other programs on the same draws.
@@ -99,12 +101,25 @@ impl Worlds {
             let all = worlds[world].iter().chain(&left[world]);
             Reliability::of(&all.map(|case| (case.kind, &case.explanations[..])).collect::<Vec<_>>())
         });
+        let rules = [0, 1].map(|world: usize| {
+            let all = worlds[world].iter().chain(&left[world]);
+            let both: Vec<(Kind, &[Said], Vec<Said>)> = all
+                .filter_map(|case| {
+                    Some((case.kind, &case.explanations[..], by_marginal(&case.explanations)?))
+                })
+                .collect();
+            [
+                Reliability::of(&both.iter().map(|(kind, own, _)| (*kind, *own)).collect::<Vec<_>>()),
+                Reliability::of(&both.iter().map(|(kind, _, other)| (*kind, &other[..])).collect::<Vec<_>>()),
+            ]
+        });
         let cases = || worlds.iter().chain(&left).flatten();
         Worlds {
             rows,
             done: [worlds.iter().map(Vec::len).sum(), draws],
             left_out: left.iter().map(Vec::len).sum(),
             reliability,
+            rules,
             wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
             others: others.iter().map(|other| Paired::of(score, other)).collect(),
             errors: cases().filter(|case| case.judgement.error.is_some()).count(),
@@ -174,6 +189,22 @@ impl Worlds {
                     100.0 * bin.right
                 );
             }
+        }
+        for (world, [decides, marginal]) in ["exact world", "background"].into_iter().zip(&self.rules) {
+            let (Some(of_deciding), Some(of_marginal)) = (decides.log_loss, marginal.log_loss) else {
+                continue;
+            };
+            let _ = writeln!(
+                text,
+                "\nBy the marginal likelihood, {world}: of {} reports that have it, its most probable explanation is right for {}, \
+                 that of the rule that decides for {}; expected calibration error {:.1} and {:.1} points, mean log loss \
+                 {of_marginal:.2} and {of_deciding:.2}.",
+                marginal.first_right[1],
+                marginal.first_right[0],
+                decides.first_right[0],
+                100.0 * marginal.calibration_error,
+                100.0 * decides.calibration_error
+            );
         }
         text
     }
