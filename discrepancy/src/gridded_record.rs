@@ -76,11 +76,11 @@ pub struct GriddedRecord {
 pub struct AxisState {
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 at rest.
-    pub(crate) rod_velocity_m_per_s: f64,
+    pub rod_velocity_m_per_s: f64,
     /// An indistinguishable rate: that of creep where the piston seems at rest, 0 where it is slow.
     pub(crate) alternative_velocity_m_per_s: Option<f64>,
     /// Absolute pressures of the chambers a and b, Pa.
-    pub(crate) pressures_pa: [f64; 2],
+    pub pressures_pa: [f64; 2],
 }
 
 impl AxisState {

@@ -48,7 +48,7 @@ pub enum ClosedLoopError {
 pub struct ClosedLoopRun {
     pub linked: bool,
     /// Weights on the carriage, kg.
-    pub(crate) added_mass_kg: f64,
+    pub added_mass_kg: f64,
     pub start: State,
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.
@@ -62,7 +62,7 @@ pub struct ClosedLoopRun {
 
 impl ClosedLoopRun {
     /// Whether the experiment suits this rig: it begins, it ends, and no moved rod comes near an end of its stroke.
-    pub(crate) fn ends_well(&self, stroke_m: f64) -> bool {
+    pub fn ends_well(&self, stroke_m: f64) -> bool {
         self.done && self.clearance_m(stroke_m).is_some_and(|clearance_m| clearance_m > NEAR_M)
     }
 

@@ -27,7 +27,7 @@ impl Entry {
         files.map_or(f64::INFINITY, |files| files.experiment.duration_s())
     }
 
-    pub(crate) fn is_linked(&self) -> bool {
+    pub fn is_linked(&self) -> bool {
         self.toml.lines().any(|line| line.trim_end() == "linked = true")
     }
 }

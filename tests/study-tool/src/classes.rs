@@ -155,7 +155,7 @@ fn is_measured(place: Place, measured: [bool; 2]) -> bool {
 }
 
 /// The middle of what is drawn.
-fn nominal(sheet: &Sheet) -> Vec<(&'static str, f64)> {
+pub(crate) fn nominal(sheet: &Sheet) -> Vec<(&'static str, f64)> {
     let key = &sheet.keys[0];
     let mean = (key.drawn[0] * key.drawn[1]).sqrt();
     // The middle must not be the baseline itself.

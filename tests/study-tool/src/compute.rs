@@ -75,6 +75,7 @@ pub fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory {
             linked: record.linked,
             added_mass_kg: record.added_mass_kg,
         },
+        settling: 1,
         inputs: record.rows.iter().map(|row| Inputs { valve: row.valve, ..Inputs::default() }).collect(),
         points: record.rows.iter().map(|row| row.axes.map(|axis| point(&axis))).collect(),
     }

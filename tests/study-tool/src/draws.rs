@@ -17,6 +17,7 @@
 //!
 //! Source: effects.md; discrepancy-notes.md, Blind protocol.
 
+pub(crate) mod twins;
 mod worlds;
 
 pub use worlds::is_beyond_drawn;
@@ -275,8 +276,7 @@ impl Generator {
             }
         }
         Recipe {
-            // Exact in every program that reads JSON.
-            seed: self.0.next_u64() >> 11,
+            seed: self.recipe_seed(),
             axis,
             both_axes: false,
             hidden: Vec::new(),
@@ -289,6 +289,11 @@ impl Generator {
             unlinked: false,
             experiment: Experiment::Train,
         }
+    }
+
+    /// Exact in every program that reads JSON.
+    fn recipe_seed(&mut self) -> u64 {
+        self.0.next_u64() >> 11
     }
 
     fn axis(&mut self) -> Axis {

@@ -9,6 +9,7 @@
 //! OUT/classes/0007.json        which effects leave the same signature
 //! OUT/score-LABEL.json, .html  the score
 //! OUT/resolve-LABEL.json, .md  what the proposed experiments resolve
+//! OUT/twins.json               twins in place of draws.json; OUT/twins-LABEL.json what became of them
 //! ```
 //!
 //! `draws.json` is written for people and other programs. It is never read back: the draws follow from seed and shape, and the

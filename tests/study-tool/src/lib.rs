@@ -27,6 +27,7 @@
 //! | [`compare`] | several scores side by side |
 //! | [`curve`] | how rates fall with noise and amplitude |
 //! | [`trajectory`], [`signature`] | true states of a record; what an effect changes in windows that start from them |
+//! | [`twins`] | two effects that a record leaves alike, and an experiment tells apart |
 //! | [`limits`] | amplitude from which an ideal observer sees an effect |
 //! | [`classes`] | which effects leave the same signature in a record |
 //! | [`nearest`], [`forms`] | the catalogue's law nearest to another form, and what it leaves of each |
@@ -59,6 +60,7 @@ pub mod score;
 pub mod signature;
 pub mod step;
 pub mod trajectory;
+pub mod twins;
 pub mod worlds;
 
 pub const SCHEMA_VERSION: u32 = 1;

@@ -19,7 +19,7 @@ use discrepancy::candidates::Candidate;
 use model_fit::estimator::{Estimator, Iterate, JOINT, Options, Step};
 use nalgebra::{DMatrix, DVector};
 use plant::RigParameters;
-use record_maker::{Form, Hidden, Recipe, Record, simulate};
+use record_maker::{Form, Hidden, PARAMETERS, Recipe, Record, simulate};
 use serde::{Deserialize, Serialize};
 
 /// Step of finite differences, as a coordinate.
@@ -35,6 +35,8 @@ const FAITHFUL_LEFT: f64 = 0.05;
 const FAITHFUL: f64 = 0.01;
 /// Ridge as a share of a column's square.
 const RIDGE: f64 = 1e-3;
+/// Largest deviation of a parameter.
+const MOST_OFF: f64 = 0.15;
 
 /// The law nearest to a hidden effect of another form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -82,25 +84,29 @@ pub(crate) fn fitted(made: &Record, hidden: &Hidden) -> Result<NearestLaw, Compu
     let candidate = Candidate::beside(&rig, sheet, hidden.place);
     let start = (0..sheet.keys.len()).map(|key| candidate.coordinate(key, hidden.numbers[key])).collect();
     let whole = length(&observer.between(&observed, observer.baseline())).powi(2);
-    let fit = Fit { observer: &observer, observed: &observed, candidate, rig: &rig };
+    let fit = Fit { observer: &observer, observed: &observed, candidate, rig: &rig, priors: &[] };
     let start = fit.at(start).expect("a record was made with these numbers");
     let nearest = fit.nearest(start, whole);
     let numbers = candidate.effect_parameters(&nearest.coordinates);
     Ok(NearestLaw { numbers, left_share: nearest.squares / whole.max(1e-12) })
 }
 
-struct Fit<'a> {
-    observer: &'a Observer,
-    observed: &'a Run,
-    candidate: Candidate,
-    rig: &'a RigParameters,
+/// The fit of a law, with the first parameters of the baseline beside it.
+pub(crate) struct Fit<'a> {
+    pub(crate) observer: &'a Observer,
+    pub(crate) observed: &'a Run,
+    pub(crate) candidate: Candidate,
+    pub(crate) rig: &'a RigParameters,
+    /// Precision of the deviation of each of [`PARAMETERS`] that is fitted, over that of the whitened readings.
+    pub(crate) priors: &'a [f64],
 }
 
-/// The law at some coordinates.
-struct Simulated {
-    coordinates: Vec<f64>,
-    run: Run,
+/// The law at some coordinates, behind which the deviations of the parameters stand.
+pub(crate) struct Simulated {
+    pub(crate) coordinates: Vec<f64>,
+    pub(crate) run: Run,
     residual: Vec<f64>,
+    /// With those of the deviations by their priors.
     squares: f64,
 }
 
@@ -115,20 +121,38 @@ impl Iterate for Simulated {
 }
 
 impl Fit<'_> {
+    /// The rig at some coordinates; `None` where there is none.
+    pub(crate) fn rig_at(&self, coordinates: &[f64]) -> Option<RigParameters> {
+        let (own, deviations) = coordinates.split_at(self.keys());
+        let mut all = PARAMETERS.iter().zip(deviations);
+        let rig = all
+            .try_fold(self.rig.clone(), |rig, (name, deviation)| with_parameter(&rig, name, 1.0 + deviation));
+        self.candidate.rig(&rig.ok()?, own).ok()
+    }
+
+    fn keys(&self) -> usize {
+        self.candidate.sheet.keys.len()
+    }
+
     fn simulated(&self, coordinates: &[f64]) -> Option<Run> {
-        Some(self.observer.readings(&self.candidate.rig(self.rig, coordinates).ok()?))
+        Some(self.observer.readings(&self.rig_at(coordinates)?))
     }
 
     /// At some coordinates; `None` where no rig can have them.
-    fn at(&self, coordinates: Vec<f64>) -> Option<Simulated> {
+    pub(crate) fn at(&self, coordinates: Vec<f64>) -> Option<Simulated> {
         let run = self.simulated(&coordinates)?;
         let residual = self.observer.between(self.observed, &run);
-        let squares = length(&residual).powi(2);
+        let off = coordinates[self.keys()..].iter().zip(self.priors);
+        let squares = length(&residual).powi(2) + off.map(|(off, prior)| prior * off * off).sum::<f64>();
         Some(Simulated { coordinates, run, residual, squares })
     }
 
+    fn bounds(&self, at: usize) -> [f64; 2] {
+        if at < self.keys() { self.candidate.fit_bounds(at) } else { [-MOST_OFF, MOST_OFF] }
+    }
+
     /// The least squares from a start, to a share of `whole`.
-    fn nearest(&self, start: Simulated, whole: f64) -> Simulated {
+    pub(crate) fn nearest(&self, start: Simulated, whole: f64) -> Simulated {
         let options = Options { steps: STEPS, converged: CONVERGED * whole, ..JOINT };
         let (fitted, _) = Estimator::new(options).descend(start, |estimator, point| {
             let Some(step) = self.step(&point.coordinates, &point.run, &point.residual) else {
@@ -138,7 +162,7 @@ impl Fit<'_> {
                 let moved = point.coordinates.iter().zip(step.iter()).enumerate();
                 self.at(moved
                     .map(|(key, (from, step))| {
-                        let [least, most] = self.candidate.fit_bounds(key);
+                        let [least, most] = self.bounds(key);
                         (from + fraction * step.clamp(-LONGEST, LONGEST)).clamp(least, most)
                     })
                     .collect())
@@ -150,7 +174,7 @@ impl Fit<'_> {
     fn step(&self, from: &[f64], run: &Run, residual: &[f64]) -> Option<DVector<f64>> {
         let columns: Vec<Vec<f64>> = (0..from.len())
             .map(|key| {
-                let [_, most] = self.candidate.fit_bounds(key);
+                let [_, most] = self.bounds(key);
                 let change = if from[key] + CHANGE > most { -CHANGE } else { CHANGE };
                 let mut moved = from.to_vec();
                 moved[key] += change;
@@ -164,7 +188,11 @@ impl Fit<'_> {
         let mut matrix = DMatrix::from_fn(count, count, |row, column| dot(&columns[row], &columns[column]));
         let largest = (0..count).map(|at| matrix[(at, at)]).fold(0.0, f64::max);
         (0..count).for_each(|at| matrix[(at, at)] += RIDGE * matrix[(at, at)] + 1e-9 * largest);
-        let right = DVector::from_iterator(count, columns.iter().map(|column| dot(column, residual)));
+        let mut right = DVector::from_iterator(count, columns.iter().map(|column| dot(column, residual)));
+        for (prior, at) in self.priors.iter().zip(self.keys()..) {
+            matrix[(at, at)] += prior;
+            right[at] -= prior * from[at];
+        }
         matrix.cholesky().map(|factor| factor.solve(&right))
     }
 }

@@ -99,7 +99,7 @@ pub fn judge(hidden: &Hidden, taken: &Taken, report: &Result<Report, String>) ->
 }
 
 /// An entry and what explains the records as well.
-fn names(entry: &Named) -> impl Iterator<Item = &Named> {
+pub(crate) fn names(entry: &Named) -> impl Iterator<Item = &Named> {
     std::iter::once(entry).chain(&entry.alternatives)
 }
 

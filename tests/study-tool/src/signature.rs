@@ -128,7 +128,8 @@ impl Observer {
         let rows = self.rows();
         let mut differences: Vec<f64> =
             run.readings.iter().zip(&from.readings).map(|(own, from)| own - from).collect();
-        differences[..rows].fill(0.0);
+        let settling = differences.len().min(rows * self.trajectory.settling);
+        differences[..settling].fill(0.0);
         let jumps: Vec<bool> = run.jumps.iter().zip(&from.jumps).map(|(own, from)| *own || *from).collect();
         for ((difference, jumps), window) in
             differences.chunks_exact_mut(rows).zip(jumps.chunks_exact(rows)).zip(&self.windows)
@@ -142,7 +143,8 @@ impl Observer {
         &self.trajectory.rig
     }
 
-    fn rows(&self) -> usize {
+    /// Readings of a window.
+    pub(crate) fn rows(&self) -> usize {
         WINDOW * CHANNELS * self.trajectory.measured.iter().filter(|measured| **measured).count()
     }
 
@@ -215,7 +217,10 @@ impl Observer {
     }
 
     fn plant(&self, rig: &RigParameters, state: &State) -> Plant {
-        Plant::in_state(rig, state).expect("the states of a record are some that the rig can be in")
+        // A supply of another pressure has fallen by the same share.
+        let ratio = rig.supply().pressure_pa / self.trajectory.rig.supply().pressure_pa;
+        let state = State { supply_pressure_pa: ratio * state.supply_pressure_pa, ..*state };
+        Plant::in_state(rig, &state).expect("the states of a record are some that the rig can be in")
     }
 }
 
@@ -318,6 +323,7 @@ mod tests {
             measured: [true, false],
             start: *plant.state(),
             inputs: Vec::new(),
+            settling: 1,
             points: Vec::new(),
         };
         for cycle in 0..2000 {

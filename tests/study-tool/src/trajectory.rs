@@ -13,6 +13,8 @@ pub struct TrueTrajectory {
     /// State at the start, from which everything but the points is carried on.
     pub start: State,
     pub inputs: Vec<Inputs>,
+    /// Windows at the start in which memories fill: they count for nothing.
+    pub settling: usize,
     /// The true mechanical state and pressures at the start of each millisecond.
     pub points: Vec<[Point; 2]>,
 }

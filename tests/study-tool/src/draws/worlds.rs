@@ -11,10 +11,10 @@
 //! a rig file takes that. The smallest that is drawn is the smallest of the sheet: what lies below is background, which nobody
 //! is asked to name.
 
-use super::Generator;
+use super::{Generator, axis_of};
 use crate::limits::Scale;
 use plant::effects::SHEETS;
-use plant::effects::sheet::{EffectKey, PlaceKind, Sheet};
+use plant::effects::sheet::{EffectKey, Place, PlaceKind, Sheet};
 use plant::parameters::VALVE_POINTS;
 use record_maker::{Background, Form, Hidden, Recipe};
 
@@ -78,15 +78,16 @@ pub fn is_beyond_drawn(hidden: &Hidden) -> bool {
 }
 
 impl Generator {
-    fn background(&mut self, recipe: &Recipe) -> Background {
+    pub(super) fn background(&mut self, recipe: &Recipe) -> Background {
         let count = 5 + self.below(6);
         let mut effects: Vec<Hidden> = Vec::new();
         while effects.len() < count {
             let sheet = &SHEETS[self.below(SHEETS.len())];
             let is_free = |hidden: &Hidden| hidden.name != sheet.name;
-            let can_be = !matches!(sheet.place, PlaceKind::Linkage) || !recipe.unlinked;
+            let is_linked = recipe.both_axes && !recipe.unlinked;
+            let can_be = !matches!(sheet.place, PlaceKind::Linkage) || is_linked;
             if can_be && effects.iter().chain(&recipe.hidden).all(is_free) {
-                effects.extend(self.below_its_smallest(sheet));
+                effects.extend(self.below_its_smallest(sheet, recipe));
             }
         }
         let mut factor = |error: f64| self.uniform([1.0 - error, 1.0 + error]);
@@ -103,9 +104,11 @@ impl Generator {
     }
 
     /// An effect at a share of its smallest amplitude; `None` for one whose amplitude is nowhere the baseline's.
-    fn below_its_smallest(&mut self, sheet: &'static Sheet) -> Option<Hidden> {
-        let places = sheet.place.places();
-        let place = places[self.below(places.len())];
+    fn below_its_smallest(&mut self, sheet: &'static Sheet, recipe: &Recipe) -> Option<Hidden> {
+        let seen =
+            |place: &&Place| recipe.both_axes || axis_of(**place).is_none_or(|axis| axis == recipe.axis);
+        let places: Vec<&Place> = sheet.place.places().iter().filter(seen).collect();
+        let place = *places[self.below(places.len())];
         let mut hidden = self.hidden(sheet, place);
         // All its amplitudes, bump, slope and ripple alike; numbers that only shape it stay as drawn.
         for (at, (key, number)) in sheet.keys.iter().zip(&mut hidden.numbers).enumerate() {
@@ -129,7 +132,7 @@ impl Generator {
 }
 
 /// The smallest excursion that is drawn.
-fn smallest(key: &EffectKey, scale: Scale) -> Option<f64> {
+pub(super) fn smallest(key: &EffectKey, scale: Scale) -> Option<f64> {
     match scale {
         Scale::None => None,
         Scale::About(..) if Scale::of(key).len() > 1 => Some(SMALLEST_EXCURSION),
@@ -140,7 +143,7 @@ fn smallest(key: &EffectKey, scale: Scale) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draws::{Draw, Kind, Shape, axis_of, draws};
+    use crate::draws::{Draw, Kind, Shape, draws};
 
     fn many() -> Vec<Draw> {
         let shape = Shape { each: 40, nulls: 100, pairs: 40, triples: 20, worlds: true, ..Shape::NO_DRAW };

@@ -242,11 +242,11 @@ fn class(entry: &Named) -> String {
     }
 }
 
-fn titled(name: &Named) -> String {
+pub(crate) fn titled(name: &Named) -> String {
     format!("{} {}", name.sheet.name, name.place)
 }
 
-fn with_alternatives(entry: &Named) -> String {
+pub(crate) fn with_alternatives(entry: &Named) -> String {
     let others: Vec<_> = entry.alternatives.iter().map(titled).collect();
     if others.is_empty() { titled(entry) } else { format!("{} [{}]", titled(entry), others.join(", ")) }
 }

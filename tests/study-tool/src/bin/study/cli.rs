@@ -24,6 +24,8 @@ pub(crate) enum Command {
     Cosines(CosinesArguments),
     /// Computes what the catalogue's law leaves of the other forms of each effect.
     Forms(FormsArguments),
+    /// Draws pairs of effects that a record leaves alike and an experiment tells apart: twins.json, written at the end.
+    Twins(TwinsArguments),
     /// Takes a step with one draw, for a campaign: its number comes as a line of JSON, what came of it goes out as one.
     One(OneArguments),
     /// Scores the results: score-LABEL.json and score-LABEL.html.
@@ -170,6 +172,22 @@ pub(crate) struct FormsArguments {
     pub(crate) write: bool,
 }
 
+#[derive(Args)]
+pub(crate) struct TwinsArguments {
+    /// Folder of the twins.
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..1 << 53))]
+    pub(crate) seed: u64,
+    /// How many are wanted.
+    #[arg(long, default_value_t = 40)]
+    pub(crate) count: usize,
+    /// Starts at once.
+    #[arg(long, default_value_t = 2)]
+    pub(crate) jobs: usize,
+}
+
 /// What is done with a draw.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Deed {
@@ -181,6 +199,8 @@ pub(crate) enum Deed {
     LeaveOut,
     /// Where the program could not tell effects apart: what it proposed is measured, and it is run on both records.
     Resolve,
+    /// A twin of `twins.json`: the program is let loose on it, and what it proposed is measured at once.
+    Twins,
 }
 
 #[derive(Args)]
@@ -292,7 +312,10 @@ pub(crate) struct ResolveArguments {
     /// What the results are called; those with the proposed experiments stand under LABEL-resolve.
     #[arg(long, default_value = "program")]
     pub(crate) label: String,
-    /// Writes the table into tests/docs/study-earlier.md.
+    /// Of the twins of the folder.
+    #[arg(long)]
+    pub(crate) twins: bool,
+    /// Writes the table into tests/docs/study-earlier.md, that of twins into tests/docs/study.md.
     #[arg(long)]
     pub(crate) write: bool,
 }

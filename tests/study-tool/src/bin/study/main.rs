@@ -1,4 +1,4 @@
-//! The study's commands, for `scripts/study`: draws, limits, cosines, forms, one, score, compare, curve, ledger, resolve.
+//! The study's commands, for `scripts/study`: draws, limits, cosines, forms, twins, one, score, compare, curve, ledger, resolve.
 
 mod cli;
 mod one;
@@ -7,7 +7,7 @@ mod scores;
 use clap::Parser;
 use cli::{
     Cli, Command, CosinesArguments, DrawsArguments, FormsArguments, LedgerArguments, LimitsArguments,
-    PlanArguments, ResolveArguments,
+    ResolveArguments, TwinsArguments,
 };
 use record_maker::Form;
 use std::collections::BTreeMap;
@@ -22,6 +22,8 @@ use study::folder::{Study, read, write_whole};
 use study::forms::{OTHERS, Selection};
 use study::ledger::Ledger;
 use study::resolve::Table;
+use study::twins::Twins;
+use study::twins::search::search;
 use study::{compute, document, forms};
 
 /// Exit code of a study that was asked to stop: everything that is done is kept.
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
         Command::Limits(arguments) => limits(&arguments),
         Command::Cosines(arguments) => cosines(&arguments, &stop),
         Command::Forms(arguments) => forms(&arguments, &stop),
+        Command::Twins(arguments) => twins(&arguments, &stop),
         Command::Score(arguments) => scores::score(&arguments),
         Command::Worlds(arguments) => scores::worlds(&arguments),
         Command::Compare(arguments) => scores::compare(&arguments),
@@ -81,7 +84,7 @@ const LEDGER: &str = "study/evidence/ledger.toml";
 const EXPECTED: &str = "study/outside-expected.json";
 
 fn draws(arguments: &DrawsArguments) -> Done {
-    admit(&arguments.plan)?;
+    admit(arguments.plan.seed)?;
     let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
     say(&format!("{} draws in {}", study.draws.len(), arguments.out.display()));
     Ok(())
@@ -138,11 +141,31 @@ fn ledger(arguments: &LedgerArguments) -> Done {
 }
 
 /// Refuses a seed that is neither for development nor in the ledger.
-fn admit(plan: &PlanArguments) -> Done {
-    Ok(Ledger::read(&committed(LEDGER))?.admit(plan.seed)?)
+fn admit(seed: u64) -> Done {
+    Ok(Ledger::read(&committed(LEDGER))?.admit(seed)?)
+}
+
+fn twins(arguments: &TwinsArguments, stop: &AtomicBool) -> Done {
+    admit(arguments.seed)?;
+    let TwinsArguments { out, seed, count, jobs } = arguments;
+    if out.join("twins.json").exists() {
+        return Err(format!("{} has twins already: give another folder", out.display()).into());
+    }
+    let twins = search(*seed, *count, *jobs, stop, &say)?;
+    if !stop.load(Ordering::Relaxed) {
+        std::fs::create_dir_all(out)?;
+        twins.save(out)?;
+    }
+    for (reason, count) in &twins.refused {
+        say(&format!("refused {count}: {reason}"));
+    }
+    Ok(())
 }
 
 fn resolve(arguments: &ResolveArguments) -> Done {
+    if arguments.twins {
+        return resolve_twins(arguments);
+    }
     let study = Study::open(&arguments.out)?;
     let table = Table::of(&study, &arguments.label)?;
     let text = table.markdown();
@@ -154,6 +177,20 @@ fn resolve(arguments: &ResolveArguments) -> Done {
     }
     say(&format!("\n{text}"));
     say(&path("json").display().to_string());
+    Ok(())
+}
+
+fn resolve_twins(arguments: &ResolveArguments) -> Done {
+    let ResolveArguments { out, label, write, .. } = arguments;
+    let table = study::twins::tables::Table::of(&Twins::open(out)?, out, label)?;
+    let text = table.markdown();
+    let path = out.join(format!("twins-{label}.json"));
+    write_whole(&path, format!("{:#}\n", serde_json::json!(table)).as_bytes())?;
+    if *write {
+        document::put(&committed(PAGE), "twins-table", &text)?;
+    }
+    say(&format!("\n{text}"));
+    say(&path.display().to_string());
     Ok(())
 }
 

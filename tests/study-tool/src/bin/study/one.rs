@@ -9,6 +9,8 @@
 use crate::cli::{Deed, OneArguments};
 use crate::{EXPECTED, INTERRUPTED, LIMITS, admit, committed, known_classes, read_if_there};
 use campaign::command::NOT_TRIED;
+use plant::RigParameters;
+use record_maker::Recipe;
 use serde_json::{Value, json};
 use std::error::Error;
 use std::io::{self, BufRead, Write};
@@ -24,7 +26,8 @@ use study::limits::Limits;
 use study::program::Program;
 use study::resolve::{self, Found};
 use study::score::{self, Known};
-use study::step::{Step, StepError, make_record};
+use study::step::{Make, Step, StepError, make_record};
+use study::twins::Twins;
 use study::{answer, report};
 
 /// Exit code of a draw whose record cannot be made: a failed run, the others need not wait for it.
@@ -48,25 +51,15 @@ pub(crate) fn one(arguments: &OneArguments, stop: &AtomicBool) -> ExitCode {
 
 /// Takes the step; `None` when it was asked to stop in its midst.
 fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Box<dyn Error>> {
-    admit(&arguments.plan)?;
+    if arguments.deed == Deed::Twins {
+        return twin(arguments, stop);
+    }
+    admit(arguments.plan.seed)?;
     let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
     let (number, again) = arguments.draw.map_or_else(asked, |draw| Ok((draw, true)))?;
-    let draw = study.draws.get(number).ok_or_else(|| {
-        let all = study.draws.len();
-        format!("draw {number}: this study has {all}, from 0; its campaign file needs draws = {all}")
-    })?;
+    let draw = draw_of(&study, number)?;
     let classes = known_classes(std::slice::from_ref(draw))?;
-    let mut step = Step {
-        study: &study,
-        label: &arguments.label,
-        make: &make_record,
-        without: None,
-        keep_truth: arguments.keep_truth,
-        drop_records: arguments.drop_records,
-        again,
-        least_free_mib: arguments.least_free,
-        stop,
-    };
+    let mut step = step(arguments, &study, &make_record, (again, stop));
     if arguments.deed == Deed::Records {
         step.records(draw)?;
         return Ok(Some(json!({"kind": draw.kind})));
@@ -96,6 +89,51 @@ fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Bo
         partly: false,
     };
     Ok(Some(answer::of_case(&score::one(&study, draw, &arguments.label, known)?)))
+}
+
+/// Takes both steps with a twin: its record, and the experiment that the program proposes for it.
+fn twin(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Box<dyn Error>> {
+    let twins = Twins::open(&arguments.out)?;
+    admit(twins.seed)?;
+    let study = twins.study(&arguments.out);
+    let (number, again) = arguments.draw.map_or_else(asked, |draw| Ok((draw, true)))?;
+    let draw = draw_of(&study, number)?;
+    let make = |recipe: &Recipe, rig: &RigParameters, measurement: &Path, truth: &Path| {
+        twins.make(number, recipe, rig, [measurement, truth])
+    };
+    let step = step(arguments, &study, &make, (again, stop));
+    let program = program(arguments)?;
+    if step.run(draw, &program)?.is_none() {
+        return Ok(None);
+    }
+    let found = resolve::run(&step, &program, draw)?;
+    Ok(found.map(|found| answer::of_found(&found, outcome(&step, draw, &found))))
+}
+
+fn draw_of(study: &Study, number: usize) -> Result<&Draw, String> {
+    study.draws.get(number).ok_or_else(|| {
+        let all = study.draws.len();
+        format!("draw {number}: this study has {all}, from 0; its campaign file needs draws = {all}")
+    })
+}
+
+fn step<'a>(
+    arguments: &'a OneArguments,
+    study: &'a Study,
+    make: Make<'a>,
+    (again, stop): (bool, &'a AtomicBool),
+) -> Step<'a> {
+    Step {
+        study,
+        label: &arguments.label,
+        make,
+        without: None,
+        keep_truth: arguments.keep_truth,
+        drop_records: arguments.drop_records,
+        again,
+        least_free_mib: arguments.least_free,
+        stop,
+    }
 }
 
 /// The draw that the campaign asks for, and whether again.

@@ -1,0 +1,98 @@
+//! How often an oracle that knows two rigs exactly tells which of them made a record.
+//!
+//! ```text
+//!   d = |M (y_A - y_B)|      y: readings without noise in windows of 100 ms, over the noise; M: free initial states ([signature])
+//!   right in Phi(d / 2) of the records, if either is as likely
+//! ```
+//!
+//! The noise is that of the rig file times a factor, rounding included, and white. The record of an experiment is the closed
+//! loop by which `next` rehearses it, driven as if the one, then the other were true: the smaller distance counts.
+//!
+//! [signature]: crate::signature
+
+use crate::signature::{Observer, length};
+use crate::trajectory::{Point, TrueTrajectory};
+use crate::twins::Part;
+use discrepancy::next::closed_loop::{ClosedLoopRun, SEED, drive};
+use discrepancy::next::menu::{Entry, MENU};
+use plant::{Axis, ParameterError, RigParameters};
+use record_maker::Record;
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::collections::BTreeMap;
+
+/// Experiments that a twin is certified with, of which those with linked rods are none for a record of one axis.
+const CERTIFIED: [&str; 8] = [
+    "shut-and-hold",
+    "chirps",
+    "ends",
+    "two-pressures",
+    "full-exhaust",
+    "slow-reversals",
+    "weights",
+    "load-steps",
+];
+/// Share of records that an oracle gets right at most in the train record, and at least in one experiment.
+pub(crate) const ALIKE: f64 = 0.7;
+pub(crate) const APART: f64 = 0.9;
+/// Keys of the sensors' noise.
+const NOISE: [&str; 3] = ["sensors.position_noise_um", "sensors.force_noise_n", "sensors.pressure_noise_pa"];
+
+/// Share of the records of two equally likely models that the likelihood ratio gets right.
+pub fn probability(distance: f64) -> f64 {
+    Normal::standard().cdf(0.5 * distance)
+}
+
+/// A rig with so many times its sensors' noise.
+///
+/// # Errors
+/// [`ParameterError`] for a noise that no rig file takes.
+pub fn with_noise(rig: &RigParameters, noise: f64) -> Result<RigParameters, ParameterError> {
+    NOISE.iter().try_fold(rig.clone(), |rig, key| {
+        let scaled: Vec<f64> = rig.numbers(key).iter().map(|number| noise * number).collect();
+        rig.with(key, &scaled)
+    })
+}
+
+/// Distance of two rigs in a part of a record, of which the first made it.
+pub fn in_record(record: &Record, part: Part, truth: &RigParameters, other: &RigParameters) -> f64 {
+    between(part.of(record, truth), other)
+}
+
+/// Distance of two rigs in an experiment; `None` where one of them cannot run it.
+pub fn in_experiment(entry: &Entry, rigs: [&RigParameters; 2], axis: Axis) -> Option<f64> {
+    let baseline = RigParameters::baseline();
+    let with = |truth: &RigParameters, other: &RigParameters| {
+        let run = drive(entry, &baseline, truth, SEED).ok()?;
+        let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
+        Some(between(driven(run, truth, axis), other))
+    };
+    let [one, other] = rigs;
+    Some(with(one, other)?.min(with(other, one)?))
+}
+
+/// Distances of two rigs in the experiments that a twin is certified with.
+pub fn in_menu(rigs: [&RigParameters; 2], axis: Axis) -> BTreeMap<String, f64> {
+    let entries = MENU.iter().filter(|entry| CERTIFIED.contains(&entry.name) && !entry.is_linked());
+    let of = |entry: &Entry| Some((entry.name.to_owned(), in_experiment(entry, rigs, axis)?));
+    entries.filter_map(of).collect()
+}
+
+fn between(trajectory: TrueTrajectory, other: &RigParameters) -> f64 {
+    length(&Observer::new(trajectory).signature(other))
+}
+
+fn driven(run: ClosedLoopRun, rig: &RigParameters, axis: Axis) -> TrueTrajectory {
+    let point = |state: &discrepancy::gridded_record::AxisState| Point {
+        extension_m: state.extension_m,
+        rod_velocity_m_per_s: state.rod_velocity_m_per_s,
+        pressures_pa: state.pressures_pa,
+    };
+    TrueTrajectory {
+        rig: rig.clone(),
+        measured: Axis::ALL.map(|own| own == axis),
+        start: run.start,
+        settling: 1,
+        inputs: run.inputs,
+        points: run.points.iter().map(|states| states.each_ref().map(point)).collect(),
+    }
+}

@@ -1,0 +1,220 @@
+//! The law of another effect that is nearest to a rig in a part of a record, with parameters of the baseline fitted beside it.
+//!
+//! ```text
+//!   record ──► responses of all effects and parameters, window by window ──► each part: share of the effect's signature that
+//!              one amplitude of another effect leaves, parameters held by their priors ──► the best: fitted in the simulator
+//! ```
+//!
+//! Responses are those at the middle of a range; the fit ([`Fit`]) moves all numbers of the other effect and all parameters.
+
+use super::{Model, Part};
+use crate::classes::{nominal, with_parameter};
+use crate::nearest::Fit;
+use crate::signature::{Observer, length};
+use crate::trajectory::WINDOW;
+use discrepancy::candidates::Candidate;
+use discrepancy::parameters::PARAMETERS as PRIORS;
+use nalgebra::DMatrix;
+use plant::{Axis, RigParameters};
+use record_maker::{Hidden, PARAMETERS};
+
+/// Change of a parameter for its response.
+const CHANGE: f64 = 0.01;
+/// Noise at which the priors are weighed against the readings: the middle of those that twins have.
+const NOISE: f64 = 3.0;
+/// Smallest amplitude of a rival as a share of the smallest drawn, and where the range holds the baseline; largest as a multiple
+/// of the largest drawn. A program names nothing below.
+const SMALLEST: f64 = 1.0;
+const SMALLEST_ABOUT: f64 = 0.05;
+const LARGEST: f64 = 2.0;
+/// Lengths of parts, windows, the longest first, and between the beginnings of parts.
+const LENGTHS: [usize; 5] = [150, 100, 60, 40, 20];
+const BETWEEN: usize = 2;
+/// Of the parts in which an effect stands out this much from its rival the longest is taken, else the one with the most, if it
+/// is [`LEAST_CONTRAST`]: a fit leaves less than the responses promise.
+const CONTRAST: f64 = 14.0;
+const LEAST_CONTRAST: f64 = 3.0;
+
+/// Responses in all windows of the record of an effect.
+#[derive(Debug)]
+pub(crate) struct Screening {
+    rig: RigParameters,
+    /// Readings of a window.
+    rows: usize,
+    /// Of the effect: its readings without those of the baseline.
+    signature: Vec<f64>,
+    parameters: Vec<Vec<f64>>,
+    others: Vec<(Candidate, Vec<f64>)>,
+}
+
+/// Another effect in a part of the record.
+#[derive(Debug, Clone)]
+pub(crate) struct Screened {
+    candidate: Candidate,
+    start: Vec<f64>,
+    pub(crate) part: Part,
+    /// Distance of the effect from the baseline, parameters fitted, at the specified noise.
+    pub(crate) seen: f64,
+    /// The same over what the other effect leaves.
+    pub(crate) contrast: f64,
+}
+
+/// A law that was fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Rival {
+    pub(crate) rig: RigParameters,
+    pub(crate) model: Model,
+    /// Distance from the rig that it was fitted to, at the specified noise.
+    pub(crate) left: f64,
+}
+
+impl Screening {
+    /// `observer` sees the whole record, the rig with the effect as its baseline.
+    pub(crate) fn new(observer: &Observer, hidden: &Hidden, axis: Axis) -> Option<Self> {
+        let rig = RigParameters::baseline();
+        let without = observer.readings(&rig);
+        let response = |rig: &RigParameters| observer.between(&observer.readings(rig), &without);
+        let of_parameter = |name: &str| {
+            let all = response(&with_parameter(&rig, name, 1.0 + CHANGE).ok()?);
+            Some(all.into_iter().map(|own| own / CHANGE).collect())
+        };
+        let parameters = PARAMETERS.iter().map(|name| of_parameter(name)).collect::<Option<_>>()?;
+        let axes = Axis::ALL.map(|own| own == axis);
+        let candidates = Candidate::all(&rig, axes, false, &[hidden.name.to_owned()]);
+        let of = |candidate: Candidate| {
+            let sheet = candidate.sheet;
+            let with = rig.with_effect(sheet.name, &candidate.place.to_string(), &nominal(sheet)).ok()?;
+            Some((candidate, response(&with)))
+        };
+        let others = candidates.into_iter().filter_map(of).collect();
+        let signature = observer.between(observer.baseline(), &without);
+        Some(Screening { rig, rows: observer.rows(), signature, parameters, others })
+    }
+
+    /// All other effects, each in the part that suits it, the one that leaves the least first.
+    pub(crate) fn all(&self) -> Vec<Screened> {
+        let mut all: Vec<Screened> = Vec::new();
+        let windows = self.signature.len() / self.rows;
+        let products = self.products(windows);
+        for (at, (candidate, _)) in self.others.iter().enumerate() {
+            let mut best: Option<Screened> = None;
+            for length in LENGTHS {
+                for from in (1..windows.saturating_sub(length)).step_by(BETWEEN) {
+                    let Some(own) = self.screened(*candidate, &products[at], [from, length]) else {
+                        continue;
+                    };
+                    if best.as_ref().is_none_or(|best| own.contrast > best.contrast) {
+                        best = Some(own);
+                    }
+                }
+                if best.as_ref().is_some_and(|best| best.contrast > CONTRAST) {
+                    break;
+                }
+            }
+            all.extend(best.filter(|best| best.contrast > LEAST_CONTRAST));
+        }
+        all.sort_by(|one, other| other.contrast.total_cmp(&one.contrast));
+        all
+    }
+
+    /// For each other effect the sums of the products of signature, response and parameters over the windows so far.
+    fn products(&self, windows: usize) -> Vec<Vec<DMatrix<f64>>> {
+        let of = |response: &Vec<f64>| {
+            let all: Vec<&Vec<f64>> =
+                [&self.signature, response].into_iter().chain(&self.parameters).collect();
+            let mut sum = DMatrix::zeros(all.len(), all.len());
+            let mut sums = vec![sum.clone()];
+            for window in 0..windows {
+                let span = window * self.rows..(window + 1) * self.rows;
+                for row in 0..all.len() {
+                    for column in 0..=row {
+                        let product = dot(&all[row][span.clone()], &all[column][span.clone()]);
+                        sum[(row, column)] += product;
+                        if row != column {
+                            sum[(column, row)] += product;
+                        }
+                    }
+                }
+                sums.push(sum.clone());
+            }
+            sums
+        };
+        self.others.iter().map(|(_, response)| of(response)).collect()
+    }
+
+    fn screened(
+        &self,
+        candidate: Candidate,
+        sums: &[DMatrix<f64>],
+        [from, length]: [usize; 2],
+    ) -> Option<Screened> {
+        let all = sums.get(from + length)? - &sums[from];
+        let count = self.parameters.len();
+        let mut normal = all.view((2, 2), (count, count)).into_owned();
+        priors().iter().enumerate().for_each(|(at, prior)| normal[(at, at)] += prior);
+        let factor = normal.cholesky()?;
+        let along = all.view((2, 0), (count, 2)).into_owned();
+        // What the parameters leave of signature and response.
+        let left = all.view((0, 0), (2, 2)) - along.transpose() * factor.solve(&along);
+        let [square, own, product] = [left[(0, 0)], left[(1, 1)], left[(0, 1)]];
+        let amplitude = product / own;
+        if !(own > 0.0 && square > 0.0)
+            || amplitude == 0.0
+            || amplitude < 0.0 && !candidate.sheet.keys[0].signed
+        {
+            return None;
+        }
+        let share = (1.0 - product * product / own / square).max(1e-9);
+        let mut start = candidate.origin();
+        let middle = candidate.coordinate(0, nominal(candidate.sheet)[0].1);
+        let [least, most] = candidate.fit_bounds(0);
+        start[0] = (amplitude * middle).clamp(least, most);
+        let part = Part { from: from * WINDOW, rows: length * WINDOW };
+        Some(Screened { candidate, start, part, seen: square.sqrt(), contrast: share.sqrt().recip() })
+    }
+
+    /// The nearest law of another effect in its part, whose observer sees the rig with the effect as its baseline; `None` where
+    /// no rig can have it, or its amplitude is none that is drawn.
+    pub(crate) fn fitted(&self, screened: &Screened, observer: &Observer) -> Option<Rival> {
+        let candidate = screened.candidate;
+        let priors = priors();
+        let fit = Fit { observer, observed: observer.baseline(), candidate, rig: &self.rig, priors: &priors };
+        let start = fit.at([&screened.start[..], &[0.0; PARAMETERS.len()]].concat())?;
+        let nearest = fit.nearest(start, screened.seen.powi(2));
+        let keys = candidate.sheet.keys.len();
+        let (own, deviations) = nearest.coordinates.split_at(keys);
+        if !is_drawn(&candidate, own[0]) {
+            return None;
+        }
+        let rig = fit.rig_at(&nearest.coordinates)?;
+        let left = length(&observer.between(observer.baseline(), &nearest.run));
+        let off = PARAMETERS.iter().zip(deviations).map(|(name, off)| ((*name).to_owned(), 1.0 + off));
+        let model = Model {
+            effect: candidate.sheet.name.to_owned(),
+            place: candidate.place.to_string(),
+            numbers: candidate.effect_parameters(own),
+            wrong_parameters: off.collect(),
+        };
+        Some(Rival { rig, model, left })
+    }
+}
+
+/// Precisions of the deviations, in the order of the record maker's parameters, over that of readings at [`NOISE`].
+fn priors() -> Vec<f64> {
+    let of = |name: &&str| {
+        PRIORS.iter().find(|prior| prior.name == *name).map_or(f64::INFINITY, |prior| prior.prior_std)
+    };
+    PARAMETERS.iter().map(|name| (NOISE / of(name)).powi(2)).collect()
+}
+
+/// Whether a first coordinate is one that is drawn, or not far beyond.
+fn is_drawn(candidate: &Candidate, coordinate: f64) -> bool {
+    let ends = candidate.sheet.keys[0].drawn.map(|number| candidate.coordinate(0, number));
+    let least =
+        if ends[0] * ends[1] < 0.0 { SMALLEST_ABOUT } else { SMALLEST * ends[0].abs().min(ends[1].abs()) };
+    (least..=LARGEST * ends[0].abs().max(ends[1].abs())).contains(&coordinate.abs())
+}
+
+fn dot(left: &[f64], right: &[f64]) -> f64 {
+    left.iter().zip(right).map(|(left, right)| left * right).sum()
+}

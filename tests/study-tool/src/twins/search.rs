@@ -1,0 +1,210 @@
+//! The search for twins: starts one after the other, until there are enough twins.
+//!
+//! A start is refused where a record at the largest noise still tells it from every other effect, where it is hardly seen, or
+//! where no experiment tells it from its rival. Of one pair of effects no more than [`MOST_OF_A_PAIR`] twins are taken.
+
+use super::certificate::{ALIKE, APART, in_menu, in_record, probability, with_noise};
+use super::rival::{Rival, Screened, Screening};
+use super::{Model, Twin, Twins};
+use crate::SCHEMA_VERSION;
+use crate::compute::{ComputeError, trajectory};
+use crate::draws::twins::{Start, start};
+use crate::signature::Observer;
+use plant::effects::SHEETS;
+use plant::{ParameterError, RigParameters};
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use record_maker::{Record, simulate};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Most twins of one pair of effects, wherever they are, so that many classes are among the twins.
+const MOST_OF_A_PAIR: usize = 5;
+/// Largest noise of a record, over the specified one.
+const MOST_NOISE: f64 = 8.0;
+/// Least distance from the baseline in the train record: twice the gain that the workflow wants of an effect is 7 squared.
+const SEEN: f64 = 7.0;
+/// Rivals of a start that are fitted, and that are certified at most.
+const FITTED: usize = 4;
+const CERTIFIED: usize = 1;
+/// Starts of each effect after which the search ends.
+const MOST_ROUNDS: usize = 24;
+
+/// Why a start is no twin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// Its record is none of one axis.
+    Linked,
+    /// Its record cannot be made, or is too strange for the catalogue.
+    NoRecord,
+    /// No other effect resembles it.
+    NoRival,
+    /// The nearest law of another effect leaves too much, or is none that is drawn.
+    NotAlike,
+    /// An observer hardly sees it at the noise that would hide the difference.
+    NotSeen,
+    /// No experiment tells the two apart.
+    NoExperiment,
+    /// There are enough of this pair.
+    Enough,
+}
+
+impl Refusal {
+    fn reason(self) -> &'static str {
+        match self {
+            Refusal::Linked => "of linked rods",
+            Refusal::NoRecord => "record cannot be made",
+            Refusal::NoRival => "no other effect resembles it",
+            Refusal::NotAlike => "nearest law of another effect tells itself apart, or is not drawn",
+            Refusal::NotSeen => "hardly seen at the noise that makes it alike",
+            Refusal::NoExperiment => "no experiment tells the two apart",
+            Refusal::Enough => "enough twins of the same pair",
+        }
+    }
+}
+
+/// Searches until there are so many twins; fewer where the starts are used up, or it was asked to stop.
+///
+/// # Errors
+/// [`ComputeError`] when there are no threads.
+pub fn search(
+    seed: u64,
+    count: usize,
+    jobs: usize,
+    stop: &AtomicBool,
+    say: &(dyn Fn(&str) + Sync),
+) -> Result<Twins, ComputeError> {
+    let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build()?;
+    let mut found = Twins {
+        schema_version: SCHEMA_VERSION,
+        seed,
+        starts: 0,
+        refused: BTreeMap::new(),
+        twins: Vec::new(),
+    };
+    for round in 0..MOST_ROUNDS {
+        if found.twins.len() >= count || stop.load(Ordering::Relaxed) {
+            break;
+        }
+        for (number, twins) in of_round(&pool, seed, round, stop) {
+            if found.twins.len() >= count {
+                break;
+            }
+            found.starts = number + 1;
+            match twins.and_then(|twins| found.rarest(twins)) {
+                Ok(twin) => found.twins.push(Twin { number: found.twins.len(), ..twin }),
+                Err(refusal) => *found.refused.entry(refusal.reason().to_owned()).or_default() += 1,
+            }
+        }
+        say(&format!("{} twins of {} starts", found.twins.len(), found.starts));
+    }
+    Ok(found)
+}
+
+type Tried = (usize, Result<Vec<Twin>, Refusal>);
+
+fn tried(seed: u64, number: usize) -> Result<Vec<Twin>, Refusal> {
+    twins_of(&start(seed, number).ok_or(Refusal::Linked)?, number)
+}
+
+/// The starts of all effects once, in their order.
+fn of_round(pool: &ThreadPool, seed: u64, round: usize, stop: &AtomicBool) -> Vec<Tried> {
+    let numbers = round * SHEETS.len()..(round + 1) * SHEETS.len();
+    let one = |number| (!stop.load(Ordering::Relaxed)).then(|| (number, tried(seed, number)));
+    pool.install(|| numbers.into_par_iter().with_max_len(1).filter_map(one).collect())
+}
+
+impl Twins {
+    /// The one of the pair of which there are fewest.
+    fn rarest(&self, twins: Vec<Twin>) -> Result<Twin, Refusal> {
+        let pair = |twin: &Twin| {
+            let mut pair = [twin.hidden.effect.clone(), twin.rival.effect.clone()];
+            pair.sort();
+            pair
+        };
+        let same = |twin: &Twin| self.twins.iter().filter(|other| pair(other) == pair(twin)).count();
+        let rarest = twins.into_iter().min_by_key(|twin| same(twin)).ok_or(Refusal::NoRival)?;
+        if same(&rarest) < MOST_OF_A_PAIR { Ok(rarest) } else { Err(Refusal::Enough) }
+    }
+}
+
+/// The twins of a start that are certified, at most [`CERTIFIED`].
+pub(super) fn twins_of(start: &Start, number: usize) -> Result<Vec<Twin>, Refusal> {
+    let (hidden, axis) = (&start.recipe.hidden[0], start.recipe.axis);
+    let rig = rig_of(hidden).map_err(|_| Refusal::NoRecord)?;
+    let record = simulate(&start.recipe, &RigParameters::baseline()).map_err(|_| Refusal::NoRecord)?;
+    let whole = Observer::new(trajectory(&record, &rig));
+    let screening = Screening::new(&whole, hidden, axis).ok_or(Refusal::NoRecord)?;
+    let mut refusal = Refusal::NoRival;
+    let mut twins: Vec<Twin> = Vec::new();
+    for screened in screening.all().iter().filter(|screened| screened.seen >= SEEN).take(FITTED) {
+        let observer = Observer::new(screened.part.of(&record, &rig));
+        let Some(rival) = screening.fitted(screened, &observer) else {
+            refusal = Refusal::NotAlike;
+            continue;
+        };
+        match of_rival(start, number, (&record, &rig, screened), rival) {
+            Ok(twin) => twins.push(twin),
+            Err(because) => refusal = because,
+        }
+        if twins.len() == CERTIFIED {
+            break;
+        }
+    }
+    if twins.is_empty() { Err(refusal) } else { Ok(twins) }
+}
+
+/// The twin of a start and the law that was fitted to it, certified.
+fn of_rival(
+    start: &Start,
+    number: usize,
+    (record, rig, screened): (&Record, &RigParameters, &Screened),
+    rival: Rival,
+) -> Result<Twin, Refusal> {
+    let noise = (rival.left / start.distance).max(1.0);
+    if noise > MOST_NOISE {
+        return Err(Refusal::NotAlike);
+    }
+    let seen = screened.seen / noise;
+    if seen < SEEN {
+        return Err(Refusal::NotSeen);
+    }
+    let noisy = |rig: &RigParameters| with_noise(rig, noise).map_err(|_| Refusal::NoRecord);
+    let (own, other) = (noisy(rig)?, noisy(&rival.rig)?);
+    let train = in_record(record, screened.part, &own, &other);
+    if probability(train) > ALIKE {
+        return Err(Refusal::NotAlike);
+    }
+    let axis = start.recipe.axis;
+    let menu = in_menu([&own, &other], axis);
+    if !menu.values().any(|distance| probability(*distance) >= APART) {
+        return Err(Refusal::NoExperiment);
+    }
+    let hidden = &start.recipe.hidden[0];
+    let own = Model {
+        effect: hidden.name.to_owned(),
+        place: hidden.place.to_string(),
+        numbers: hidden.numbers.clone(),
+        wrong_parameters: Vec::new(),
+    };
+    let [hidden, rival] = if start.rival_is_true { [rival.model, own] } else { [own, rival.model] };
+    Ok(Twin {
+        number: 0,
+        start: number,
+        recipe_seed: start.recipe.seed,
+        axis: axis.name().to_owned(),
+        part: screened.part,
+        noise,
+        hidden,
+        rival,
+        seen,
+        train,
+        menu,
+    })
+}
+
+fn rig_of(hidden: &record_maker::Hidden) -> Result<RigParameters, ParameterError> {
+    let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
+    let numbers: Vec<_> = sheet.keys.iter().map(|key| key.name).zip(hidden.numbers.iter().copied()).collect();
+    RigParameters::baseline().with_effect(sheet.name, &hidden.place.to_string(), &numbers)
+}

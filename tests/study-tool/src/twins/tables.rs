@@ -1,0 +1,217 @@
+//! What a program made of twins: what it said of their records, and whether the experiment that it proposed told them apart.
+
+use super::Twins;
+use super::certificate::probability;
+use crate::SCHEMA_VERSION;
+use crate::compare::{grid, reported};
+use crate::draws::Draw;
+use crate::folder::{FolderError, Study};
+use crate::interval::Rate;
+use crate::program::{Identity, Taken};
+use crate::report::{self, Report};
+use crate::resolve::{self, Outcome, ambiguous, judge, leaves_open};
+use crate::step::read_result;
+use serde::Serialize;
+use serde_json::json;
+use std::path::Path;
+
+/// What is wanted of the twins that are left ambiguous, in the exact world and beside a background.
+const WANTED: [&str; 2] = ["80 %", "70 %"];
+
+/// What a program said of the first record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum First {
+    /// The truth is among names that explain the record alike.
+    Ambiguous,
+    /// One name, the truth's.
+    Right,
+    /// The truth is named, and another effect beside it, or more is missing.
+    NotAlone,
+    /// Names without the truth, nothing left open.
+    Wrong,
+    /// Names that explain the record alike, without the truth.
+    TruthNotAmong,
+    NoName,
+    Error,
+}
+
+/// One twin in one world.
+#[derive(Debug, Clone, Serialize)]
+pub struct Case {
+    pub number: usize,
+    pub background: bool,
+    pub hidden: String,
+    pub rival: String,
+    pub first: First,
+    /// Whether the rival is among the names of the first report.
+    pub rival_named: bool,
+    /// The first report's names, alternatives in brackets, and the second one's.
+    pub named: [Vec<String>; 2],
+    pub experiment: Option<String>,
+    /// The best one of the certificate, and how often an oracle is right with it.
+    pub best: Option<(String, f64)>,
+    /// Of an ambiguous one whose proposed experiment was made; nothing where none was proposed.
+    pub outcome: Option<Outcome>,
+    /// Whether the rival is among the names of the second report.
+    pub rival_left: bool,
+    pub problem: Option<String>,
+    pub wall_s: f64,
+}
+
+/// What became of the twins, as `twins-LABEL.json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Table {
+    pub schema_version: u32,
+    pub label: String,
+    pub program: Option<Identity>,
+    pub seed: u64,
+    pub cases: Vec<Case>,
+}
+
+impl Table {
+    /// The table of what is done.
+    ///
+    /// # Errors
+    /// [`FolderError`] when a result is none.
+    pub fn of(twins: &Twins, root: &Path, label: &str) -> Result<Self, FolderError> {
+        let study = twins.study(root);
+        let resolved = resolve::Table::of(&study, label)?;
+        let mut cases = Vec::new();
+        for draw in study.draws.iter().filter(|draw| study.run(label, draw.number).exists()) {
+            cases.push(case(twins, &study, label, draw, &resolved)?);
+        }
+        let (label, seed) = (label.to_owned(), twins.seed);
+        Ok(Table { schema_version: SCHEMA_VERSION, label, program: resolved.program, seed, cases })
+    }
+
+    /// As tables in Markdown.
+    pub fn markdown(&self) -> String {
+        let program = self.program.as_ref().map_or_else(|| "no program".to_owned(), Identity::reported);
+        let mut text = format!("{} ({program}), twins of seed {}.\n\n", self.label, self.seed);
+        let heads = ["", "exact world", "wanted", "background", "wanted"].map(str::to_owned);
+        text.push_str(&grid(&heads, self.rows()));
+        text.push('\n');
+        let heads = [
+            "twin",
+            "hidden",
+            "rival",
+            "best of the certificate",
+            "at first",
+            "proposed",
+            "then",
+            "named at last",
+        ];
+        text.push_str(&grid(&heads.map(str::to_owned), self.cases.iter().map(Case::cells)));
+        text
+    }
+
+    fn rows(&self) -> Vec<Vec<String>> {
+        let row = |what: &str, of: &dyn Fn(&Case) -> bool, is: &dyn Fn(&Case) -> bool, wanted: [&str; 2]| {
+            let cell = |background: bool| {
+                let cases = self.cases.iter().filter(|case| case.background == background && of(case));
+                reported(&Rate::of(cases, is))
+            };
+            let [exact, beside] = wanted.map(str::to_owned);
+            vec![what.to_owned(), cell(false), exact, cell(true), beside]
+        };
+        let all = |_: &Case| true;
+        let open = |case: &Case| case.first == First::Ambiguous;
+        let first = |first: First| move |case: &Case| case.first == first;
+        let then = |outcome: Outcome| move |case: &Case| case.outcome == Some(outcome);
+        let none = ["", ""];
+        vec![
+            row("ambiguous at first, the truth among the names", &all, &open, none),
+            row("of these: the rival among the names", &open, &|case| case.rival_named, none),
+            row("of these: told apart by the proposed experiment", &open, &then(Outcome::Resolved), WANTED),
+            row("of these: still ambiguous", &open, &then(Outcome::StillAmbiguous), none),
+            row(
+                "of these: still ambiguous, the rival gone",
+                &open,
+                &|case| case.outcome == Some(Outcome::StillAmbiguous) && !case.rival_left,
+                none,
+            ),
+            row("of these: the truth gone", &open, &then(Outcome::Wrong), none),
+            row("of these: no good report", &open, &then(Outcome::Error), none),
+            row("of these: no experiment proposed", &open, &|case| case.experiment.is_none(), none),
+            row("right name at once", &all, &first(First::Right), none),
+            row("right name at once, not alone", &all, &first(First::NotAlone), none),
+            row("wrong name at once", &all, &first(First::Wrong), none),
+            row("ambiguous without the truth", &all, &first(First::TruthNotAmong), none),
+            row("no name", &all, &first(First::NoName), none),
+            row("no good report", &all, &first(First::Error), none),
+        ]
+    }
+}
+
+impl Case {
+    fn cells(&self) -> Vec<String> {
+        let best = self.best.as_ref().map(|(name, share)| format!("{name} {:.0} %", 1e2 * share));
+        vec![
+            format!("{}{}", self.number, if self.background { ", background" } else { "" }),
+            self.hidden.clone(),
+            self.rival.clone(),
+            best.unwrap_or_default(),
+            format!("{}: {}", word(self.first), self.named[0].join("; ")),
+            self.experiment.clone().unwrap_or_default(),
+            self.outcome.map(word).unwrap_or_default(),
+            self.named[1].join("; "),
+        ]
+    }
+}
+
+/// As `twins-LABEL.json` has it.
+fn word(value: impl Serialize) -> String {
+    json!(value).as_str().unwrap_or_default().to_owned()
+}
+
+fn case(
+    twins: &Twins,
+    study: &Study,
+    label: &str,
+    draw: &Draw,
+    resolved: &resolve::Table,
+) -> Result<Case, FolderError> {
+    let (number, folder) = (draw.number, study.run(label, draw.number));
+    let twin = twins.of_draw(number).expect("a draw of these twins");
+    let taken = read_result(&folder.join("result.json"))?.taken;
+    let report = report::read(&folder.join("report.json"));
+    let then = resolved.cases.iter().find(|case| case.number == number);
+    let with_both = report::read(&study.run(&resolve::label(label), number).join("report.json")).ok();
+    let listed = |report: Option<&Report>| -> Vec<String> {
+        report.iter().flat_map(|report| &report.named).map(resolve::tables::with_alternatives).collect()
+    };
+    let has_rival = |report: Option<&Report>| {
+        let all = report.into_iter().flat_map(|report| &report.named).flat_map(resolve::names);
+        all.map(resolve::tables::titled).any(|name| name == twin.rival.title())
+    };
+    Ok(Case {
+        number,
+        background: draw.recipe.background.is_some(),
+        hidden: twin.hidden.title(),
+        rival: twin.rival.title(),
+        first: first(draw, &taken, &report),
+        rival_named: has_rival(report.as_ref().ok()),
+        named: [listed(report.as_ref().ok()), listed(with_both.as_ref())],
+        experiment: then.and_then(|case| case.experiment.clone()),
+        best: twin.best().map(|(name, distance)| (name.to_owned(), probability(distance))),
+        outcome: then.and_then(|case| case.outcome),
+        rival_left: has_rival(with_both.as_ref()),
+        problem: then.and_then(|case| case.problem.clone()),
+        wall_s: taken.wall_s,
+    })
+}
+
+/// What a report says of the record of a twin.
+pub(super) fn first(draw: &Draw, taken: &Taken, report: &Result<Report, String>) -> First {
+    let hidden = &draw.recipe.hidden[0];
+    match (judge(hidden, taken, report), report) {
+        (Outcome::Error, _) | (_, Err(_)) => First::Error,
+        (_, Ok(report)) if ambiguous(draw, report).is_some() => First::Ambiguous,
+        (Outcome::Resolved, _) => First::Right,
+        (Outcome::StillAmbiguous, _) => First::NotAlone,
+        (_, Ok(report)) if report.named.is_empty() => First::NoName,
+        (_, Ok(report)) if leaves_open(report) => First::TruthNotAmong,
+        _ => First::Wrong,
+    }
+}
