@@ -152,7 +152,7 @@ impl Case {
             self.hidden.clone(),
             self.rival.clone(),
             best.unwrap_or_default(),
-            format!("{}: {}", word(self.first), self.named[0].join("; ")),
+            [&[word(self.first)][..], &self.named[0][..]].concat().join("; "),
             self.experiment.clone().unwrap_or_default(),
             self.outcome.map(word).unwrap_or_default(),
             self.named[1].join("; "),
