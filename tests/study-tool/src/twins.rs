@@ -92,11 +92,11 @@ pub struct Twin {
     pub hidden: Model,
     pub rival: Model,
     /// Distance of what was started with from the baseline in the train record, standard deviations, parameters fitted.
-    pub seen: f64,
+    pub seen_distance: f64,
     /// Distance of the two models in the train record.
-    pub train: f64,
+    pub train_distance: f64,
     /// The same in the experiments of the menu that both rigs can run, the smaller of both truths.
-    pub menu: BTreeMap<String, f64>,
+    pub menu_distances: BTreeMap<String, f64>,
 }
 
 /// The twins of a seed, as `twins.json`.
@@ -131,7 +131,7 @@ impl Model {
 impl Twin {
     /// The experiment in which the two models are farthest apart.
     pub fn best(&self) -> Option<(&str, f64)> {
-        let best = self.menu.iter().max_by(|one, other| one.1.total_cmp(other.1));
+        let best = self.menu_distances.iter().max_by(|one, other| one.1.total_cmp(other.1));
         best.map(|(name, distance)| (name.as_str(), *distance))
     }
 

@@ -1,7 +1,7 @@
 //! How often an oracle that knows two rigs exactly tells which of them made a record.
 //!
 //! ```text
-//!   d = |M (y_A - y_B)|      y: readings without noise in windows of 100 ms, over the noise; M: free initial states ([signature])
+//!   d = |M (y_A - y_B)|      y: readings without noise over the noise, windows of 100 ms; M: free initial states ([signature])
 //!   right in Phi(d / 2) of the records, if either is as likely
 //! ```
 //!

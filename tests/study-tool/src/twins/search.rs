@@ -197,9 +197,9 @@ fn of_rival(
         noise,
         hidden,
         rival,
-        seen,
-        train,
-        menu,
+        seen_distance: seen,
+        train_distance: train,
+        menu_distances: menu,
     })
 }
 

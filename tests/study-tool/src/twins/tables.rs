@@ -50,7 +50,7 @@ pub struct Case {
     pub named: [Vec<String>; 2],
     pub experiment: Option<String>,
     /// The best one of the certificate, and how often an oracle is right with it.
-    pub best: Option<(String, f64)>,
+    pub certified: Option<(String, f64)>,
     /// Of an ambiguous one whose proposed experiment was made; nothing where none was proposed.
     pub outcome: Option<Outcome>,
     /// Whether the rival is among the names of the second report.
@@ -146,7 +146,7 @@ impl Table {
 
 impl Case {
     fn cells(&self) -> Vec<String> {
-        let best = self.best.as_ref().map(|(name, share)| format!("{name} {:.0} %", 1e2 * share));
+        let best = self.certified.as_ref().map(|(name, share)| format!("{name} {:.0} %", 1e2 * share));
         vec![
             format!("{}{}", self.number, if self.background { ", background" } else { "" }),
             self.hidden.clone(),
@@ -194,7 +194,7 @@ fn case(
         rival_named: has_rival(report.as_ref().ok()),
         named: [listed(report.as_ref().ok()), listed(with_both.as_ref())],
         experiment: then.and_then(|case| case.experiment.clone()),
-        best: twin.best().map(|(name, distance)| (name.to_owned(), probability(distance))),
+        certified: twin.best().map(|(name, distance)| (name.to_owned(), probability(distance))),
         outcome: then.and_then(|case| case.outcome),
         rival_left: has_rival(with_both.as_ref()),
         problem: then.and_then(|case| case.problem.clone()),

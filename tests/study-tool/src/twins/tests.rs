@@ -67,11 +67,11 @@ fn an_effect_that_no_other_resembles_is_refused() {
 fn a_twin_is_alike_in_its_record_and_apart_in_an_experiment() {
     let (number, start) = start_of("valve-dead-zone");
     let twin = twins_of(&start, number).unwrap().remove(0);
-    assert!(probability(twin.train) <= 0.7 && twin.seen >= 7.0, "{twin:?}");
+    assert!(probability(twin.train_distance) <= 0.7 && twin.seen_distance >= 7.0, "{twin:?}");
     assert!(twin.best().is_some_and(|(_, distance)| probability(distance) >= 0.9), "{twin:?}");
     assert_ne!(twin.hidden.effect, twin.rival.effect);
     let names = [&twin.hidden.effect, &twin.rival.effect];
-    assert!(names.contains(&&"valve-dead-zone".to_owned()) && twin.menu.len() <= 8);
+    assert!(names.contains(&&"valve-dead-zone".to_owned()) && twin.menu_distances.len() <= 8);
 
     let folder = tempfile::tempdir().unwrap();
     let refused = BTreeMap::from([("why".to_owned(), 3)]);
