@@ -103,6 +103,9 @@ pub struct NameArguments {
     /// File of suspects beside the rig file: terms as expressions that may be missing, candidates beside the effects.
     #[arg(long, value_name = "FILE")]
     pub suspects: Option<PathBuf>,
+    /// Give each explanation its marginal likelihood beside the probability that decides.
+    #[arg(long)]
+    pub marginal_likelihoods: bool,
     /// Of a model file: wherever no suspect is named, search for terms that none of them describes; without it, where more
     /// than noise is left.
     #[arg(long)]

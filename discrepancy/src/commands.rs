@@ -92,7 +92,7 @@ fn progress() -> impl FnMut(&str) {
 }
 
 fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
-    let NameArguments { records, without, suspects, discover, no_discover } = arguments;
+    let NameArguments { records, without, suspects, marginal_likelihoods, discover, no_discover } = arguments;
     threads(records.threads);
     known_effects(without)?;
     tests.iter().try_for_each(|test| is_there(test))?;
@@ -129,6 +129,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         options: records.read.options(),
         without: without.clone(),
         suspects: suspects.as_ref().map_or(Ok(Vec::new()), |file| read_suspects(file))?,
+        marginal_likelihoods: *marginal_likelihoods,
     };
     let outcome = close(&task, &mut progress)?;
     let Outcome { report, extended, pictures, experiment, not_judged } = &outcome;

@@ -195,8 +195,7 @@ pub fn name(
     // Its parameters were shrunk to start the next round: the fit that its loss is of has others.
     let as_fitted = fitted.iter().find(|fit| fit.loss == model.loss).unwrap_or(model);
     let fits = Fits { parameters: calibrated, model: as_fitted, fitted: &fitted };
-    let mut explanations = explanations(here, &linearisation, &columns, &fits);
-    marginal::weigh(here, calibrated, columns.candidates.len(), &mut explanations);
+    let explanations = explanations(here, &linearisation, &columns, &fits);
     let searched = Searched { selection, all_rounds, lacks_fit, any_homogeneous };
     let decision = decide(here, &explanations, searched);
     let Decision { selection, lacks_fit, shares, is_named, explained } = decision;
@@ -235,6 +234,11 @@ pub fn name(
         is_named,
         explanations,
     }
+}
+
+/// Gives the explanations of a search their marginal likelihoods.
+pub fn weigh_by_marginal_likelihood(engine: &Engine<'_>, found: &mut SelectionResult) {
+    marginal::weigh(engine, &found.calibrated, found.columns.candidates.len(), &mut found.explanations);
 }
 
 /// Refits the reported model on all of the records, where the search used a part of them.

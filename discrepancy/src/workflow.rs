@@ -50,6 +50,8 @@ pub struct Task {
     pub without: Vec<String>,
     /// Candidates beside the catalogue.
     pub suspects: Vec<&'static Suspect>,
+    /// Whether explanations get their marginal likelihoods, which decide nothing.
+    pub marginal_likelihoods: bool,
 }
 
 /// Outputs of the workflow.

@@ -3,7 +3,7 @@
 use crate::record::{both_gridded, gridded, gridded_briefly, hiding};
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
-use discrepancy::name::{SelectionResult, is_large, name};
+use discrepancy::name::{SelectionResult, is_large, name, weigh_by_marginal_likelihood};
 use discrepancy::parameters::{COUNT, with_factors};
 use discrepancy::report::ExplanationKind;
 use plant::RigParameters;
@@ -16,7 +16,9 @@ fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -
     let records = [gridded_briefly(hidden, &RigParameters::baseline())];
     let engine = Engine::new(&records, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
-    name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())
+    let mut found = name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ());
+    weigh_by_marginal_likelihood(&engine, &mut found);
+    found
 }
 
 fn names(found: &SelectionResult) -> Vec<String> {

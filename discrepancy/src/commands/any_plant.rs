@@ -14,8 +14,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
-    let NameArguments { records, without, .. } = arguments;
-    no_options_of_a_rig(&records.read, without)?;
+    let NameArguments { records, without, marginal_likelihoods, .. } = arguments;
+    no_options_of_a_rig(&records.read, without, *marginal_likelihoods)?;
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
     let out = Folder::open(&out, [&records.rig].into_iter().chain(&records.train).chain(tests))?;
     let model = PathBuf::from(records.rig.file_name().unwrap_or("model.toml".as_ref()));
@@ -55,7 +55,7 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
 
 /// `check` of records with a model file: what can be said before anything is fitted.
 pub(super) fn check_command(arguments: &RecordArguments, out: Option<&Folder>) -> Result<Exit, CommandError> {
-    no_options_of_a_rig(&arguments.read, &[])?;
+    no_options_of_a_rig(&arguments.read, &[], false)?;
     let all = look(&arguments.rig, &arguments.train)?;
     let mut text = String::new();
     for one in &all {
@@ -70,10 +70,15 @@ pub(super) fn check_command(arguments: &RecordArguments, out: Option<&Folder>) -
 }
 
 /// Refuses what belongs to a rig file.
-fn no_options_of_a_rig(read: &ReadArguments, without: &[String]) -> Result<(), CommandError> {
+fn no_options_of_a_rig(
+    read: &ReadArguments,
+    without: &[String],
+    marginal_likelihoods: bool,
+) -> Result<(), CommandError> {
     let given = [
         ("--mapping", read.mapping.is_some(), "[record] of the model file says how records are read"),
         ("--without", !without.is_empty(), "take the suspect out of the model file"),
+        ("--marginal-likelihoods", marginal_likelihoods, "its report has the gains of suspects"),
     ];
     match given.iter().find(|(_, given, _)| *given) {
         Some((option, _, instead)) => {

@@ -6,6 +6,7 @@ use pagekit::markup::{number, paragraph, table, words as text_cell};
 use pagekit::plot::{Bar, figure, share_bars};
 
 pub(super) fn explanations(report: &Report) -> String {
+    let with_marginal = report.explanations.iter().any(|explanation| explanation.marginal.is_some());
     let row = |explanation: &Explanation| {
         let optional =
             |value: Option<f64>| number(value.map_or_else(|| words::NOTHING.to_owned(), words::percent));
@@ -13,25 +14,30 @@ pub(super) fn explanations(report: &Report) -> String {
             let value = explanation.evidence.as_ref().map(value);
             number(value.map_or_else(|| words::NOTHING.to_owned(), words::short))
         };
-        vec![
+        let mut cells = vec![
             text_cell(name(explanation)),
             number(words::percent(explanation.probability)),
-            optional(explanation.marginal.map(|own| own.probability)),
             of_evidence(noise_ratio),
             of_evidence(|evidence| evidence.behind),
             of_evidence(|evidence| evidence.parameters_moved),
             optional(explanation.evidence.and_then(|evidence| evidence.amplitude_variation)),
-        ]
+        ];
+        if with_marginal {
+            cells.push(optional(explanation.marginal.map(|marginal| marginal.probability)));
+        }
+        cells
     };
-    let heads = [
+    let mut heads = vec![
         "explanation",
         "probability",
-        "by marginal likelihood",
         "leaves, times noise",
         "loss behind the best",
         "parameters moved",
         "amplitude differs by",
     ];
+    if with_marginal {
+        heads.push("by marginal likelihood, which decides nothing");
+    }
     let table = table("Explanations", &heads, report.explanations.iter().map(row));
     if table.is_empty() {
         return table;
@@ -40,7 +46,7 @@ pub(super) fn explanations(report: &Report) -> String {
         + &probabilities(&report.explanations)
         + &paragraph(
             "The right explanation leaves about 1 times the noise, moves few parameters, and all stretches of the records agree \
-             on its amplitude. The column by marginal likelihood is a second rule, which decides nothing.",
+             on its amplitude.",
         )
         + &table
 }

@@ -4,7 +4,7 @@ use super::{RigFile, Task, WorkflowError, findings, on_shared_axes, open_all, pa
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::gridded_record::{GriddedRecord, searched_share};
-use crate::name::{SelectionResult, name};
+use crate::name::{SelectionResult, name, weigh_by_marginal_likelihood};
 use crate::report;
 
 /// The explanations of the training records alone, with their evidence: the search without what follows it. Empty where a record
@@ -39,5 +39,10 @@ pub(super) fn searched_for(
     let (rig, measured) = (engine.rig(), records[0].measured);
     let mut candidates = Candidate::all(rig, measured, linked, &task.without);
     candidates.extend(Candidate::of_suspects(rig, measured, &task.suspects));
-    name(engine, candidates, progress)
+    let mut found = name(engine, candidates, progress);
+    if task.marginal_likelihoods {
+        progress("marginal likelihoods");
+        weigh_by_marginal_likelihood(engine, &mut found);
+    }
+    found
 }
