@@ -18,6 +18,7 @@ use crate::windows::{ReferenceRun, VariableRanges, Windows, axis_by_axis, dot};
 use model_fit::stats::order_statistic;
 use plant::effects::leave_laws_alone;
 use plant::{Batch, RigParameters};
+use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -92,6 +93,22 @@ impl<'a> Engine<'a> {
             .flat_map(|windows| windows.dof(self.axis_by_axis))
             .map(|scaled_dof| scaled_dof * self.variance_factor)
             .collect();
+        self.on(windows, scaled_dof)
+    }
+
+    /// Synthetic records in the same windows, which a rig made whose readings are `simulated`: [`Windows::drawn`].
+    pub(crate) fn drawn(&self, simulated: &[f64], random: &mut Pcg64) -> Engine<'a> {
+        let mut at = 0;
+        let draw = |windows: &Windows<'a>| {
+            let from = at;
+            at += windows.count() * windows.rows();
+            windows.drawn(&simulated[from..at], self.variance_factor, random)
+        };
+        let windows = self.windows.iter().map(draw).collect();
+        self.on(windows, self.scaled_dof.clone())
+    }
+
+    fn on(&self, windows: Vec<Windows<'a>>, scaled_dof: Vec<f64>) -> Engine<'a> {
         Engine {
             windows,
             rig: self.rig.clone(),

@@ -19,6 +19,7 @@ pub(crate) mod evidence;
 
 use crate::windows::dot;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Passes of reweighting.
 const PASSES: usize = 12;
@@ -44,7 +45,7 @@ pub(crate) struct Products {
     /// C'e of each window.
     scores: Vec<Vec<f64>>,
     /// C'C of each window, row by row, shared by all residuals of the same columns.
-    information: Vec<Vec<f64>>,
+    information: Arc<[Vec<f64>]>,
 }
 
 /// A fit of some columns.
@@ -100,6 +101,13 @@ impl Products {
                     .collect()
             })
             .collect();
+    }
+
+    /// The products of another residual with the same columns.
+    pub(crate) fn of_residual<C: AsRef<[f64]>>(&self, residual: &[f64], columns: &[C], rows: usize) -> Self {
+        let mut products = self.clone();
+        products.set_residual(residual, columns, rows);
+        products
     }
 
     /// The same residual with the squares that noise adds on average.
@@ -333,7 +341,7 @@ impl Products {
         let (matrix, _) = self.normal(first, weights, precisions);
         let inverse = matrix.try_inverse().unwrap_or_else(|| DMatrix::zeros(count, count));
         let weighted = |row: usize, column: usize| -> f64 {
-            let windows = weights.iter().zip(&self.information);
+            let windows = weights.iter().zip(self.information.iter());
             windows.map(|(weight, products)| weight * products[row * self.columns + column]).sum()
         };
         (count..self.columns)

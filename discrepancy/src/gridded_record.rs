@@ -250,6 +250,22 @@ impl GriddedRecord {
         gridded
     }
 
+    /// Standard errors of an axis' point from the noise of its samples, in the order of [`AxisState::NUDGES`]; none of a rate that
+    /// is exactly 0.
+    pub(crate) fn point_errors(&self, axis: usize, rests: bool) -> [f64; 4] {
+        let error = |channel: usize, variance: f64| {
+            let share = self.lag1_autocorrelation[axis][channel];
+            self.noise[axis][channel] * (variance * (1.0 + share) / (1.0 - share)).sqrt()
+        };
+        let pressure = parabola_variance(PRESSURE_REACH);
+        let [position, rate] = if rests {
+            [rest::mean_variance(), 0.0]
+        } else {
+            [parabola_variance(POSITION_HALF_WIDTH), slope_error(POSITION_HALF_WIDTH).powi(2)]
+        };
+        [error(0, position), error(0, rate) / PERIOD_S, error(2, pressure), error(3, pressure)]
+    }
+
     /// Points, autocorrelation and jitter of an axis from its samples.
     fn smooth(&mut self, axis: Axis, rig: &RigParameters) {
         let i = axis.index();
@@ -332,11 +348,21 @@ fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: 
     });
     let Some(variance) = moving else { return 0.0 };
     // A parabola absorbs part of the scatter.
-    let m = POSITION_HALF_WIDTH as f64;
-    let kept =
-        1.0 - 3.0 * (3.0 * m * m + 3.0 * m - 1.0) / ((2.0 * m - 1.0) * (2.0 * m + 1.0) * (2.0 * m + 3.0));
+    let kept = 1.0 - parabola_variance(POSITION_HALF_WIDTH);
     let jitter_s = (variance / kept).max(0.0).sqrt();
     if jitter_s < LEAST_JITTER_S { 0.0 } else { jitter_s }
+}
+
+/// Variance of the value of a parabola over so many samples to each side, over that of a sample.
+fn parabola_variance(reach: usize) -> f64 {
+    let m = reach as f64;
+    3.0 * (3.0 * m * m + 3.0 * m - 1.0) / ((2.0 * m - 1.0) * (2.0 * m + 1.0) * (2.0 * m + 3.0))
+}
+
+/// Standard error of the slope of such a parabola, per period, over the standard deviation of a sample.
+fn slope_error(reach: usize) -> f64 {
+    let n = reach as f64;
+    (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt()
 }
 
 /// Grid index of each row; rows whose time jumps back share that of the row before.

@@ -10,7 +10,8 @@
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
 //! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
 //! joins and stays when its amplitude is homogeneous over windows (`name/heterogeneity.rs`), small ones too. Probabilities of
-//! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
+//! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands. What is to
+//! be named has to gain more than chance gives, few windows aside (`name/significance.rs`).
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
@@ -25,6 +26,7 @@ mod null_distribution;
 mod pitch;
 mod probabilities;
 mod round;
+mod significance;
 mod start_states;
 
 use crate::calibrate::calibrate;
@@ -32,6 +34,7 @@ use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::parameters::{COUNT, with_factors};
 use crate::refit::{EffectEstimate, Linearisation, Refit, coordinates, derivative, linearise, rig_of};
+use crate::report::Significance;
 use crate::screen::{Columns, Screened};
 pub use decision::NotExplained;
 use decision::{Decision, Searched, decide};
@@ -50,6 +53,7 @@ use null_distribution::NullDistribution;
 use plant::effects::sheet::Part;
 use rayon::prelude::*;
 use round::Round;
+use significance::Fitted;
 use start_states::{RefitWithInitialStates, refit_with_starts};
 
 /// Maximum number of effects, those below the amplitude floor included.
@@ -119,6 +123,8 @@ pub struct SelectionResult {
     pub is_named: Vec<bool>,
     /// What was compared, nothing first.
     pub explanations: Vec<Explanation>,
+    /// Of the set that is named, or would be.
+    pub significance: Option<Significance>,
 }
 
 /// Selects the effects that are missing from the baseline.
@@ -197,7 +203,23 @@ pub fn name(
     let fits = Fits { parameters: calibrated, model: as_fitted, fitted: &fitted };
     let explanations = explanations(here, &linearisation, &columns, &fits);
     let searched = Searched { selection, all_rounds, lacks_fit, any_homogeneous };
-    let decision = decide(here, &explanations, searched);
+    let mut decision = decide(here, &explanations, searched);
+    let significance = decision.to_be_named().and_then(|model| {
+        progress("testing what is named against chance");
+        let calibrated = &decision.selection.calibrated;
+        let fitted = Fitted {
+            engine: here,
+            linearisation: &linearisation,
+            columns: &columns,
+            calibrated,
+            explanations: &explanations,
+            threshold,
+        };
+        fitted.significance(model)
+    });
+    if let Some(objection) = significance.as_ref().and_then(Significance::objection) {
+        decision = decision.without_names(here, objection);
+    }
     let Decision { selection, lacks_fit, shares, is_named, explained } = decision;
     let not_explained = explained.as_ref().err().copied();
     let reported = explained.unwrap_or_else(|_| {
@@ -233,6 +255,7 @@ pub fn name(
         not_explained,
         is_named,
         explanations,
+        significance,
     }
 }
 

@@ -1,5 +1,6 @@
 //! The report, and how its parts are made: `runlog/src/discrepancy_report.rs` has its types.
 
+use crate::refit::EffectEstimate;
 use plant::effects::sheet::{Part, Place};
 pub use runlog::discrepancy_report::*;
 
@@ -9,6 +10,11 @@ pub fn place_of(place: Place) -> Where {
     let named = Where::named(&place.to_string());
     debug_assert!(place.element.is_some() == named.element.is_some() || matches!(place.part, Part::Linkage));
     named
+}
+
+/// An effect of a fit without its numbers.
+pub(crate) fn effect_place(placed: &EffectEstimate) -> EffectPlace {
+    EffectPlace { effect: placed.candidate.sheet.name.to_owned(), place: place_of(placed.candidate.place) }
 }
 
 /// The words in a sentence: `a`, `a and b`, `a, b and c`.

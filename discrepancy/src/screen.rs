@@ -6,13 +6,15 @@
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::fit::Products;
+use crate::fit::{Fit, Products};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Linearisation, parameter_precisions};
 use rayon::prelude::*;
 
 /// Penalty for each column of a candidate.
-const COLUMN_PENALTY: f64 = 6.0;
+pub(crate) const COLUMN_PENALTY: f64 = 6.0;
+/// Prior precision of a column's coefficient, which is about 1: it keeps the equations regular.
+const COLUMN_PRECISION: f64 = 1e-2;
 
 #[derive(Debug)]
 pub struct Columns {
@@ -78,47 +80,80 @@ impl Columns {
         residual: &[f64],
         model_sensitivities: &[Vec<f64>],
     ) -> (f64, Vec<Screened>) {
-        let always = COUNT + model_sensitivities.len();
-        let all: Vec<&Vec<f64>> =
-            linearisation.columns.iter().chain(model_sensitivities).chain(&self.columns).collect();
+        let all = self.beside(linearisation, model_sensitivities);
+        let beside = Beside::new(linearisation, model_sensitivities.len());
         let products = engine.products(residual, &all);
-        let (mut precisions, mut prior_offset) = (parameter_precisions(), linearisation.deviations());
-        precisions.resize(always, 1e-2);
-        prior_offset.resize(always, 0.0);
-        let basic: Vec<usize> = (0..always).collect();
-        let null_loss = products.fit_from(&basic, &precisions, &prior_offset).loss;
+        let null_loss = beside.fit(&products).loss;
         let screened = (0..self.candidates.len())
             .into_par_iter()
-            .filter_map(|at| self.screen_one(&products, at, &basic, &precisions, &prior_offset))
+            .filter_map(|at| {
+                let BestColumns { loss, coordinates, .. } = self.best_columns(&products, at, &beside)?;
+                let start = EffectEstimate { candidate: self.candidates[at], coordinates };
+                Some(Screened { at, loss, start })
+            })
             .collect();
         (null_loss, screened)
     }
 
-    fn screen_one(
+    /// All columns: of the parameters, of a model, of the probes.
+    pub(crate) fn beside<'c>(
+        &'c self,
+        linearisation: &'c Linearisation,
+        model_sensitivities: &'c [Vec<f64>],
+    ) -> Vec<&'c [f64]> {
+        let all = linearisation.columns.iter().chain(model_sensitivities).chain(&self.columns);
+        all.map(Vec::as_slice).collect()
+    }
+
+    /// Largest gain of `count` candidates that join one after the other, those before the last by their loss; `products` are of
+    /// [`Columns::beside`] without a model. `gain` is that of windows from the squares without to those with them; each column is
+    /// charged [`COLUMN_PENALTY`].
+    pub(crate) fn largest_gain(
         &self,
         products: &Products,
-        at: usize,
-        basic: &[usize],
-        precisions: &[f64],
-        prior_offset: &[f64],
-    ) -> Option<Screened> {
-        let always = basic.len();
+        linearisation: &Linearisation,
+        count: usize,
+        gain: impl Fn(&[f64], &[f64]) -> f64,
+    ) -> f64 {
+        let mut beside = Beside::new(linearisation, 0);
+        let null = beside.fit(products);
+        let mut joined: Vec<usize> = Vec::new();
+        let mut largest = f64::NEG_INFINITY;
+        for _ in 0..count {
+            let others = (0..self.candidates.len()).filter(|at| !joined.contains(at));
+            let fitted: Vec<(usize, BestColumns)> =
+                others.filter_map(|at| Some((at, self.best_columns(products, at, &beside)?))).collect();
+            let gains = fitted.iter().map(|(_, best)| {
+                let charged = COLUMN_PENALTY * best.columns.len() as f64 + beside.penalty;
+                gain(&null.squares, &best.squares) - charged
+            });
+            largest = gains.fold(largest, f64::max);
+            let best = fitted.into_iter().min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
+            let Some((at, best)) = best else { break };
+            joined.push(at);
+            beside.join(&best.columns);
+        }
+        largest
+    }
+
+    /// The best fit of a candidate's probes, in some of their combinations.
+    fn best_columns(&self, products: &Products, at: usize, beside: &Beside) -> Option<BestColumns> {
+        let always = beside.columns.len();
         let candidate = self.candidates[at];
         // Probes of the amplitude enter one at a time; probes of further keys with a neutral value join.
         let (leading, joining): (Vec<_>, Vec<_>) =
             self.probes[at].iter().partition(|(probe, _)| probe[0] != 0.0);
-        let mut best: Option<(f64, Vec<f64>)> = None;
+        let mut best: Option<BestColumns> = None;
         let alone = Vec::new();
         for (probe, index) in &leading {
             for with in if joining.is_empty() { vec![&alone] } else { vec![&alone, &joining] } {
-                let mut chosen = basic.to_vec();
-                let mut chosen_precisions = precisions.to_vec();
-                chosen.push(always + index);
-                chosen.extend(with.iter().map(|(_, index)| always + index));
-                chosen_precisions.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
-                let mut chosen_from = prior_offset.to_vec();
-                chosen_from.resize(chosen.len(), 0.0);
-                let fit = products.fit_from(&chosen, &chosen_precisions, &chosen_from);
+                let mut joined = beside.clone();
+                let columns: Vec<usize> = std::iter::once(index)
+                    .chain(with.iter().map(|(_, index)| index))
+                    .map(|index| beside.first_probe + index)
+                    .collect();
+                joined.join(&columns);
+                let fit = joined.fit(products);
                 let mut coordinates = probe.clone();
                 let [least, most] = candidate.range(0);
                 let coefficient = fit.coefficients[always];
@@ -135,16 +170,56 @@ impl Columns {
                         coordinates[key] = (coefficient * z).clamp(least.max(-1.3), most.min(1.3));
                     }
                 }
-                let loss = fit.loss + COLUMN_PENALTY * (1 + with.len()) as f64;
-                if best.as_ref().is_none_or(|(best, _)| loss < *best) {
-                    best = Some((loss, coordinates));
+                let loss = fit.loss + joined.penalty;
+                if best.as_ref().is_none_or(|best| loss < best.loss) {
+                    best = Some(BestColumns { loss, coordinates, columns, squares: fit.squares });
                 }
             }
         }
-        best.map(|(loss, coordinates)| Screened {
-            at,
-            loss,
-            start: EffectEstimate { candidate, coordinates },
-        })
+        best
+    }
+}
+
+/// A candidate's best fit.
+struct BestColumns {
+    loss: f64,
+    coordinates: Vec<f64>,
+    /// Its columns among all.
+    columns: Vec<usize>,
+    /// Of each window.
+    squares: Vec<f64>,
+}
+
+/// Columns that are fitted together, with what holds their coefficients.
+#[derive(Clone)]
+struct Beside {
+    columns: Vec<usize>,
+    precisions: Vec<f64>,
+    prior_offset: Vec<f64>,
+    /// Of the candidates' columns among them.
+    penalty: f64,
+    /// Index of the first probe's column.
+    first_probe: usize,
+}
+
+impl Beside {
+    /// The parameters, and the first columns after them, which are a model's.
+    fn new(linearisation: &Linearisation, of_model: usize) -> Self {
+        let always = COUNT + of_model;
+        let (mut precisions, mut prior_offset) = (parameter_precisions(), linearisation.deviations());
+        precisions.resize(always, COLUMN_PRECISION);
+        prior_offset.resize(always, 0.0);
+        Beside { columns: (0..always).collect(), precisions, prior_offset, penalty: 0.0, first_probe: always }
+    }
+
+    fn join(&mut self, columns: &[usize]) {
+        self.columns.extend(columns);
+        self.precisions.resize(self.columns.len(), COLUMN_PRECISION);
+        self.prior_offset.resize(self.columns.len(), 0.0);
+        self.penalty += COLUMN_PENALTY * columns.len() as f64;
+    }
+
+    fn fit(&self, products: &Products) -> Fit {
+        products.fit_from(&self.columns, &self.precisions, &self.prior_offset)
     }
 }

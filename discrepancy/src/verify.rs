@@ -195,4 +195,4 @@ fn is_better(before: &Power, after: &Power) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -68,6 +68,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     let found = found(&RigParameters::baseline(), &[]);
     assert_eq!(names(&found), Vec::<String>::new());
     assert_eq!(found.not_explained, None);
+    assert!(found.significance.is_none(), "nothing was to be named: {:?}", found.significance);
     let kinds: Vec<ExplanationKind> = found.explanations.iter().map(|explanation| explanation.kind).collect();
     assert_eq!(kinds, [ExplanationKind::Nothing, ExplanationKind::Parameters, ExplanationKind::NoneOfThese]);
     assert_eq!(most_probable_by_marginal(&found), 0);
@@ -126,6 +127,9 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
     assert!((leakage - 4.0).abs() < 4.0 * error + 0.05, "{leakage} +- {error}");
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
+    let tests = found.significance.as_ref().expect("it was to be named");
+    let chance = tests.chance.as_ref().expect("the rods are not linked");
+    assert!(tests.objection().is_none() && chance.draws == 5 && chance.p_value < 0.005, "{tests:?}");
     let explanation = &found.explanations[2];
     assert_eq!(explanation.sets[0][0].candidate.name(), "rod-leakage drive.b");
     assert_eq!(most_probable_by_marginal(&found), 2);

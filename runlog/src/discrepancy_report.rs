@@ -14,6 +14,7 @@ mod next;
 mod objection;
 mod outside;
 mod record_check;
+mod significance;
 mod verdict;
 mod verification;
 
@@ -26,6 +27,7 @@ pub use objection::Objection;
 pub use outside::{Curve, Dependence, Outside, Surface, TableTerm};
 pub use record_check::{ChannelCheck, Finding, RecordCheck};
 use serde::{Deserialize, Deserializer, Serialize};
+pub use significance::{DrawnRecords, Ended, Significance};
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 pub use verdict::Verdict;
@@ -89,6 +91,9 @@ pub struct Report {
     /// All explanations that were weighed: nothing, parameters, sets of effects with the reported one first, none of these.
     #[serde(default)]
     pub explanations: Vec<Explanation>,
+    /// The tests of the set of effects that is named, or would be; null where none would.
+    #[serde(skip_deserializing)]
+    pub significance: Option<Significance>,
     /// Effects that the training records do not excite.
     #[serde(default)]
     pub not_excited: Vec<EffectPlace>,

@@ -18,6 +18,9 @@ pub(super) fn in_words(report: &Report) -> String {
     for quantity in &report.parameters {
         let _ = writeln!(text, "  {}", quantity_in_words(quantity));
     }
+    if let Some(tests) = &report.significance {
+        let _ = writeln!(text, "  {}", tests.in_words());
+    }
     if let Some(objection) = report.objection() {
         let how = match objection {
             Objection::Worse => "gets worse with it",

@@ -53,7 +53,7 @@ impl Products {
             let of = |(weight, products): (&f64, &Vec<f64>)| {
                 weight * products[others[row] * self.columns + column]
             };
-            weights.iter().zip(&self.information).map(of).sum()
+            weights.iter().zip(self.information.iter()).map(of).sum()
         });
         let taken = solve(matrix, &cross)?;
         let mut projection = vec![0.0; self.columns];
@@ -69,7 +69,7 @@ impl Products {
             let information: f64 = (0..self.columns).map(row).sum::<f64>().max(1e-12);
             (score / information, weight * information)
         };
-        Some(weights.iter().zip(&self.scores).zip(&self.information).map(window).collect())
+        Some(weights.iter().zip(&self.scores).zip(self.information.iter()).map(window).collect())
     }
 
     /// One-step delete-one-window jackknife errors with frozen window weights. Where few windows determine a coefficient,

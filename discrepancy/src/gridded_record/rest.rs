@@ -4,7 +4,7 @@
 //! Rest is slow for a while; creep is slow and steady in one direction for longer. Where neither is certain, the alternative rate
 //! is kept, and the simulation decides by the residual.
 
-use super::{POSITION_HALF_WIDTH, Parabola};
+use super::{POSITION_HALF_WIDTH, Parabola, slope_error};
 use model_fit::stats::mean;
 use plant::PERIOD_S;
 
@@ -17,6 +17,11 @@ const CREEP_REACHES: [usize; 2] = [50, 100];
 const CREEP_FASTEST_M_PER_S: f64 = 0.01;
 /// Significance of a difference of two means, in standard errors.
 const CREEP_ERRORS: f64 = 4.0;
+
+/// Variance of a position at rest over that of a sample: it is a mean.
+pub(super) fn mean_variance() -> f64 {
+    1.0 / (2 * REST_REACH + 1) as f64
+}
 
 /// Positions of an axis and where they rest.
 pub(super) struct Still<'a> {
@@ -40,10 +45,8 @@ pub(super) struct Rate {
 impl<'a> Still<'a> {
     /// `noise_m` is the effective noise of means, larger than that of readings where noise is autocorrelated.
     pub(super) fn new(parabolas: &'a [Option<Parabola>], positions: &'a [Option<f64>], noise_m: f64) -> Self {
-        // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
-        let n = POSITION_HALF_WIDTH as f64;
-        let slope_error = noise_m * (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt();
-        let slow = |parabola: &Parabola| parabola.slope.abs() < SLOW_ERRORS * slope_error;
+        let error = noise_m * slope_error(POSITION_HALF_WIDTH);
+        let slow = |parabola: &Parabola| parabola.slope.abs() < SLOW_ERRORS * error;
         let slow: Vec<bool> = parabolas.iter().map(|parabola| parabola.as_ref().is_some_and(slow)).collect();
         let mut still = Still { parabolas, positions, noise_m, slow, rests: Vec::new() };
         still.rests = (0..positions.len()).map(|place| still.rest(place)).collect();

@@ -53,6 +53,8 @@ const MAX_PARAMETERS_OFF: usize = 3;
 pub enum NotExplained {
     TooLittle,
     TooManyParametersOff,
+    /// Why, in words after the effects.
+    NotSignificant(&'static str),
 }
 
 impl NotExplained {
@@ -61,6 +63,7 @@ impl NotExplained {
         match self {
             NotExplained::TooLittle => "explains too little",
             NotExplained::TooManyParametersOff => "explains it only beside too many parameters that are off",
+            NotExplained::NotSignificant(objection) => objection,
         }
     }
 }
@@ -85,6 +88,29 @@ pub(super) struct Decision {
     pub(super) is_named: Vec<bool>,
     /// The model without the parameters that it does not need, where it is an explanation.
     pub(super) explained: Result<Refit, NotExplained>,
+}
+
+impl Decision {
+    /// The model whose effects are to be named.
+    pub(super) fn to_be_named(&self) -> Option<&Refit> {
+        Some(&self.selection.model).filter(|_| self.explained.is_ok() && self.is_named.contains(&true))
+    }
+
+    /// Parameters alone, where they leave no more than noise; else outside the catalogue.
+    pub(super) fn without_names(mut self, engine: &Engine<'_>, objection: &'static str) -> Self {
+        self.is_named.fill(false);
+        if super::lacks_fit(engine, self.selection.calibrated.loss) {
+            self.explained = Err(NotExplained::NotSignificant(objection));
+            return self;
+        }
+        self.selection.rounds.clear();
+        self.selection.model = self.selection.calibrated.clone();
+        self.shares.clear();
+        self.is_named.clear();
+        self.lacks_fit = false;
+        self.explained = Ok(with_needed(engine, &self.selection.model));
+        self
+    }
 }
 
 pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched: Searched) -> Decision {

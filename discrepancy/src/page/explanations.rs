@@ -43,6 +43,7 @@ pub(super) fn explanations(report: &Report) -> String {
         return table;
     }
     paragraph(&advice(&report.explanations))
+        + &report.significance.as_ref().map_or(String::new(), |tests| paragraph(&tests.in_words()))
         + &probabilities(&report.explanations)
         + &paragraph(
             "The right explanation leaves about 1 times the noise, moves few parameters, and all stretches of the records agree \

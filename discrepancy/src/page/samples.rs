@@ -256,6 +256,29 @@ fn explanations() -> Vec<Explanation> {
     ]
 }
 
+fn significance() -> Significance {
+    let effect = |name: &str| vec![EffectPlace { effect: name.to_owned(), place: at("drive", None) }];
+    let drawn = |effects, observed, reached, largest, p_value| DrawnRecords {
+        effects,
+        observed,
+        draws: 5,
+        reached,
+        largest,
+        p_value,
+        ended: Ended::FarAbove,
+        significant: true,
+    };
+    Significance {
+        effects: effect("piston-leakage"),
+        gain: 1612.0,
+        best_windows: 3,
+        gain_without_best: 1480.0,
+        least_gain: 25.0,
+        chance: Some(drawn(Vec::new(), 1480.0, 0, -2.6, 2e-7)),
+        other: Some(drawn(effect("inclination"), 300.0, 0, -41.0, 0.0021)),
+    }
+}
+
 pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
     let size = if verdict == Verdict::NothingMissing { 0.02 } else { 1.0 };
     let mut pictures = pictures(size);
@@ -310,6 +333,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
         Verdict::Named => {
             report.summary = "Air leaks past the drive's piston: 2.51 Nl/min from 6 to 1 bar.".to_owned();
             report.named = vec![leakage()];
+            report.significance = Some(significance());
             let offset = vec![quantity("offset_percent", 0.21, 0.02, "%", None)];
             let offset = named("valve-offset", at("load", None), offset, 0.012);
             report.small = vec![NamedEffect { amplitude_variation: Some(0.04), ..offset }];

@@ -11,7 +11,12 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
     record_over(3000, rig, baseline, seed)
 }
 
-fn record_over(periods: usize, rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRecord {
+pub(crate) fn record_over(
+    periods: usize,
+    rig: &RigParameters,
+    baseline: &RigParameters,
+    seed: u64,
+) -> GriddedRecord {
     let mut record = GriddedRecord {
         name: "made".to_owned(),
         measured: [true, false],

@@ -1,5 +1,6 @@
 //! Start states of windows: their sensitivities, and their estimation.
 
+use super::whiten::gaussian;
 use super::{COARSE_SUBSTEPS, WINDOW, Windows, dot, project};
 use crate::gridded_record::{AxisState, GriddedRecord};
 use nalgebra::{DMatrix, DVector};
@@ -194,6 +195,28 @@ impl Windows<'_> {
         let mut windows = Windows { points, readings, ..self.clone() };
         windows.estimate_starts_by(START_PASSES, |_| Cow::Borrowed(sensitivities));
         windows
+    }
+
+    /// The same without estimates: `simulated` plus drawn noise of `variance_factor` times the power, with start states that are
+    /// off by drawn errors of the record's points.
+    pub(crate) fn drawn(&self, simulated: &[f64], variance_factor: f64, random: &mut Pcg64) -> Self {
+        let size = variance_factor.sqrt();
+        let noise = self.raw_noise(random);
+        let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + size * noise).collect();
+        let mut points = self.points.clone();
+        for points in &mut points {
+            for axis in (0..2).filter(|axis| self.record.measured[*axis]) {
+                let point = &mut points[axis];
+                let rests = point.rod_velocity_m_per_s == 0.0;
+                let [way_m, rate_m_per_s, a_pa, b_pa] =
+                    self.record.point_errors(axis, rests).map(|error| size * error * gaussian(random));
+                point.extension_m += way_m;
+                point.rod_velocity_m_per_s += rate_m_per_s;
+                point.pressures_pa[0] += a_pa;
+                point.pressures_pa[1] += b_pa;
+            }
+        }
+        Windows { points, readings, ..self.clone() }
     }
 
     /// What one simulation nudges: of which axes, which number of the start state. Axes that do not act on each other are nudged

@@ -6,7 +6,7 @@ use crate::name::{SelectionResult, is_large, off, same, share_removed};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
-    self, DetectionLimit, EffectPlace, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, place_of,
+    self, DetectionLimit, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, effect_place, place_of,
     strongest,
 };
 
@@ -48,6 +48,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &SelectionResult) -> Report 
         insignificant,
         candidates: candidates(found),
         explanations: explanations(found),
+        significance: found.significance.clone(),
         not_excited,
         detection_limits,
         ..empty(verdict, String::new())
@@ -138,6 +139,7 @@ fn parameters(engine: &Engine<'_>, found: &SelectionResult) -> (Vec<Quantity>, V
 
 fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
     let null_loss = found.null_loss;
+    let objection = found.significance.as_ref().and_then(|tests| Some((tests, tests.objection()?)));
     found
         .screened
         .iter()
@@ -155,6 +157,10 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
                 reason.reason()
             } else if let Some(at) = of_model {
                 if found.is_named[at] { "named" } else { "part of the model, and too small to be named" }
+            } else if let Some((_, objection)) =
+                objection.filter(|(tests, _)| tests.effects.contains(&effect_place(placed)))
+            {
+                objection
             } else if is_alike && found.not_explained.is_none() {
                 "explains as much as what is named"
             } else if alone.is_some_and(|fit| !is_large(&fit.placed[0])) {
@@ -181,14 +187,10 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
 }
 
 pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> {
-    let effect = |placed: &EffectEstimate| EffectPlace {
-        effect: placed.candidate.sheet.name.to_owned(),
-        place: place_of(placed.candidate.place),
-    };
     let all = found.explanations.iter().map(|explanation| report::Explanation {
         kind: explanation.kind,
         probability: explanation.probability,
-        sets: explanation.sets.iter().map(|set| set.iter().map(effect).collect()).collect(),
+        sets: explanation.sets.iter().map(|set| set.iter().map(effect_place).collect()).collect(),
         evidence: explanation.features,
         marginal: explanation.marginal,
     });
@@ -196,7 +198,7 @@ pub(super) fn explanations(found: &SelectionResult) -> Vec<report::Explanation> 
 }
 
 /// Candidates that the records do not excite, and the detection limits of the others.
-fn limits(found: &SelectionResult) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
+fn limits(found: &SelectionResult) -> (Vec<report::EffectPlace>, Vec<DetectionLimit>) {
     let mut not_excited = Vec::new();
     let mut limits = Vec::new();
     for (candidate, limit) in found.columns.candidates.iter().zip(&found.limits) {
@@ -218,7 +220,7 @@ fn limits(found: &SelectionResult) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
                     unit: key.unit.name().to_owned(),
                 });
             }
-            _ => not_excited.push(EffectPlace { effect, place }),
+            _ => not_excited.push(report::EffectPlace { effect, place }),
         }
     }
     (not_excited, limits)
@@ -230,6 +232,12 @@ pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
 
 /// The verdict in a sentence or two.
 pub(super) fn summary(report: &Report) -> String {
+    let not_named = report.significance.as_ref().filter(|_| report.nearest.is_none());
+    let not_named = not_named.and_then(|tests| Some(format!(" {} {}.", tests.tested(), tests.objection()?)));
+    verdict_in_words(report) + &not_named.unwrap_or_default()
+}
+
+fn verdict_in_words(report: &Report) -> String {
     let one = |effect: &NamedEffect| format!("{} ({})", effect.effect, effect.place);
     let parameters =
         report.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>().join(", ");

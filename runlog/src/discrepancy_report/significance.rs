@@ -1,0 +1,113 @@
+//! Whether the gain of a named set of effects could be chance, or that of a few windows.
+
+use super::EffectPlace;
+use serde::Serialize;
+
+/// The tests that a set of effects has to pass for a name. Gains are falls of the loss over the windows of the searched part.
+#[derive(Clone, Debug, Serialize)]
+pub struct Significance {
+    /// The set that was tested, named where it passed; effects too small to be named are among them.
+    pub effects: Vec<EffectPlace>,
+    /// Its gain over parameters alone, less what the screening charges for each number.
+    pub gain: f64,
+    /// Number of windows that are left out of `gain_without_best`.
+    pub best_windows: usize,
+    /// The gain without the windows that contribute most.
+    pub gain_without_best: f64,
+    /// What `gain_without_best` has to exceed.
+    pub least_gain: f64,
+    /// Records drawn with parameters alone; null where the rods are linked.
+    pub chance: Option<DrawnRecords>,
+    /// Records drawn with the other one of the two most probable explanations, where it has effects too: how often is the tested set
+    /// as far ahead of it as in the records? No condition of a name.
+    pub other: Option<DrawnRecords>,
+}
+
+/// A sequential test on records that were drawn with an explanation.
+#[derive(Clone, Debug, Serialize)]
+pub struct DrawnRecords {
+    /// Effects with which they were drawn; empty for parameters alone.
+    pub effects: Vec<EffectPlace>,
+    /// What the tested set gains on the records, over the explanation.
+    pub observed: f64,
+    /// Number of records.
+    pub draws: usize,
+    /// Draws that reach `observed`.
+    pub reached: usize,
+    /// The largest gain of a draw: over parameters alone that of any set of as many effects.
+    pub largest: f64,
+    /// Bound of the p-value.
+    pub p_value: f64,
+    /// Why no more were drawn.
+    pub ended: Ended,
+    /// Whether `observed` is larger than chance gives, at the level of a twentieth.
+    pub significant: bool,
+}
+
+/// How a sequential test ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ended {
+    /// Two draws reached what was observed.
+    Reached,
+    /// What was observed lies far above all draws.
+    FarAbove,
+    /// All draws were spent.
+    AllDrawn,
+}
+
+impl Significance {
+    /// Why the set has no name, in words after its effects; `None` where it passes.
+    #[must_use]
+    pub fn objection(&self) -> Option<&'static str> {
+        if self.gain_without_best <= self.least_gain {
+            Some("gains too little outside three windows")
+        } else if self.chance.as_ref().is_some_and(|chance| !chance.significant) {
+            Some("gains no more than chance may")
+        } else {
+            None
+        }
+    }
+
+    /// The effects that were tested, in words.
+    #[must_use]
+    pub fn tested(&self) -> String {
+        names(&self.effects)
+    }
+
+    /// What the tests show, in a sentence or two.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let Significance { gain, gain_without_best, best_windows, least_gain, .. } = self;
+        let mut text = format!(
+            "{} gains {gain:.0}, and {gain_without_best:.0} without its {best_windows} best windows, where a name needs \
+             {least_gain:.0}.",
+            self.tested()
+        );
+        if let Some(DrawnRecords { draws, reached, largest, p_value, .. }) = &self.chance {
+            text += &format!(
+                " Of {draws} simulated records with parameters alone {reached} reach the latter, and the best gains {largest:.0} \
+                 (p {}).",
+                p_words(*p_value)
+            );
+        }
+        if let Some(DrawnRecords { effects, draws, reached, p_value, .. }) = &self.other {
+            text += &format!(
+                " Of {draws} simulated records with {} instead {reached} put it as far ahead (p {}).",
+                names(effects),
+                p_words(*p_value)
+            );
+        }
+        text
+    }
+}
+
+fn names(effects: &[EffectPlace]) -> String {
+    let names: Vec<String> = effects.iter().map(|one| format!("{} ({})", one.effect, one.place)).collect();
+    names.join(" and ")
+}
+
+/// A p-value to a thousandth.
+fn p_words(p_value: f64) -> String {
+    if p_value < 1e-3 { "below 0.001".to_owned() } else { format!("{p_value:.3}") }
+}
