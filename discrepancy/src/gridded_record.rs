@@ -250,8 +250,8 @@ impl GriddedRecord {
         gridded
     }
 
-    /// Standard errors of an axis' point from the noise of its samples, in the order of [`AxisState::NUDGES`]; none of a rate that
-    /// is exactly 0.
+    /// Standard errors of an axis' point from the noise of its samples, in the order of [`AxisState::NUDGES`]; 0 of the
+    /// rate of an axis at rest.
     pub(crate) fn point_errors(&self, axis: usize, rests: bool) -> [f64; 4] {
         let error = |channel: usize, variance: f64| {
             let share = self.lag1_autocorrelation[axis][channel];

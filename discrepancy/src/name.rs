@@ -10,8 +10,8 @@
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
 //! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
 //! joins and stays when its amplitude is homogeneous over windows (`name/heterogeneity.rs`), small ones too. Probabilities of
-//! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands. What is to
-//! be named has to gain more than chance gives, few windows aside (`name/significance.rs`).
+//! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
+//! What is to be named has to gain more than chance gives, three windows aside (`name/significance.rs`).
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 

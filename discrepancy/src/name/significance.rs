@@ -5,17 +5,17 @@
 //!   as many effects beside them ──► its gain; at most DRAWS times, fewer where the answer is clear (sequential.rs)
 //! ```
 //!
-//! A parametric bootstrap through the simulator: unlike signs drawn at random (`name/null_distribution.rs`), it knows effects that
-//! act to one side in few windows. The largest gain over all candidates accounts for the search (Westfall, Young). Refits are one
-//! Gauss-Newton step on the columns of the screening, on the safe side: refitted in the simulator, the best of a draw gained 15 in
-//! place of 31, -47 in place of 6 and 3 in place of 11 (draws of two null records at four times the noise, seed 18, the two with the
-//! largest gains of twenty).
+//! A parametric bootstrap through the simulator: unlike signs drawn at random (`name/null_distribution.rs`), it knows
+//! effects that act to one side in few windows. The largest gain over all candidates accounts for the search (Westfall, Young).
+//! Refits are one Gauss-Newton step on the columns of the screening, on the safe side: refitted in the simulator, the best of a
+//! draw gained 15 in place of 31, -47 in place of 6 and 3 in place of 11 (draws of two null records at four times the noise,
+//! seed 18, those with the largest gains of twenty).
 //!
-//! The tested set against another one: records are drawn with the other one, and both are refitted by one step on the sensitivities of
-//! their fits (Cox 1961; Williams 1970: simulated).
+//! The tested set against another one: records are drawn with the other one, and both are refitted by one step on the
+//! sensitivities of their fits (Cox 1961; Williams 1970: simulated).
 //!
-//! Source: Besag, Clifford 1991, Biometrika 78(2). Westfall, Young 1993, Resampling-Based Multiple Testing. Cox 1961, Proc. 4th
-//! Berkeley Symp. 1: separate families. Williams 1970, J. R. Stat. Soc. B 32(3).
+//! Source: Besag, Clifford 1991, Biometrika 78(2). Westfall, Young 1993, Resampling-Based Multiple Testing. Cox 1961,
+//! Proc. 4th Berkeley Symp. 1: separate families. Williams 1970, J. R. Stat. Soc. B 32(3).
 
 mod sequential;
 

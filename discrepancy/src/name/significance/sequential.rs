@@ -6,9 +6,9 @@
 //!   all draws spent                                             ──► p = (draws that reach it + 1) / (draws + 1)
 //! ```
 //!
-//! *Far above*: of n draws from a shifted exponential distribution, a further one exceeds the smallest by r times their range with
-//! probability n / (n + 1) prod_(i < n) i / (i + r), since what exceeds the smallest is exponential again. The largest of many
-//! chi2-like gains has a tail like that. With r = 1 it is 1 / (n + 1), the p-value of plain Monte Carlo.
+//! *Far above*: of n draws from a shifted exponential distribution, a further one exceeds the smallest by r times their range
+//! with probability n / (n + 1) prod_(i < n) i / (i + r), since what exceeds the smallest is exponential again. The
+//! largest of many chi2-like gains has a tail like that. With r = 1 it is 1 / (n + 1), the p-value of plain Monte Carlo.
 //!
 //! Source: Besag, Clifford 1991, Biometrika 78(2): sequential Monte Carlo p-values.
 
