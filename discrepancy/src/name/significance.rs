@@ -63,9 +63,15 @@ impl Fitted<'_> {
         let gains = window_gains(self.engine.scaled_dof(), &self.calibrated.squares, &model.squares);
         let charged = COLUMN_PENALTY * numbers(&model.placed) as f64;
         let gain = gains.iter().sum::<f64>() - charged;
-        // A threshold from a residual that is signal is no measure of chance.
-        let lacks_fit = lacks_fit(self.engine, model.loss);
-        let least_gain = if lacks_fit { MIN_LOSS_REDUCTION } else { self.threshold.max(MIN_LOSS_REDUCTION) };
+        // Draws say how much chance gives without the best windows, which is far less than with them. Where there are none, what
+        // any gain has to exceed counts; a threshold from a residual that is signal is no measure of chance.
+        let least_gain = if !self.engine.is_linked() {
+            0.0
+        } else if lacks_fit(self.engine, model.loss) {
+            MIN_LOSS_REDUCTION
+        } else {
+            self.threshold.max(MIN_LOSS_REDUCTION)
+        };
         let gain_without_best = without_best(&gains) - charged;
         let chance =
             if self.engine.is_linked() { None } else { Some(self.by_chance(model, gain_without_best)?) };

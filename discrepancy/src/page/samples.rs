@@ -273,7 +273,7 @@ fn significance() -> Significance {
         gain: 1612.0,
         best_windows: 3,
         gain_without_best: 1480.0,
-        least_gain: 25.0,
+        least_gain: 0.0,
         chance: Some(drawn(Vec::new(), 1480.0, 0, -2.6, 2e-7)),
         other: Some(drawn(effect("inclination"), 300.0, 0, -41.0, 0.0021)),
     }

@@ -81,7 +81,7 @@ impl Significance {
         let Significance { gain, gain_without_best, best_windows, least_gain, .. } = self;
         let mut text = format!(
             "{} gains {gain:.0}, and {gain_without_best:.0} without its {best_windows} best windows, where a name needs \
-             {least_gain:.0}.",
+             more than {least_gain:.0}.",
             self.tested()
         );
         if let Some(DrawnRecords { draws, reached, largest, p_value, .. }) = &self.chance {
