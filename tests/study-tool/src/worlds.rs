@@ -196,8 +196,8 @@ impl Worlds {
             };
             let _ = writeln!(
                 text,
-                "\nBy the marginal likelihood, {world}: of {} reports that have it, its most probable explanation is right for {}, \
-                 that of the rule that decides for {}; expected calibration error {:.1} and {:.1} points, mean log loss \
+                "\nBy the marginal likelihood, {world}: of {} reports that have it, its most probable explanation is right \
+                 for {}, that of the rule that decides for {}; expected calibration error {:.1} and {:.1} points, mean log loss \
                  {of_marginal:.2} and {of_deciding:.2}.",
                 marginal.first_right[1],
                 marginal.first_right[0],
