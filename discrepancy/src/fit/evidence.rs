@@ -117,16 +117,18 @@ impl Integrated {
     /// Products of a model with the inputs integrated out; `residual` and `columns` are their places in [`InputGrams::cross`].
     pub(crate) fn products(&self, plain: &Products, residual: usize, columns: &[usize]) -> Products {
         let mut reduced = plain.clone();
+        let mut information = plain.information.to_vec();
         let count = plain.columns;
         for (window, taken) in self.taken.iter().enumerate().filter(|(_, taken)| !taken.is_empty()) {
             reduced.squares[window] = (reduced.squares[window] - taken[(residual, residual)]).max(0.0);
             for (row, at) in columns.iter().enumerate() {
                 reduced.scores[window][row] -= taken[(residual, *at)];
                 for (column, other) in columns.iter().enumerate() {
-                    reduced.information[window][row * count + column] -= taken[(*at, *other)];
+                    information[window][row * count + column] -= taken[(*at, *other)];
                 }
             }
         }
+        reduced.information = information.into();
         reduced
     }
 }

@@ -95,6 +95,7 @@ fn a_strong_effect_is_significant_after_five_draws_with_any_number_of_threads() 
         features: None,
         fit: Some(fit.clone()),
         probability: 0.5,
+        marginal: None,
     });
     let of = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
