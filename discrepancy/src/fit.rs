@@ -140,13 +140,8 @@ impl Products {
             products
         });
         let scores = self.scores.iter().zip(scores).map(|(own, further)| [own.as_slice(), further].concat());
-        Products {
-            columns,
-            dof: self.dof.clone(),
-            squares: self.squares.clone(),
-            scores: scores.collect(),
-            information: information.collect(),
-        }
+        let (dof, squares) = (self.dof.clone(), self.squares.clone());
+        Products { columns, dof, squares, scores: scores.collect(), information: information.collect() }
     }
 
     pub(crate) fn columns(&self) -> usize {

@@ -4,14 +4,16 @@
 //!   probability of one half and more                 the model of the search leaves more than noise      noise alone
 //!   a set of effects within the bar                  that set, with "more is missing"                    the model of the search
 //!   a set of effects beyond the bar, none of these   outside the catalogue                               the model of the search
-//!   nothing, parameters, or no explanation           the model of the search, unless it explains         the model of the search
+//!   parameters, or no explanation                    the model of the search, unless it explains         the model of the search
 //!                                                    too little: then outside the catalogue
+//!   nothing                                          parameters alone, or outside the catalogue          parameters alone
 //! ```
 //!
 //! The bar: the amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; by [`MAX_CV_OF_PART`], beside at most
 //! [`MAX_PARAMETERS_OFF`] parameters that are moved, where the model of the search leaves more than noise, and the set more than
 //! [`MOST_LOSS_LEFT`] of the loss. The model of the search has no name either where more than [`MAX_PARAMETERS_OFF`] parameters
-//! are off beside it, unless an effect of it joined as a homogeneous one.
+//! are off beside it, unless an effect of it joined as a homogeneous one, or where its set is less probable than nothing or than
+//! [`LEAST_PROBABLE`]: so it is wherever nothing has one half. A set whose variation cannot be computed is beyond the bar.
 
 use super::elimination::Selection;
 use super::explanations::Explanation;

@@ -15,8 +15,8 @@ static WEIGHTS: LazyLock<Weights> = LazyLock::new(|| {
     serde_json::from_str(include_str!("../../study/weights.json")).expect("weights of a fit")
 });
 
-/// Scales of the features: the loss by which alternatives are told apart, what the best model of an exact record leaves,
-/// a variation that chance does not give.
+/// Scales of the features, fixed with the weights: the loss difference and the lack of fit of the search when they were fitted, a
+/// variation that chance does not give.
 const BEHIND_SCALE: f64 = 9.0;
 const EXCESS_SCALE: f64 = 0.08;
 const VARIATION_SCALE: f64 = 0.1;
