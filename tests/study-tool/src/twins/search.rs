@@ -87,7 +87,11 @@ pub fn search(
         if found.twins.len() >= count || stop.load(Ordering::Relaxed) {
             break;
         }
-        for (number, twins) in of_round(&pool, seed, round, stop) {
+        let tried = of_round(&pool, seed, round, stop);
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        for (number, twins) in tried {
             if found.twins.len() >= count {
                 break;
             }

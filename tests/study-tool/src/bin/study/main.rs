@@ -152,7 +152,8 @@ fn twins(arguments: &TwinsArguments, stop: &AtomicBool) -> Done {
         return Err(format!("{} has twins already: give another folder", out.display()).into());
     }
     let twins = search(*seed, *count, *jobs, stop, &say)?;
-    if !stop.load(Ordering::Relaxed) {
+    // A stopped search keeps the twins of its whole rounds.
+    if !twins.twins.is_empty() {
         std::fs::create_dir_all(out)?;
         twins.save(out)?;
     }
