@@ -25,9 +25,8 @@ const MOST_NOISE: f64 = 8.0;
 /// Least distance from the baseline in the train record. At 7, whose square is twice the gain that the workflow wants of an
 /// effect, twins of a development seed with 8 to 16 had no name.
 const SEEN: f64 = 10.0;
-/// Rivals of a start that are fitted, and that are certified at most.
+/// Rivals of a start that are fitted, until one makes a twin.
 const FITTED: usize = 4;
-const CERTIFIED: usize = 1;
 /// Starts of each effect after which the search ends.
 const MOST_ROUNDS: usize = 24;
 
@@ -84,19 +83,19 @@ pub fn search(
         twins: Vec::new(),
     };
     for round in 0..MOST_ROUNDS {
-        if found.twins.len() >= count || stop.load(Ordering::Relaxed) {
+        if found.twins.len() >= count {
             break;
         }
         let tried = of_round(&pool, seed, round, stop);
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        for (number, twins) in tried {
+        for (number, twin) in tried {
             if found.twins.len() >= count {
                 break;
             }
             found.starts = number + 1;
-            match twins.and_then(|twins| found.rarest(twins)) {
+            match twin.and_then(|twin| found.of_few(twin)) {
                 Ok(twin) => found.twins.push(Twin { number: found.twins.len(), ..twin }),
                 Err(refusal) => *found.refused.entry(refusal.reason().to_owned()).or_default() += 1,
             }
@@ -106,10 +105,10 @@ pub fn search(
     Ok(found)
 }
 
-type Tried = (usize, Result<Vec<Twin>, Refusal>);
+type Tried = (usize, Result<Twin, Refusal>);
 
-fn tried(seed: u64, number: usize) -> Result<Vec<Twin>, Refusal> {
-    twins_of(&start(seed, number).ok_or(Refusal::Linked)?, number)
+fn tried(seed: u64, number: usize) -> Result<Twin, Refusal> {
+    twin_of(&start(seed, number).ok_or(Refusal::Linked)?, number)
 }
 
 /// The starts of all effects once, in their order.
@@ -120,28 +119,26 @@ fn of_round(pool: &ThreadPool, seed: u64, round: usize, stop: &AtomicBool) -> Ve
 }
 
 impl Twins {
-    /// The one of the pair of which there are fewest.
-    fn rarest(&self, twins: Vec<Twin>) -> Result<Twin, Refusal> {
+    /// A twin of a pair of which there are not enough.
+    fn of_few(&self, twin: Twin) -> Result<Twin, Refusal> {
         let pair = |twin: &Twin| {
             let mut pair = [twin.hidden.effect.clone(), twin.rival.effect.clone()];
             pair.sort();
             pair
         };
-        let same = |twin: &Twin| self.twins.iter().filter(|other| pair(other) == pair(twin)).count();
-        let rarest = twins.into_iter().min_by_key(|twin| same(twin)).ok_or(Refusal::NoRival)?;
-        if same(&rarest) < MOST_OF_A_PAIR { Ok(rarest) } else { Err(Refusal::Enough) }
+        let same = self.twins.iter().filter(|other| pair(other) == pair(&twin)).count();
+        if same < MOST_OF_A_PAIR { Ok(twin) } else { Err(Refusal::Enough) }
     }
 }
 
-/// The twins of a start that are certified, at most [`CERTIFIED`].
-pub(super) fn twins_of(start: &Start, number: usize) -> Result<Vec<Twin>, Refusal> {
+/// The first rival of a start that is certified makes the twin.
+pub(super) fn twin_of(start: &Start, number: usize) -> Result<Twin, Refusal> {
     let (hidden, axis) = (&start.recipe.hidden[0], start.recipe.axis);
     let rig = rig_of(hidden).map_err(|_| Refusal::NoRecord)?;
     let record = simulate(&start.recipe, &RigParameters::baseline()).map_err(|_| Refusal::NoRecord)?;
     let whole = Observer::new(trajectory(&record, &rig));
     let screening = Screening::new(&whole, hidden, axis).ok_or(Refusal::NoRecord)?;
     let mut refusal = Refusal::NoRival;
-    let mut twins: Vec<Twin> = Vec::new();
     for screened in screening.all().iter().filter(|screened| screened.seen >= SEEN).take(FITTED) {
         let observer = Observer::new(screened.part.of(&record, &rig));
         let Some(rival) = screening.fitted(screened, &observer) else {
@@ -149,14 +146,11 @@ pub(super) fn twins_of(start: &Start, number: usize) -> Result<Vec<Twin>, Refusa
             continue;
         };
         match of_rival(start, number, (&record, &rig, screened), rival) {
-            Ok(twin) => twins.push(twin),
+            Ok(twin) => return Ok(twin),
             Err(because) => refusal = because,
         }
-        if twins.len() == CERTIFIED {
-            break;
-        }
     }
-    if twins.is_empty() { Err(refusal) } else { Ok(twins) }
+    Err(refusal)
 }
 
 /// The twin of a start and the law that was fitted to it, certified.

@@ -1,7 +1,7 @@
 //! What an oracle tells apart, which starts are refused, one certificate from start to end, and what counts as told apart.
 
 use super::certificate::{in_experiment, probability, with_noise};
-use super::search::{Refusal, twins_of};
+use super::search::{Refusal, twin_of};
 use super::tables::{First, Table, first};
 use super::*;
 use crate::SCHEMA_VERSION;
@@ -60,13 +60,13 @@ fn start_of(effect: &str) -> (usize, Start) {
 #[test]
 fn an_effect_that_no_other_resembles_is_refused() {
     let (number, start) = start_of("force-sensor-offset");
-    assert!(matches!(twins_of(&start, number), Err(Refusal::NoRival | Refusal::NotAlike | Refusal::NotSeen)));
+    assert!(matches!(twin_of(&start, number), Err(Refusal::NoRival | Refusal::NotAlike | Refusal::NotSeen)));
 }
 
 #[test]
 fn a_twin_is_alike_in_its_record_and_apart_in_an_experiment() {
     let (number, start) = start_of("valve-dead-zone");
-    let twin = twins_of(&start, number).unwrap().remove(0);
+    let twin = twin_of(&start, number).unwrap();
     assert!(probability(twin.train_distance) <= 0.7 && twin.seen_distance >= 7.0, "{twin:?}");
     assert!(twin.best().is_some_and(|(_, distance)| probability(distance) >= 0.9), "{twin:?}");
     assert_ne!(twin.hidden.effect, twin.rival.effect);
