@@ -205,6 +205,10 @@ impl Image {
         // First all are looked at, then all are taken.
         let mut rest = None;
         for take in [false, true] {
+            // Its queue may be full, so that it comes before anything is taken.
+            if take && controls[LOAD_SET] != 0.0 && !actions.load() {
+                return Err(Refusal::Busy);
+            }
             let mut value = begun.unwrap_or(Begun { next: address, bytes: [0; 8], count: 0 });
             for (byte, at) in bytes.iter().zip(offset..) {
                 value.bytes[value.count] = *byte;
@@ -284,8 +288,7 @@ impl Image {
         match place {
             ARM if value == 0.0 => self.trace.disarm(),
             ARM => self.trace.arm(&self.controls),
-            LOAD_SET if value == 0.0 => {}
-            LOAD_SET => return if actions.load() { Ok(()) } else { Err(Refusal::Busy) },
+            LOAD_SET => {}
             _ => self.controls[place] = value,
         }
         Ok(())
@@ -320,6 +323,7 @@ pub(super) mod tests {
         pub(crate) set: Vec<(usize, f64)>,
         pub(crate) stored: Vec<Vec<f64>>,
         pub(crate) loads: usize,
+        pub(crate) is_busy: bool,
     }
 
     impl ParameterActions for Notes {
@@ -333,8 +337,8 @@ pub(super) mod tests {
         }
 
         fn load(&mut self) -> bool {
-            self.loads += 1;
-            true
+            self.loads += usize::from(!self.is_busy);
+            !self.is_busy
         }
     }
 
@@ -407,6 +411,18 @@ pub(super) mod tests {
             assert_eq!(notes.set, [(0, 30.5)], "cut at {cut}");
             assert_eq!(read::<8>(&image, PARAMETERS), value);
         }
+    }
+
+    #[test]
+    fn a_block_whose_load_finds_a_full_queue_changes_nothing() {
+        let (mut image, mut notes) = (image(), Notes { is_busy: true, ..Notes::default() });
+        let channel_4 = CONTROL + WIDE * (LOAD_SET as u32 - 2);
+        let block: Vec<u8> = [3_u64, 0, 1].iter().flat_map(|value| value.to_le_bytes()).collect();
+        assert_eq!(image.write(channel_4, &block, &mut notes), Err(Refusal::Busy));
+        assert_eq!(read::<4>(&image, channel_4), 17_u32.to_le_bytes());
+        notes.is_busy = false;
+        image.write(channel_4, &block, &mut notes).unwrap();
+        assert_eq!((read::<4>(&image, channel_4), notes.loads), (3_u32.to_le_bytes(), 1));
     }
 
     #[test]
