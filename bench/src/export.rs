@@ -1,4 +1,5 @@
-//! What a run put on the bus and recorded, in the files that other tools read: CSV, MDF4, MCAP, ASC, BLF.
+//! What a run put on the bus and recorded, in the files that other tools read: CSV, MDF4, MCAP, ASC, BLF, and a trace
+//! of its timing.
 //!
 //! ```text
 //!   bus.log ─► recorded_log.rs ─┬─► signals.rs (rig.dbc) ─┬─► table.rs   CSV

@@ -46,7 +46,7 @@ pub(crate) enum PartError {
         "{path}: was made by another version of the programs ({theirs}, this is {ours}); use that version, or another --out"
     )]
     OtherProgram { path: String, theirs: String, ours: String },
-    #[error("{path}: {what}; delete it, and run the campaign again: it does only what is missing")]
+    #[error("{path}: {what}; run the campaign again: it makes this part anew, and what is missing")]
     Unreadable { path: String, what: String },
 }
 
@@ -226,7 +226,7 @@ mod tests {
         ] {
             fs::write(&path, &bad).unwrap();
             let reported = ours.read(out.path(), 0).unwrap_err().to_string();
-            assert!(reported.contains(words) && reported.contains("delete it"), "{bad}: {reported}");
+            assert!(reported.contains(words) && reported.contains("this part anew"), "{bad}: {reported}");
         }
         fs::write(&path, [0xff, 0xfe]).unwrap();
         assert!(ours.read(out.path(), 0).unwrap_err().to_string().contains("cannot be read"));

@@ -5,9 +5,9 @@
 //! ```
 //! `use` names a law of a library, shipped or the user's, whose variables are the rig's (`plant/src/parameters/laws.rs`).
 //!
-//! A number without a value is an amplitude: 0 is the rig without the suspect, its `prior`, else half of its range, is a
-//! coordinate of 1. That is a scale: the standard deviation of the prior distribution is three times it. The smallest amplitude
-//! that is named is `MIN_AMPLITUDE_RATIO` of a tenth of it. A number with a value is a shape, which starts there.
+//! A number without a value is an amplitude: 0 is the rig without the suspect, its `prior`, else half of the larger end of its
+//! range, is a coordinate of 1. That is a scale: the standard deviation of the prior distribution is three times it. The smallest
+//! amplitude that is named is `MIN_AMPLITUDE_RATIO` of a tenth of it. A number with a value is a shape, which starts there.
 
 use crate::report::{DeclaredSuspect, place_of};
 use model::{Change, EntryParameter, Library};

@@ -76,7 +76,7 @@ pub enum WorkflowError {
     #[error(transparent)]
     Parameters(#[from] ParameterError),
     #[error(
-        "{file}: a model file: only close, name, check, extend and explain take one; give a rig file here"
+        "{file}: a model file: only close, name, check, extend, explain and simulate take one; give a rig file here"
     )]
     ModelFile { file: String },
     #[error(transparent)]

@@ -92,8 +92,8 @@ pub struct RunArguments {
     /// Repeat the experiment until N seconds of the rig's time have passed
     #[arg(long, value_name = "N")]
     pub seconds: Option<String>,
-    /// can://IFACE or unix:///PATH[?loss=P&seed=N]; default: in real time can://vcan0 when it is up, else the embedded bus of
-    /// your user, where other programs look for it; where that is taken, and in lockstep, an embedded bus of the run's own
+    /// can://IFACE or unix:///PATH[?loss=P&seed=N&bitrate=B]; default: in real time can://vcan0 when it is up, else the embedded
+    /// bus of your user, where other programs look for it; where that is taken, and in lockstep, an embedded bus of the run's own
     #[arg(long, value_name = "URL")]
     pub bus: Option<String>,
     /// The run's folder (default: runs/TIME-EXPERIMENT, and runs/latest points to it)

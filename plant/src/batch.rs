@@ -1,4 +1,4 @@
-//! Many rigs at once: a period of each costs half to a third of what it costs alone, and has the same bits.
+//! Many rigs at once: a period of each costs a quarter to three quarters of what it costs alone, and has the same bits.
 //!
 //! A batch holds plants and moves all of them by one period, each with inputs of its own. Eight neighbours make a group, whose
 //! numbers stand in columns (`batch/columns.rs`), and the compiler turns the loop over them into wide instructions

@@ -44,8 +44,8 @@ class Rig(Expectations, People):
     """The emulated rig on an embedded bus of its own, with what controls it.
 
     Used as a context manager: programs start on entering, and none is left on leaving, however this process ends. In lockstep time advances
-    inside `expect`, `wait_for`, `never`, `stable_for`, `run_for`, `finish` alone, and two runs of a test leave the same bytes; in real time
-    it goes on by itself. Times are the rig's, in s.
+    inside the methods that wait (`run_for`, `run_until`, `expect`, `wait_for`, `never`, `always`, `stable_for`, `finish`, `end`) alone, and two
+    runs of a test leave the same bytes; in real time it goes on by itself. Times are the rig's, in s.
     """
 
     def __init__(

@@ -296,7 +296,7 @@ def table(hidden, nulls):
         ("the same of the term's number", counted(inside, "term"), "85 to 95 %"),
         ("all draws: 90 % intervals that hold", share(sum(all_inside), len(all_inside)), ""),
         ("true suspect withheld: place that is said", of_withheld(hidden, "located"), "at least 80 %"),
-        ("the same, and the variables", of_withheld(hidden, "variable"), ""),
+        ("the same, and the variables", of_withheld(hidden, "variable"), "at least 80 %"),
         ("the same: place of what is named instead", of_withheld(hidden, "named place"), ""),
         ("twins by structure that fits cannot tell either", share(sum(confirmed), len(confirmed)), "at least 90 %"),
         ("crashes, time-outs (counted as wrong)", str(sum(map(bool, failed))), ""),

@@ -44,8 +44,7 @@ pub(crate) struct SoakArguments {
     /// Probability that a frame is lost in these segments.
     #[arg(long, default_value_t = 0.01, value_parser = probability)]
     pub loss: f64,
-    /// Whether a broken bound on a position error fails the segment. The bounds are those of an experiment run once; repeated,
-    /// it breaks some of them in lockstep too, where no machine disturbs.
+    /// Whether a broken bound on a position error fails the segment, unless a process stood still for 5 ms in it.
     #[arg(long, value_enum, default_value_t = YesNo::No)]
     pub judge_positions: YesNo,
     /// Newest segments that keep their big files (logs and tables).

@@ -168,7 +168,7 @@ fn excuse(evidence: &SegmentFiles, judge: bool) -> Option<String> {
     let late = |report: &ProcessReport| report.timing.stages.wakeup_ns.max;
     let stall_ns = evidence.reports.values().filter_map(late).max().unwrap_or_default();
     if !judge {
-        Some("told, not judged: bounds of an experiment driven once".into())
+        Some("reported, not judged: --judge-positions no".into())
     } else if stall_ns >= STALL_NS {
         Some(format!("not judged: a process stood still for {:.1} ms", stall_ns as f64 * 1e-6))
     } else {

@@ -6,7 +6,7 @@
 //!   a set of effects beyond the bar, none of these   outside the catalogue                               the model of the search
 //!   parameters, or no explanation                    the model of the search, unless it explains         the model of the search
 //!                                                    too little: then outside the catalogue
-//!   nothing                                          parameters alone, or outside the catalogue          parameters alone
+//!   nothing                                          outside the catalogue                               parameters alone
 //! ```
 //!
 //! The bar: the amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; by [`MAX_CV_OF_PART`], beside at most

@@ -66,7 +66,8 @@ pub struct Explanation {
     /// What the records say about it; null for none of these.
     #[serde(skip_deserializing)]
     pub evidence: Option<Features>,
-    /// The second rule; null for linked rods, and where an explanation has no mode.
+    /// The second rule; null where it was not asked for (`--marginal-likelihoods`), for linked rods, and where an explanation has
+    /// no mode.
     #[serde(default)]
     pub marginal: Option<Marginal>,
 }

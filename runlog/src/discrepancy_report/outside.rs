@@ -51,7 +51,8 @@ pub struct TableTerm {
 /// Statistical dependence of a disagreement on a variable.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Dependence {
-    /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt, or constant for a term that is always there.
+    /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt, one of the history (`change of u (2 ms)`, `last movement
+    /// of x`, …), or constant for a term that is always there.
     pub variable: String,
     /// Share of the variance explained on folds it was not fitted on.
     #[serde(deserialize_with = "null_is_nan")]
