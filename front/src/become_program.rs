@@ -63,8 +63,8 @@ pub(crate) fn test(front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontE
     if !look.status.success() {
         let said = String::from_utf8_lossy(&look.stderr);
         return Err(FrontError::Input(format!(
-            "{} has no airbench_hil with pytest ({}): install both (the wheel of a release, or \
-             python/ of a checkout, and pytest), or name another interpreter with AIRBENCH_PYTHON",
+            "{} has no airbench_hil with pytest ({}): pip install both, the wheel of a release or \
+             python/ of a checkout, and pytest, or name another interpreter with AIRBENCH_PYTHON",
             python.display(),
             said.lines().last().unwrap_or("it said nothing")
         )));

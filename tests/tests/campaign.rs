@@ -164,7 +164,7 @@ fn parts_that_are_not_whole_or_not_ours_are_told_and_never_merged() {
     let good = fs::read_to_string(&path).expect("a part");
     let merge = || place.run("merge", &["whole"]).expect_code(BAD_INPUT);
     for (bad, words) in [
-        (good[..good.len() / 2].to_owned(), "delete it"),
+        (good[..good.len() / 2].to_owned(), "makes this part anew"),
         (good.replace("made by ", "made by 0123"), "another version"),
         (good.replace("campaign ", "campaign 0123"), "another campaign"),
         (good.replacen("\n4,", "\n5,", 1), "not as it was written"),
