@@ -11,7 +11,7 @@
 //! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
 //! joins and stays when its amplitude is homogeneous over windows (`name/heterogeneity.rs`), small ones too. Probabilities of
 //! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
-//! What is to be named has to gain more than chance gives, three windows aside (`name/significance.rs`).
+//! What is to be named has to gain more than chance gives, its best windows aside (`name/significance.rs`).
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 

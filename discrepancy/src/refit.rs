@@ -358,6 +358,14 @@ pub(crate) fn coordinate_columns(
         .collect()
 }
 
+/// Step of the finite difference of a coordinate, to the side that stays inside the range.
+pub(crate) fn difference_step(effect: &EffectEstimate, key: usize) -> f64 {
+    let coordinate = effect.coordinates[key];
+    let size = CHANGE.max(CHANGE_SHARE * coordinate.abs());
+    let [_, most] = effect.candidate.fit_bounds(key);
+    if coordinate + size > most { -size } else { size }
+}
+
 /// Sensitivity to a coordinate, by a one-sided difference that stays inside the range.
 pub(crate) fn derivative(
     engine: &Engine<'_>,
@@ -367,11 +375,7 @@ pub(crate) fn derivative(
     at: usize,
     key: usize,
 ) -> Option<Vec<f64>> {
-    let candidate = placed[at].candidate;
-    let coordinate = placed[at].coordinates[key];
-    let size = CHANGE.max(CHANGE_SHARE * coordinate.abs());
-    let [_, most] = candidate.fit_bounds(key);
-    let change = if coordinate + size > most { -size } else { size };
+    let change = difference_step(&placed[at], key);
     let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;
     let readings = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);

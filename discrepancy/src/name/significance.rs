@@ -41,8 +41,10 @@ const AT_ONCE: usize = 5;
 /// Fixed seeds: the tests are part of the result and have the same bits in each run.
 const SEED: u64 = 0x51_691f_1ca9_ce00;
 const SEED_OTHER: u64 = 0x51_691f_1ca9_ce01;
-/// Windows without which the gain has to be one all the same.
+/// Most windows without which the gain has to be one all the same.
 const BEST_WINDOWS: usize = 3;
+/// Windows of the records for each of them: of a record of four windows nothing would be left.
+const WINDOWS_FOR_EACH: usize = 5;
 
 /// The records and what was fitted to them.
 pub(super) struct Fitted<'a> {
@@ -80,7 +82,7 @@ impl Fitted<'_> {
         Some(Significance {
             effects: places(&model.placed),
             gain,
-            best_windows: BEST_WINDOWS,
+            best_windows: best_windows(gains.len()),
             gain_without_best,
             least_gain,
             chance,
@@ -224,11 +226,16 @@ fn window_gains(dof: &[f64], without: &[f64], with: &[f64]) -> Vec<f64> {
     dof.iter().zip(without).zip(with).map(gain).collect()
 }
 
-/// Their sum without the [`BEST_WINDOWS`] largest.
+/// Windows that are left out of so many.
+fn best_windows(windows: usize) -> usize {
+    BEST_WINDOWS.min(windows / WINDOWS_FOR_EACH)
+}
+
+/// Sum of the gains without the largest, [`best_windows`] of them.
 fn without_best(gains: &[f64]) -> f64 {
     let mut ascending = gains.to_vec();
     ascending.sort_by(f64::total_cmp);
-    ascending.iter().take(gains.len().saturating_sub(BEST_WINDOWS)).sum()
+    ascending.iter().take(gains.len() - best_windows(gains.len())).sum()
 }
 
 /// Number of numbers of the effects.

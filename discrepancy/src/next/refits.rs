@@ -23,13 +23,9 @@ use crate::engine::Engine;
 use crate::gridded_record::GriddedRecord;
 use crate::name::INDISTINGUISHABLE_LOSS_DIFFERENCE;
 use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{EffectEstimate, coordinate_precision, parameter_precisions};
+use crate::refit::{EffectEstimate, coordinate_precision, difference_step, parameter_precisions};
 use plant::RigParameters;
 use plant::effects::sheet::Part;
-
-/// Change of a coordinate in finite differences, least and as a share.
-const CHANGE: f64 = 0.02;
-const CHANGE_SHARE: f64 = 0.05;
 
 /// A rehearsed record and what each explanation leaves of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -225,10 +221,7 @@ fn column(
     key: usize,
     simulated: &[f64],
 ) -> Option<Vec<f64>> {
-    let coordinate = effect.coordinates[key];
-    let size = CHANGE.max(CHANGE_SHARE * coordinate.abs());
-    let [_, most] = effect.candidate.fit_bounds(key);
-    let change = if coordinate + size > most { -size } else { size };
+    let change = difference_step(effect, key);
     let mut coordinates = effect.coordinates.clone();
     coordinates[key] += change;
     let changed = engine.simulate(&effect.candidate.rig(rig, &coordinates).ok()?);

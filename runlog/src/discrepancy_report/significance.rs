@@ -61,7 +61,7 @@ impl Significance {
     #[must_use]
     pub fn objection(&self) -> Option<&'static str> {
         if self.gain_without_best <= self.least_gain {
-            Some("gains too little outside three windows")
+            Some("gains too little outside its best windows")
         } else if self.chance.as_ref().is_some_and(|chance| !chance.significant) {
             Some("gains no more than chance may")
         } else {
@@ -79,9 +79,13 @@ impl Significance {
     #[must_use]
     pub fn in_words(&self) -> String {
         let Significance { gain, gain_without_best, best_windows, least_gain, .. } = self;
+        let without_best = match best_windows {
+            0 => String::new(),
+            1 => format!(", and {gain_without_best:.0} without its best window"),
+            more => format!(", and {gain_without_best:.0} without its {more} best windows"),
+        };
         let mut text = format!(
-            "{} gains {gain:.0}, and {gain_without_best:.0} without its {best_windows} best windows, where a name needs \
-             more than {least_gain:.0}.",
+            "{} gains {gain:.0}{without_best}, where a name needs more than {least_gain:.0}.",
             self.tested()
         );
         if let Some(DrawnRecords { draws, reached, largest, p_value, .. }) = &self.chance {
