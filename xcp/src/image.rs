@@ -205,7 +205,7 @@ impl Image {
         // First all are looked at, then all are taken.
         let mut rest = None;
         for take in [false, true] {
-            // Its queue may be full, so that it comes before anything is taken.
+            // A load may find its queue full, so that it goes before anything is taken.
             if take && controls[LOAD_SET] != 0.0 && !actions.load() {
                 return Err(Refusal::Busy);
             }
