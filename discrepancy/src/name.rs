@@ -221,6 +221,7 @@ pub fn name(
         decision = decision.without_names(here, objection);
     }
     let Decision { selection, lacks_fit, shares, is_named, explained } = decision;
+    let lacks_fit = lacks_fit || lacks_fit_on_an_axis(here, &selection.model);
     let not_explained = explained.as_ref().err().copied();
     let reported = explained.unwrap_or_else(|_| {
         let rig = with_factors(engine.rig(), &selection.calibrated.factors);
@@ -316,6 +317,15 @@ pub(crate) fn share_removed(before: f64, after: f64) -> f64 {
 /// Whether a model with this loss leaves more than noise.
 fn lacks_fit(engine: &Engine<'_>, loss: f64) -> bool {
     loss > lack_of_fit_per_dof(engine.is_linked()) * engine.scaled_dof().iter().sum::<f64>()
+}
+
+/// Whether a model leaves more than noise on one of the axes, where each counts: the other one would hide it in the sum.
+fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &Refit) -> bool {
+    let lacks_on = |axes| {
+        let (loss, dof) = engine.loss_on(axes, &model.squares);
+        loss > lack_of_fit_per_dof(engine.is_linked()) * dof
+    };
+    engine.axis_by_axis() && (lacks_on([true, false]) || lacks_on([false, true]))
 }
 
 /// Mean log ratio of a window's chi2 to its degrees of freedom above which a model leaves more than noise.
