@@ -107,7 +107,9 @@ impl Fitted<'_> {
                 without_best(&window_gains(drawn.scaled_dof(), without, with))
             })
         };
-        Some(drawn_records(Vec::new(), gain, DRAWS, draw))
+        // A record too short to leave windows out keeps the gains of single windows, whose tail is heavy.
+        let has_light_tail = best_windows(model.squares.len()) > 0;
+        Some(drawn_records(Vec::new(), gain, DRAWS, has_light_tail, draw))
     }
 
     /// The other set of effects among the two most probable explanations.
@@ -136,7 +138,7 @@ impl Fitted<'_> {
             other_step.loss(&residual, drawn.rows()) - model_step.loss(&of_model, drawn.rows())
         };
         let ahead = loss(&other.squares, dof) - loss(&model.squares, dof);
-        Some(drawn_records(places(&other.placed), ahead, draws, draw))
+        Some(drawn_records(places(&other.placed), ahead, draws, true, draw))
     }
 }
 
@@ -196,9 +198,10 @@ fn drawn_records(
     effects: Vec<EffectPlace>,
     observed: f64,
     most: usize,
+    has_light_tail: bool,
     draw: impl Fn(usize) -> f64 + Sync,
 ) -> DrawnRecords {
-    let mut test = Sequential::new(observed);
+    let mut test = Sequential::new(observed, has_light_tail);
     let mut ended = None;
     while ended.is_none() && test.drawn.len() < most {
         let from = test.drawn.len();

@@ -10,7 +10,7 @@ pub struct Significance {
     pub effects: Vec<EffectPlace>,
     /// Its gain over parameters alone, less what the screening charges for each number.
     pub gain: f64,
-    /// Number of windows that are left out of `gain_without_best`.
+    /// Number of windows that are left out of `gain_without_best`; 0 of a record with fewer than five.
     pub best_windows: usize,
     /// The gain without the windows that contribute most.
     pub gain_without_best: f64,
@@ -80,7 +80,7 @@ impl Significance {
     pub fn in_words(&self) -> String {
         let Significance { gain, gain_without_best, best_windows, least_gain, .. } = self;
         let without_best = match best_windows {
-            0 => String::new(),
+            0 => ", in too few windows to leave the best ones out".to_owned(),
             1 => format!(", and {gain_without_best:.0} without its best window"),
             more => format!(", and {gain_without_best:.0} without its {more} best windows"),
         };
@@ -90,7 +90,7 @@ impl Significance {
         );
         if let Some(DrawnRecords { draws, reached, largest, p_value, .. }) = &self.chance {
             text += &format!(
-                " Of {draws} simulated records with parameters alone {reached} reach the latter, and the best gains {largest:.0} \
+                " Of {draws} simulated records with parameters alone {reached} reach {gain_without_best:.0}, and the best gains {largest:.0} \
                  (p {}).",
                 p_words(*p_value)
             );
