@@ -42,7 +42,7 @@ pub(super) fn explanations(report: &Report) -> String {
     if table.is_empty() {
         return table;
     }
-    paragraph(&advice(&report.explanations))
+    paragraph(&advice(report))
         + &report.significance.as_ref().map_or(String::new(), |tests| paragraph(&tests.in_words()))
         + &probabilities(&report.explanations)
         + &paragraph(
@@ -56,11 +56,20 @@ pub(super) fn explanations(report: &Report) -> String {
 const CLEAR: f64 = 0.9;
 
 /// What to do, in a sentence.
-fn advice(explanations: &[Explanation]) -> String {
-    let mut ranked: Vec<&Explanation> = explanations.iter().collect();
+fn advice(report: &Report) -> String {
+    let mut ranked: Vec<&Explanation> = report.explanations.iter().collect();
     ranked.sort_by(|left, right| right.probability.total_cmp(&left.probability));
     let [first, second, ..] = ranked[..] else { return String::new() };
-    let first_words = format!("{} ({})", name(first), words::percent(first.probability));
+    let with_probability = |one: &Explanation| format!("{} ({})", name(one), words::percent(one.probability));
+    let first_words = with_probability(first);
+    if let (Some(named), Some(other)) = (report.named_explanation(), report.more_probable()) {
+        return format!(
+            "Named is {}, the best model of the search, although {} is more probable by what is known of other records. Record \
+             what tells these two apart before you decide.",
+            with_probability(named),
+            with_probability(other)
+        );
+    }
     match (first.kind, first.probability >= CLEAR) {
         (ExplanationKind::NoneOfThese, _) => format!(
             "Most probable is {first_words}: look at where model and records disagree before you add anything to the model."

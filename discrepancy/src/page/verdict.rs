@@ -1,7 +1,7 @@
 //! The box on top: verdict, effects with numbers, closed gap.
 
 use super::words;
-use crate::report::{NamedEffect, Objection, Report, Verdict, listed};
+use crate::report::{Explanation, NamedEffect, Objection, Report, Verdict, listed};
 use model_fit::WORSE;
 use pagekit::page::escaped;
 
@@ -20,14 +20,21 @@ pub(super) fn title(report: &Report) -> &'static str {
 
 /// What a finding lacks: the support of the held-out record, or that nothing beside it is missing.
 fn doubt(report: &Report) -> Option<&'static str> {
+    let is_outside = report.verdict == Verdict::OutsideCatalogue;
     match report.objection() {
         Some(Objection::Worse) if report.is_rig_file_enough() => {
             Some("Fitted parameters make the held-out record worse")
         }
+        Some(Objection::Worse) if is_outside => Some(
+            "Something is missing that the catalogue does not have, and what was fitted makes the held-out record worse",
+        ),
         Some(Objection::Worse) => Some("What was found makes the held-out record worse"),
+        Some(Objection::NotConfirmed) if is_outside => {
+            Some("The held-out record does not confirm what was found outside the catalogue")
+        }
         Some(Objection::NotConfirmed) => Some("The held-out record does not confirm what was found"),
         Some(Objection::SomethingMissing) => Some("The held-out record shows that something is missing"),
-        Some(Objection::MoreMissing) if report.verdict == Verdict::OutsideCatalogue => None,
+        Some(Objection::MoreMissing) if is_outside => None,
         Some(Objection::MoreMissing) => Some("The held-out record shows that more is missing"),
         None if report.verdict == Verdict::Named && report.adequate == Some(false) => {
             Some("Part of what the simulation lacks")
@@ -48,10 +55,11 @@ pub(super) fn head(report: &Report) -> String {
     let (sign, class, style) = match report.verdict {
         Verdict::BadData => ('\u{2717}', "verdict no", ""),
         Verdict::Ambiguous | Verdict::OutsideCatalogue => open,
-        _ if doubt(report).is_some() => open,
+        _ if doubt(report).is_some() || report.more_probable().is_some() => open,
         _ => ('\u{2713}', "verdict", ""),
     };
     let mut points: Vec<String> = report.named.iter().flat_map(named).collect();
+    points.extend(report.named_explanation().map(probability));
     points.extend(report.small.iter().map(|small| one(small, "<i>smaller:</i> ")));
     points.extend(report.parameters.iter().map(|quantity| {
         let before = quantity.before.map_or(String::new(), |before| {
@@ -93,6 +101,10 @@ pub(super) fn head(report: &Report) -> String {
 fn named(named: &NamedEffect) -> Vec<String> {
     let line = one(named, "");
     std::iter::once(line).chain(named.alternatives.iter().map(|other| one(other, "<i>or</i> "))).collect()
+}
+
+fn probability(named: &Explanation) -> String {
+    format!("Probability of this explanation: {}", words::percent(named.probability))
 }
 
 fn one(named: &NamedEffect, before: &str) -> String {

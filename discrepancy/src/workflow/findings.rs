@@ -234,7 +234,11 @@ pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
 pub(super) fn summary(report: &Report) -> String {
     let not_named = report.significance.as_ref().filter(|_| report.nearest.is_none());
     let not_named = not_named.and_then(|tests| Some(format!(" {} {}.", tests.tested(), tests.objection()?)));
-    verdict_in_words(report) + &not_named.unwrap_or_default()
+    let improbable = report.named_explanation().zip(report.more_probable()).map(|(named, other)| {
+        let [named, other] = [named, other].map(|one| 1e2 * one.probability);
+        format!(" Its probability is {named:.0} %; another explanation has {other:.0} %.")
+    });
+    verdict_in_words(report) + &not_named.unwrap_or_default() + &improbable.unwrap_or_default()
 }
 
 fn verdict_in_words(report: &Report) -> String {

@@ -1,6 +1,6 @@
 //! What explains the training records, and how probable it is.
 
-use super::{EffectPlace, null_is_nan};
+use super::{EffectPlace, NamedEffect, Report, null_is_nan};
 use serde::{Deserialize, Serialize};
 
 /// What is the case, if an explanation is right.
@@ -70,4 +70,26 @@ pub struct Explanation {
     /// no mode.
     #[serde(default)]
     pub marginal: Option<Marginal>,
+}
+
+impl Report {
+    /// The explanation whose effects are named; `None` where none is named, or smaller effects came in beside them.
+    #[must_use]
+    pub fn named_explanation(&self) -> Option<&Explanation> {
+        let is_in = |set: &[EffectPlace], named: &NamedEffect| {
+            set.iter().any(|one| one.effect == named.effect && one.place == named.place)
+        };
+        let is_named = |set: &Vec<EffectPlace>| {
+            set.len() == self.named.len() && self.named.iter().all(|named| is_in(set, named))
+        };
+        self.explanations.iter().find(|one| !self.named.is_empty() && one.sets.iter().any(is_named))
+    }
+
+    /// The most probable explanation, where it is another one than the named.
+    #[must_use]
+    pub fn more_probable(&self) -> Option<&Explanation> {
+        let named = self.named_explanation()?;
+        let others = self.explanations.iter().filter(|one| one.probability > named.probability);
+        others.max_by(|one, other| one.probability.total_cmp(&other.probability))
+    }
 }

@@ -1,13 +1,14 @@
 //! What the held-out record holds against a report: headline, words and exit code follow it.
 
-use super::{Report, Verdict};
+use super::{Report, Verdict, Verification};
 
 /// What the held-out record holds against a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Objection {
     /// A signal gets worse with the extended model.
     Worse,
-    /// The finding does not improve it significantly.
+    /// The finding does not improve it significantly; of something outside the catalogue, to which no law was added, the rig file
+    /// leaves no more than noise.
     NotConfirmed,
     /// It shows something, and the training records nothing that is missing.
     SomethingMissing,
@@ -29,11 +30,19 @@ impl Report {
         let found = !self.is_rig_file_enough();
         match () {
             () if held_out.worse => Some(Objection::Worse),
-            () if found && !held_out.confirmed => Some(Objection::NotConfirmed),
+            () if found && !self.is_confirmed(held_out) => Some(Objection::NotConfirmed),
             () if held_out.more_missing => {
                 Some(if found { Objection::MoreMissing } else { Objection::SomethingMissing })
             }
             () => None,
         }
+    }
+
+    /// Whether the held-out record supports the finding. That something is missing which no law describes is a finding about the
+    /// rig file: the extended model then has fitted parameters alone, which that very thing pulls from where they are right.
+    fn is_confirmed(&self, held_out: &Verification) -> bool {
+        let has_law =
+            self.verdict != Verdict::OutsideCatalogue || self.outside.as_ref().is_some_and(|one| one.added);
+        if has_law { held_out.confirmed } else { held_out.chi2_before > held_out.chi2_null[1] }
     }
 }
