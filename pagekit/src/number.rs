@@ -4,7 +4,7 @@ use humantime::format_rfc3339_seconds;
 use std::time::{Duration, UNIX_EPOCH};
 
 /// What stands where nothing was measured.
-pub const NOTHING: &str = "–";
+pub const NOT_MEASURED: &str = "–";
 /// Narrow space between thousands, where no line may break.
 const THOUSANDS: char = '\u{202f}';
 
@@ -31,7 +31,7 @@ pub fn count(count: u64) -> String {
 #[must_use]
 pub fn decimal(value: f64, digits: usize) -> String {
     if !value.is_finite() {
-        return NOTHING.into();
+        return NOT_MEASURED.into();
     }
     let text = format!("{:.digits$}", value.abs());
     let (whole, fraction) = text.split_once('.').map_or((text.as_str(), ""), |(whole, rest)| (whole, rest));
@@ -100,7 +100,7 @@ pub fn in_us(ns: u64) -> String {
 /// The same where nothing may have been measured.
 #[must_use]
 pub fn maybe_us(ns: Option<u64>) -> String {
-    ns.map_or_else(|| NOTHING.into(), in_us)
+    ns.map_or_else(|| NOT_MEASURED.into(), in_us)
 }
 
 /// A length of time with the unit that suits it.
@@ -153,8 +153,11 @@ mod tests {
         assert_eq!(count(999), "999");
         assert_eq!(decimal(-1234.56, 1), "−1\u{202f}234.6");
         assert_eq!(decimal(-0.01, 1), "0.0");
-        assert_eq!([59_000.0, 48.3, f64::NAN].map(compact), ["59\u{202f}000", "48.30", NOTHING]);
-        assert_eq!((decimal(f64::NAN, 1), decimal(f64::INFINITY, 0)), (NOTHING.into(), NOTHING.into()));
+        assert_eq!([59_000.0, 48.3, f64::NAN].map(compact), ["59\u{202f}000", "48.30", NOT_MEASURED]);
+        assert_eq!(
+            (decimal(f64::NAN, 1), decimal(f64::INFINITY, 0)),
+            (NOT_MEASURED.into(), NOT_MEASURED.into())
+        );
         assert_eq!(
             (change(0.04), change(-3.0), change(f64::NAN)),
             ("+0.0 %".into(), "−3.0 %".into(), "– %".into())
@@ -165,7 +168,7 @@ mod tests {
     fn lengths_of_time_have_the_unit_that_suits_them() {
         assert_eq!(
             (in_us(52), in_us(13_149), maybe_us(None)),
-            ("0.05".into(), "13.1".into(), NOTHING.into())
+            ("0.05".into(), "13.1".into(), NOT_MEASURED.into())
         );
         let reported = [7, 13_149, 3_500_000, 2_000_000_000].map(length);
         assert_eq!(reported, ["7 ns", "13.1 µs", "3.50 ms", "2.00 s"]);

@@ -1,12 +1,12 @@
 //! Numbers with the digits that count: three of them, or as many as an error asks for. What is no number is a dash, never NaN.
 
-use crate::number::NOTHING;
+use crate::number::NOT_MEASURED;
 
 /// A number with three digits that count, plain from 0.001 to 99 999 and with a power of ten beyond.
 #[must_use]
 pub fn short(value: f64) -> String {
     if !value.is_finite() {
-        return NOTHING.to_owned();
+        return NOT_MEASURED.to_owned();
     }
     if value == 0.0 {
         return "0".to_owned();
@@ -29,7 +29,7 @@ pub fn round(value: f64) -> String {
 #[must_use]
 pub fn fixed(value: f64, digits: usize) -> String {
     if !value.is_finite() {
-        return NOTHING.to_owned();
+        return NOT_MEASURED.to_owned();
     }
     let text = format!("{value:.digits$}");
     // Rounding may leave a zero its sign.
@@ -77,7 +77,7 @@ mod tests {
                 "\u{2212}2.50",
                 "1.50\u{b7}10\u{207b}\u{2076}",
                 "3.00\u{b7}10\u{2076}",
-                NOTHING
+                NOT_MEASURED
             ]
         );
         assert_eq!([0.0312, 0.97, 0.9996, 1.0].map(percent), ["3.1 %", "97 %", "100 %", "100 %"]);

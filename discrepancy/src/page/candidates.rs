@@ -32,7 +32,7 @@ pub(super) fn candidates(report: &Report) -> String {
             text_cell(&one.effect),
             text_cell(words::place(&one.effect, &one.place)),
             number(words::short(one.score)),
-            number(one.share_explained.map_or_else(|| words::NOTHING.to_owned(), words::percent)),
+            number(one.share_explained.map_or_else(|| words::NOT_MEASURED.to_owned(), words::percent)),
             number(words::with_unit(&words::short(one.amplitude), &one.unit)),
             Cell::Sentence(with_doubt(one)),
         ]

@@ -25,7 +25,7 @@ fn record(check: &RecordCheck) -> String {
         let (unit, factor) = words::shown_small(words::unit_of(column));
         let size = |value: Option<f64>| {
             number(value.map_or_else(
-                || words::NOTHING.to_owned(),
+                || words::NOT_MEASURED.to_owned(),
                 |value| words::with_unit(&words::short(value * factor), &unit),
             ))
         };

@@ -9,10 +9,10 @@ pub(super) fn explanations(report: &Report) -> String {
     let with_marginal = report.explanations.iter().any(|explanation| explanation.marginal.is_some());
     let row = |explanation: &Explanation| {
         let optional =
-            |value: Option<f64>| number(value.map_or_else(|| words::NOTHING.to_owned(), words::percent));
+            |value: Option<f64>| number(value.map_or_else(|| words::NOT_MEASURED.to_owned(), words::percent));
         let of_evidence = |value: fn(&Features) -> f64| {
             let value = explanation.evidence.as_ref().map(value);
-            number(value.map_or_else(|| words::NOTHING.to_owned(), words::short))
+            number(value.map_or_else(|| words::NOT_MEASURED.to_owned(), words::short))
         };
         let mut cells = vec![
             text_cell(name(explanation)),

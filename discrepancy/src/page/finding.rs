@@ -156,7 +156,7 @@ fn quantities(label: &str, head: &str, all: &[Quantity], meaning: impl Fn(&str) 
         if is_in_file {
             let before =
                 quantity.before.map(|before| words::with_unit(&words::short(before), &quantity.unit));
-            cells.push(number(before.unwrap_or_else(|| words::NOTHING.to_owned())));
+            cells.push(number(before.unwrap_or_else(|| words::NOT_MEASURED.to_owned())));
         }
         cells
     };
@@ -173,7 +173,7 @@ fn sentence(law: &str) -> String {
 /// The variables that the disagreement of a balance depends on, the strongest first.
 pub(super) fn located_variables(label: &str, term: &LocatedTerm) -> String {
     let row = |one: &LocatedVariable| {
-        let evidence = one.log_evidence.map_or_else(|| words::NOTHING.to_owned(), words::short);
+        let evidence = one.log_evidence.map_or_else(|| words::NOT_MEASURED.to_owned(), words::short);
         vec![text_cell(&one.variable), number(words::percent(one.share)), number(evidence)]
     };
     table(label, &["variable", "explains", "log evidence"], term.variables.iter().map(row))

@@ -75,7 +75,7 @@ fn signals(errors: &BTreeMap<String, BeforeAfter>, whiteness: &BTreeMap<String, 
     names.dedup();
     let two = |pair: Option<&BeforeAfter>, unit: &str| {
         let figures = |value: fn(&BeforeAfter) -> f64| {
-            let text = pair.map_or_else(|| words::NOTHING.to_owned(), |pair| words::short(value(pair)));
+            let text = pair.map_or_else(|| words::NOT_MEASURED.to_owned(), |pair| words::short(value(pair)));
             number(if pair.is_some() { words::with_unit(&text, unit) } else { text })
         };
         [figures(|pair| pair.before), figures(|pair| pair.after)]

@@ -96,7 +96,7 @@ fn regimes(location: &Location) -> String {
                 Some(cell) => {
                     Cell::Shaded(cell.over_noise.max(1.0).log10() / 2.0, words::short(cell.over_noise))
                 }
-                None => Cell::Shaded(0.0, words::NOTHING.to_owned()),
+                None => Cell::Shaded(0.0, words::NOT_MEASURED.to_owned()),
             }
         };
         std::iter::once(text_cell(words::balance(balance))).chain(names.iter().map(shaded)).collect()

@@ -1,7 +1,7 @@
 //! Numbers, places and signals as a person reads them. What is no number is a dash, never NaN.
 
 use crate::report::{NamedEffect, Quantity, Where, decimals};
-pub(super) use pagekit::number::NOTHING;
+pub(super) use pagekit::number::NOT_MEASURED;
 pub(super) use pagekit::significant::{fixed, percent, short};
 use plant::effects::sheet;
 use plant::effects::sheet::PlaceKind;

@@ -3,7 +3,7 @@
 use crate::model::{BoundResult, Comparison, ComparisonCell};
 use crate::resolution::{self, Verdict};
 use pagekit::markup::{Cell, Table, none, number, paragraph, words as text};
-use pagekit::number::{self, NOTHING};
+use pagekit::number::{self, NOT_MEASURED};
 
 /// The groups with their changes against the first.
 pub(super) fn comparison(comparison: Option<&Comparison>) -> String {
@@ -22,7 +22,7 @@ pub(super) fn comparison(comparison: Option<&Comparison>) -> String {
         for (place, cell) in row.cells.iter().enumerate() {
             cells.push(number(median(cell)));
             if place > 0 {
-                cells.push(number(cell.change_percent.map_or_else(|| NOTHING.into(), number::change)));
+                cells.push(number(cell.change_percent.map_or_else(|| NOT_MEASURED.into(), number::change)));
                 cells.push(text(noise(cell.beyond_noise)));
             }
         }
@@ -51,7 +51,7 @@ fn noise(beyond: Option<bool>) -> &'static str {
 /// The bounds: kept, broken, or not resolved.
 pub(super) fn bounds(bounds: &[BoundResult]) -> String {
     let mut table = Table::new("Bounds", ["figure", "value", "interval", "at least", "at most", "verdict"]);
-    let reported = |value: Option<f64>| value.map_or_else(|| NOTHING.into(), number::compact);
+    let reported = |value: Option<f64>| value.map_or_else(|| NOT_MEASURED.into(), number::compact);
     for bound in bounds {
         let value = if bound.value.is_some() { reported(bound.value) } else { "not measured".into() };
         let verdict = match bound.verdict() {
@@ -62,7 +62,7 @@ pub(super) fn bounds(bounds: &[BoundResult]) -> String {
             }
         };
         let interval = bound.interval.map_or_else(
-            || NOTHING.into(),
+            || NOT_MEASURED.into(),
             |(low, high)| format!("{} – {}", number::compact(low), number::compact(high)),
         );
         table.row([

@@ -37,7 +37,7 @@ fn table(title: &str, facts: &[Fact]) -> String {
     }
     let rows = facts.iter().map(|fact| {
         let (name, value) = (escaped(&fact.name), escaped(&fact.value));
-        let value = if value.is_empty() { number::NOTHING.to_owned() } else { value };
+        let value = if value.is_empty() { number::NOT_MEASURED.to_owned() } else { value };
         format!("<tr><th scope=\"row\">{name}</th><td class=\"code\">{value}</td></tr>\n")
     });
     let rows: String = rows.collect();

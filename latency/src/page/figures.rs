@@ -4,7 +4,7 @@ use super::families::Family;
 use super::histograms::scrolling;
 use crate::model::{Distribution, PercentilesNs, Ratio, Source};
 use pagekit::markup::{Cell, Table, folded, none, number, paragraph, words as text};
-use pagekit::number::{self, NOTHING};
+use pagekit::number::{self, NOT_MEASURED};
 use pagekit::svg::{Drawing, Look, Scale, stroke, text as label};
 
 pub(super) const PERCENTILES: [&str; 7] = ["p50", "p90", "p99", "p99.9", "p99.99", "max", "count"];
@@ -47,10 +47,10 @@ pub(super) fn ratios(ratios: &[Ratio]) -> String {
     for ratio in ratios {
         let interval = ratio
             .interval
-            .map_or_else(|| NOTHING.into(), |(low, high)| format!("{} – {}", two(low), two(high)));
+            .map_or_else(|| NOT_MEASURED.into(), |(low, high)| format!("{} – {}", two(low), two(high)));
         let confidence = ratio
             .confidence
-            .map_or_else(|| NOTHING.into(), |share| format!("{} %", number::decimal(100.0 * share, 1)));
+            .map_or_else(|| NOT_MEASURED.into(), |share| format!("{} %", number::decimal(100.0 * share, 1)));
         table.row([
             text(&ratio.name),
             number(two(ratio.median)),
@@ -59,7 +59,7 @@ pub(super) fn ratios(ratios: &[Ratio]) -> String {
             number(number::count(ratio.pairs_ns.len() as u64)),
         ]);
         for (place, (ours, reference)) in ratio.pairs_ns.iter().enumerate() {
-            let quotient = quotient(*ours, *reference).map_or_else(|| NOTHING.into(), two);
+            let quotient = quotient(*ours, *reference).map_or_else(|| NOT_MEASURED.into(), two);
             pairs.row([
                 text(&ratio.name),
                 number((place + 1).to_string()),

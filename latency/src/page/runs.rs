@@ -132,7 +132,7 @@ fn counted(runs: &[RunPart]) -> String {
             let sum = runs.iter().filter_map(|run| value(run, name)).fold(0, u64::saturating_add);
             let sum = (runs.len() > 1).then(|| number(number::count(sum)));
             let reported =
-                |run| number(value(run, name).map_or_else(|| number::NOTHING.into(), number::count));
+                |run| number(value(run, name).map_or_else(|| number::NOT_MEASURED.into(), number::count));
             table.row([text(*name)].into_iter().chain(sum).chain(runs.iter().map(reported)));
         }
         table.html_or("Nothing was counted.")
