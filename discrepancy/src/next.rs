@@ -9,10 +9,10 @@
 //! within [`MOST_REPETITIONS`] is proposed with so many, and a second one where it leaves much open. Where none is worth its
 //! time, [`remedies`] names a manual measurement: tilting, uncoupling, locking the piston.
 //!
-//! T of the proposed entry stands beside it: the expected gain in chi2 of the true explanation over its rival with refitted
+//! T of the proposed entry stands beside it: the expected gain in chi2 of the true explanation over the alternative with refitted
 //! amplitude, with noise and model error (`next/divergence.rs`). Its target is 25, a distance d' = 5 between the two mean
-//! records. Alone, as the criterion of T-optimality [Atkinson, Fedorov 1975], it takes noise as white and the rival's other
-//! numbers as known.
+//! records. Alone, as the criterion of T-optimality [Atkinson, Fedorov 1975], it takes noise as white and the alternative's
+//! other numbers as known.
 //!
 //! | file | holds |
 //! |---|---|
@@ -25,7 +25,7 @@
 //! | [`nuisance`] | baseline parameters that are refitted jointly |
 //! | [`remedies`] | what would separate effects where no experiment does |
 //!
-//! Which entry separates which twins: `discrepancy/docs/next.md`. Of eight pairs of twins there the largest T told none apart,
+//! Which entry separates which twins: `discrepancy/docs/next.md`. Of eight pairs of twins there the largest T separated none,
 //! the rehearsals five. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner 1965; Atkinson and Fedorov 1975, Biometrika
 //! 62(1): T-optimality.
 
@@ -73,7 +73,7 @@ impl Explanation {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentDivergences {
     pub name: &'static str,
-    /// For each ordered pair: the true explanation, its rival, their divergence.
+    /// For each ordered pair: the true explanation, the alternative, their divergence.
     pub pairs: Vec<(usize, usize, Divergence)>,
 }
 
@@ -147,10 +147,10 @@ pub fn judge(
         .map(|truth| {
             let run = drive(entry, baseline, &explanations[truth].rig, SEED).ok()?;
             let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
-            let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != truth).collect();
-            let rigs: Vec<_> = [truth].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
+            let alternatives: Vec<usize> = (0..explanations.len()).filter(|at| *at != truth).collect();
+            let rigs: Vec<_> = [truth].iter().chain(&alternatives).map(|at| &explanations[*at].rig).collect();
             let values = divergences(&run, baseline, &rigs, &perturbed, axes_measured);
-            Some(rivals.into_iter().zip(values).map(|(rival, value)| (truth, rival, value)).collect())
+            Some(alternatives.into_iter().zip(values).map(|(at, value)| (truth, at, value)).collect())
         })
         .collect();
     Some(ExperimentDivergences { name: entry.name, pairs: pairs?.concat() })
@@ -183,7 +183,7 @@ fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
     let open = best.pairs(times).into_iter().filter(|pair| pair.2 < WORTH_IT);
     let left: Vec<(usize, usize)> = open.map(|(one, other, _)| (one.min(other), one.max(other))).collect();
     let otherwise = remedies::of_pairs(explanations, &left);
-    let told = probability_in_words(probability, best.trials.len());
+    let separated = probability_in_words(probability, best.trials.len());
     let divergence = judge(entry, question.baseline, explanations, question.axes_measured)
         .map(|judged| judged.least_in_repetitions(times));
     let found = Next {
@@ -197,7 +197,7 @@ fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
     let how_often = if times > 1 { format!(" in {times} repetitions") } else { String::new() };
     if probability.value < WORTH_IT {
         let reason = format!(
-            "{alike}, and no experiment of this rig separates them: the best, {}, is expected to{how_often} {told}",
+            "{alike}, and no experiment of this rig separates them: the best, {}, is expected to{how_often} {separated}",
             best.name
         );
         let next = Next { reason, ..found };
@@ -205,7 +205,7 @@ fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
     }
     let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
     let reason = format!(
-        "{alike}; {}, which serves to tell apart {}, is expected to separate them{how_often} {told}{rest}",
+        "{alike}; {}, which serves to tell apart {}, is expected to separate them{how_often} {separated}{rest}",
         entry.name, entry.purpose
     );
     let then = second(best, times, &rehearsed).map(|(after, both)| SecondExperiment {

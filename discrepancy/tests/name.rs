@@ -70,7 +70,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     assert_eq!(found.not_explained, None);
     assert!(found.significance.is_none(), "nothing was to be named: {:?}", found.significance);
     let kinds: Vec<ExplanationKind> = found.explanations.iter().map(|explanation| explanation.kind).collect();
-    assert_eq!(kinds, [ExplanationKind::Nothing, ExplanationKind::Parameters, ExplanationKind::NoneOfThese]);
+    assert_eq!(kinds, [ExplanationKind::Null, ExplanationKind::Parameters, ExplanationKind::NoneOfThese]);
     assert_eq!(most_probable_by_marginal(&found), 0);
     let nothing = found.explanations[0].features.expect("of the rig file");
     assert!(nothing.loss_per_dof.abs() < 0.08 && nothing.parameters_moved == 0.0, "{nothing:?}");
@@ -134,9 +134,9 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     assert_eq!(explanation.sets[0][0].candidate.name(), "rod-leakage drive.b");
     assert_eq!(most_probable_by_marginal(&found), 2);
     let features = explanation.features.expect("of the leak");
-    assert!(features.behind == 0.0 && features.amplitude_variation < Some(0.1), "{features:?}");
+    assert!(features.loss_difference == 0.0 && features.amplitude_variation < Some(0.1), "{features:?}");
     for other in &found.explanations[..2] {
-        assert!(other.features.expect("of another explanation").behind > 100.0, "{other:?}");
+        assert!(other.features.expect("of another explanation").loss_difference > 100.0, "{other:?}");
     }
 }
 

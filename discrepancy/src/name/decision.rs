@@ -188,10 +188,10 @@ fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
     let is_it = |set: &Vec<EffectEstimate>| {
         set.len() == large.len() && large.iter().all(|placed| set.iter().any(|other| same(placed, other)))
     };
-    let nothing = explanations.iter().find(|one| one.kind == ExplanationKind::Nothing);
-    let least = nothing.map_or(LEAST_PROBABLE, |nothing| nothing.probability.max(LEAST_PROBABLE));
-    let own = explanations.iter().find(|one| !large.is_empty() && one.sets.iter().any(is_it));
-    own.is_some_and(|own| own.probability < least)
+    let null = explanations.iter().find(|one| one.kind == ExplanationKind::Null);
+    let least = null.map_or(LEAST_PROBABLE, |null| null.probability.max(LEAST_PROBABLE));
+    let set = explanations.iter().find(|one| !large.is_empty() && one.sets.iter().any(is_it));
+    set.is_some_and(|set| set.probability < least)
 }
 
 impl Selection {
@@ -244,14 +244,14 @@ mod tests {
             probability,
             marginal: None,
         };
-        let improbable = |nothing: f64, set: f64| {
+        let improbable = |null: f64, set: f64| {
             let sets = vec![vec![placed("piston-leakage", 1.0)], vec![placed("inclination", 0.9)]];
             is_improbable(
                 &model,
                 &[
-                    one(ExplanationKind::Nothing, Vec::new(), nothing),
+                    one(ExplanationKind::Null, Vec::new(), null),
                     one(ExplanationKind::Effects, sets, set),
-                    one(ExplanationKind::NoneOfThese, Vec::new(), 1.0 - nothing - set),
+                    one(ExplanationKind::NoneOfThese, Vec::new(), 1.0 - null - set),
                 ],
             )
         };

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   model of the selection, then all fits by loss ──► a set of effects each ──► alike sets together ──► the first few
-//!   features of each: what it leaves, how far it is behind, parameters moved, agreement of the windows, amplitude, share
+//!   features of each: what it leaves, loss above the best, parameters moved, agreement of the windows, amplitude, share
 //! ```
 //!
 //! A set has the effects that are large enough to be named; fits that differ in smaller ones beside them are the same
@@ -61,14 +61,14 @@ pub(super) fn explanations(
     let restarted = engine.is_linked().then(|| engine.with_starts_under(engine.rig()));
     let of_rig_file = restarted.as_ref().unwrap_or(engine);
     let baseline = of_rig_file.squares(&of_rig_file.residual(&of_rig_file.simulate(engine.rig())));
-    let nothing = fit::loss(&baseline, of_rig_file.scaled_dof());
+    let null_loss = fit::loss(&baseline, of_rig_file.scaled_dof());
     let alike = Alike::new(engine, linearisation, columns, fits.model);
     let classes = classes(fits, |left, right| alike.are(left, right));
-    let losses = classes.iter().map(|class| class[0].loss).chain([nothing, fits.parameters.loss]);
+    let losses = classes.iter().map(|class| class[0].loss).chain([null_loss, fits.parameters.loss]);
     let best = losses.fold(f64::INFINITY, f64::min);
     let features = |loss: f64, factors: &[f64; COUNT]| Features {
         loss_per_dof: loss / dof,
-        behind: loss - best,
+        loss_difference: loss - best,
         parameters_moved: parameters_moved(factors),
         amplitude_variation: None,
         smallest_amplitude: None,
@@ -84,7 +84,7 @@ pub(super) fn explanations(
         marginal: None,
     };
     let mut all = vec![
-        without_effects(ExplanationKind::Nothing, Some(features(nothing, &[1.0; COUNT]))),
+        without_effects(ExplanationKind::Null, Some(features(null_loss, &[1.0; COUNT]))),
         without_effects(
             ExplanationKind::Parameters,
             Some(features(fits.parameters.loss, &fits.parameters.factors)),

@@ -75,7 +75,7 @@ fn marginals(
     let models: Vec<Model<'_>> = explanations
         .par_iter()
         .map(|one| {
-            let are_exact = one.kind == ExplanationKind::Nothing;
+            let are_exact = one.kind == ExplanationKind::Null;
             let alone = if are_exact { [1.0; COUNT] } else { calibrated.factors };
             let (placed, factors) =
                 one.fit.as_ref().map_or((&[][..], alone), |fit| (&fit.placed[..], fit.factors));

@@ -17,7 +17,7 @@ static WEIGHTS: LazyLock<Weights> = LazyLock::new(|| {
 
 /// Scales of the features, fixed with the weights: the loss difference and the lack of fit of the search when they were fitted, a
 /// variation that chance does not give.
-const BEHIND_SCALE: f64 = 9.0;
+const LOSS_DIFFERENCE_SCALE: f64 = 9.0;
 const EXCESS_SCALE: f64 = 0.08;
 const VARIATION_SCALE: f64 = 0.1;
 /// Above so many times the smallest amplitude that is named, a larger one counts no more.
@@ -37,7 +37,8 @@ struct Weights {
     none_of_these: f64,
     /// The first set of effects: that of the search, or the best fit where it selected none.
     selected: f64,
-    behind: f64,
+    #[serde(rename = "behind")]
+    loss_difference: f64,
     excess: f64,
     /// What effects leave: the laws of a catalogue are never exact.
     excess_of_effects: f64,
@@ -72,7 +73,7 @@ fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
             weights.parameters + weights.parameters_alone * moved.ln()
         }
         ExplanationKind::Effects => weights.effects,
-        ExplanationKind::Nothing | ExplanationKind::NoneOfThese => 0.0,
+        ExplanationKind::Null | ExplanationKind::NoneOfThese => 0.0,
     };
     let smallest = features.smallest_amplitude.unwrap_or(1.0);
     let (of_effects, variation) = match explanation.kind {
@@ -82,7 +83,7 @@ fn utility(explanation: &Explanation, weights: &Weights) -> f64 {
         _ => (0.0, 0.0),
     };
     of_kind
-        + weights.behind * (features.behind / BEHIND_SCALE).ln_1p()
+        + weights.loss_difference * (features.loss_difference / LOSS_DIFFERENCE_SCALE).ln_1p()
         + (weights.excess + of_effects) * (features.loss_per_dof.max(0.0) / EXCESS_SCALE).ln_1p()
         + weights.variation * (variation / VARIATION_SCALE).ln_1p()
         + weights.amplitude * smallest.clamp(1.0, LARGEST_RATIO).ln()
@@ -93,10 +94,10 @@ mod tests {
     use super::*;
     use crate::report::Features;
 
-    fn explanation(kind: ExplanationKind, loss_per_dof: f64, behind: f64) -> Explanation {
+    fn explanation(kind: ExplanationKind, loss_per_dof: f64, loss_difference: f64) -> Explanation {
         let features = Features {
             loss_per_dof,
-            behind,
+            loss_difference,
             parameters_moved: 0.0,
             amplitude_variation: None,
             smallest_amplitude: None,
@@ -109,9 +110,9 @@ mod tests {
 
     #[test]
     fn probabilities_sum_to_one_and_follow_what_is_left() {
-        let of = |nothing: f64, behind: f64| {
+        let of = |null_loss_per_dof: f64, null_loss_difference: f64| {
             probabilities(&[
-                explanation(ExplanationKind::Nothing, nothing, behind),
+                explanation(ExplanationKind::Null, null_loss_per_dof, null_loss_difference),
                 explanation(ExplanationKind::Parameters, 0.0, 0.0),
                 explanation(ExplanationKind::NoneOfThese, 0.0, 0.0),
             ])
@@ -125,7 +126,7 @@ mod tests {
             "{clean:?} {wrong:?}"
         );
         let nobody = probabilities(&[
-            explanation(ExplanationKind::Nothing, 4.0, 1e5),
+            explanation(ExplanationKind::Null, 4.0, 1e5),
             explanation(ExplanationKind::Parameters, 2.0, 0.0),
             explanation(ExplanationKind::NoneOfThese, 0.0, 0.0),
         ]);

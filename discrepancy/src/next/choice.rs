@@ -1,9 +1,9 @@
 //! Which experiment: the one whose rehearsed records tell the explanations apart most often.
 //!
 //! ```text
-//!   entries from the shortest on, few trials each ──► all rivals far behind ──► all trials: still so ──► this one
-//!                    └──► none is so clear: the few with rivals farthest behind get all trials, the best of them
-//!   probability = mean over truths and rivals of the share of trials in which the rival is told from the truth
+//!   entries from the shortest on, few trials each ──► all loss differences large ──► all trials: still so ──► this one
+//!                    └──► none is so clear: the few with the largest on average get all trials, the best of them
+//!   probability = mean over truths and alternatives of the share of trials that separate the two
 //! ```
 //!
 //! Of equally good ones the shorter comes first, then the one that stays farther from the ends of the stroke. Losses of
@@ -85,27 +85,27 @@ impl RehearsedEntry {
         self.trials.iter().map(|trial| trial.truth + 1).max().unwrap_or(0)
     }
 
-    /// How far rivals fall behind on average, each trial counted up to where it is decided.
+    /// Mean scaled loss difference of the alternatives, each trial counted up to where it is decided.
     pub(super) fn score(&self) -> f64 {
         let all: Vec<f64> = self
             .trials
             .iter()
-            .flat_map(|trial| trial.rivals().map(|(_, behind)| behind.clamp(-1.0, DECIDED)))
+            .flat_map(|trial| trial.alternatives().map(|(_, difference)| difference.clamp(-1.0, DECIDED)))
             .collect();
         all.iter().sum::<f64>() / all.len().max(1) as f64
     }
 
-    /// For each pair of a truth and a rival the share of trials that tell them apart, in so many repetitions.
+    /// For each pair of a truth and an alternative the share of trials that tell them apart, in so many repetitions.
     pub(super) fn pairs(&self, times: usize) -> Vec<(usize, usize, f64)> {
         let mut pairs = Vec::new();
         for truth in 0..self.truths() {
             let trials = self.of_truth(truth);
-            for rival in (0..self.truths()).filter(|rival| *rival != truth) {
-                let told = (0..trials.len()).filter(|from| {
-                    let repeated = (0..times).map(|at| trials[(from + at) % trials.len()].behind[rival]);
-                    repeated.sum::<f64>() > 1.0
-                });
-                pairs.push((truth, rival, told.count() as f64 / trials.len().max(1) as f64));
+            for alternative in (0..self.truths()).filter(|at| *at != truth) {
+                let difference = |at: usize| trials[at % trials.len()].scaled_loss_differences[alternative];
+                let separated = (0..trials.len())
+                    .filter(|from| (0..times).map(|at| difference(from + at)).sum::<f64>() > 1.0)
+                    .count();
+                pairs.push((truth, alternative, separated as f64 / trials.len().max(1) as f64));
             }
         }
         pairs
@@ -133,9 +133,9 @@ impl RehearsedEntry {
         let mut shares = Vec::new();
         for truth in 0..self.truths() {
             let (first, second) = (self.of_truth(truth), next.of_truth(truth));
-            for rival in (0..self.truths()).filter(|rival| *rival != truth) {
+            for alternative in (0..self.truths()).filter(|at| *at != truth) {
                 let mut all = 0;
-                let mut told = 0;
+                let mut separated = 0;
                 for (at, one) in first.iter().enumerate() {
                     for (after, other) in second.iter().enumerate() {
                         // Of the same experiment two records, not one twice.
@@ -143,10 +143,11 @@ impl RehearsedEntry {
                             continue;
                         }
                         all += 1;
-                        told += usize::from(one.behind[rival] + other.behind[rival] > 1.0);
+                        let both = [one, other].map(|trial| trial.scaled_loss_differences[alternative]);
+                        separated += usize::from(both[0] + both[1] > 1.0);
                     }
                 }
-                shares.push(f64::from(told as u32) / f64::from(all.max(1) as u32));
+                shares.push(f64::from(separated as u32) / f64::from(all.max(1) as u32));
             }
         }
         let share = shares.iter().sum::<f64>() / shares.len().max(1) as f64;
@@ -176,7 +177,7 @@ pub(super) fn rehearse(
     all
 }
 
-/// The shortest first: one that is certain, each rival far behind, ends the search.
+/// The shortest first: one that is certain, each loss difference large, ends the search.
 fn of_alike(
     setting: &Setting<'_>,
     entries: &[&'static Entry],

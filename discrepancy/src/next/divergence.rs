@@ -3,11 +3,11 @@
 //! ```text
 //! J_i  = M (readings of explanation i - readings of the baseline) / noise     in windows of 100 ms, driven as if i were true
 //! M    = 1 - S S^+                       S: what the readings change with x, v, p_a, p_b at the start of the window
-//! D_ij = min over a of |J_i - a J_j|^2 = |J_i|^2 (1 - cos_ij^2)               the rival's amplitude a >= 0 is refitted
+//! D_ij = min over a of |J_i - a J_j|^2 = |J_i|^2 (1 - cos_ij^2)               the alternative's amplitude a >= 0 is refitted
 //! T_ij = D_ij / (1 + e^2 |J_i|^2)                                             e = 1/16: no model is better than that
 //! ```
 //!
-//! D is the expected gain in chi2 of the true explanation over its rival; the inner product excludes nuisance parameters
+//! D is the expected gain in chi2 of the true explanation over the alternative; the inner product excludes nuisance parameters
 //! (`nuisance.rs`). For signatures of hundreds of standard deviations D is large for any two that differ, but model error leaves
 //! a share e of the signature. T counts that share as noise: it equals D for a weak signature, and for a strong one T >= 25 means
 //! a cosine below 0.95. The amplitude is refitted although the first record bounds it, so that T is conservative.
@@ -48,7 +48,7 @@ struct Run {
     starts: Vec<State>,
 }
 
-/// Divergence of an explanation from a rival.
+/// Divergence of an explanation from an alternative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
     /// |J|^2 of the true one, squared standard deviations.
@@ -78,14 +78,14 @@ pub(crate) fn divergences(
     let signatures = signatures(driven, baseline, &all, measured);
     let (signatures, sensitivities) = signatures.split_at(rigs.len());
     let product = Product::new(sensitivities);
-    let Some((truth, rivals)) = signatures.split_first() else { return Vec::new() };
+    let Some((truth, alternatives)) = signatures.split_first() else { return Vec::new() };
     let square = product.of(truth, truth).max(0.0);
-    let from = |rival: &Vec<f64>| {
-        let lengths = (square * product.of(rival, rival).max(0.0)).sqrt();
-        let cosine = if lengths > 0.0 { (product.of(truth, rival) / lengths).clamp(0.0, 1.0) } else { 0.0 };
+    let from = |other: &Vec<f64>| {
+        let lengths = (square * product.of(other, other).max(0.0)).sqrt();
+        let cosine = if lengths > 0.0 { (product.of(truth, other) / lengths).clamp(0.0, 1.0) } else { 0.0 };
         Divergence { square, cosine }
     };
-    rivals.iter().map(from).collect()
+    alternatives.iter().map(from).collect()
 }
 
 /// M J of each rig.

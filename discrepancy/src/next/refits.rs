@@ -3,14 +3,14 @@
 //! ```text
 //!   explanation i, experiment ──► closed loop ──► readings + noise ──► windows of the workflow
 //!   L_j = min over a of  sum_k f_k ln(|e_j - C_j a|^2 / f_k) + priors      C_j: parameters, numbers of the effects of j
-//!   i is told from j when L_j - L_i exceeds what the workflow calls indistinguishable
+//!   i is separated from j when L_j - L_i exceeds what the workflow calls indistinguishable
 //! ```
 //!
 //! The refit is one Gauss-Newton step from each explanation's own numbers, which explain the training records already. Priors
 //! are those of naming; the numbers of the effects are held by their standard errors in the report, which stand for the training
 //! records. A declared term of the user keeps its numbers.
 //!
-//! A rival that may move its parameters absorbs a part of what T counts as its distance, and coloured noise hides another.
+//! An alternative that may move its parameters absorbs a part of what T counts as its distance, and coloured noise hides another.
 //!
 //! Source: Chernoff 1959, Ann. Math. Stat. 30(3): sequential design of experiments.
 
@@ -32,15 +32,16 @@ use plant::effects::sheet::Part;
 pub struct Trial {
     /// The explanation that made it.
     pub truth: usize,
-    /// Loss of each explanation above that of the truth, over the largest that is indistinguishable.
-    pub behind: Vec<f64>,
+    /// Loss of each explanation above that of the truth, shrunk, over the largest difference that is indistinguishable.
+    pub scaled_loss_differences: Vec<f64>,
 }
 
 impl Trial {
-    /// Each explanation but the truth, with how far it is behind.
-    pub(super) fn rivals(&self) -> impl Iterator<Item = (usize, f64)> {
+    /// Each explanation but the truth, with its scaled loss difference.
+    pub(super) fn alternatives(&self) -> impl Iterator<Item = (usize, f64)> {
         let truth = self.truth;
-        self.behind.iter().copied().enumerate().filter(move |(rival, _)| *rival != truth)
+        let differences = self.scaled_loss_differences.iter().copied().enumerate();
+        differences.filter(move |(at, _)| *at != truth)
     }
 }
 
@@ -57,7 +58,7 @@ pub(super) struct Setting<'a> {
     pub(super) noise: &'a ReadingNoise,
     /// Axes on which the records are compared.
     pub(super) measured: [bool; 2],
-    /// What is left of each distance on a rig that is no explanation's exactly: of a truth, of each rival.
+    /// What is left of each distance on a rig that is no explanation's exactly: of a truth, of each alternative.
     pub(super) shrinkage: Vec<Vec<f64>>,
 }
 
@@ -107,14 +108,14 @@ impl Setting<'_> {
             }
         }
         let most = INDISTINGUISHABLE_LOSS_DIFFERENCE * design_effect;
-        let behind = losses.iter().zip(&self.shrinkage[truth]);
-        let behind = behind.map(|(loss, shrinkage)| shrinkage * (loss - losses[truth]) / most);
-        Some(Trial { truth, behind: behind.collect() })
+        let scaled = |(loss, shrinkage): (&f64, &f64)| shrinkage * (loss - losses[truth]) / most;
+        let scaled_loss_differences = losses.iter().zip(&self.shrinkage[truth]).map(scaled).collect();
+        Some(Trial { truth, scaled_loss_differences })
     }
 
     /// The same setting with the distances shrunk by what the training records show of them.
     ///
-    /// Rivals that the training records leave within one indistinguishable difference although they should be farther apart
+    /// Alternatives that the training records leave within one indistinguishable difference although they should be farther apart
     /// there, if one of them were exact, are kept alike by errors of the model: distances in other experiments are shrunk by as
     /// much.
     pub(super) fn shrunk_by(self, training: &Engine<'_>) -> Self {
@@ -124,7 +125,7 @@ impl Setting<'_> {
         Setting { shrinkage: rows.chain(self.shrinkage.into_iter().skip(expected.len())).collect(), ..self }
     }
 
-    /// For each truth the expected distance of each rival in the training records.
+    /// For each truth the expected distance of each alternative in the training records.
     fn expected_distances(&self, training: &Engine<'_>) -> Option<Vec<Vec<f64>>> {
         let rigs = self.explanations.iter().map(|explanation| &explanation.rig);
         let simulated: Vec<Vec<f64>> = rigs.map(|rig| training.simulate(rig)).collect();
@@ -132,8 +133,8 @@ impl Setting<'_> {
         let fits = all.clone().map(|at| Refits::new(self, at, training, &simulated[at]));
         let fits: Vec<Refits> = fits.collect::<Option<_>>()?;
         let of_truth = |truth: usize| -> Option<Vec<f64>> {
-            let losses = fits.iter().zip(&simulated).map(|(fit, rival)| {
-                fit.loss(training, &training.difference(&simulated[truth], rival), Noise::Expected)
+            let losses = fits.iter().zip(&simulated).map(|(fit, alternative)| {
+                fit.loss(training, &training.difference(&simulated[truth], alternative), Noise::Expected)
             });
             let losses: Vec<(f64, f64)> = losses.collect::<Option<_>>()?;
             let (least, clustered) = losses[truth];

@@ -33,14 +33,14 @@ fn question<'a>(
     Question { baseline: rig, explanations, axes_measured: [true, false], noise, training: None }
 }
 
-/// An experiment whose trials leave the only rival so far behind, in turn with each of two truths.
-fn rehearsed(name: &'static str, length_s: f64, behind: &[f64]) -> RehearsedEntry {
-    let trial = |truth: usize, behind: f64| {
-        let mut both = vec![0.0; 2];
-        both[1 - truth] = behind;
-        Trial { truth, behind: both }
+/// An experiment whose trials have these scaled loss differences of the only alternative, in turn with each of two truths.
+fn rehearsed(name: &'static str, length_s: f64, differences: &[f64]) -> RehearsedEntry {
+    let trial = |truth: usize, difference: f64| {
+        let mut scaled_loss_differences = vec![0.0; 2];
+        scaled_loss_differences[1 - truth] = difference;
+        Trial { truth, scaled_loss_differences }
     };
-    let trials = (0..2).flat_map(|truth| behind.iter().map(move |behind| trial(truth, *behind)));
+    let trials = (0..2).flat_map(|truth| differences.iter().map(move |difference| trial(truth, *difference)));
     RehearsedEntry { name, trials: trials.collect(), length_s, clearance_m: 0.01 }
 }
 
@@ -115,11 +115,11 @@ fn an_explanation_does_not_differ_from_itself_and_differs_from_another() {
     let other = explained(&[("piston-leakage", "drive", &[("leakage_nl_per_min", 2.0)])]);
     let rig = RigParameters::baseline();
     let judged = judge(entry, &rig, &[one, twice, other], [true, false]).expect("it can be rehearsed");
-    let of = |truth, rival| {
+    let of = |truth, alternative| {
         judged
             .pairs
             .iter()
-            .find(|pair| (pair.0, pair.1) == (truth, rival))
+            .find(|pair| (pair.0, pair.1) == (truth, alternative))
             .expect("a pair")
             .2
             .in_repetitions(1)
@@ -179,7 +179,8 @@ fn explanations_that_are_one_are_never_told_apart() {
     let rehearsed = rehearse(&setting, &[entry], &mut |_| {});
     let trials = &rehearsed[0].trials;
     assert_eq!(trials.len(), 20, "{trials:?}");
-    assert!(trials.iter().flat_map(|trial| &trial.behind).all(|behind| behind.abs() < 1e-9), "{trials:?}");
+    let mut differences = trials.iter().flat_map(|trial| &trial.scaled_loss_differences);
+    assert!(differences.all(|difference| difference.abs() < 1e-9), "{trials:?}");
     let proposal = choose(question(&rig, &explanations, &noise), rehearsed);
     assert!(proposal.next.experiment.is_none(), "{:?}", proposal.next);
     assert_eq!(proposal.next.probability, Some(0.0));
@@ -194,11 +195,11 @@ fn what_no_experiment_separates_is_reported_with_what_would() {
         explained(&[("force-sensor-offset", "drive", &[("offset_n", 5.0)])]),
     ];
     let question = question(&rig, &explanations, &noise);
-    let chosen = |behind: &[f64]| choose(question, vec![rehearsed("chirps", 15.0, behind)]);
+    let chosen = |differences: &[f64]| choose(question, vec![rehearsed("chirps", 15.0, differences)]);
     let Proposal { next, experiment_toml, .. } = chosen(&[0.1; 10]);
     assert!(experiment_toml.is_none() && next.experiment.is_none(), "{next:?}");
     assert!(next.otherwise.is_some_and(|what| what.contains("tilting")));
-    // Three times 0.4 is told, twice is not.
+    // Three times 0.4 separates, twice does not.
     let Proposal { next, experiment_toml, .. } = chosen(&[0.4; 10]);
     assert!(experiment_toml.is_some_and(|toml| toml.contains("repetitions = 3")), "{next:?}");
     assert_eq!(next.probability, Some(1.0));
@@ -237,7 +238,8 @@ fn an_entry_that_separates_more_pairs_wins_over_one_that_separates_fewer_by_more
     // How far 0 and 1, 0 and 2, 1 and 2 are apart.
     let entry = |name: &'static str, [near, far, others]: [f64; 3]| {
         let trials = [vec![0.0, near, far], vec![near, 0.0, others], vec![far, others, 0.0]];
-        let trials = trials.into_iter().enumerate().map(|(truth, behind)| Trial { truth, behind });
+        let trials = trials.into_iter().enumerate();
+        let trials = trials.map(|(truth, scaled_loss_differences)| Trial { truth, scaled_loss_differences });
         RehearsedEntry { name, trials: trials.collect(), length_s: 15.0, clearance_m: 0.01 }
     };
     let mut all = vec![entry("chirps", [90.0, 0.0, 0.0]), entry("ends", [3.0, 4.0, 0.0])];

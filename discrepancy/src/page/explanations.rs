@@ -18,7 +18,7 @@ pub(super) fn explanations(report: &Report) -> String {
             text_cell(name(explanation)),
             number(words::percent(explanation.probability)),
             of_evidence(noise_ratio),
-            of_evidence(|evidence| evidence.behind),
+            of_evidence(|evidence| evidence.loss_difference),
             of_evidence(|evidence| evidence.parameters_moved),
             optional(explanation.evidence.and_then(|evidence| evidence.amplitude_variation)),
         ];
@@ -31,7 +31,7 @@ pub(super) fn explanations(report: &Report) -> String {
         "explanation",
         "probability",
         "leaves, times noise",
-        "loss behind the best",
+        "loss above the best",
         "parameters moved",
         "amplitude differs by",
     ];
@@ -74,7 +74,7 @@ fn advice(report: &Report) -> String {
         (ExplanationKind::NoneOfThese, _) => format!(
             "Most probable is {first_words}: look at where model and records disagree before you add anything to the model."
         ),
-        (ExplanationKind::Nothing, true) => format!("Keep {first_words}."),
+        (ExplanationKind::Null, true) => format!("Keep {first_words}."),
         (ExplanationKind::Parameters, true) => format!("Correct the numbers of the rig file: {first_words}."),
         (ExplanationKind::Effects, true) => format!("Add to the model: {first_words}."),
         (_, false) => format!(
@@ -120,7 +120,7 @@ fn name(explanation: &Explanation) -> String {
     let effect =
         |one: &EffectPlace| format!("{} at the {}", one.effect, words::place(&one.effect, &one.place));
     match explanation.kind {
-        ExplanationKind::Nothing => "the rig file as it is".to_owned(),
+        ExplanationKind::Null => "the rig file as it is".to_owned(),
         ExplanationKind::Parameters => "parameters alone".to_owned(),
         ExplanationKind::NoneOfThese => "none of these".to_owned(),
         ExplanationKind::Effects => {

@@ -224,9 +224,9 @@ fn check(file: &str) -> RecordCheck {
 
 fn explanations() -> Vec<Explanation> {
     let effect = |name: &str| EffectPlace { effect: name.to_owned(), place: at("drive", None) };
-    let evidence = |loss_per_dof, behind, amplitude_variation| Features {
+    let evidence = |loss_per_dof, loss_difference, amplitude_variation| Features {
         loss_per_dof,
-        behind,
+        loss_difference,
         parameters_moved: 0.4,
         amplitude_variation,
         smallest_amplitude: amplitude_variation.map(|_| 5.0),
@@ -244,7 +244,7 @@ fn explanations() -> Vec<Explanation> {
     };
     let leakages = ["piston-leakage", "valve-null-leakage"];
     vec![
-        of(ExplanationKind::Nothing, 0.0, Vec::new(), Some(evidence(3.1, 4200.0, None))),
+        of(ExplanationKind::Null, 0.0, Vec::new(), Some(evidence(3.1, 4200.0, None))),
         of(ExplanationKind::Parameters, 0.0, Vec::new(), Some(evidence(1.2, 1600.0, None))),
         of(
             ExplanationKind::Effects,

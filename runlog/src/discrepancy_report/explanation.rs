@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExplanationKind {
-    /// The rig file as it is.
-    Nothing,
+    /// The null hypothesis: the rig file as it is.
+    #[serde(rename = "nothing")]
+    Null,
     /// Parameters of the rig file that are off.
     Parameters,
     /// Effects of the catalogue, parameters beside them.
@@ -23,8 +24,9 @@ pub struct Features {
     /// Loss per degree of freedom: the mean log ratio of a window's chi2 to what noise gives, penalties included; on the axes
     /// that its effects act on, where both are recorded and the rods are not linked.
     pub loss_per_dof: f64,
-    /// Loss above that of the best explanation.
-    pub behind: f64,
+    /// Loss above that of the best explanation: the difference of minus twice the log-likelihoods, penalties included.
+    #[serde(rename = "behind")]
+    pub loss_difference: f64,
     /// Number of parameters off the rig file's values, each counted by x^2 / (x^2 + tolerance^2) of its relative deviation x.
     pub parameters_moved: f64,
     /// Largest coefficient of variation of its effects' amplitudes between windows; null without effects, or where no derivative

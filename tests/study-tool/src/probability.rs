@@ -45,7 +45,7 @@ pub fn judge(draw: &Draw, classes: &[Vec<Member>], left_out: bool, report: &Repo
     let alone = recipe.hidden.is_empty();
     let is_right = |explanation: &Explanation| match explanation.kind {
         _ if left_out => explanation.kind == ExplanationKind::NoneOfThese,
-        ExplanationKind::Nothing => alone && recipe.wrong_parameters.is_empty(),
+        ExplanationKind::Null => alone && recipe.wrong_parameters.is_empty(),
         ExplanationKind::Parameters => alone && !recipe.wrong_parameters.is_empty(),
         ExplanationKind::Effects => {
             !alone && explanation.sets.iter().any(|set| stand_for(set, &recipe.hidden, classes))

@@ -17,10 +17,10 @@ const SHAPE_FREEDOM: f64 = 4.0;
 const SHAPE_SCALE: f64 = 0.5;
 
 /// Prior probabilities of the kinds: as often nothing is missing as an effect is, and once in five what nobody listed.
-const NOTHING: f64 = 0.2;
-const PARAMETERS: f64 = 0.2;
-const EFFECTS: f64 = 0.4;
-const NONE_OF_THESE: f64 = 0.2;
+const PRIOR_NULL: f64 = 0.2;
+const PRIOR_PARAMETERS: f64 = 0.2;
+const PRIOR_EFFECTS: f64 = 0.4;
+const PRIOR_NONE_OF_THESE: f64 = 0.2;
 /// Shares of the sets of one, two and three effects in that of effects.
 const OF_SETS: [f64; 3] = [0.7, 0.25, 0.05];
 
@@ -28,13 +28,13 @@ const OF_SETS: [f64; 3] = [0.7, 0.25, 0.05];
 /// search did not list too: of so many, some fit by chance. Sets that count as one have that of all of them.
 pub(super) fn prior_of(explanation: &Explanation, candidates: usize) -> f64 {
     match explanation.kind {
-        ExplanationKind::Nothing => NOTHING,
-        ExplanationKind::Parameters => PARAMETERS,
-        ExplanationKind::NoneOfThese => NONE_OF_THESE,
+        ExplanationKind::Null => PRIOR_NULL,
+        ExplanationKind::Parameters => PRIOR_PARAMETERS,
+        ExplanationKind::NoneOfThese => PRIOR_NONE_OF_THESE,
         ExplanationKind::Effects => {
             let effects = explanation.fit.as_ref().map_or(1, |fit| fit.placed.len()).clamp(1, OF_SETS.len());
             let number: f64 = (0..effects).map(|at| (candidates - at) as f64 / (at + 1) as f64).product();
-            EFFECTS * OF_SETS[effects - 1] * explanation.sets.len() as f64 / number.max(1.0)
+            PRIOR_EFFECTS * OF_SETS[effects - 1] * explanation.sets.len() as f64 / number.max(1.0)
         }
     }
 }
@@ -84,7 +84,7 @@ mod tests {
     use plant::RigParameters;
 
     const KINDS: [ExplanationKind; 5] = [
-        ExplanationKind::Nothing,
+        ExplanationKind::Null,
         ExplanationKind::Parameters,
         ExplanationKind::Effects,
         ExplanationKind::Effects,
@@ -120,8 +120,9 @@ mod tests {
             prior_of(&one, 40)
         };
         let whole = 40.0 * of(1, 1) + 780.0 * of(2, 1) + 9880.0 * of(3, 1);
-        assert!((whole - EFFECTS).abs() < 1e-12 && of(1, 2) == 2.0 * of(1, 1), "{whole}");
-        assert!((NOTHING + PARAMETERS + EFFECTS + NONE_OF_THESE - 1.0).abs() < 1e-12);
+        assert!((whole - PRIOR_EFFECTS).abs() < 1e-12 && of(1, 2) == 2.0 * of(1, 1), "{whole}");
+        let all = PRIOR_NULL + PRIOR_PARAMETERS + PRIOR_EFFECTS + PRIOR_NONE_OF_THESE;
+        assert!((all - 1.0).abs() < 1e-12, "{all}");
     }
 
     #[test]
