@@ -92,7 +92,7 @@ pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
         &format!(
             "{}<nav aria-label=\"Contents\">\n<ul class=\"contents\">\n{contents}</ul>\n</nav>\n<main>\n{body}</main>\n\
              <footer class=\"page-foot\">\n<p>Schema version {}. The same for programs is in report.json beside this page. \
-             \u{b1} is one standard error.</p>\n</footer>\n",
+             \u{b1} is half the half-width of a nominal 95.4 % interval.</p>\n</footer>\n",
             verdict::head(report),
             report.schema_version
         ),

@@ -37,7 +37,8 @@ pub(super) fn candidates(report: &Report) -> String {
             Cell::Sentence(with_doubt(one)),
         ]
     };
-    let heads = ["effect", "where", "score", "explains alone", "amplitude", "what became of it"];
+    let heads =
+        ["effect", "where", "score", "share of the log misfit, alone", "amplitude", "what became of it"];
     let count = report.candidates.len();
     let all = table("All candidates", &heads, report.candidates.iter().map(row));
     charts(&[drawn]) + &folded(&format!("All {count} candidates, and what became of each"), &all)

@@ -50,7 +50,7 @@ pub(super) fn finding(report: &Report) -> String {
                 number(words::percent(small.share_explained)),
             ]
         };
-        let heads = ["effect", "where", "numbers", "explains"];
+        let heads = ["effect", "where", "numbers", "share of the log misfit"];
         text += &table("Smaller effects", &heads, report.small.iter().map(row));
     }
     if !report.parameters.is_empty() {
@@ -106,7 +106,7 @@ fn effect(report: &Report, named: &NamedEffect) -> String {
     let mut text = heading(&format!("{} at the {place}", named.effect));
     if let Some(law) = law(report, named) {
         text += &paragraph(&format!(
-            "{}. It explains {} of what the rig file leaves unexplained there.",
+            "{}. It explains {} of the log misfit that the rig file leaves there.",
             sentence(&law),
             words::percent(named.share_explained)
         ));
@@ -131,7 +131,11 @@ fn effect(report: &Report, named: &NamedEffect) -> String {
             ]
         };
         let rows = named.alternatives.iter().map(row);
-        text += &table("Alternatives", &["it can be as well", "where", "numbers", "explains"], rows);
+        text += &table(
+            "Alternatives",
+            &["it can be as well", "where", "numbers", "share of the log misfit"],
+            rows,
+        );
     }
     text
 }
@@ -229,7 +233,7 @@ fn table_added(outside: &Outside) -> String {
         .map(|table| format!("{} over {}", words::balance(&table.balance), table.variable))
         .collect();
     let share = outside.share_explained.map_or(String::new(), |share| {
-        format!("; that takes {} of the disagreement of the training records", words::percent(share))
+        format!("; that takes {} of the log misfit of the training records", words::percent(share))
     });
     format!("It is added to the model as a table: {}{share}.", listed(&tables))
 }
@@ -308,7 +312,8 @@ pub(super) fn next(report: &Report) -> String {
         let probability =
             next.probability.zip(next.probability_interval).map_or(String::new(), |(value, of)| {
                 format!(
-                    " It tells them apart with a probability of {:.0} % ({:.0} to {:.0} %).",
+                    " It tells them apart with a probability of {:.0} % ({:.0} to {:.0} %), if one of these explanations \
+                     is exact.",
                     1e2 * value,
                     1e2 * of[0],
                     1e2 * of[1]
@@ -317,7 +322,7 @@ pub(super) fn next(report: &Report) -> String {
         let then = next.then.as_ref().map_or(String::new(), |then| {
             format!(
                 " If the records still leave it open, <code>{}</code> is next: both together tell them apart with a \
-                 probability of {:.0} %.",
+                 probability of {:.0} %, if one of them is exact.",
                 pagekit::page::escaped(&then.experiment),
                 1e2 * then.probability
             )

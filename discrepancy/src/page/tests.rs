@@ -72,7 +72,7 @@ fn the_verdict_stands_first_with_names_numbers_and_errors() {
     let all_candidates = format!("All {} candidates", SHEETS.len());
     let order = [
         "\u{2713} Air leaks past",
-        "piston-leakage at the drive axis: leakage 2.513 \u{b1} 0.041 Nl/min; it explains 97 % of the disagreement there",
+        "piston-leakage at the drive axis: leakage 2.513 \u{b1} 0.041 Nl/min; it explains 97 % of the log misfit there",
         "On test.csv, a held-out record, 92 % to 99.6 % of the gap to the noise is closed",
         "where they differ most",
         "What is missing",
@@ -207,7 +207,7 @@ fn what_is_ambiguous_stands_together_with_the_experiment_that_tells() {
     let seen = text(&made(Verdict::Ambiguous));
     for part in [
         "inclination",
-        "or friction-asymmetry at the drive axis: asymmetry 47.1 \u{b1} 1.2 %; it explains 94 %",
+        "or friction-asymmetry at the drive axis: asymmetry 47.1 \u{b1} 1.2 %; it explains 94 % of the log misfit there",
         "To run next: next.toml",
         "63",
         "Tilting the rig",
@@ -237,7 +237,7 @@ fn what_is_outside_the_catalogue_has_its_curve_formula_and_significance() {
         "91 %",
         "is added to the model as a table",
         "resembles piston-leakage at the drive axis",
-        "it explains 60 % of the disagreement there",
+        "it explains 60 % of the log misfit there",
         "it depends on p_b",
     ] {
         assert!(seen.contains(part), "{part}");

@@ -111,7 +111,7 @@ fn one(named: &NamedEffect, before: &str) -> String {
     let numbers = words::numbers(named);
     let numbers = if numbers.is_empty() { numbers } else { format!(": {numbers}") };
     format!(
-        "{before}<b>{}</b> at the {}{}; it explains {} of the disagreement there",
+        "{before}<b>{}</b> at the {}{}; it explains {} of the log misfit there",
         escaped(&named.effect),
         escaped(&words::place(&named.effect, &named.place)),
         escaped(&numbers),

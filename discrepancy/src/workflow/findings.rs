@@ -290,7 +290,7 @@ fn verdict_in_words(report: &Report) -> String {
                 let rest =
                     if remaining.is_empty() { ".".to_owned() } else { format!("; of the rest,{remaining}") };
                 format!(
-                    " It resembles {}, whose law takes {:.0} % and {decision}{rest}",
+                    " It resembles {}, whose law takes {:.0} % of the log misfit and {decision}{rest}",
                     one(nearest),
                     1e2 * nearest.share_explained
                 )
