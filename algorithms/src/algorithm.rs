@@ -4,8 +4,8 @@
 //!   sensors, set-points ──► pre-controller ──► Ready ──► Algorithm ──► wanted rod velocity ──► post-controller ──► opening
 //! ```
 //!
-//! Everything is in the axis's own extension: positions grow as the own rod comes out, and a positive result extends it,
-//! which raises the own force sensor's reading when something is in the way. So one algorithm serves both axes.
+//! Everything is in the axis's own extension: positions grow as its rod comes out, and a positive result extends it,
+//! which raises the axis's force sensor's reading when something is in the way. So one algorithm serves both axes.
 //! An algorithm holds its state and nothing else: parameters come with each step, since they may change while running.
 //! It neither allocates nor blocks; that its result is a number is checked behind it.
 
@@ -18,13 +18,13 @@ use settings::parameters::{Declared, Parameter};
 pub struct Ready {
     /// Time between two steps of the algorithm, s.
     pub period_s: f64,
-    /// Extension of the own rod, m.
+    /// Extension of the axis's rod, m.
     pub position_m: f64,
     /// Its rate, filtered, m/s.
     pub velocity_m_per_s: f64,
     /// The rate of that, filtered, m/s^2.
     pub acceleration_m_per_s2: f64,
-    /// Own force sensor, filtered, N, compression positive.
+    /// Force sensor of the axis, filtered, N, compression positive.
     pub force_n: f64,
     /// Absolute pressure of the cap-side chamber, filtered, Pa.
     pub pressure_a_pa: f64,

@@ -6,7 +6,7 @@
 //!   both:    |v| <= v_max
 //! ```
 //!
-//! w: set-point of the force, N, zero as a rule; F: own force sensor, N, compression positive; x': rate of the own extension,
+//! w: set-point of the force, N, zero as a rule; F: force sensor of the axis, N, compression positive; x': rate of the extension,
 //! m/s; k_p: gain, m/(N s); k_f: share of the rate; d: dead zone, N; v_max: limit, m/s. No state.
 //!
 //! At standstill neither the zero of the sensor nor the noise of x' shall set the rod in motion, hence the dead zone and no
@@ -32,7 +32,7 @@ settings::parameters! {
     /// Parameters of `force-manual`.
     struct Parameters {
         gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.015, "velocity for each error"),
-        velocity_feed_forward: declare("", [0.0, 1.0], 0.5, "share of the own rod's velocity that is fed forward while it moves"),
+        velocity_feed_forward: declare("", [0.0, 1.0], 0.5, "share of the rod's velocity that is fed forward while it moves"),
         dead_zone_n: declare("N", [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
         moving: declare("", [0.0, 1.0], 0.0, "from 0.5 on the rod counts as moving; in [giving-way] the force chain decides it"),
         limit_m_per_s: declare("m/s", [0.0, 5.0], 1.0,

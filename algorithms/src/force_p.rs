@@ -1,10 +1,10 @@
-//! Force control as in the paper: proportional, with the own rod's velocity as a disturbance fed forward.
+//! Force control as in the paper: proportional, with the rod's velocity as a disturbance fed forward.
 //!
 //! ```text
 //!   w ──► v = k_p (w - F) + k_f x'
 //! ```
 //!
-//! w: set-point of the force, N; F: own force sensor, N, compression positive; x': rate of the own extension, m/s; k_p: gain,
+//! w: set-point of the force, N; F: force sensor of the axis, N, compression positive; x': rate of the extension, m/s; k_p: gain,
 //! m/(N s); k_f: share of the rate. No state. At a blocked rod the air integrates v to force, so P alone leaves no lasting
 //! error; the motion that the other axis forces on the rod would, and x' moves the air along with the rod.
 //!
@@ -25,7 +25,7 @@ settings::parameters! {
     /// Parameters of `force-p`.
     struct Parameters {
         gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.012, "velocity for each error"),
-        velocity_feed_forward: declare("", [0.0, 2.0], 0.8, "share of the own rod's velocity that is fed forward"),
+        velocity_feed_forward: declare("", [0.0, 2.0], 0.8, "share of the rod's velocity that is fed forward"),
     }
 }
 

@@ -9,7 +9,7 @@
 //!   v    = f / c(x, p_a, p_b) + s k_f x'          c = p_a A_a^2 / V_a + p_b A_b^2 / V_b
 //! ```
 //!
-//! w, w': set-point and its rate, N and N/s; F, F': own force sensor and its filtered rate; x', x'': filtered rates of the own
+//! w, w': set-point and its rate, N and N/s; F, F': force sensor and its filtered rate; x', x'': filtered rates of the axis's
 //! extension, m/s and m/s^2; c: stiffness of the air, N/m, from nominal geometry and measured position and pressures: the
 //! characteristic map, which has its counterpart for the valve in the pressure-compensated linearisation
 //! ([`crate::linearisation`]); b: nominal viscous friction, N s/m; k_p: gain, 1/s; T_i, T_d: integral and derivative time,
@@ -53,7 +53,7 @@ settings::parameters! {
             "fastest rate of the reference, as the velocity that it stands for"),
         valve_time_s: declare("s", [0.0, 0.1], 0.012, "how much later the force comes than asked for"),
         rate_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the reference's rate that is fed forward"),
-        velocity_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the own rod's velocity that is fed forward while it moves"),
+        velocity_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the rod's velocity that is fed forward while it moves"),
         friction_feed_forward: declare("", [0.0, 1.0], 0.8,
             "share of the nominal viscous friction's rate that is fed forward while it moves"),
         dead_zone_n: declare("N", [0.0, 100.0], 5.0, "error that is let be while the rod stands"),

@@ -122,7 +122,7 @@ impl Guarded {
         }
     }
 
-    /// The wanted velocity of the own rod, m/s: a finite number.
+    /// The wanted velocity of the axis's rod, m/s: a finite number.
     ///
     /// # Errors
     /// The fault, latched before or now: the valve is to be shut. The algorithm is not asked again.

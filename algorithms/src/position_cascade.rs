@@ -56,7 +56,7 @@ settings::parameters! {
         force_gain_per_s: declare("1/s", [0.0, 200.0], 25.0, "force rate for each error of the force"),
         acceleration_feed_forward: declare("", [0.0, 2.0], 1.0,
             "share of the set-point's acceleration that is fed forward as a force rate"),
-        moved_mass_kg: declare("kg", [0.0, 100.0], 5.0, "mass that the set-point's acceleration is told of"),
+        moved_mass_kg: declare("kg", [0.0, 100.0], 5.0, "mass by which the set-point's acceleration is multiplied"),
         friction_compensation: declare("", [0.0, 1.0], 1.0, "share of the nominal sliding friction that is compensated"),
         friction_speed_m_per_s: declare("m/s", [1e-4, 1.0], 0.004, "wanted speed from which on it is compensated in full"),
         load_compensation: declare("", [0.0, 1.0], 1.0,

@@ -22,7 +22,7 @@ pub use record::{Answer, AxisRecord};
 pub use work::{ForcePlan, Plan};
 
 use crate::chains::leading::{Leading, LeadingInputs};
-use crate::chains::main::{MainCause, MainConfig, MainOutput, OwnAxis};
+use crate::chains::main::{AxisMeasurement, MainCause, MainConfig, MainOutput};
 use crate::chains::settled::ControlError;
 use crate::chains::{AfterStop, Fault};
 use crate::figures::PositionFigures;
@@ -100,7 +100,7 @@ impl AxisController {
         }
     }
 
-    /// Takes a frame that is none of the own sensors and nothing of the rig's.
+    /// Takes a frame that is none of this axis's sensors and nothing of the rig's.
     pub fn hear(&mut self, frame: &Frame) {
         self.received.take(frame);
     }
@@ -117,7 +117,7 @@ impl AxisController {
         self.program.observe(cycle, sensors, supply_pa);
         self.average.take(sensors.position_m);
         self.received.listen(cycle);
-        let output = self.advance(cycle, rig, self.rig.map(|_| self.own_axis(sensors)));
+        let output = self.advance(cycle, rig, self.rig.map(|_| self.measurement(sensors)));
         let partner = &self.received.partner;
         let hand = self.received.hand.take();
         let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.main.still(), hand };
@@ -137,7 +137,7 @@ impl AxisController {
         self.answer_with(cycle, command, record)
     }
 
-    /// What is to be said in `cycle` though no own sensors came, which is a fault once it lasted.
+    /// What is to be said in `cycle` though no sensors of this axis came, which is a fault once it lasted.
     pub fn without_sensors(&mut self, cycle: u64) -> Option<EmergencyStop> {
         self.fault = Some(Fault::SensorLoss);
         self.advance(cycle, None, None);
@@ -145,12 +145,17 @@ impl AxisController {
         self.leading.stop.frame_due(cycle)
     }
 
-    fn advance(&mut self, cycle: u64, rig: Option<&RigStatus>, own: Option<OwnAxis>) -> MainOutput {
+    fn advance(
+        &mut self,
+        cycle: u64,
+        rig: Option<&RigStatus>,
+        measurement: Option<AxisMeasurement>,
+    ) -> MainOutput {
         let before = self.leading.output.map(|output| output.state);
         let output = self.leading.advance(&LeadingInputs {
             cycle,
             rig: rig.copied(),
-            own,
+            measurement,
             prepared: self.work.prepared(),
             partner: self.received.partner,
             frame: self.received.stop.take(),
@@ -164,12 +169,12 @@ impl AxisController {
         output
     }
 
-    fn own_axis(&self, sensors: &Sensors) -> OwnAxis {
+    fn measurement(&self, sensors: &Sensors) -> AxisMeasurement {
         let error = match &self.asked {
             Some(Asked { demand, hand: Hand::User }) => self.work.error(demand, self.program.ready()),
             _ => ControlError::None,
         };
-        OwnAxis { position_m: sensors.position_m - self.program.geometry().offset_m, error }
+        AxisMeasurement { position_m: sensors.position_m - self.program.geometry().offset_m, error }
     }
 
     fn command(&mut self, cycle: u64) -> ValveCommand {

@@ -1,7 +1,7 @@
 //! The sequence chains of one axis controller: state machines that say what is asked of the axis, and do nothing else.
 //!
 //! ```text
-//!   rig status, console, own trip ─► emergency_stop ─┐ state
+//!   rig status, console, a trip ───► emergency_stop ─┐ state
 //!   sensors, console, partner ─────────────────────► main ─► Phase ─► axis ─┬─► force     (relieving, manual mode, names)
 //!                                     ▲                                     └─► matching  (offset of the load's sensor)
 //!                                     └───────────── prepared, fault ◄──────────┘
@@ -34,7 +34,7 @@ use protocol::frames::{ChainStatus, ChainValues, RunControl, RunControlCommand};
 use protocol::periods::CYCLE_S;
 
 /// Cycles after which a partner that is needed counts as lost: ten periods of its status. Those that the axis answered itself
-/// count: when the rig skips cycles, or the own process is held up, the partner is not to blame.
+/// count: when the rig skips cycles, or this process is held up, the partner is not to blame.
 pub const PARTNER_LOST_CYCLES: u64 = 100;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

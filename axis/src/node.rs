@@ -262,7 +262,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         }
     }
 
-    /// The rig goes on, and own sensors do not come: after each tick the axis says what a fault has to say.
+    /// The rig goes on, and sensors of the axis do not come: after each tick the axis says what a fault has to say.
     fn speak_without_sensors(&mut self, place: usize, bus: &mut dyn Bus) {
         let Some(cycle) = self.view.cycle() else { return };
         let member = &mut self.members[place];

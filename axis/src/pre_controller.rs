@@ -40,7 +40,7 @@ impl Geometry {
         Self { axis, stroke_m, offset_m: 0.0 }
     }
 
-    /// +1 when the own rod extends in the rig's +x, else -1.
+    /// +1 when the axis's rod extends in the rig's +x, else -1.
     pub fn direction(&self) -> f64 {
         match self.axis {
             Axis::Drive => 1.0,
@@ -48,7 +48,7 @@ impl Geometry {
         }
     }
 
-    /// Extension of the own rod at a rig coordinate, m.
+    /// Extension of the axis's rod at a rig coordinate, m.
     pub fn extension_m(&self, position_m: f64) -> f64 {
         match self.axis {
             Axis::Drive => position_m,
@@ -56,7 +56,7 @@ impl Geometry {
         }
     }
 
-    /// Rig coordinate at an extension of the own rod, m.
+    /// Rig coordinate at an extension of the axis's rod, m.
     pub fn position_m(&self, extension_m: f64) -> f64 {
         // Each axis's map is its own inverse.
         self.extension_m(extension_m)

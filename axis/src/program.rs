@@ -224,7 +224,7 @@ impl Program {
         self.pre.set_offset(offset_m);
     }
 
-    /// The velocity that the algorithm wants, m/s, own extension.
+    /// The velocity that the algorithm wants, m/s, along the axis's extension.
     pub fn wanted_m_per_s(&self, hand: Hand) -> f64 {
         match (hand, &self.giving_way) {
             (Hand::ForceChain, Some(giving_way)) => giving_way.slot.wanted_m_per_s,

@@ -108,8 +108,9 @@ impl RigView {
             let ahead = (ALIVE_RANGE + u64::from(sensors.alive) - known % ALIVE_RANGE) % ALIVE_RANGE;
             // Behind the other axis's newest, and yet new to its own: arbitration let that one pass, and no round is over.
             let behind = ALIVE_RANGE - ahead;
-            let own = self.newest[axis.index()];
-            let passed = behind <= MOST_PASSED && own.is_some_and(|own| known.saturating_sub(behind) > own);
+            let newest = self.newest[axis.index()];
+            let passed =
+                behind <= MOST_PASSED && newest.is_some_and(|newest| known.saturating_sub(behind) > newest);
             let cycle = if passed { known - behind } else { known + ahead };
             self.newest[axis.index()] = Some(cycle);
             self.cycle = Some(known.max(cycle));

@@ -293,12 +293,12 @@ impl Inputs {
                 SetPoints::Forces(_) => None,
             }),
             prepares: section.is_some_and(|section| !section.prepare.is_empty()),
-            own: Lengths {
+            lengths: Lengths {
                 // Both axes end together, whichever has the longer row.
                 experiment_s: self.experiment.duration_s(),
                 ..section.map_or(Lengths::default(), |section| lengths(section, program))
             },
-            either: Lengths {
+            longest_lengths: Lengths {
                 prepare_s: most(|lengths| lengths.prepare_s),
                 initial_force_s: most(|lengths| lengths.initial_force_s),
                 experiment_s: self.experiment.duration_s(),

@@ -200,7 +200,7 @@ impl Instance {
         unsafe { (self.functions.reset)(self.state.as_ptr(), ready, parameters.as_ptr()) }
     }
 
-    /// The wanted velocity of the own rod, m/s, unchecked.
+    /// The wanted velocity of the axis's rod, m/s, unchecked.
     ///
     /// # Panics
     /// As [`Instance::reset`].

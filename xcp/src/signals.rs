@@ -141,7 +141,7 @@ pub(crate) static SIGNALS: [Signal; 24] = [
     number(
         ("extension_acceleration_m_per_s2", "m/s^2"),
         [-1000.0, 1000.0],
-        "acceleration of the own rod, filtered, positive as it extends",
+        "acceleration of the rod, filtered, positive as it extends",
         |view| view.ready.acceleration_m_per_s2,
     ),
     number(("force_n", "N"), [-2000.0, 2000.0], "force, filtered", |view| view.ready.force_n),
@@ -169,7 +169,7 @@ pub(crate) static SIGNALS: [Signal; 24] = [
     number(
         ("wanted_velocity_m_per_s", "m/s"),
         [-100.0, 100.0],
-        "velocity that the algorithm wants, positive as the own rod extends",
+        "velocity that the algorithm wants, positive as the rod extends",
         |view| view.record.wanted_velocity_m_per_s,
     ),
     number(("applied_velocity_m_per_s", "m/s"), [-100.0, 100.0], "what the valve can do of it", |view| {

@@ -1,4 +1,4 @@
-//! Whether the own sensors are still within their range, by what the rig says of them.
+//! Whether the axis's sensors are still within their range, by what the rig says of them.
 //!
 //! Force and pressures count, the position does not: a carriage at its end reads beyond the range whenever the noise is on
 //! that side. A status tells of the cycles since the one before, so its word holds until the next one; half a second of
@@ -13,7 +13,7 @@ use protocol::frames::RigStatus;
 /// Cycles after which a sensor that is saturated in all of them is a fault.
 const LONGEST: u32 = 500;
 
-/// For how long each of the own sensors has been saturated: force, pressures of cap and rod side.
+/// For how long each of the axis's sensors has been saturated: force, pressures of cap and rod side.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Range([u32; 3]);
 

@@ -5,7 +5,8 @@ use nominal::Axis;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis};
 
 pub(super) struct Received {
-    own: Axis,
+    /// The axis that hears.
+    axis: Axis,
     experiment: u8,
     pub(super) partner: Partner,
     partner_spoke: bool,
@@ -16,10 +17,10 @@ pub(super) struct Received {
 }
 
 impl Received {
-    /// Nothing, by the axis `own` in experiment number `experiment`.
-    pub(super) fn new(own: Axis, experiment: u8) -> Self {
+    /// Nothing, by `axis` in experiment number `experiment`.
+    pub(super) fn new(axis: Axis, experiment: u8) -> Self {
         Self {
-            own,
+            axis,
             experiment,
             partner: Partner::default(),
             partner_spoke: false,
@@ -30,9 +31,9 @@ impl Received {
         }
     }
 
-    /// Takes a frame; those of the own axis are of another controller and nothing to go by.
+    /// Takes a frame; those of this axis are of another controller and nothing to go by.
     pub(super) fn take(&mut self, frame: &Frame) {
-        match (self.own, frame) {
+        match (self.axis, frame) {
             (Axis::Load, Frame::DriveChainStatus(status)) | (Axis::Drive, Frame::LoadChainStatus(status)) => {
                 self.partner.status = Some(*status);
                 self.partner_spoke = true;
@@ -48,7 +49,7 @@ impl Received {
                 self.take_stop(stop);
             }
             (_, Frame::RunControl(control)) => self.console.take_run_control(control, self.experiment),
-            (own, Frame::HandSetPoint(hand)) if own == axis_of(hand) => self.hand = Some(*hand),
+            (axis, Frame::HandSetPoint(hand)) if axis == axis_of(hand) => self.hand = Some(*hand),
             _ => {}
         }
     }

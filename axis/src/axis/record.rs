@@ -37,7 +37,7 @@ pub struct AxisRecord {
     /// Its rate, filtered, m/s.
     pub velocity_m_per_s: f64,
     pub force_n: f64,
-    /// Velocity that the algorithm wants, own extension, m/s.
+    /// Velocity that the algorithm wants, along the axis's extension, m/s.
     pub wanted_velocity_m_per_s: f64,
     /// Opening sent, -1 to 1.
     pub opening: f64,

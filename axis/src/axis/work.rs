@@ -139,7 +139,7 @@ impl Work {
     pub(super) fn error(&self, demand: &Demand, ready: &Ready) -> ControlError {
         match self {
             Self::Shut => ControlError::None,
-            // Both in the own extension, where only the difference counts.
+            // Both in the axis's extension, where only the difference counts.
             Self::Position { .. } => {
                 ControlError::Position { error_m: ready.set_position_m - ready.position_m }
             }

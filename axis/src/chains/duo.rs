@@ -3,7 +3,7 @@
 //! Each is wired as in an axis controller, by the same [`Leading`].
 
 use super::leading::{Leading, LeadingInputs};
-use super::main::{Lengths, MainConfig, MainOutput, OwnAxis, Phase};
+use super::main::{AxisMeasurement, Lengths, MainConfig, MainOutput, Phase};
 use super::settled::ControlError;
 use super::{AfterStop, Console, Fault, Partner};
 use protocol::frames::{
@@ -84,11 +84,12 @@ impl One {
         if !self.alive {
             return None;
         }
-        let own = self.sensors.then_some(OwnAxis { position_m: self.position_m, error: self.error });
+        let measurement =
+            self.sensors.then_some(AxisMeasurement { position_m: self.position_m, error: self.error });
         let output = self.leading.advance(&LeadingInputs {
             cycle,
             rig: Some(rig),
-            own,
+            measurement,
             prepared: self.prepared,
             partner: self.partner,
             frame,
@@ -201,13 +202,13 @@ impl Duo {
 
 /// Half a second of positioning, 0.2 s of force, 0.3 s of settling, 1 s of experiment.
 pub(super) fn short() -> MainConfig {
-    let own = Lengths { prepare_s: 0.0, initial_force_s: 0.2, experiment_s: 1.0 };
+    let lengths = Lengths { prepare_s: 0.0, initial_force_s: 0.2, experiment_s: 1.0 };
     MainConfig {
         experiment: 9,
         start_m: Some(0.1),
         prepares: true,
-        own,
-        either: own,
+        lengths,
+        longest_lengths: lengths,
         settling_s: 0.3,
         settling_timeout_s: 2.0,
         after_emergency_stop: AfterStop::Restart,

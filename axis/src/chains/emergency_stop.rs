@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!            rig tripped, a frame                       at standstill,               not tripped any more,
-//!            (own fault: from any)                      100 cycles at least          nothing held here
+//!            (local fault: from any)                    100 cycles at least          nothing held here
 //!   Ready ─────────────────────────────────► Tripped ───────────────────► Waiting- ──────────────────────► Recovering
 //!     ▲                                         ▲      or 1 s             ForRelease                           │
 //!     │                                         └─── rig tripped, a frame ◄─── Recovering, WaitingForStart     │
@@ -63,7 +63,7 @@ pub struct StopInputs {
     pub at_standstill: bool,
     /// A status of the partner came lately, or none is needed.
     pub partner_fresh: bool,
-    /// Own sensors came lately and are good.
+    /// Sensors of this axis came lately and are good.
     pub sensors_fresh: bool,
 }
 
@@ -75,7 +75,7 @@ pub enum StopCause {
     /// Somebody tripped it over the bus.
     Frame(EmergencyStopReason),
     /// This controller tripped it.
-    Own(Fault),
+    LocalFault(Fault),
     Standstill,
     NoStandstill,
     Released,
@@ -83,8 +83,9 @@ pub enum StopCause {
     Started,
 }
 
+/// The fault for which this controller tripped the emergency stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Own {
+struct LocalFault {
     fault: Fault,
     acknowledged: bool,
 }
@@ -93,8 +94,8 @@ struct Own {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     Ready,
-    Tripped { own: Option<Own> },
-    WaitingForRelease { own: Option<Own> },
+    Tripped { local_fault: Option<LocalFault> },
+    WaitingForRelease { local_fault: Option<LocalFault> },
     Recovering { up_since: Option<u64> },
     WaitingForStart,
 }
@@ -136,7 +137,7 @@ impl EmergencyStopChain {
     /// Trips the emergency stop for a fault of this controller; the first one is kept until it is released.
     pub fn trip(&mut self, fault: Fault, cycle: u64) {
         if self.holds().is_none() {
-            self.enter(EmergencyStopChainState::Tripped, StopCause::Own(fault), cycle);
+            self.enter(EmergencyStopChainState::Tripped, StopCause::LocalFault(fault), cycle);
         }
     }
 
@@ -168,12 +169,12 @@ impl EmergencyStopChain {
 
     /// The fault for which this controller holds the emergency stop.
     pub fn holds(&self) -> Option<Fault> {
-        self.own().filter(|own| !own.acknowledged).map(|own| own.fault)
+        self.local_fault().filter(|local| !local.acknowledged).map(|local| local.fault)
     }
 
-    fn own(&self) -> Option<Own> {
+    fn local_fault(&self) -> Option<LocalFault> {
         match self.state {
-            State::Tripped { own } | State::WaitingForRelease { own } => own,
+            State::Tripped { local_fault } | State::WaitingForRelease { local_fault } => local_fault,
             _ => None,
         }
     }
@@ -182,10 +183,11 @@ impl EmergencyStopChain {
     fn note(&mut self, inputs: &StopInputs) {
         let up = self.is_up(inputs);
         match &mut self.state {
-            State::Tripped { own: Some(own) } | State::WaitingForRelease { own: Some(own) } => {
-                let over = own.fault.is_over(inputs.partner_fresh, inputs.sensors_fresh);
+            State::Tripped { local_fault: Some(local) }
+            | State::WaitingForRelease { local_fault: Some(local) } => {
+                let over = local.fault.is_over(inputs.partner_fresh, inputs.sensors_fresh);
                 if inputs.console.release && over {
-                    own.acknowledged = true;
+                    local.acknowledged = true;
                     // Once for each of the person's frames: the bus may have lost the one before.
                     self.frames = Frames::Release;
                 }
@@ -246,17 +248,17 @@ impl EmergencyStopChain {
         self.state = match state {
             S::Ready => State::Ready,
             S::Tripped => {
-                let own = match cause {
-                    StopCause::Own(fault) => Some(Own { fault, acknowledged: false }),
+                let local_fault = match cause {
+                    StopCause::LocalFault(fault) => Some(LocalFault { fault, acknowledged: false }),
                     // Nothing is held where the rig or a frame can trip from.
                     _ => None,
                 };
-                if let Some(Own { fault, .. }) = own {
+                if let Some(LocalFault { fault, .. }) = local_fault {
                     self.frames = Frames::Hold { next: now, reason: fault.reason() };
                 }
-                State::Tripped { own }
+                State::Tripped { local_fault }
             }
-            S::WaitingForRelease => State::WaitingForRelease { own: self.own() },
+            S::WaitingForRelease => State::WaitingForRelease { local_fault: self.local_fault() },
             S::Recovering => State::Recovering { up_since: None },
             S::WaitingForStart => State::WaitingForStart,
         };

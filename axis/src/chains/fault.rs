@@ -1,6 +1,6 @@
 //! What ends a run by fault: a name for files, a reason for the bus, a sentence for people, and when its cause is gone.
 //!
-//! Every fault shuts the own valve in the cycle in which it is found and trips the central emergency stop with its reason.
+//! Every fault shuts the axis's valve in the cycle in which it is found and trips the central emergency stop with its reason.
 
 use protocol::frames::EmergencyStopReason;
 use std::fmt;
@@ -57,10 +57,10 @@ faults! {
         "the rods are not linked, so there is nothing to press against: link them, in an experiment's file by \
          linked = true in [rig]",
     SensorLoss "sensor-loss" SensorLoss:
-        "the own sensors fell silent for 50 ms: see whether the rig still sends them",
+        "this axis's sensors fell silent for 50 ms: see whether the rig still sends them",
     LimitExceeded "limit-exceeded" LimitExceeded:
-        "the own force or a chamber's pressure was beyond its sensor's range for half a second: look for a blocked \
-         axis, too high a supply, or a broken sensor",
+        "this axis's force or a chamber's pressure was beyond its sensor's range for half a second: look for a \
+         blocked axis, too high a supply, or a broken sensor",
     ControllerFault "controller-fault" ControllerFault: "the algorithm gave no number or missed its time",
 }
 

@@ -71,7 +71,7 @@ pub struct ForceInputs {
     pub cycle: u64,
     pub asked: ForceAsked,
     pub force_n: f64,
-    /// Own velocity, filtered, m/s.
+    /// Velocity of this axis's rod, filtered, m/s.
     pub velocity_m_per_s: f64,
 }
 

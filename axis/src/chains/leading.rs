@@ -9,7 +9,7 @@
 //! A fault trips once, when it comes: what was released since stays released, unless its cause comes again.
 
 use super::emergency_stop::{EmergencyStopChain, StopConfig, StopInputs};
-use super::main::{MainChain, MainConfig, MainInputs, MainOutput, OwnAxis};
+use super::main::{AxisMeasurement, MainChain, MainConfig, MainInputs, MainOutput};
 use super::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopReason, RigStatus};
 
@@ -17,14 +17,14 @@ use protocol::frames::{EmergencyStopReason, RigStatus};
 pub struct LeadingInputs {
     pub cycle: u64,
     pub rig: Option<RigStatus>,
-    /// Own sensors; `None` before the first, and while they are lost.
-    pub own: Option<OwnAxis>,
+    /// `None` before the first sensors of this axis, and while they are lost.
+    pub measurement: Option<AxisMeasurement>,
     pub prepared: bool,
     pub partner: Partner,
     /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
     pub frame: Option<EmergencyStopReason>,
     pub console: Console,
-    /// A fault of the own axis that was found since the last cycle.
+    /// A fault of this axis that was found since the last cycle.
     pub fault: Option<Fault>,
 }
 
@@ -50,7 +50,7 @@ impl Leading {
 
     /// Moves both on by one edge at most, and trips for a fault that is new.
     pub fn advance(&mut self, inputs: &LeadingInputs) -> MainOutput {
-        let LeadingInputs { cycle, rig, own, prepared, partner, frame, console, fault } = *inputs;
+        let LeadingInputs { cycle, rig, measurement, prepared, partner, frame, console, fault } = *inputs;
         let emergency_stop = self.stop.advance(&StopInputs {
             cycle,
             rig,
@@ -58,9 +58,9 @@ impl Leading {
             console,
             at_standstill: self.main.still(),
             partner_fresh: !self.partner_needed || partner.fresh(cycle).is_some(),
-            sensors_fresh: own.is_some(),
+            sensors_fresh: measurement.is_some(),
         });
-        let main = MainInputs { cycle, own, prepared, partner, emergency_stop, console, fault };
+        let main = MainInputs { cycle, measurement, prepared, partner, emergency_stop, console, fault };
         let output = self.main.advance(&main);
         let was_in_fault = self.output.is_some_and(|before| before.fault.is_some());
         // While in fault the chain keeps the first one; another, or the same again, trips all the same.

@@ -12,21 +12,21 @@
 //!   any but fault ─── a named fault ───────────────────────────► Fault
 //! ```
 //!
-//! The conditions are the own ones. A state on the way to done is left when the own condition holds *and* the partner, if it is
-//! needed, says OK in the same state or is in a later one. OK says that the own condition holds, so what one axis detects travels
-//! by that flag; a start that only one of them heard does too.
+//! The conditions are those of this axis. A state on the way to done is left when its condition holds *and* the partner, if it is
+//! needed, says OK in the same state or is in a later one. OK says that the sender's condition holds, so what one axis detects
+//! travels by that flag; a start that only one of them heard does too.
 //!
 //! What ends in a safe state (valve shut), and how fast:
 //!
 //! | what | where | after |
 //! |---|---|---|
-//! | emergency stop, console's abort, a fault of the own axis | any | in the cycle that tells |
+//! | emergency stop, console's abort, a fault of this axis | any | in the cycle that tells |
 //! | partner aborted or in fault | between waiting for the rig and done | in the cycle that tells; 100 cycles after a (re)start |
 //! | partner silent | initial positioning to final settling | 100 cycles after its last status |
 //! | partner began anew | initial positioning to final settling | in the cycle that tells |
-//! | own condition not met | preparing, settling, final settling | `settling_timeout_s` beyond the state's own length |
-//! | partner not OK, own condition met | initial positioning to final settling | the same beyond the longer length, and 0.1 s |
-//! | partner never heard at the start | waiting for the rig | 10 s after the own sensors |
+//! | condition not met | preparing, settling, final settling | `settling_timeout_s` beyond the state's own length |
+//! | partner not OK, condition met | initial positioning to final settling | the same beyond the longer length, and 0.1 s |
+//! | partner never heard at the start | waiting for the rig | 10 s after this axis's sensors |
 //!
 //! From aborted and fault the chain goes on when the emergency stop chain has been through and is ready again, or, when there was
 //! no emergency stop, on `RunControl` start; both not with [`AfterStop::End`](super::AfterStop::End). It begins with the
@@ -42,7 +42,7 @@ mod interface;
 mod tests;
 
 pub use config::{Lengths, MainConfig, Start, approach_s};
-pub use interface::{MainCause, MainInputs, MainOutput, OwnAxis, Phase};
+pub use interface::{AxisMeasurement, MainCause, MainInputs, MainOutput, Phase};
 
 use super::settled::Settled;
 use super::sync::repetitions_ahead;
@@ -74,7 +74,7 @@ struct Ended {
 }
 
 /// What a state needs to know besides since when it lasts, which is noted as it is entered. Initial positioning to final settling
-/// are running; `since` is when the first own sensors came.
+/// are running; `since` is when the first sensors of this axis came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     WaitingForRig { since: Option<u64> },
@@ -131,15 +131,15 @@ impl MainChain {
     /// Keeps what the inputs tell, without a change of state.
     fn note(&mut self, inputs: &MainInputs) {
         let cycle = inputs.cycle;
-        if let Some(own) = inputs.own {
-            self.settled.take(cycle, own.position_m, own.error);
+        if let Some(measurement) = inputs.measurement {
+            self.settled.take(cycle, measurement.position_m, measurement.error);
         }
         let partner_started = self.config.partner_needed && self.relation(inputs).ok();
         let in_settling = self.entered.state == MainChainState::Settling;
         self.started |= in_settling && (inputs.console.start || partner_started);
         let (held, ok) = (self.held(inputs), self.ok(inputs));
         match &mut self.state {
-            State::WaitingForRig { since } if inputs.own.is_some() => *since = since.or(Some(cycle)),
+            State::WaitingForRig { since } if inputs.measurement.is_some() => *since = since.or(Some(cycle)),
             State::Aborted { ended } | State::Fault { ended, .. } => {
                 ended.stopped |= inputs.emergency_stop != EmergencyStopChainState::Ready;
                 ended.by_person |= inputs.console.abort;
@@ -180,11 +180,11 @@ impl MainChain {
             MainCause::Recovered | MainCause::Started => self.later_repetition(inputs),
             _ => 0,
         };
-        self.from_m = inputs.own.map_or(0.0, |own| own.position_m);
+        self.from_m = inputs.measurement.map_or(0.0, |measurement| measurement.position_m);
         self.approach_s = self.config.start_m.map_or(0.0, |start_m| approach_s(self.from_m, start_m));
     }
 
-    /// The later of the own repetition and the partner's.
+    /// The later of this axis's repetition and the partner's.
     fn later_repetition(&self, inputs: &MainInputs) -> u32 {
         let status = inputs.partner.fresh(inputs.cycle).filter(|_| self.config.partner_needed);
         let ahead = status.map_or(0, |status| repetitions_ahead(self.repetition, status));

@@ -42,7 +42,7 @@ pub struct MatchingInputs {
     pub asked: bool,
     pub linked: bool,
     pub still: bool,
-    /// Own position sensor, without any offset, m.
+    /// Position sensor of this axis, without any offset, m.
     pub position_m: f64,
     pub partner: Partner,
 }
@@ -50,7 +50,7 @@ pub struct MatchingInputs {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MatchingOutput {
     pub state: MatchingChainState,
-    /// The last matched offset, to be taken from the own sensor, m; 0 before.
+    /// The last matched offset, to be taken from this axis's sensor, m; 0 before.
     pub offset_m: f64,
     pub matched: bool,
     pub fault: Option<Fault>,
@@ -105,7 +105,7 @@ impl Positions {
 enum State {
     Idle,
     WaitingForRest { began: u64, partner: Positions, rest_since: u64 },
-    Averaging { began: u64, own: Positions, partner: Positions, sampled: Option<u64> },
+    Averaging { began: u64, positions: Positions, partner: Positions, sampled: Option<u64> },
     Matched,
     Fault { fault: Fault },
 }
@@ -159,8 +159,8 @@ impl MatchingChain {
                     (*partner, *rest_since) = (Positions::NONE, cycle);
                 }
             }
-            State::Averaging { own, partner, sampled, .. } => {
-                own.take(inputs.position_m);
+            State::Averaging { positions, partner, sampled, .. } => {
+                positions.take(inputs.position_m);
                 let due = sampled.is_none_or(|last| cycle.saturating_sub(last) >= SAMPLE_CYCLES);
                 if let Some(position_m) = partner_m.filter(|_| due) {
                     partner.take(position_m);
@@ -193,15 +193,15 @@ impl MatchingChain {
                 let go = at_rest && inputs.linked && partner_position_m(inputs).is_some();
                 go.then_some((S::Averaging, MatchingCause::AtRest)).or_else(|| too_long(*began))
             }
-            State::Averaging { began, own, partner, .. } => {
-                let moved = own.moved(numbers.moved_m) || partner.moved(numbers.moved_m);
+            State::Averaging { began, positions, partner, .. } => {
+                let moved = positions.moved(numbers.moved_m) || partner.moved(numbers.moved_m);
                 let back = |cause| Some((S::WaitingForRest, cause));
                 let over = passed(self.entered.cycle) >= cycles(numbers.average_s);
                 match partner_position_m(inputs) {
                     _ if !inputs.linked => back(MatchingCause::NotLinked),
                     None => back(MatchingCause::Silent),
                     _ if moved => back(MatchingCause::Moved),
-                    _ if over => Some(Self::judge(own.mean_m() - partner.mean_m(), numbers)),
+                    _ if over => Some(Self::judge(positions.mean_m() - partner.mean_m(), numbers)),
                     _ => too_long(*began),
                 }
             }
@@ -227,15 +227,15 @@ impl MatchingChain {
     /// The only writer of the state.
     fn enter(&mut self, state: MatchingChainState, cause: MatchingCause, now: u64) {
         use MatchingChainState as S;
-        let [own, partner] = [Positions::NONE; 2];
+        let [positions, partner] = [Positions::NONE; 2];
         let began = self.began(now);
         self.state = match (state, cause) {
             (S::Idle, _) => State::Idle,
             (S::WaitingForRest, _) => State::WaitingForRest { began, partner, rest_since: now },
-            (S::Averaging, _) => State::Averaging { began, own, partner, sampled: None },
+            (S::Averaging, _) => State::Averaging { began, positions, partner, sampled: None },
             (S::Matched, _) => {
-                if let State::Averaging { own, partner, .. } = &self.state {
-                    self.offset_m = own.mean_m() - partner.mean_m();
+                if let State::Averaging { positions, partner, .. } = &self.state {
+                    self.offset_m = positions.mean_m() - partner.mean_m();
                 }
                 State::Matched
             }

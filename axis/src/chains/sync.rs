@@ -1,4 +1,4 @@
-//! Where the partner stands, seen from the own main chain.
+//! Where the partner stands, seen from this axis's main chain.
 //!
 //! ```text
 //!   waiting-for-rig │ initial-positioning … final-settling │ … again, repetition + 1 … │ done
@@ -71,16 +71,16 @@ mod tests {
     use super::*;
     use MainChainState as S;
 
-    fn seen(own: (S, u32), partner: (S, u8, bool)) -> Relation {
+    fn seen(chain: (S, u32), partner: (S, u8, bool)) -> Relation {
         let (main_chain, repetition, ok) = partner;
         let status = ChainStatus { main_chain, repetition, ok, ..ChainStatus::default() };
         let partner = Partner { status: Some(status), received: Some(0), ..Partner::default() };
-        relation(own.0, own.1, &partner, 0)
+        relation(chain.0, chain.1, &partner, 0)
     }
 
     #[test]
     fn the_order_goes_through_states_and_repetitions() {
-        let own = (S::Experiment, 3);
+        let chain = (S::Experiment, 3);
         for (partner, expected) in [
             ((S::Experiment, 3, false), Relation::Here { ok: false }),
             ((S::Experiment, 3, true), Relation::Here { ok: true }),
@@ -95,7 +95,7 @@ mod tests {
             ((S::Aborted, 3, true), Relation::Aborted),
             ((S::Fault, 3, true), Relation::Fault),
         ] {
-            assert_eq!(seen(own, partner), expected, "{partner:?}");
+            assert_eq!(seen(chain, partner), expected, "{partner:?}");
         }
     }
 

@@ -160,17 +160,18 @@ pub(crate) struct Given<'g, 'a> {
 impl Given<'_, '_> {
     /// A value of the row's own unit that must be given: `to` reads `to_m` or `to_n`.
     pub(crate) fn place(&mut self, stem: &str, meaning: &'static str) -> Result<f64, SettingsError> {
-        let parameter = self.own(stem, self.scale.most(), meaning);
+        let parameter = self.in_unit(stem, self.scale.most(), meaning);
         self.section.needed_number(&parameter)
     }
 
     /// A deviation to both sides that must be given.
     pub(crate) fn amplitude(&mut self) -> Result<f64, SettingsError> {
-        let parameter = self.own("amplitude", 0.5 * self.scale.most(), "deviation to either side");
+        let parameter = self.in_unit("amplitude", 0.5 * self.scale.most(), "deviation to either side");
         self.section.needed_number(&parameter)
     }
 
-    fn own(&self, stem: &str, most: f64, meaning: &'static str) -> Parameter {
+    /// A number of the row's unit, named `stem` with the unit behind it, from 0 to `most`.
+    fn in_unit(&self, stem: &str, most: f64, meaning: &'static str) -> Parameter {
         let name = format!("{stem}_{}", self.scale.unit().to_lowercase());
         let parameter = Parameter::new(("", self.scale.unit()), [0.0, most], 0.0, meaning);
         Parameter { name: name.into(), ..parameter }

@@ -20,19 +20,19 @@ const TELLING: [(&str, Quantity); 4] = [
 pub(crate) fn quantity(segments: &[Section<'_>]) -> Result<Option<Quantity>, SettingsError> {
     let mut first = None;
     for segment in segments {
-        let Some(own) = own_quantity(segment) else { continue };
-        let (quantity, line) = *first.get_or_insert((own, segment.line()));
-        if own != quantity {
-            let (own, other) = (own.name(), quantity.name());
+        let Some(stated) = stated_quantity(segment) else { continue };
+        let (quantity, line) = *first.get_or_insert((stated, segment.line()));
+        if stated != quantity {
+            let (stated, other) = (stated.name(), quantity.name());
             let message =
-                format!("law is of {own}s, line {line} of {other}s: a row mixes no positions and forces");
+                format!("law is of {stated}s, line {line} of {other}s: a row mixes no positions and forces");
             return Err(segment.wrong_at("law", &message));
         }
     }
     Ok(first.map(|(quantity, _)| quantity))
 }
 
-fn own_quantity(segment: &Section<'_>) -> Option<Quantity> {
+fn stated_quantity(segment: &Section<'_>) -> Option<Quantity> {
     let name = segment.peek("law")?;
     if force::KINDS.iter().any(|kind| kind.name == name) {
         return Some(Quantity::Force);

@@ -125,7 +125,10 @@ fn everything_trips_from_everywhere_in_its_cycle() {
     for state in [S::Ready, S::Tripped, S::WaitingForRelease, S::Recovering, S::WaitingForStart] {
         let mut play = Play::to(AfterStop::OnStart, state);
         play.chain.trip(Fault::SensorLoss, play.inputs.cycle);
-        assert_eq!((play.chain.state(), play.cause()), (S::Tripped, StopCause::Own(Fault::SensorLoss)));
+        assert_eq!(
+            (play.chain.state(), play.cause()),
+            (S::Tripped, StopCause::LocalFault(Fault::SensorLoss))
+        );
         let stop = EmergencyStop { reason: EmergencyStopReason::SensorLoss, release: false };
         assert_eq!(play.chain.frame_due(play.inputs.cycle), Some(stop), "at once, in {state}");
     }

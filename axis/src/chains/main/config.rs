@@ -27,19 +27,20 @@ pub enum Start {
     OnStart,
 }
 
-/// Configuration of the main chain of one axis. Both axes must be given the same, save for what is called own.
+/// Configuration of the main chain of one axis. Both axes must be given the same, save for `start_m`, `prepares` and
+/// `lengths`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MainConfig {
     pub experiment: u8,
     pub partner_needed: bool,
-    /// Own: where the initial positioning ends, m; `None` for an axis that is not positioned.
+    /// Where the initial positioning ends, m; `None` for an axis that is not positioned.
     pub start_m: Option<f64>,
-    /// Own: whether preparing waits for `prepared`.
+    /// Whether preparing waits for `prepared`.
     pub prepares: bool,
-    /// Own: how long the states are meant to last.
-    pub own: Lengths,
+    /// How long the states are meant to last.
+    pub lengths: Lengths,
     /// How long they are meant to last for the slower of both axes.
-    pub either: Lengths,
+    pub longest_lengths: Lengths,
     /// Longest initial positioning of either axis, s.
     pub approach_longest_s: f64,
     /// How often the experiment is run; `None`: until the rig ends.
@@ -60,8 +61,8 @@ impl Default for MainConfig {
             partner_needed: true,
             start_m: None,
             prepares: false,
-            own: Lengths::default(),
-            either: Lengths::default(),
+            lengths: Lengths::default(),
+            longest_lengths: Lengths::default(),
             approach_longest_s: approach_s(0.0, 0.5),
             repetitions: Some(1),
             settling_s: 0.5,

@@ -27,7 +27,7 @@ impl MainChain {
 
     fn decide_waiting_for_rig(&self, since: u64, inputs: &MainInputs) -> Option<Edge> {
         let go = Some((MainChainState::InitialPositioning, MainCause::Ready));
-        inputs.own?;
+        inputs.measurement?;
         if !self.config.partner_needed {
             return go;
         }
@@ -93,13 +93,13 @@ impl MainChain {
 
     fn decide_late(&self, wait: &Wait, inputs: &MainInputs) -> Option<Edge> {
         let timeout = cycles(self.config.settling_timeout_s);
-        let [own, either] = self.expected_cycles();
+        let [length, longest] = self.expected_cycles();
         if let Some(ok_since) = wait.ok_since {
-            let from = ok_since.max(self.entered.cycle + either);
+            let from = ok_since.max(self.entered.cycle + longest);
             // The partner's own time-out, which names the cause, comes first.
             return passed(from, timeout + GRACE_CYCLES, inputs.cycle).then_some(fault(Fault::PartnerNotOk));
         }
-        let from = wait.for_console.unwrap_or(0).max(self.entered.cycle + own);
+        let from = wait.for_console.unwrap_or(0).max(self.entered.cycle + length);
         // Settled and waiting for the console is not late.
         let late = passed(from, timeout, inputs.cycle) && !self.held(inputs);
         let cause = match self.entered.state {
@@ -114,7 +114,7 @@ impl MainChain {
         if self.config.after_emergency_stop == AfterStop::End || !ready(inputs.emergency_stop) {
             return None;
         }
-        inputs.own.filter(|_| inputs.fault.is_none())?;
+        inputs.measurement.filter(|_| inputs.fault.is_none())?;
         if self.config.partner_needed {
             inputs.partner.fresh(inputs.cycle).filter(|status| {
                 use MainChainState::{Aborted, Fault, InitialPositioning};
@@ -135,20 +135,20 @@ impl MainChain {
         relation(self.entered.state, self.repetition, &inputs.partner, inputs.cycle)
     }
 
-    /// Whether the own axis is done with the state, whoever must start what follows.
+    /// Whether this axis is done with the state, whoever must start what follows.
     pub(super) fn held(&self, inputs: &MainInputs) -> bool {
         use MainChainState as S;
         let (config, since) = (&self.config, self.entered.cycle);
         let over = |length_s| passed(since, cycles(length_s), inputs.cycle + 1);
         match self.entered.state {
-            S::WaitingForRig => inputs.own.is_some(),
+            S::WaitingForRig => inputs.measurement.is_some(),
             S::InitialPositioning => over(self.approach_s),
             S::Preparing => inputs.prepared || !config.prepares,
-            S::InitialForce => over(config.own.initial_force_s),
+            S::InitialForce => over(config.lengths.initial_force_s),
             S::Settling | S::FinalSettling => {
                 self.settled.settled_for(config.settling_s, since, inputs.cycle)
             }
-            S::Experiment => over(config.own.experiment_s),
+            S::Experiment => over(config.lengths.experiment_s),
             S::Done => true,
             S::Aborted | S::Fault => false,
         }
@@ -161,14 +161,15 @@ impl MainChain {
 
     /// How long the state is meant to last, for this axis and for the slower of both.
     fn expected_cycles(&self) -> [u64; 2] {
-        let MainConfig { own, either, settling_s, approach_longest_s, .. } = &self.config;
+        let MainConfig { lengths, longest_lengths: longest, settling_s, approach_longest_s, .. } =
+            &self.config;
         use MainChainState as S;
         let seconds = match self.entered.state {
             S::InitialPositioning => [self.approach_s, *approach_longest_s],
-            S::Preparing => [own.prepare_s, either.prepare_s],
-            S::InitialForce => [own.initial_force_s, either.initial_force_s],
+            S::Preparing => [lengths.prepare_s, longest.prepare_s],
+            S::InitialForce => [lengths.initial_force_s, longest.initial_force_s],
             S::Settling | S::FinalSettling => [*settling_s; 2],
-            S::Experiment => [own.experiment_s, either.experiment_s],
+            S::Experiment => [lengths.experiment_s, longest.experiment_s],
             _ => [0.0; 2],
         };
         [cycles(seconds[0]), cycles(seconds[0].max(seconds[1]))]

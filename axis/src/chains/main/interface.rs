@@ -5,8 +5,9 @@ use crate::chains::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopChainState, MainChainState};
 use std::fmt;
 
+/// What the axis measures of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OwnAxis {
+pub struct AxisMeasurement {
     /// Position sensor as it came, less the matched offset, rig coordinates, m.
     pub position_m: f64,
     pub error: ControlError,
@@ -15,14 +16,14 @@ pub struct OwnAxis {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MainInputs {
     pub cycle: u64,
-    /// Own sensors; `None` before the first.
-    pub own: Option<OwnAxis>,
+    /// `None` before the first sensors of this axis.
+    pub measurement: Option<AxisMeasurement>,
     pub prepared: bool,
     pub partner: Partner,
-    /// State of the own emergency stop chain in this cycle.
+    /// State of this axis's emergency stop chain in this cycle.
     pub emergency_stop: EmergencyStopChainState,
     pub console: Console,
-    /// A fault of the own axis: sensors, limits, algorithm, force or matching chain.
+    /// A fault of this axis: sensors, limits, algorithm, force or matching chain.
     pub fault: Option<Fault>,
 }
 

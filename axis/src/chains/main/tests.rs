@@ -27,7 +27,7 @@ fn order(one: &One) -> Vec<S> {
 fn reported(cycle: u64, status: ChainStatus) -> MainInputs {
     MainInputs {
         cycle,
-        own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
+        measurement: Some(AxisMeasurement { position_m: 0.1, error: ControlError::None }),
         partner: Partner { status: Some(status), values: None, received: Some(cycle) },
         ..MainInputs::default()
     }
@@ -136,8 +136,14 @@ fn repetitions_begin_with_the_initial_positioning() {
 #[test]
 fn forever_goes_past_the_wrap_of_the_repetition() {
     let tiny = Lengths { experiment_s: 0.01, ..Lengths::default() };
-    let config =
-        MainConfig { repetitions: None, own: tiny, either: tiny, settling_s: 0.0, start_m: None, ..short() };
+    let config = MainConfig {
+        repetitions: None,
+        lengths: tiny,
+        longest_lengths: tiny,
+        settling_s: 0.0,
+        start_m: None,
+        ..short()
+    };
     let mut duo = Duo::new(&config);
     duo.run(20_000);
     let repetition = duo.axes[0].output.unwrap().repetition;

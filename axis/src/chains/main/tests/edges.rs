@@ -21,7 +21,7 @@ fn follows(from: S) -> &'static [S] {
 prop_compose! {
     fn any_inputs()(
         cycles in prop_oneof![4 => 1_u64..30, 1 => 0_u64..3000],
-        own in prop_oneof![9 => Just(true), 1 => Just(false)],
+        sensors in prop_oneof![9 => Just(true), 1 => Just(false)],
         position_m in prop_oneof![9 => Just(0.1), 1 => -1.0..1.0, 1 => Just(f64::NAN)],
         prepared: bool,
         partner in (0_u8..10, any::<bool>(), 0_u8..3, 0_u64..150, 0_u8..5),
@@ -39,7 +39,7 @@ prop_compose! {
         };
         (cycles, MainInputs {
             cycle: 0,
-            own: own.then_some(OwnAxis { position_m, error: ControlError::None }),
+            measurement: sensors.then_some(AxisMeasurement { position_m, error: ControlError::None }),
             prepared,
             partner: Partner { status: Some(status), values: None, received: Some(age) },
             emergency_stop: EmergencyStopChainState::from_raw(stop).unwrap(),

@@ -155,11 +155,17 @@ fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
     let endless = 1e4;
     let slow = |state| match state {
         S::InitialPositioning => MainConfig { start_m: Some(0.1 + 0.1 * endless), ..short() },
-        S::InitialForce => MainConfig { own: Lengths { initial_force_s: endless, ..short().own }, ..short() },
-        S::Experiment => MainConfig { own: Lengths { experiment_s: endless, ..short().own }, ..short() },
-        S::Preparing => {
-            MainConfig { prepares: true, own: Lengths { prepare_s: endless, ..short().own }, ..short() }
+        S::InitialForce => {
+            MainConfig { lengths: Lengths { initial_force_s: endless, ..short().lengths }, ..short() }
         }
+        S::Experiment => {
+            MainConfig { lengths: Lengths { experiment_s: endless, ..short().lengths }, ..short() }
+        }
+        S::Preparing => MainConfig {
+            prepares: true,
+            lengths: Lengths { prepare_s: endless, ..short().lengths },
+            ..short()
+        },
         _ => MainConfig { settling_timeout_s: endless, ..short() },
     };
     for state in RUNNING {
@@ -190,9 +196,9 @@ fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
 
 #[test]
 fn a_slow_partner_is_waited_for_when_its_length_is_known() {
-    let long = Lengths { experiment_s: 6.0, ..short().own };
-    let mut duo = Duo::new(&MainConfig { either: long, ..short() });
-    duo.axes[1] = One::new(MainConfig { own: long, either: long, ..short() });
+    let long = Lengths { experiment_s: 6.0, ..short().lengths };
+    let mut duo = Duo::new(&MainConfig { longest_lengths: long, ..short() });
+    duo.axes[1] = One::new(MainConfig { lengths: long, longest_lengths: long, ..short() });
     duo.run(9000);
     assert_eq!(duo.states(), [S::Done; 2]);
 }
