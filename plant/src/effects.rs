@@ -205,7 +205,7 @@ impl AxisEffects {
 
 /// Which laws of an axis have effects in them; the others are the baseline's.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Touched {
+pub(crate) struct ChangedLaws {
     pub(crate) spool: bool,
     pub(crate) air: bool,
     pub(crate) stored_air: bool,
@@ -214,10 +214,10 @@ pub(crate) struct Touched {
     pub(crate) past_readings: bool,
 }
 
-impl Touched {
+impl ChangedLaws {
     /// By the sheets of the effects of both axes, and their tables.
-    pub(crate) fn of(on: &[AxisEffects; 2]) -> [Touched; 2] {
-        let mut both = [Touched::default(); 2];
+    pub(crate) fn of(on: &[AxisEffects; 2]) -> [ChangedLaws; 2] {
+        let mut both = [ChangedLaws::default(); 2];
         for (axis, effects) in on.iter().enumerate() {
             effects.each_law(|law| match law {
                 Law::Spool => both[axis].spool = true,
@@ -249,16 +249,16 @@ impl AxisEffects {
 }
 
 /// Whether effects change constants and what sensors show at an instant, and nothing else.
-fn act_in_no_step(on: &[AxisEffects; 2], touched: &[Touched; 2]) -> bool {
+fn act_in_no_step(on: &[AxisEffects; 2], changed_laws: &[ChangedLaws; 2]) -> bool {
     let declared = on.iter().any(|on| on.declared.any());
-    !declared && touched.iter().all(|touched| *touched == Touched::default())
+    !declared && changed_laws.iter().all(|laws| *laws == ChangedLaws::default())
 }
 
 /// Whether the baseline's laws move a plant of this rig: nothing is added to it, or what changes constants and readings alone.
 #[must_use]
 pub fn leave_laws_alone(rig: &RigParameters) -> bool {
     let on = AxisEffects::of(rig);
-    act_in_no_step(&on, &Touched::of(&on))
+    act_in_no_step(&on, &ChangedLaws::of(&on))
 }
 
 /// The sheet of an effect by its name.

@@ -210,7 +210,7 @@ fn edge_flows(
     ]
     .map(Pair::to_array);
     let Some(effects) = effects else { return flows.map(|lanes| Pair::new(lanes[0], lanes[1])) };
-    for axis in (0..2).filter(|axis| effects.touched[*axis].air) {
+    for axis in (0..2).filter(|axis| effects.changed_laws[*axis].air) {
         let through = effects.ports_at(integrator, axis, state, air).flow_m3_per_s;
         flows.iter_mut().zip(through).for_each(|(lanes, flow)| lanes[axis] = flow);
     }

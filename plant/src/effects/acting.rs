@@ -14,7 +14,7 @@ use super::presliding::Bristle;
 use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
 use super::tabulated::Seen;
-use super::{AxisEffects, OpenBalance, Touched, act_in_no_step};
+use super::{AxisEffects, ChangedLaws, OpenBalance, act_in_no_step};
 use crate::faults::{Faults, Outlet};
 use crate::integrator::laws::{At, Baseline, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
@@ -28,7 +28,7 @@ use crate::truth::Forces;
 #[derive(Debug, Clone)]
 pub(crate) struct Effects {
     pub(crate) on: [AxisEffects; 2],
-    pub(crate) touched: [Touched; 2],
+    pub(crate) changed_laws: [ChangedLaws; 2],
     pub(crate) memory: Memory,
     /// Factors of the motion: for the two lengths of step and the directions of drive and load, to the middle and to the end.
     pub(super) ways: [[[[MotionSpan; 2]; 2]; 2]; 2],
@@ -63,7 +63,7 @@ impl Effects {
         let on = AxisEffects::of(rig);
         let mut effects = Box::new(Effects {
             memory: Memory::at_rest(&on, of, state),
-            touched: Touched::of(&on),
+            changed_laws: ChangedLaws::of(&on),
             on,
             ways: [[[[of.spans()[0].motion_to_end; 2]; 2]; 2]; 2],
             substep_s: of.substep_s(),
@@ -94,14 +94,14 @@ impl Effects {
 
     /// What is broken in the laws from now on; [`Effects::move_with`] follows.
     pub(crate) fn set_faults(&mut self, faults: &Faults) {
-        self.touched = Touched::of(&self.on);
+        self.changed_laws = ChangedLaws::of(&self.on);
         for (axis, faults) in faults.axes.iter().enumerate() {
             self.friction_factors[axis] = faults.friction_factor;
             self.outlets[axis] = faults.outlets();
             let leaks = self.leaks(axis);
-            self.touched[axis].air |= leaks;
-            self.touched[axis].stored_air |= leaks;
-            if !self.touched[axis].stored_air {
+            self.changed_laws[axis].air |= leaks;
+            self.changed_laws[axis].stored_air |= leaks;
+            if !self.changed_laws[axis].stored_air {
                 self.memory.moving.axes[axis].air_rate_w = [0.0; 2];
             }
         }
@@ -116,11 +116,11 @@ impl Effects {
 
     fn has_baseline_laws(&self) -> bool {
         let leaks = (0..2).any(|axis| self.leaks(axis));
-        act_in_no_step(&self.on, &self.touched) && self.baseline_friction && !leaks
+        act_in_no_step(&self.on, &self.changed_laws) && self.baseline_friction && !leaks
     }
 
     fn has_baseline_friction(&self) -> bool {
-        self.touched.iter().all(|touched| !touched.friction) && self.friction_factors == [1.0; 2]
+        self.changed_laws.iter().all(|laws| !laws.friction) && self.friction_factors == [1.0; 2]
     }
 
     fn leaks(&self, axis: usize) -> bool {
@@ -177,7 +177,8 @@ impl Effects {
     fn spool_to_middle(&self, at: At<'_>, carried: &mut Moving) -> Pair {
         let mut spools = at.spool_after(at.span.spool_to_middle).to_array();
         let (since_period_s, half_s) = (at.since_period_s(), at.span.span_s / 2.0);
-        for (axis, spool) in spools.iter_mut().enumerate().filter(|(axis, _)| self.touched[*axis].spool) {
+        for (axis, spool) in spools.iter_mut().enumerate().filter(|(axis, _)| self.changed_laws[*axis].spool)
+        {
             let axis_states = &mut carried.axes[axis];
             if at.held.stuck[axis] {
                 (*spool, axis_states.spool_rate_per_s) = (at.from.spool.to_array()[axis], 0.0);
@@ -202,7 +203,7 @@ impl Effects {
         let mut pressure_pa = middle.pressure.map(Pair::to_array);
         let mut flow = middle.edge_flow.map(Pair::to_array);
         let mut drawn = 0.0;
-        for axis in (0..2).filter(|axis| self.touched[*axis].air) {
+        for axis in (0..2).filter(|axis| self.changed_laws[*axis].air) {
             let lane = |pair: Pair| pair.to_array()[axis];
             let axis_states = &mut carried.axes[axis];
             let exhaust = ExhaustSide {
@@ -275,7 +276,7 @@ impl Laws for Effects {
     fn middle(&self, at: At<'_>, carried: &mut Moving) -> Middle {
         let spool = self.spool_to_middle(at, carried);
         let mut middle = at.middle(spool);
-        if self.touched.iter().any(|touched| touched.air) {
+        if self.changed_laws.iter().any(|laws| laws.air) {
             self.pass_air(at, spool, carried, &mut middle);
         }
         middle
@@ -283,7 +284,11 @@ impl Laws for Effects {
 
     fn outside(&self, at: At<'_>, middle: &Middle) -> Pair {
         let force = |axis: usize| {
-            if self.touched[axis].force { self.force(axis, &seen(at, middle, axis)).sum(0.0) } else { 0.0 }
+            if self.changed_laws[axis].force {
+                self.force(axis, &seen(at, middle, axis)).sum(0.0)
+            } else {
+                0.0
+            }
         };
         at.held.hand + Pair::new(force(0), force(1))
     }
@@ -389,7 +394,7 @@ impl Laws for Effects {
     }
 
     fn air(&self, at: At<'_>, to: &mut Lanes, middle: &Middle, carried: &mut Moving) {
-        if !self.touched.iter().any(|touched| touched.stored_air) {
+        if !self.changed_laws.iter().any(|laws| laws.stored_air) {
             return;
         }
         let (of, from) = (at.of, at.from);
@@ -399,7 +404,7 @@ impl Laws for Effects {
         let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
         let mut stored = to.air().map(|air| air.stored.to_array());
         for axis in [0, 1] {
-            if !self.touched[axis].stored_air {
+            if !self.changed_laws[axis].stored_air {
                 continue;
             }
             let lane = |pair: Pair| pair.to_array()[axis];
@@ -443,8 +448,9 @@ impl Laws for Effects {
 
     fn spool(&self, at: At<'_>, carried: &Moving) -> Pair {
         let baseline = at.spool_after(at.span.spool_to_end).to_array();
-        let spool =
-            |axis: usize| if self.touched[axis].spool { carried.axes[axis].spool } else { baseline[axis] };
+        let spool = |axis: usize| {
+            if self.changed_laws[axis].spool { carried.axes[axis].spool } else { baseline[axis] }
+        };
         Pair::new(spool(0), spool(1))
     }
 
@@ -463,7 +469,7 @@ impl Laws for Effects {
             for (line, flow) in self.memory.lines[axis].iter_mut().zip(axis_states.port_flow_m3_per_s) {
                 line.iter_mut().for_each(|line| line.push(flow));
             }
-            if self.touched[axis].past_readings {
+            if self.changed_laws[axis].past_readings {
                 self.keep_readings(of, axis, lanes);
             }
             if self.on[axis].declared.remembers() {

@@ -126,7 +126,7 @@ impl<'a> Friction<'a> {
     /// Level of sliding friction in a direction (1 extending, -1 retracting) at a speed, N, not below 0.
     pub(super) fn sliding_n(&self, speed: f64, direction: f64) -> f64 {
         let file = self.of.motion.levels().sliding_n[0];
-        let level = if self.effects.touched[self.axis].friction {
+        let level = if self.effects.changed_laws[self.axis].friction {
             self.sliding_level(speed, direction).sum(file).max(0.0)
         } else {
             file
@@ -137,7 +137,7 @@ impl<'a> Friction<'a> {
     /// Break-away level in a direction, N: not easier than to slide.
     pub(super) fn break_away_n(&self, direction: f64) -> f64 {
         let (file, factor) = (self.of.motion.levels(), self.effects.friction_factors[self.axis]);
-        if !self.effects.touched[self.axis].friction {
+        if !self.effects.changed_laws[self.axis].friction {
             return file.break_away_n[0] * factor;
         }
         let sliding = self.sliding_level(0.0, direction);
