@@ -2,6 +2,7 @@
 
 use super::columns::Table;
 use super::{NewError, Roles};
+use crate::stats::median;
 use model::{RESERVED, Unit, with_powers};
 use records::{ColumnOptions, read_columns};
 use std::path::Path;
@@ -176,9 +177,9 @@ fn time((column, unit): (&str, Option<&str>), values: &[f64]) -> Time {
     let unit = if is_time { unit } else { "s".to_owned() };
     let factor = Unit::parse(&unit).map_or(1.0, |unit| unit.factor);
     let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
+    let step = median(&mut steps).expect("a time that grows has two values");
     let length = values[values.len() - 1] - values[0];
-    Time { column: column.into(), unit, step_s: steps[steps.len() / 2] * factor, length_s: length * factor }
+    Time { column: column.into(), unit, step_s: step * factor, length_s: length * factor }
 }
 
 fn column((column, unit): (&str, Option<&str>), values: Vec<f64>, step_s: f64, others: &[Column]) -> Column {
