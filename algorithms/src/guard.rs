@@ -95,7 +95,7 @@ impl Guarded {
         Self { algorithm, clock, slow: 0, fault: None }
     }
 
-    /// The latched fault.
+    /// The fault since which the algorithm is not asked any more; `None` before one.
     #[must_use]
     pub fn fault(&self) -> Option<AlgorithmFault> {
         self.fault

@@ -104,7 +104,6 @@ impl<'a> Windows<'a> {
         Windows { record, rig, starts, points, outputs, readings, valid, jitter_sensitivity, bases }
     }
 
-    /// The baseline rig.
     pub fn rig(&self) -> &RigParameters {
         &self.rig
     }

@@ -64,7 +64,7 @@ pub const RELINEARISED: Options =
 /// New linearisations of the parameters alone, from the rig file's values to a supply or a mass that is a tenth off.
 pub const CALIBRATION: Options = Options { steps: 7, ..RELINEARISED };
 
-/// A simulated model.
+/// A model simulated at one set of its numbers.
 pub trait Iterate {
     /// Loss of the windows with priors and penalties.
     fn loss(&self) -> f64;
@@ -74,7 +74,7 @@ pub trait Iterate {
 
 /// A step that was searched for.
 pub enum Step<P> {
-    /// The next iterate.
+    /// The first fraction whose loss is below that of the iterate before.
     Taken(P),
     /// No fraction lowers the loss, though the linearised model promises this fall.
     Refused { promised: f64 },

@@ -28,7 +28,7 @@ const NANOS_PER_SECOND: u64 = 1_000_000_000;
 
 /// A source of time that can be read and waited for.
 pub trait Clock {
-    /// The time now.
+    /// The reading of the clock, never earlier than the one before.
     fn now(&self) -> Instant;
 
     /// Returns when the clock shows `deadline` or later; at once if it already does.

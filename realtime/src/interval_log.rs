@@ -38,13 +38,13 @@ pub struct TaggedRecorder {
 }
 
 impl TaggedRecorder {
-    /// An empty recorder.
+    /// A recorder without samples, whose lines in the log begin with `Tag=` and this tag.
     #[must_use]
     pub fn new(tag: String) -> Self {
         Self { tag, whole: Recorder::new(), interval: Recorder::new() }
     }
 
-    /// Counts a sample.
+    /// Counts a sample of so many ns.
     pub fn record(&mut self, ns: u64) {
         self.each(|recorder| recorder.record(ns));
     }
@@ -55,20 +55,20 @@ impl TaggedRecorder {
         record(&mut self.interval);
     }
 
-    /// Percentiles of the whole run.
+    /// Percentiles of the whole run, ns.
     #[must_use]
     pub fn percentiles(&self) -> Percentiles {
         self.whole.percentiles()
     }
 
-    /// The whole run.
+    /// Samples of the whole run, ns.
     #[must_use]
     pub fn whole(&self) -> &Recorder {
         &self.whole
     }
 }
 
-/// The open log.
+/// A log of which lines up to the last full second are in the file.
 pub struct IntervalLog {
     path: PathBuf,
     file: File,

@@ -32,7 +32,7 @@ pub enum Axis {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind<M = FaultMark> {
-    /// A late wake-up.
+    /// The emulator woke late: the cycles it had missed were computed, and no frames of them were sent.
     #[error("woke late, {cycles} cycle(s) computed but not sent")]
     Skipped {
         /// Cycles that were computed and not sent.

@@ -36,7 +36,7 @@ macro_rules! units {
 }
 
 units! {
-    /// A plain number.
+    /// Without a dimension, printed as nothing.
     One "";
     /// A whole number of bits.
     Bits "bits";

@@ -27,7 +27,8 @@ pub(super) fn smt(root: &Root) -> SharedCores {
         cpus(root).iter().filter_map(siblings).filter(|list| list.contains([',', '-'])).collect();
     cores.sort();
     cores.dedup();
-    let control = root.text(&format!("{CPUS}/smt/control")).unwrap_or_else(|| "not told".to_owned());
+    let control =
+        root.text(&format!("{CPUS}/smt/control")).unwrap_or_else(|| "not reported by the kernel".to_owned());
     let control = Some(control);
     if cores.is_empty() {
         SharedCores::NoneShared { control }
