@@ -121,7 +121,7 @@ impl Candidate {
             let here = rig.terms().iter().find(|term| term.is_same(&suspect.declared));
             let present = here.map(|term| {
                 let mut numbers = [0.0; MOST_KEYS];
-                numbers.iter_mut().zip(term.numbers()).for_each(|(own, number)| *own = number.value);
+                numbers.iter_mut().zip(term.numbers()).for_each(|(value, number)| *value = number.value);
                 numbers
             });
             Candidate { sheet: &suspect.sheet, place: suspect.place, suspect: Some(suspect), present }

@@ -125,12 +125,12 @@ impl Products {
     ) -> Products {
         let (present, further) = (self.columns, scores.first().map_or(0, Vec::len));
         let columns = present + further;
-        let information = self.information.iter().zip(information).map(|(own, (between, among))| {
+        let information = self.information.iter().zip(information).map(|(known, (between, among))| {
             let mut products = vec![0.0; columns * columns];
             for row in 0..columns {
                 for column in 0..columns {
                     products[row * columns + column] = match (row < present, column < present) {
-                        (true, true) => own[row * present + column],
+                        (true, true) => known[row * present + column],
                         (true, false) => between[(row, column - present)],
                         (false, true) => between[(column, row - present)],
                         (false, false) => among[(row - present, column - present)],
@@ -139,7 +139,8 @@ impl Products {
             }
             products
         });
-        let scores = self.scores.iter().zip(scores).map(|(own, further)| [own.as_slice(), further].concat());
+        let scores =
+            self.scores.iter().zip(scores).map(|(known, further)| [known.as_slice(), further].concat());
         let (dof, squares) = (self.dof.clone(), self.squares.clone());
         Products { columns, dof, squares, scores: scores.collect(), information: information.collect() }
     }

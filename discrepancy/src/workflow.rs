@@ -333,7 +333,7 @@ fn is_copy(one: &Path, other: &Path) -> bool {
 /// [`ExtendError`] when it names what a rig cannot have.
 pub fn extended(rig_file: &RigFile, reported: &Report) -> Result<String, ExtendError> {
     let effects = || reported.named.iter().chain(&reported.small);
-    let suspect = |effect: &NamedEffect| reported.suspects.iter().find(|own| own.is(effect));
+    let suspect = |effect: &NamedEffect| reported.suspects.iter().find(|suspect| suspect.is(effect));
     let of_catalogue = effects().filter(|effect| suspect(effect).is_none());
     let additions: Vec<Addition> = of_catalogue.map(addition).collect();
     let terms: Vec<(&NamedEffect, &DeclaredSuspect)> =

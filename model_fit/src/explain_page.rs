@@ -10,9 +10,10 @@ use pagekit::page::{document, escaped};
 
 /// The page; `records` are the lines that training records say, `text` is the whole as text.
 pub(crate) fn page(model: &Model, records: &[String], text: &str) -> String {
-    let own = |suspect: Option<usize>| suspect.is_none_or(|suspect| model.suspects[suspect].is_term);
-    let states: Vec<&State> = model.states.iter().filter(|one| own(one.suspect)).collect();
-    let parameters: Vec<&Parameter> = model.parameters.iter().filter(|one| own(one.suspect)).collect();
+    let is_of_model = |suspect: Option<usize>| suspect.is_none_or(|suspect| model.suspects[suspect].is_term);
+    let states: Vec<&State> = model.states.iter().filter(|one| is_of_model(one.suspect)).collect();
+    let parameters: Vec<&Parameter> =
+        model.parameters.iter().filter(|one| is_of_model(one.suspect)).collect();
     let suspects = (0..model.suspects.len()).filter(|index| !model.suspects[*index].is_term);
     let records = match records {
         [] => String::new(),
@@ -95,13 +96,14 @@ fn suspect(model: &Model, index: usize) -> String {
     let decoy = if suspect.is_decoy { ", a decoy" } else { "" };
     let about = [format!("{}: {}", place(model, index), term(model, index))];
     let about: Vec<String> = about.into_iter().chain(kind(suspect)).collect();
-    let own: Vec<&Parameter> = model.parameters.iter().filter(|one| one.suspect == Some(index)).collect();
+    let parameters: Vec<&Parameter> =
+        model.parameters.iter().filter(|one| one.suspect == Some(index)).collect();
     format!(
         "<h3>{}{decoy}</h3>\n<div class=\"chart\">\n{}</div>\n{}{}",
         escaped(&suspect.name),
         typeset::of_suspect(model, index),
         list(&about, ""),
-        numbers(&own)
+        numbers(&parameters)
     )
 }
 

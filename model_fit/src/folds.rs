@@ -106,11 +106,11 @@ pub(super) fn refitted(fitted: &Fitted<'_>) -> Option<Folds> {
         let (end, _) = without.fit(point.values_si.clone(), STEPS).ok()?;
         // Numbers of a record by all of its rows.
         let rows = fitting.records.iter().map(|record| record.time_s.len()).max()?;
-        let own = Fitting::frozen(fitting, &end, fitting.records, &fitted.suspects, rows);
+        let of_records = Fitting::frozen(fitting, &end, fitting.records, &fitted.suspects, rows);
         let start = fitting.unknowns.iter().zip(&end.values_si);
         let start = start.filter(|(unknown, _)| !matches!(unknown.what, What::Shared(_)));
-        let (own_end, _) = own.fit(start.map(|(_, value)| *value).collect(), STEPS).ok()?;
-        let residuals = own.residuals(&own_end.values_si).ok()?;
+        let (refitted, _) = of_records.fit(start.map(|(_, value)| *value).collect(), STEPS).ok()?;
+        let residuals = of_records.residuals(&refitted.values_si).ok()?;
         let squares = |output: usize| {
             let of_record = residuals.iter().zip(&cut.block_of).map(|(record, blocks)| {
                 let rows = record[output][0].iter().zip(blocks);

@@ -220,17 +220,17 @@ fn of_record(model: &Model, record: &Measured) -> Vec<String> {
     let Some(said) = simulated(model, record) else { return Vec::new() };
     let mut notes = Vec::new();
     for (output, of_model) in model.outputs.iter().enumerate() {
-        let own = correlation(&said[output], &record.outputs[output]);
+        let agreement = correlation(&said[output], &record.outputs[output]);
         let name = &of_model.name;
         notes.extend(sizes(model, output, &said[output], &record.outputs[output]));
-        if own < AGAINST {
+        if agreement < AGAINST {
             notes.push(format!(
-                "before the fit the model moves against {name} (correlation {own:.2}): is a sign wrong, in the record or in the \
-                 equations?"
+                "before the fit the model moves against {name} (correlation {agreement:.2}): is a sign wrong, in the record \
+                 or in the equations?"
             ));
             continue;
         }
-        if own > UNLIKE {
+        if agreement > UNLIKE {
             continue;
         }
         let others = model.outputs.iter().enumerate().filter(|(other, _)| *other != output);
@@ -244,8 +244,8 @@ fn of_record(model: &Model, record: &Measured) -> Vec<String> {
         let best = like.chain(exchanged).max_by(|one, other| one.0.total_cmp(&other.0));
         if let Some((best, column)) = best.filter(|(best, _)| *best > SAME_SHAPE) {
             notes.push(format!(
-                "before the fit the model of {name} is not like column {} (correlation {own:.2}), and with {column} in its place \
-                 it is ({best:.2}): are columns exchanged?",
+                "before the fit the model of {name} is not like column {} (correlation {agreement:.2}), and with {column} in its \
+                 place it is ({best:.2}): are columns exchanged?",
                 of_model.column
             ));
         }

@@ -353,13 +353,13 @@ fn left(model: &Model, record: &str, output: usize, rms_si: [f64; 2], rows: usiz
 
 /// What tells a model from another one: its equations and suspects, not its numbers.
 pub(super) fn equations(model: &Model) -> Vec<String> {
-    let own = |suspect: Option<usize>| suspect.is_none();
-    let states = model.states.iter().filter(|one| own(one.suspect));
-    let definitions = model.definitions.iter().filter(|one| own(one.suspect));
+    let is_of_model = |suspect: Option<usize>| suspect.is_none();
+    let states = model.states.iter().filter(|one| is_of_model(one.suspect));
+    let definitions = model.definitions.iter().filter(|one| is_of_model(one.suspect));
     states
         .map(|one| format!("d{}/dt = {}", one.name, one.derivative.text))
         .chain(definitions.map(|one| format!("{} = {}", one.name, one.value.text)))
-        .chain(model.frictions.iter().filter(|one| own(one.suspect)).map(|one| friction(model, one)))
+        .chain(model.frictions.iter().filter(|one| is_of_model(one.suspect)).map(|one| friction(model, one)))
         .chain(model.outputs.iter().map(|one| format!("output {} = {}", one.name, one.value.text)))
         .chain(
             (0..model.suspects.len()).map(|one| {

@@ -176,19 +176,19 @@ impl Fitting<'_> {
 }
 
 /// Places of a suspect's own numbers among the unknowns.
-fn own(fitting: &Fitting<'_>, suspect: usize) -> Vec<usize> {
-    let is_own = |place: &usize| fitting.suspect_of(&fitting.unknowns[*place]) == Some(suspect);
-    (0..fitting.unknowns.len()).filter(is_own).collect()
+fn places_of(fitting: &Fitting<'_>, suspect: usize) -> Vec<usize> {
+    let is_of_suspect = |place: &usize| fitting.suspect_of(&fitting.unknowns[*place]) == Some(suspect);
+    (0..fitting.unknowns.len()).filter(is_of_suspect).collect()
 }
 
 /// A suspect's own numbers over their ranges.
 fn over_ranges(fitting: &Fitting<'_>, suspect: usize, first: &[f64]) -> Vec<Vec<f64>> {
-    let own = own(fitting, suspect);
+    let places = places_of(fitting, suspect);
     let rows: usize = fitting.records.iter().map(|record| record.time_s.len()).sum();
-    let points = if own.is_empty() { 0 } else { (OWN_ROWS / rows.max(1)).clamp(OWN[0], OWN[1]) };
+    let points = if places.is_empty() { 0 } else { (OWN_ROWS / rows.max(1)).clamp(OWN[0], OWN[1]) };
     let point = |number: usize| {
         let mut values = first.to_vec();
-        for (dimension, place) in own.iter().enumerate().take(PRIMES.len()) {
+        for (dimension, place) in places.iter().enumerate().take(PRIMES.len()) {
             let share = radical_inverse(number as u32, PRIMES[dimension]);
             values[*place] = within_range(values[*place], fitting.unknowns[*place].range_si, share);
         }
@@ -215,7 +215,7 @@ fn within_range(value: f64, [least, most]: [f64; 2], share: f64) -> f64 {
 
 /// A start that leaves what the smaller fit leaves: a larger model must not end above it.
 fn without_effect(fitting: &Fitting<'_>, suspect: usize, first: &[f64], loss: f64) -> Option<Vec<f64>> {
-    let candidates = own(fitting, suspect).into_iter().flat_map(|place| {
+    let candidates = places_of(fitting, suspect).into_iter().flat_map(|place| {
         let [least, most] = fitting.unknowns[place].range_si;
         let ends = [0.0, least, most]
             .into_iter()

@@ -60,8 +60,8 @@ pub(crate) fn curves(found: &Found<'_>, rivals: &[Rival<'_>]) -> Vec<TermCurve> 
         let name = &fit.fitting.model.suspects[rival.instead_of].name;
         let of_named = curves.iter().find(|curve| curve.suspect == *name && curve.instead_of.is_none());
         let over = of_named.map(|curve| curve.variable.as_str());
-        let own = drawn((fit, &found.baseline), (&[rival.suspect], over), true);
-        curves.extend(own.into_iter().map(|curve| TermCurve { instead_of: Some(name.clone()), ..curve }));
+        let instead = drawn((fit, &found.baseline), (&[rival.suspect], over), true);
+        curves.extend(instead.into_iter().map(|curve| TermCurve { instead_of: Some(name.clone()), ..curve }));
     }
     curves
 }
@@ -136,12 +136,12 @@ impl Along {
         for record in 0..records.len() {
             let directions = fitting.of_record(record);
             let direction = |place: &usize| directions.iter().position(|other| other == place);
-            let own: Vec<Option<usize>> = places.iter().map(direction).collect();
+            let of_term: Vec<Option<usize>> = places.iter().map(direction).collect();
             let sink = |_, output, value, slope: &[f64]| {
                 if output == term {
                     values.push(value);
                     let of_number = |direction: &Option<usize>| direction.map_or(0.0, |at| slope[at]);
-                    slopes.push(DVector::from_iterator(own.len(), own.iter().map(of_number)));
+                    slopes.push(DVector::from_iterator(of_term.len(), of_term.iter().map(of_number)));
                 }
             };
             fitting.simulate(record, &fitted.point.values_si, true, sink).ok()?;
@@ -283,19 +283,24 @@ parameters.b = { unit = "1/s", value = 0.01, range = [-10, 10] }
             curve.unit
         );
         let numbers = report::numbers(&fitted, &baseline, has_law);
-        let own = numbers.iter().filter(|number| number.suspect.is_some());
-        let own: Vec<_> = own.map(|number| [number.value, number.standard_error.unwrap()]).collect();
+        let of_suspect = numbers.iter().filter(|number| number.suspect.is_some());
+        let of_suspect: Vec<_> =
+            of_suspect.map(|number| [number.value, number.standard_error.unwrap()]).collect();
         let errors = covariance::errors(&fitted, &baseline, has_law);
-        let covariance = covariance::of_numbers(&fitted, &errors, &[1, own.len()]);
+        let covariance = covariance::of_numbers(&fitted, &errors, &[1, of_suspect.len()]);
         let covariance = covariance.unwrap();
-        check(&curve.bins, &own, covariance[(0, 1)] / (covariance[(0, 0)] * covariance[(1, 1)]).sqrt());
+        check(
+            &curve.bins,
+            &of_suspect,
+            covariance[(0, 1)] / (covariance[(0, 0)] * covariance[(1, 1)]).sqrt(),
+        );
     }
 
     /// Where a law is proportional to its only number, so is its error: the state that it moves does not enter.
     #[test]
     fn the_band_of_a_law_with_one_number_is_the_error_of_that_number() {
-        with_curve(0, true, |bins, own, _| {
-            let [[k, error]] = own else { panic!("{own:?}") };
+        with_curve(0, true, |bins, numbers, _| {
+            let [[k, error]] = numbers else { panic!("{numbers:?}") };
             assert!(bins.len() > 20 && (k - 0.3).abs() < 0.1, "{k}");
             for Bin { x, mean, error: of_curve, .. } in bins {
                 assert!((mean + k * x.powi(3)).abs() < 0.1 * (0.1 + mean.abs()), "{mean} at {x}");
@@ -308,8 +313,8 @@ parameters.b = { unit = "1/s", value = 0.01, range = [-10, 10] }
     /// e^2 = (x^3 e_a)^2 + (x e_b)^2 + 2 r x^4 e_a e_b; bins are narrow, so that means are those of their middle to some percent.
     #[test]
     fn the_band_of_a_law_with_two_numbers_counts_their_correlation() {
-        with_curve(1, false, |bins, own, correlation| {
-            let [[_, of_a], [_, of_b]] = own else { panic!("{own:?}") };
+        with_curve(1, false, |bins, numbers, correlation| {
+            let [[_, of_a], [_, of_b]] = numbers else { panic!("{numbers:?}") };
             assert!(correlation.abs() > 0.1, "the test says little: {correlation}");
             for Bin { x, error, .. } in bins.iter().filter(|bin| bin.x.abs() > 0.5) {
                 let [a, b] = [x.powi(3) * of_a, x * of_b];

@@ -145,7 +145,7 @@ impl Group {
         if self.stale {
             self.seat(registers, plants);
         }
-        if let Some(first) = self.in_lanes.iter().position(|own| *own) {
+        if let Some(first) = self.in_lanes.iter().position(|in_lane| *in_lane) {
             self.load(first, plants, inputs);
             self.advance(registers, first, plants);
             for (lane, plant) in plants.iter_mut().enumerate().filter(|(lane, _)| self.in_lanes[*lane]) {
@@ -166,15 +166,15 @@ impl Group {
         self.in_lanes = [false; WIDTH];
         let Some(first) = plants.iter().find(|plant| plant.is_baseline()) else { return };
         let substeps = first.integrator().substeps();
-        for (own, plant) in self.in_lanes.iter_mut().zip(plants) {
-            *own = plant.is_baseline() && plant.integrator().substeps() == substeps;
+        for (in_lane, plant) in self.in_lanes.iter_mut().zip(plants) {
+            *in_lane = plant.is_baseline() && plant.integrator().substeps() == substeps;
         }
-        if self.in_lanes.iter().filter(|own| **own).count() < registers.worthwhile() {
+        if self.in_lanes.iter().filter(|in_lane| **in_lane).count() < registers.worthwhile() {
             self.in_lanes = [false; WIDTH];
             return;
         }
-        for (lane, own) in self.in_lanes.iter().enumerate() {
-            let plant = if *own { &plants[lane] } else { first };
+        for (lane, in_lane) in self.in_lanes.iter().enumerate() {
+            let plant = if *in_lane { &plants[lane] } else { first };
             self.fixed.seat(lane, plant.integrator());
         }
     }

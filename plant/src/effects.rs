@@ -195,9 +195,9 @@ impl AxisEffects {
                 .collect();
             axes[usize::from(switched.place.part == Part::Load)].switch_on(switched, &numbers, rig);
         }
-        for (own, axis) in axes.iter_mut().zip(Axis::ALL) {
-            own.tabulated = Tables::of(rig, axis);
-            own.declared = DeclaredTerms::of(rig, axis);
+        for (effects, axis) in axes.iter_mut().zip(Axis::ALL) {
+            effects.tabulated = Tables::of(rig, axis);
+            effects.declared = DeclaredTerms::of(rig, axis);
         }
         axes
     }

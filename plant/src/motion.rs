@@ -79,7 +79,7 @@ impl Motion {
 
     #[inline(always)]
     pub(crate) fn formed<P>(&self, form: &mut impl Form<P>) -> Self {
-        let mut both = |own: [f64; 2]| [form.one(own[0]), form.one(own[1])];
+        let mut both = |axes: [f64; 2]| [form.one(axes[0]), form.one(axes[1])];
         Motion {
             masses_kg: both(self.masses_kg),
             behind_sensor_kg: both(self.behind_sensor_kg),

@@ -49,14 +49,14 @@ impl Supply {
     #[inline(always)]
     pub(crate) fn formed<P>(&self, form: &mut impl Form<P>) -> Self {
         let mut one = |number| form.one(number);
-        let own = &self.parameters;
+        let parameters = &self.parameters;
         let parameters = SupplyParameters {
-            pressure_pa: one(own.pressure_pa),
-            exhaust_pressure_pa: one(own.exhaust_pressure_pa),
-            atmospheric_pressure_pa: one(own.atmospheric_pressure_pa),
-            discharge_time_constant_s: one(own.discharge_time_constant_s),
-            recovery_time_constant_s: one(own.recovery_time_constant_s),
-            check_valve_pressure_pa: one(own.check_valve_pressure_pa),
+            pressure_pa: one(parameters.pressure_pa),
+            exhaust_pressure_pa: one(parameters.exhaust_pressure_pa),
+            atmospheric_pressure_pa: one(parameters.atmospheric_pressure_pa),
+            discharge_time_constant_s: one(parameters.discharge_time_constant_s),
+            recovery_time_constant_s: one(parameters.recovery_time_constant_s),
+            check_valve_pressure_pa: one(parameters.check_valve_pressure_pa),
         };
         Supply { parameters }
     }

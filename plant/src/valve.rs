@@ -115,10 +115,10 @@ impl<P: Axes> Valve<P> {
 }
 
 #[inline(always)]
-fn formed_hinges<P: Copy, F: Form<P>>(own: &[Pair; HINGES], form: &mut F) -> [P; HINGES] {
-    let mut formed = [form.pair(own[0]); HINGES];
+fn formed_hinges<P: Copy, F: Form<P>>(hinges: &[Pair; HINGES], form: &mut F) -> [P; HINGES] {
+    let mut formed = [form.pair(hinges[0]); HINGES];
     for i in 1..HINGES {
-        formed[i] = form.pair(own[i]);
+        formed[i] = form.pair(hinges[i]);
     }
     formed
 }
@@ -211,7 +211,7 @@ mod tests {
         for chamber_bar in [1.5, 4.0, 6.5] {
             let filled = paper_flow(supply_kv, supply_bar, chamber_bar) / 3600.0;
             let emptied = paper_flow(exhaust_kv, chamber_bar, exhaust_bar) / 3600.0;
-            let reported = [opening, -opening].map(|own| valve.flow_m3_per_s(own, chamber_bar * 1e5));
+            let reported = [opening, -opening].map(|opening| valve.flow_m3_per_s(opening, chamber_bar * 1e5));
             assert!((reported[0] - filled).abs() <= 1e-9 * filled, "{reported:?}, {filled}");
             assert!((reported[1] + emptied).abs() <= 1e-9 * emptied, "{reported:?}, {emptied}");
         }

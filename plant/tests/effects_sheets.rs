@@ -118,8 +118,8 @@ fn an_amplitude_is_drawn_away_from_nothing() {
     for sheet in SHEETS {
         let key = &sheet.keys[0];
         // An effect that re-values a number of the file is drawn on both sides of it.
-        let own = ["dead-volume", "coupling-backlash", "coupling-compliance"].contains(&sheet.name);
-        if let Some(neutral) = key.neutral.filter(|_| !own) {
+        let is_revalued = ["dead-volume", "coupling-backlash", "coupling-compliance"].contains(&sheet.name);
+        if let Some(neutral) = key.neutral.filter(|_| !is_revalued) {
             let [low, high] = key.drawn;
             assert!(neutral < low || high < neutral, "{}.{} may be drawn as nothing", sheet.name, key.name);
         }

@@ -117,8 +117,8 @@ pub fn clear(run: &Path, process: &str) -> io::Result<()> {
         let name = entry.map_err(|error| named(&folder, &error))?.file_name();
         let Some(name) = name.to_str() else { continue };
         // One process's name may begin another's; the cycle that follows tells.
-        let own = name.strip_prefix(process).and_then(|rest| rest.strip_prefix('-'));
-        if own.is_some_and(|rest| rest.starts_with(|first: char| first.is_ascii_digit())) {
+        let of_process = name.strip_prefix(process).and_then(|rest| rest.strip_prefix('-'));
+        if of_process.is_some_and(|rest| rest.starts_with(|first: char| first.is_ascii_digit())) {
             remove(run, name)?;
         }
     }

@@ -190,7 +190,7 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> io::Result<()> 
 /// What the system says; then the file that was there before is as it was.
 pub fn write_whole(path: &Path, text: &str) -> io::Result<()> {
     // A device in whose place a file is put is gone for the whole machine.
-    if std::fs::metadata(path).is_ok_and(|own| !own.is_file() && !own.is_dir()) {
+    if std::fs::metadata(path).is_ok_and(|existing| !existing.is_file() && !existing.is_dir()) {
         return std::fs::write(path, text);
     }
     let mut name = path.file_name().unwrap_or_default().to_owned();

@@ -217,11 +217,12 @@ pub(crate) fn log_marginal_likelihood(
             - held.component_mul(&start);
         let factor = Cholesky::new(hessian)?;
         let moved = factor.solve(&score);
-        let own = with.factor.solve(&(&with.score - &with.between * &moved));
-        step.rows_mut(0, parameters).copy_from(&own);
+        let of_parameters = with.factor.solve(&(&with.score - &with.between * &moved));
+        step.rows_mut(0, parameters).copy_from(&of_parameters);
         step.rows_mut(parameters, coordinates).copy_from(&moved);
         let off = &estimate - &shift * &moved;
-        let beyond: f64 = (&deviations + &own).iter().zip(&flat).map(|(off, flat)| flat * off * off).sum();
+        let beyond: f64 =
+            (&deviations + &of_parameters).iter().zip(&flat).map(|(off, flat)| flat * off * off).sum();
         let determinants = log_determinant(&with.factor) + log_determinant(&factor)
             - log_determinant(&Cholesky::new(precision.clone())?);
         found = Some(-0.5 * (determinants + off.dot(&(&precision * &off)) + beyond));
@@ -398,9 +399,9 @@ mod tests {
             let left = &from_mean - scale.powi(2) * &coordinates * coordinates.transpose() * &solved;
             let term = Cholesky::new(of_term(&self.inputs)).unwrap();
             let weighed = term.solve(&parameters);
-            let own =
+            let estimate =
                 (parameters.transpose() * &weighed).try_inverse().unwrap() * weighed.transpose() * &left;
-            let left = left - parameters * own;
+            let left = left - parameters * estimate;
             self.dof = left.dot(&term.solve(&left));
             log + 0.5 * self.dof
         }
@@ -437,8 +438,8 @@ mod tests {
     fn a_prior_three_times_as_wide_costs_ln_3_for_each_amplitude() {
         let mut made = Made::new(TERM.size);
         made.closed_form(0.8);
-        let [own, wide] = [5.0, 15.0].map(|scale| made.by_laplace(prior(scale, 1.0)));
-        assert!((own - wide - 2.0 * 3.0_f64.ln()).abs() < 0.05, "{own} {wide}");
+        let [narrow, wide] = [5.0, 15.0].map(|scale| made.by_laplace(prior(scale, 1.0)));
+        assert!((narrow - wide - 2.0 * 3.0_f64.ln()).abs() < 0.05, "{narrow} {wide}");
     }
 
     #[test]

@@ -206,10 +206,10 @@ impl<'a> Model<'a> {
     /// Nodes along the first leading amplitude that needs them.
     fn nodes(&self, at: &Placed<'_>) -> Option<Nodes> {
         let mut coordinate = 0;
-        for (effect, own) in at.placed.iter().enumerate() {
+        for (effect, placed) in at.placed.iter().enumerate() {
             let deviation = self.posterior_deviation(at.engine, coordinate)?;
-            let z = own.coordinates[0];
-            let [least, most] = own.candidate.fit_bounds(0);
+            let z = placed.coordinates[0];
+            let [least, most] = placed.candidate.fit_bounds(0);
             let is_near_bound = (z - least).min(most - z) < NEAR_BOUND * deviation;
             if is_near_bound || !self.is_parabolic(at, effect, coordinate, deviation) {
                 let ends = [(z - COVERED * deviation).max(least), (z + COVERED * deviation).min(most)];
@@ -222,7 +222,7 @@ impl<'a> Model<'a> {
                 let nodes = quadrature(ends).into_iter().map(node).collect::<Option<_>>()?;
                 return Some(Nodes { coordinate, nodes });
             }
-            coordinate += own.coordinates.len();
+            coordinate += placed.coordinates.len();
         }
         None
     }
@@ -251,8 +251,11 @@ impl<'a> Model<'a> {
     fn posterior_deviation(&self, engine: &Engine<'_>, coordinate: usize) -> Option<f64> {
         let all: Vec<usize> = (0..self.products.columns()).collect();
         let of_coordinates = self.coordinates.iter().map(|(prior, z)| prior.precision(*z));
-        let precisions: Vec<f64> =
-            parameter_precisions().into_iter().chain(of_coordinates).map(|own| own / POWER).collect();
+        let precisions: Vec<f64> = parameter_precisions()
+            .into_iter()
+            .chain(of_coordinates)
+            .map(|precision| precision / POWER)
+            .collect();
         let weights = self.products.weights(&engine.squares(&self.residual));
         let (hessian, _) = self.products.normal(&all, &weights, &precisions);
         let at = COUNT + coordinate;
@@ -265,7 +268,7 @@ impl<'a> Model<'a> {
         let others = || without(&self.coordinates, coordinate);
         let of_others = others().map(|(prior, z)| prior.precision(*z));
         let precisions: Vec<f64> =
-            parameter_precisions().into_iter().chain(of_others).map(|own| own / POWER).collect();
+            parameter_precisions().into_iter().chain(of_others).map(|precision| precision / POWER).collect();
         let from: Vec<f64> = self.deviations.iter().copied().chain(others().map(|(_, z)| *z)).collect();
         let all: Vec<usize> = (0..columns.len()).collect();
         engine.products(residual, &columns).fit_from(&all, &precisions, &from).loss
@@ -298,11 +301,11 @@ impl<'a> Model<'a> {
     }
 
     fn by_scale(&self, log: impl Fn(f64) -> Option<f64>) -> Option<[f64; 3]> {
-        let own = log(SCALE_FACTORS[0])?;
+        let first = log(SCALE_FACTORS[0])?;
         if self.coordinates.is_empty() {
-            return Some([own; 3]);
+            return Some([first; 3]);
         }
-        Some([own, log(SCALE_FACTORS[1])?, log(SCALE_FACTORS[2])?])
+        Some([first, log(SCALE_FACTORS[1])?, log(SCALE_FACTORS[2])?])
     }
 
     fn log_likelihood(

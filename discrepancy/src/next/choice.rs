@@ -258,13 +258,13 @@ fn round(setting: &Setting<'_>, entry: &'static Entry, seeds: Seeds) -> Option<R
 
 /// The order of finalists.
 pub(super) fn better(one: &RehearsedEntry, other: &RehearsedEntry) -> Ordering {
-    let [own, others] = [one, other].map(|entry| {
+    let [left, right] = [one, other].map(|entry| {
         let times = entry.repetitions(MOST_REPETITIONS);
         let value = entry.probability(times).value;
         (value >= WANTED, times, value)
     });
-    let fewer = if own.0 && others.0 { own.1.cmp(&others.1) } else { Ordering::Equal };
-    others.0.cmp(&own.0).then(fewer).then(others.2.total_cmp(&own.2)).then(preferred(one, other))
+    let fewer = if left.0 && right.0 { left.1.cmp(&right.1) } else { Ordering::Equal };
+    right.0.cmp(&left.0).then(fewer).then(right.2.total_cmp(&left.2)).then(preferred(one, other))
 }
 
 /// Shorter, then farther from the ends of the stroke.

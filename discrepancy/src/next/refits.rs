@@ -237,8 +237,8 @@ fn free_effects(
     baseline: &RigParameters,
     explanation: &Explanation,
 ) -> Vec<(EffectEstimate, Vec<Option<f64>>)> {
-    let own = explanation.rig.effects().iter().filter(|effect| !baseline.effects().contains(effect));
-    own.map(|effect| {
+    let free = explanation.rig.effects().iter().filter(|effect| !baseline.effects().contains(effect));
+    free.map(|effect| {
         let sheet = plant::effects::sheet(effect.name).expect("an effect that is on has a sheet");
         let candidate = Candidate::beside(baseline, sheet, effect.place);
         let coordinates: Vec<f64> =

@@ -97,7 +97,7 @@ mod tests {
     fn every_measurement_of_a_sheet_has_words_and_tells_several_apart() {
         let named = |by| SHEETS.iter().filter(|sheet| sheet.told_apart_by.contains(by)).count();
         for by in SHEETS.iter().flat_map(|sheet| sheet.told_apart_by) {
-            assert!(REMEDIES.iter().any(|(own, ..)| own == by), "{by:?}");
+            assert!(REMEDIES.iter().any(|(measurement, ..)| measurement == by), "{by:?}");
         }
         for (by, parameters, _) in REMEDIES {
             assert!(named(by) + parameters.len() > 1, "{by:?}");

@@ -8,7 +8,7 @@
 //! file. It takes the file's place, so the chambers' volumes are V_own + A xi. Valid while the air in the hose has the
 //! chamber's pressure. No regularisation: a constant.
 //!
-//! Properties: the sum is the own volume whatever the file says; at the file's value nothing is added; it counts most near
+//! Properties: the sum is V_own whatever the file says; at the file's value nothing is added; it counts most near
 //! the end of the stroke, where the chamber is small.
 //!
 //! Source: inactive volume at the ends of the stroke, Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336; range:

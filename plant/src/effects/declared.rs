@@ -404,7 +404,7 @@ impl DeclaredTerms {
         }
     }
 
-    /// Force along the own extension, N.
+    /// Force along the axis's extension, N.
     pub(crate) fn force(&self, at: &DeclaredAt<'_>) -> f64 {
         self.sum(Target::Force, at).clamp(-MOST_FORCE_N, MOST_FORCE_N)
     }

@@ -219,9 +219,9 @@ mod tests {
 
     #[test]
     fn an_axis_gets_its_own_effects_and_those_of_the_supply() {
-        for (among, own) in [(Among::Drive, Part::Drive), (Among::Load, Part::Load)] {
+        for (among, part) in [(Among::Drive, Part::Drive), (Among::Load, Part::Load)] {
             let parts: BTreeSet<Part> = many(2, among).iter().map(|effect| effect.place.part).collect();
-            assert_eq!(parts, BTreeSet::from([own, Part::Supply]));
+            assert_eq!(parts, BTreeSet::from([part, Part::Supply]));
         }
     }
 

@@ -17,7 +17,7 @@
 //!
 //! The pressure term is negative or 0, Pa. Beyond the choked flow k p / 2 no pressure at the port draws more: the drop goes
 //! on in a steep line to all of p within 0.1 % more flow, so that a solver finds the choked flow as where the line is
-//! crossed. The cushion closes at once (a spear with a sharp edge). The force is along the own extension, N, inwards; the
+//! crossed. The cushion closes at once (a spear with a sharp edge). The force is along the axis's extension, N, inwards; the
 //! buffer is elastic and gives back what it took; at the very end the baseline's dead stop remains.
 //!
 //! Properties: fills freely; nothing outside the cushion; the drop of eq. (4) up to p/2; never less drop for more flow; the
@@ -119,7 +119,7 @@ impl EndCushion {
         -(drop_pa + CHOKED * (passed_pa - open_pa))
     }
 
-    /// Force of the elastic stops along the own extension, N: inwards, 0 outside the last millimetre.
+    /// Force of the elastic stops along the axis's extension, N: inwards, 0 outside the last millimetre.
     pub(crate) fn stop_force(&self, extension_m: f64, stroke_m: f64) -> f64 {
         let pressed = |to_end_m: f64| (BUFFER_M - to_end_m).max(0.0);
         self.stop_stiffness_n_per_m * (pressed(extension_m) - pressed(stroke_m - extension_m))

@@ -154,7 +154,7 @@ impl<'a> Friction<'a> {
         }
     }
 
-    /// Friction of the bristles, along the own extension; `None` for an axis without them.
+    /// Friction of the bristles, along the axis's extension; `None` for an axis without them.
     pub(crate) fn bristles(&self, place: Place, force_n: f64) -> Option<Bristles> {
         let effect = self.effects.on[self.axis].presliding?;
         let deflection_m = self.effects.memory.moving.axes[self.axis].deflection_m;

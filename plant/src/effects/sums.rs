@@ -82,7 +82,7 @@ balance!(/** Break-away level in one direction, not below the sliding level at r
     + pressure_dependent_friction + position_dependent_friction + rest_time_dependent_break_away + added);
 balance!(/** Viscous friction in one direction. */
     Viscous "viscous" in "N_s_per_m" = file + friction_asymmetry);
-balance!(/** Friction where bristles take the place of stick and slip, along the own extension. */
+balance!(/** Friction where bristles take the place of stick and slip, along the axis's extension. */
     Bristles "bristles" in "N" = nothing + presliding);
 balance!(/** Force on the piston along its own extension, beside air, hand, contact and friction. */
     Force "force" in "N" = nothing

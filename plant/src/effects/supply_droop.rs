@@ -147,7 +147,7 @@ mod tests {
         ) {
             let effect = effect(10_f64.powf(droop), volume);
             let after = effect.advance(node, set, drawn, span);
-            let goal = effect.node.and_then(|own| own.equilibrium(set, -drawn)).unwrap_or(node / 2.0);
+            let goal = effect.node.and_then(|node| node.equilibrium(set, -drawn)).unwrap_or(node / 2.0);
             prop_assert!(after > 0.0 && (node.min(goal)..=node.max(goal)).contains(&after));
         }
     }

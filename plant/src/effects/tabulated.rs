@@ -259,7 +259,7 @@ impl Law {
 #[inline]
 #[must_use]
 pub fn interpolated(at: &[f64], value: &[f64], x: f64) -> f64 {
-    let above = at.partition_point(|own| *own <= x);
+    let above = at.partition_point(|point| *point <= x);
     if above == 0 || above == at.len() {
         return value[above.min(at.len() - 1)];
     }
@@ -278,8 +278,8 @@ pub(crate) struct Tables {
 impl Tables {
     /// Those of an axis that a rig has.
     pub(crate) fn of(rig: &RigParameters, axis: Axis) -> Self {
-        let own = rig.tabulated().iter().filter(|table| table.axis == axis);
-        let laws = own.map(|table| Law {
+        let of_axis = rig.tabulated().iter().filter(|table| table.axis == axis);
+        let laws = of_axis.map(|table| Law {
             balance: table.balance,
             variable: table.variable,
             at: table.at.clone(),
@@ -302,7 +302,7 @@ impl Tables {
         self.adds(Balance::FlowA) || self.adds(Balance::FlowB)
     }
 
-    /// Force along the own extension, N.
+    /// Force along the axis's extension, N.
     pub(crate) fn force(&self, seen: &Seen) -> f64 {
         self.sum(Balance::Force, seen)
     }
@@ -349,11 +349,12 @@ mod tests {
 
     #[test]
     fn it_is_exact_at_its_points_straight_between_and_constant_beyond() {
-        let own = tables(&[table(Balance::Force, Variable::Extension, &[0.0, 0.1, 0.4], &[2.0, 4.0, -8.0])]);
+        let tables =
+            tables(&[table(Balance::Force, Variable::Extension, &[0.0, 0.1, 0.4], &[2.0, 4.0, -8.0])]);
         for (x, force) in
             [(-1.0, 2.0), (0.0, 2.0), (0.05, 3.0), (0.1, 4.0), (0.25, -2.0), (0.4, -8.0), (9.0, -8.0)]
         {
-            assert!((own.force(&seen(x, 0.0)) - force).abs() < 1e-12, "{x}");
+            assert!((tables.force(&seen(x, 0.0)) - force).abs() < 1e-12, "{x}");
         }
     }
 

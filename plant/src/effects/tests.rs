@@ -33,9 +33,9 @@ fn every_effect_has_a_term_of_its_own_at_every_place() {
     let (rig, plant, inputs) = moving();
     let terms = terms(plant.effects().expect("on"), &plant, &inputs);
     for switched in rig.effects() {
-        let own =
+        let is_it =
             |term: &&Term| term.effect == switched.name.replace('-', "_") && term.part == switched.place.part;
-        assert!(terms.iter().any(|term| own(&term)), "{} {}", switched.name, switched.place);
+        assert!(terms.iter().any(|term| is_it(&term)), "{} {}", switched.name, switched.place);
     }
     let names: Vec<String> = terms.iter().map(Term::column).collect();
     for (i, name) in names.iter().enumerate() {

@@ -208,8 +208,9 @@ impl Reader<'_> {
             return Err(section.wrong_at("name", "name: an effect of the catalogue has it"));
         }
         let places = || -> Vec<(String, Axis, Target)> {
-            let one =
-                |axis: Axis| Target::ALL.map(|own| (format!("{}.{}", axis.name(), own.name()), axis, own));
+            let one = |axis: Axis| {
+                Target::ALL.map(|target| (format!("{}.{}", axis.name(), target.name()), axis, target))
+            };
             Axis::ALL.into_iter().flat_map(one).collect()
         };
         let known = || places().into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(", ");
@@ -234,7 +235,7 @@ impl Reader<'_> {
         let others: Vec<Table> = self
             .of_file
             .iter()
-            .filter(|one| curves.iter().all(|own| own.name != one.name))
+            .filter(|one| curves.iter().all(|curve| curve.name != one.name))
             .cloned()
             .collect();
         curves.extend(others);
@@ -244,18 +245,18 @@ impl Reader<'_> {
         let ways: Vec<Variable<'_>> = kept.iter().map(KeptText::variable).collect();
         let mut before = variables();
         if target.kind() != PlaceKind::Channel
-            && numbers.iter().any(|own| own.name == before[SENSOR_FORCE].name)
+            && numbers.iter().any(|number| number.name == before[SENSOR_FORCE].name)
         {
             // The number stands for itself.
             before[SENSOR_FORCE].name = "";
         }
         let variables = [before.clone(), ways.clone()].concat();
         let taken = variables.iter().map(|one| one.name).chain((!kept.is_empty()).then_some(STEP.0));
-        if let Some(number) = numbers.iter().find(|own| taken.clone().any(|name| name == own.name)) {
+        if let Some(number) = numbers.iter().find(|number| taken.clone().any(|name| name == number.name)) {
             return Err(section.wrong(&format!("parameters.{}: a variable has this name", number.name)));
         }
         let all = VARIABLES.iter().map(|one| one.0).chain([STEP.0]);
-        if let Some(one) = kept.iter().find(|own| all.clone().any(|name| name == own.name)) {
+        if let Some(one) = kept.iter().find(|kept| all.clone().any(|name| name == kept.name)) {
             return Err(section.wrong(&format!("memory.{}: a variable has this name", one.name)));
         }
         let parameters: Vec<Variable<'_>> = numbers

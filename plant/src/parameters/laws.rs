@@ -132,7 +132,7 @@ fn stands_for(law: &Law, given: &[(String, String)], name: &str, depth: usize) -
 }
 
 fn is_of_rig(name: &str) -> bool {
-    VARIABLES.iter().any(|(own, ..)| *own == name)
+    VARIABLES.iter().any(|(variable, ..)| *variable == name)
 }
 
 /// The numbers of the law with what the file says of them; `stands` gets what they are called in the expression.
@@ -154,11 +154,11 @@ fn numbers(
             }
             None => one(number, None)?,
         };
-        let own = read.map_err(|why| section.wrong(&format!("parameters.{}.{why}", number.name)))?;
+        let read = read.map_err(|why| section.wrong(&format!("parameters.{}.{why}", number.name)))?;
         if number.is_fixed {
-            let unit = if own.unit.text == "1" { String::new() } else { format!("[{}]", own.unit.text) };
-            let constant = format!("{:?}{unit}", own.value.abs());
-            let sign = if own.value < 0.0 { "-" } else { "" };
+            let unit = if read.unit.text == "1" { String::new() } else { format!("[{}]", read.unit.text) };
+            let constant = format!("{:?}{unit}", read.value.abs());
+            let sign = if read.value < 0.0 { "-" } else { "" };
             stands.push((number.name.clone(), format!("({sign}{constant})")));
             continue;
         }
@@ -167,7 +167,7 @@ fn numbers(
             false => number.name.clone(),
         };
         stands.push((number.name.clone(), name.clone()));
-        numbers.push(Number { name, ..own });
+        numbers.push(Number { name, ..read });
     }
     given.map_or(Ok(()), |given| given.finish())?;
     Ok(numbers)

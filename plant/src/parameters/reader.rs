@@ -164,8 +164,8 @@ impl Entries {
 
     /// Adds a declared term, in place of one of the same name and place.
     pub(super) fn put_term(&mut self, term: Declared) {
-        match self.terms.iter_mut().find(|own| own.is_same(&term)) {
-            Some(own) => *own = term,
+        match self.terms.iter_mut().find(|known| known.is_same(&term)) {
+            Some(known) => *known = term,
             None => self.terms.push(term),
         }
     }

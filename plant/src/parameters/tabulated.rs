@@ -22,11 +22,13 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<Tabulated>> {
 }
 
 fn read_one(mut section: Section<'_>) -> Result<Tabulated> {
-    let balances = Axis::ALL
-        .map(|axis| Balance::ALL.map(|own| (format!("{}.{}", axis.name(), own.name()), (axis, own))));
-    let balances: Vec<_> = balances.iter().flatten().map(|(name, own)| (name.as_str(), *own)).collect();
+    let balances = Axis::ALL.map(|axis| {
+        Balance::ALL.map(|balance| (format!("{}.{}", axis.name(), balance.name()), (axis, balance)))
+    });
+    let balances: Vec<_> = balances.iter().flatten().map(|(name, place)| (name.as_str(), *place)).collect();
     let (axis, balance) = section.needed_choice("balance", &balances)?;
-    let variable = section.needed_choice("variable", &Variable::ALL.map(|own| (own.name(), own)))?;
+    let variable =
+        section.needed_choice("variable", &Variable::ALL.map(|variable| (variable.name(), variable)))?;
     section.allow(&["balance", "variable", "at", balance.key()])?;
     let at = numbers(&section, "at", MOST_AT)?;
     let value = numbers(&section, balance.key(), balance.most())?;
@@ -45,7 +47,7 @@ fn numbers(section: &Section<'_>, key: &str, most: f64) -> Result<Vec<f64>> {
     let [fewest, many] = POINTS;
     // A NaN, which TOML admits, is within nothing.
     let fits = |numbers: &Vec<f64>| {
-        (fewest..=many).contains(&numbers.len()) && numbers.iter().all(|own| own.abs() <= most)
+        (fewest..=many).contains(&numbers.len()) && numbers.iter().all(|number| number.abs() <= most)
     };
     let allowed = format!("allowed are {fewest} to {many} numbers, each -{most} to {most}");
     section.peek_numbers(key).filter(fits).ok_or_else(|| section.refused(key, &allowed))
