@@ -15,7 +15,7 @@
  *
  * Rules
  *  - Units are SI, angles do not occur, pressures are absolute. Everything is in the axis's own extension: positions grow as the
- *    own rod comes out, a positive result extends it and raises the own force reading when something is in the way.
+ *    rod comes out, a positive result extends it and raises the force reading when something is in the way.
  *  - reset and step run inside a cycle of 1 ms: they must not allocate, lock, wait, print or open files. A step that takes more
  *    than 20 ms once, or more than 1 ms ten times running, is a latched fault with the valve shut (in real time only).
  *  - The result must be a finite number; NaN or infinity is a latched fault with the valve shut. It need not be limited: the
@@ -49,10 +49,10 @@ extern "C" {
 /* What the pre-controller has made ready for a step. */
 struct airbench_ready {
     double period_s;                 /* time between two steps of the algorithm */
-    double position_m;               /* extension of the own rod */
+    double position_m;               /* extension of the axis's rod */
     double velocity_m_per_s;         /* its rate, filtered */
     double acceleration_m_per_s2;    /* the rate of that, filtered */
-    double force_n;                  /* own force sensor, filtered, compression positive */
+    double force_n;                  /* force sensor of the axis, filtered, compression positive */
     double pressure_a_pa;            /* cap-side chamber, filtered */
     double pressure_b_pa;            /* rod-side chamber, filtered */
     double supply_pressure_pa;       /* supply, as the rig tells it */
@@ -115,7 +115,7 @@ struct airbench_algorithm {
     void (*destroy)(void *self);
     /* Begins anew from what is: no integral, no memory. The axis has been without control before. */
     void (*reset)(void *self, const struct airbench_ready *ready, const double *parameters);
-    /* The velocity that the own rod shall have, m/s. parameters: values in the order of the table; they may change between two
+    /* The velocity that the rod shall have, m/s. parameters: values in the order of the table; they may change between two
      * steps. Neither pointer may be kept. */
     double (*step)(void *self, const struct airbench_ready *ready, const double *parameters);
 };
