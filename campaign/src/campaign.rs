@@ -1,17 +1,17 @@
 //! A campaign, ready to be run: its file, the files that this names, its runs, and how they are shared out.
 
 use crate::child::Limit;
-use crate::command::{self, CommandError, Words};
+use crate::command::{self, CommandError, Invocation};
 use crate::condition::{self, Condition, ConditionError};
 use crate::factor::Value;
 use crate::file;
 use crate::file::{CampaignFile, ExperimentKind, Kind, Pace, RESERVED};
+use crate::inputs::{CampaignInputs, InputsError};
 use crate::outcome::{Ended, Outcome};
 use crate::parts::{Parts, hash, usual_runs_per_part};
 use crate::points::{Point, Points, TooMany};
 use crate::processes::{self, ProcessesError, Programs};
 use crate::rehearsed;
-use crate::shelf::{CampaignInputs, ShelfError};
 use figures::top::POSITIONS;
 use settings::SettingsError;
 use sha2::{Digest, Sha256};
@@ -27,7 +27,7 @@ pub(crate) struct Campaign {
     /// How they are shared out.
     pub parts: Parts,
     /// The files that it names; none for a command.
-    shelf: Option<CampaignInputs>,
+    inputs: Option<CampaignInputs>,
     programs: Programs,
 }
 
@@ -46,7 +46,7 @@ pub(crate) enum CampaignError {
     #[error(transparent)]
     File(#[from] SettingsError),
     #[error(transparent)]
-    CampaignInputs(#[from] ShelfError),
+    Inputs(#[from] InputsError),
     #[error("{0}: {1}")]
     TooMany(String, TooMany),
     #[error("{0}: {1}")]
@@ -67,7 +67,7 @@ impl Campaign {
         if let Kind::Command(words) = &mut file.kind {
             words[0] = program(&words[0], &folder)?;
         }
-        let shelf = match &file.kind {
+        let inputs = match &file.kind {
             Kind::Experiment(kind) => Some(CampaignInputs::read(&file, kind, &places.shipped)?),
             Kind::Command(_) => None,
         };
@@ -76,15 +76,15 @@ impl Campaign {
             .map_err(|error| CampaignError::TooMany(name(), error))?;
         let runs = points.runs();
         let parts = Parts {
-            campaign: which_campaign(&file, shelf.as_ref()),
+            campaign: which_campaign(&file, inputs.as_ref()),
             program: which_program(&file, places)?,
             columns: columns(&file),
             runs,
             runs_per_part: file.runs_per_part.unwrap_or_else(|| usual_runs_per_part(runs)),
         };
         let programs = Programs { folder: places.programs.clone() };
-        let campaign = Self { file, points, parts, shelf, programs };
-        if campaign.shelf.is_some() {
+        let campaign = Self { file, points, parts, inputs, programs };
+        if campaign.inputs.is_some() {
             for run in [0, runs - 1] {
                 campaign.condition(&campaign.points.point(run))?;
             }
@@ -102,8 +102,8 @@ impl Campaign {
     }
 
     fn condition(&self, point: &Point) -> Result<Condition<'_>, CampaignError> {
-        let shelf = self.shelf.as_ref().expect("only campaigns of experiments have conditions");
-        condition::condition(shelf, &self.points, point).map_err(|error| self.refused(error))
+        let inputs = self.inputs.as_ref().expect("only campaigns of experiments have conditions");
+        condition::condition(inputs, &self.points, point).map_err(|error| self.refused(error))
     }
 
     fn refused(&self, error: ConditionError) -> CampaignError {
@@ -123,8 +123,8 @@ impl Campaign {
         match kind.pace {
             Pace::Rehearsal => {
                 let condition = self.condition(point)?;
-                let shelf = self.shelf.as_ref().expect("an experiment has its files");
-                let outcome = rehearsed::rehearse(&condition, shelf, point.run, kind.longest_s);
+                let inputs = self.inputs.as_ref().expect("an experiment has its files");
+                let outcome = rehearsed::rehearse(&condition, inputs, point.run, kind.longest_s);
                 outcome.map(Some).map_err(|error| self.refused(error))
             }
             Pace::Lockstep => match self.run_somewhere(point, limit)? {
@@ -155,8 +155,8 @@ impl Campaign {
         again: bool,
         limit: Limit<'_>,
     ) -> Result<Option<Outcome>, CampaignError> {
-        let words = Words { command, folder: &self.file.folder()?, again };
-        command::run(words, self.points.factors(), point, limit)
+        let invocation = Invocation { command, folder: &self.file.folder()?, again };
+        command::run(invocation, self.points.factors(), point, limit)
             .map_err(|error| CampaignError::Command(command[0].clone(), point.run, error))
     }
 
@@ -174,9 +174,9 @@ impl Campaign {
         limit: Limit<'_>,
     ) -> Result<Option<Outcome>, CampaignError> {
         let condition = self.condition(point)?;
-        let shelf = self.shelf.as_ref().expect("only campaigns of experiments run in folders");
+        let inputs = self.inputs.as_ref().expect("only campaigns of experiments run in folders");
         let seconds = self.experiment().map_or(0.0, |kind| kind.longest_s);
-        match processes::run(&condition, shelf, (point.run, seconds), &self.programs, folder, limit) {
+        match processes::run(&condition, inputs, (point.run, seconds), &self.programs, folder, limit) {
             Ok(outcome) => Ok(Some(outcome)),
             Err(ProcessesError::Stopped) => Ok(None),
             Err(ProcessesError::Condition(error)) => Err(self.refused(error)),
@@ -243,13 +243,13 @@ fn program(word: &str, folder: &Path) -> Result<String, CampaignError> {
 }
 
 /// Tells one campaign from another by all that its results follow from.
-fn which_campaign(file: &CampaignFile, shelf: Option<&CampaignInputs>) -> String {
+fn which_campaign(file: &CampaignFile, inputs: Option<&CampaignInputs>) -> String {
     let mut all = String::new();
     let mut add = |name: &str, hash: &str| {
         let _ = writeln!(all, "{name} {hash}");
     };
     add("campaign", &hash(file.text.as_bytes()));
-    shelf.into_iter().flat_map(CampaignInputs::hashes).for_each(|(name, hash)| add(&name, &hash));
+    inputs.into_iter().flat_map(CampaignInputs::hashes).for_each(|(name, hash)| add(&name, &hash));
     hash(all.as_bytes())[..16].to_owned()
 }
 

@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::shard::Asked;
+use crate::shard::ShardArgument;
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub struct Cli {
 /// What to do.
 #[derive(Subcommand, Debug)]
 pub(crate) enum Command {
-    /// Tell how many runs there are, and what the first ones are made with; runs nothing.
+    /// Print the number of runs and the values of the first ones; runs nothing.
     Plan(PlanArguments),
     /// Make the missing runs of a campaign or of one shard; a complete campaign is merged at the end.
     Run(RunArguments),
@@ -30,7 +30,7 @@ pub(crate) enum Command {
 /// Where things are.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CommonArguments {
-    /// The campaign file.
+    /// Path of the campaign file, a TOML file as in campaign/campaigns; required, no default.
     pub(crate) file: PathBuf,
     /// Folder with the shipped experiments and programs.
     #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../controller"))]
@@ -63,7 +63,7 @@ pub(crate) struct RunArguments {
     pub(crate) out: Option<PathBuf>,
     /// Shard to run: INDEX/COUNT, INDEX from 0; COUNT alone takes the index from Slurm or Kubernetes.
     #[arg(long, value_name = "INDEX/COUNT")]
-    pub(crate) shard: Option<Asked>,
+    pub(crate) shard: Option<ShardArgument>,
     /// Runs at once; default: as many as there are cores.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
     pub(crate) jobs: Option<u64>,

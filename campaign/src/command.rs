@@ -21,16 +21,16 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
 
-/// Bytes that are kept of what a program says, at least: the last ones.
-const MOST_SAID: usize = 1 << 20;
-/// Most of its words that a result keeps.
-const WORDS: usize = 400;
+/// At least so many of the last bytes of a program's output are kept.
+const KEPT_OUTPUT_BYTES: usize = 1 << 20;
+/// Most characters of a program's last line that a result keeps as the reason of a failure.
+const MAX_REASON_CHARS: usize = 400;
 /// Exit code of a program that tried nothing: `EX_TEMPFAIL` of sysexits.h.
 pub const NOT_TRIED: i32 = 75;
 
 /// A program, where it runs, and what for.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Words<'a> {
+pub(crate) struct Invocation<'a> {
     /// The program and its arguments.
     pub(crate) command: &'a [String],
     /// The folder that it runs in.
@@ -54,7 +54,7 @@ pub(crate) enum CommandError {
 /// # Errors
 /// [`CommandError`] for what is no result.
 pub(crate) fn run(
-    Words { command, folder, again }: Words<'_>,
+    Invocation { command, folder, again }: Invocation<'_>,
     factors: &[Factor],
     point: &Point,
     limit: Limit<'_>,
@@ -130,7 +130,7 @@ fn answered(answer: &Map<String, Json>) -> Outcome {
 
 /// The last line, cut where it is long.
 fn last_words(text: &str) -> String {
-    text.trim_end().lines().next_back().unwrap_or_default().chars().take(WORDS).collect()
+    text.trim_end().lines().next_back().unwrap_or_default().chars().take(MAX_REASON_CHARS).collect()
 }
 
 /// Reads to the end, so that a program never waits for its listener, and keeps the end.
@@ -141,8 +141,8 @@ fn listen(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
         // What cannot be read any more is over.
         while let Ok(length @ 1..) = pipe.read(&mut piece) {
             output.extend_from_slice(&piece[..length]);
-            if output.len() > 2 * MOST_SAID {
-                output.drain(..output.len() - MOST_SAID);
+            if output.len() > 2 * KEPT_OUTPUT_BYTES {
+                output.drain(..output.len() - KEPT_OUTPUT_BYTES);
             }
         }
         String::from_utf8_lossy(&output).into_owned()
@@ -164,8 +164,8 @@ mod tests {
         let point = Point { run: 3, draw: 1, seed: 7, hidden_seed: 0, values: vec![Value::Text("x".into())] };
         let command: Vec<_> = ["sh", "-c", script].map(str::to_owned).into();
         let stop = AtomicBool::new(false);
-        let words = Words { command: &command, folder: Path::new("/"), again: false };
-        run(words, &[factor], &point, Limit::of(longest_s, &stop))
+        let invocation = Invocation { command: &command, folder: Path::new("/"), again: false };
+        run(invocation, &[factor], &point, Limit::of(longest_s, &stop))
     }
 
     fn answer(script: &str, longest_s: f64) -> Outcome {

@@ -5,8 +5,8 @@
 
 use crate::edits::{self, EditError};
 use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
+use crate::inputs::{CampaignInputs, RigFile, Text};
 use crate::points::{Point, Points};
-use crate::shelf::{CampaignInputs, RigFile, Text};
 use axis_control::program::file::Source;
 use plant::effects::draw::{Among, EffectSampler};
 use plant::effects::sheet;
@@ -45,7 +45,7 @@ pub(crate) struct ConditionError {
 }
 
 pub(crate) fn condition<'s>(
-    shelf: &'s CampaignInputs,
+    inputs: &'s CampaignInputs,
     points: &Points,
     point: &Point,
 ) -> Result<Condition<'s>, ConditionError> {
@@ -54,8 +54,8 @@ pub(crate) fn condition<'s>(
     for (factor, value) in points.factors().iter().zip(&point.values) {
         sorted.take(&factor.changes, value, point);
     }
-    let nominal = shelf.rig(sorted.file(FileChoice::Rig));
-    let experiment = shelf.experiment(sorted.file(FileChoice::Experiment));
+    let nominal = inputs.rig(sorted.file(FileChoice::Rig));
+    let experiment = inputs.experiment(sorted.file(FileChoice::Experiment));
     let edited = |file: &Text, numbers: &[(String, f64)]| {
         let numbers = numbers.iter().map(|(path, number)| (path.as_str(), *number));
         edits::with(&file.text, numbers)
@@ -73,7 +73,7 @@ pub(crate) fn condition<'s>(
             "{file}: rig.sealed: a campaign says itself what is hidden, by choose = \"hidden\""
         )));
     }
-    let program = |choice| sorted.file(choice).map(|name| shelf.chosen_program(name));
+    let program = |choice| sorted.file(choice).map(|name| inputs.chosen_program(name));
     Ok(Condition {
         programs: [program(FileChoice::DriveProgram), program(FileChoice::LoadProgram)],
         set: sorted.set.clone(),
@@ -91,8 +91,8 @@ pub(crate) fn condition<'s>(
 impl Condition<'_> {
     /// The program of an axis that the experiment calls `written`.
     #[must_use]
-    pub(crate) fn program(&self, shelf: &CampaignInputs, axis: Axis, written: &str) -> Option<Source> {
-        self.programs[axis.index()].or_else(|| shelf.program(written, self.experiment)).cloned()
+    pub(crate) fn program(&self, inputs: &CampaignInputs, axis: Axis, written: &str) -> Option<Source> {
+        self.programs[axis.index()].or_else(|| inputs.program(written, self.experiment)).cloned()
     }
 }
 
@@ -172,17 +172,17 @@ mod tests {
     use crate::file::{CampaignFile, Kind};
     use std::path::Path;
 
-    fn shelf(text: &str) -> (CampaignInputs, Points) {
+    fn read(text: &str) -> (CampaignInputs, Points) {
         let file = CampaignFile::from_toml(text, Path::new("c.toml")).unwrap();
         let Kind::Experiment(kind) = &file.kind else { panic!("an experiment") };
         let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller");
-        let shelf = CampaignInputs::read(&file, kind, &shipped).unwrap();
-        (shelf, Points::new(&file.factors, file.draws, file.seed).unwrap())
+        let inputs = CampaignInputs::read(&file, kind, &shipped).unwrap();
+        (inputs, Points::new(&file.factors, file.draws, file.seed).unwrap())
     }
 
     #[test]
     fn values_reach_the_simulated_rig_and_the_controllers_keep_the_nominal_one() {
-        let (shelf, points) = shelf(
+        let (inputs, points) = read(
             "title = \"t\"\nexperiment = \"step\"\n\
              [[vary]]\nrig = \"friction.sliding_force_n\"\nlist = [20]\n\
              [[vary]]\nrig = \"effects.valve-offset.drive.offset_percent\"\nlist = [1.5]\n\
@@ -190,25 +190,25 @@ mod tests {
              [[vary]]\nset = \"drive.algorithm.gain_per_s\"\nlist = [30.5]\n\
              [[vary]]\nchoose = \"drive-program\"\nlist = [\"position-cascade\"]\n",
         );
-        let condition = condition(&shelf, &points, &points.point(0)).unwrap();
+        let condition = condition(&inputs, &points, &points.point(0)).unwrap();
         assert_eq!(condition.rig.friction().sliding_force_n, 20.0);
         assert_eq!(condition.nominal.nominal.friction().sliding_force_n, 26.0);
         assert_eq!(condition.rig.effects().len(), 1);
         assert_eq!(condition.scene.added_mass_kg, 10.0);
         assert_eq!(condition.set, ["drive.algorithm.gain_per_s=30.5"]);
-        let program = condition.program(&shelf, Axis::Drive, "position-p").unwrap();
+        let program = condition.program(&inputs, Axis::Drive, "position-p").unwrap();
         assert!(program.path.ends_with("position-cascade.toml"));
     }
 
     #[test]
     fn a_hidden_effect_is_drawn_by_the_run_and_none_is_none() {
-        let (shelf, points) = shelf(
+        let (inputs, points) = read(
             "title = \"t\"\nexperiment = \"step\"\ndraws = 3\n\
              [[vary]]\nchoose = \"hidden\"\nlist = [\"none\", \"rod-leakage\"]\n",
         );
         let effects = |run| {
             let point = points.point(run);
-            condition(&shelf, &points, &point).unwrap().rig.effects().to_vec()
+            condition(&inputs, &points, &point).unwrap().rig.effects().to_vec()
         };
         assert!(effects(0).is_empty());
         assert_eq!(effects(3)[0].name, "rod-leakage");
@@ -217,10 +217,10 @@ mod tests {
 
     #[test]
     fn a_value_that_the_rig_cannot_have_is_told_with_the_run() {
-        let (shelf, points) = shelf(
+        let (inputs, points) = read(
             "title = \"t\"\nexperiment = \"step\"\n[[vary]]\nrig = \"friction.sliding_force_n\"\nlist = [26, 1e6]\n",
         );
-        let error = condition(&shelf, &points, &points.point(1)).unwrap_err();
+        let error = condition(&inputs, &points, &points.point(1)).unwrap_err();
         assert!(
             error.to_string().contains("run 1: rig.toml:") && error.message.contains("sliding_force_n"),
             "{error}"
@@ -229,12 +229,12 @@ mod tests {
 
     #[test]
     fn numbers_of_one_fault_make_one_entry_of_the_script() {
-        let (shelf, points) = shelf(
+        let (inputs, points) = read(
             "title = \"t\"\nexperiment = \"step\"\npace = \"lockstep\"\n\
              [[vary]]\nfault = \"position-sensor-spike\"\nat = \"drive\"\nkey = \"spike_m\"\nfrom_s = 1\nlist = [0.1]\n\
              [[vary]]\nfault = \"position-sensor-spike\"\nat = \"drive\"\nkey = \"every_ms\"\nfrom_s = 1\nlist = [50]\n",
         );
-        let text = condition(&shelf, &points, &points.point(0)).unwrap().faults_toml;
+        let text = condition(&inputs, &points, &points.point(0)).unwrap().faults_toml;
         assert_eq!(
             text,
             "[[fault]]\nname = \"position-sensor-spike\"\nfrom_s = 1.0\nat = \"drive\"\nspike_m = 0.1\nevery_ms = 50\n"

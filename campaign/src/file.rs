@@ -256,7 +256,7 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
     match (kind, changes) {
         (Kind::Command(_), Changes::Passed) => Ok(()),
         (Kind::Command(_), _) => {
-            Err("name: a command is told name and value: leave out what is changed, give a name".into())
+            Err("name: a command receives name and value: leave out what is changed, give a name".into())
         }
         (Kind::Experiment(_), Changes::Passed) => {
             Err("rig: needs exactly one of rig, experiment, set, fault, choose".into())

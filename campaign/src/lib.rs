@@ -18,7 +18,7 @@
 //! | [`mod@file`] | the campaign file |
 //! | [`factor`] | what is varied |
 //! | [`points`] | which runs there are |
-//! | [`shelf`] | the files that a campaign names |
+//! | [`inputs`] | the files that a campaign names |
 //! | [`edits`] | numbers put into the texts of files |
 //! | [`condition`] | what a run is made with |
 //! | [`rehearsed`], [`processes`], [`command`] | the three ways in which a run is made |
@@ -39,6 +39,7 @@ mod edits;
 mod engine;
 mod factor;
 mod file;
+mod inputs;
 mod merge;
 mod outcome;
 mod page;
@@ -47,4 +48,3 @@ mod points;
 mod processes;
 mod rehearsed;
 mod shard;
-mod shelf;

@@ -38,7 +38,7 @@ pub(crate) struct Results {
     /// Numbers by the name of their column; NaN where a run has none.
     numbers: BTreeMap<String, Vec<f64>>,
     /// Words by the name of their column: places in the list of different ones.
-    words: BTreeMap<String, Words>,
+    words: BTreeMap<String, CategoricalColumn>,
     /// The first of the runs that did not come to their end.
     pub unfinished: Vec<Unfinished>,
 }
@@ -52,19 +52,19 @@ pub(crate) struct Unfinished {
     pub because: String,
 }
 
-/// Most runs whose trouble is reported one by one.
-const MOST_TOLD: usize = 100;
+/// Most unfinished runs that are reported one by one.
+const MAX_REPORTED: usize = 100;
 
 /// A column of words, each kept once.
 #[derive(Debug, Default)]
-pub(crate) struct Words {
+pub(crate) struct CategoricalColumn {
     /// The different ones, in the order in which they came.
     pub known: Vec<String>,
     /// The word of each run.
     pub places: Vec<u32>,
 }
 
-impl Words {
+impl CategoricalColumn {
     fn push(&mut self, word: &str) {
         let place = self.known.iter().position(|known| known == word).unwrap_or_else(|| {
             self.known.push(word.to_owned());
@@ -141,13 +141,13 @@ impl Results {
             if numbers_of(&factor.values) {
                 results.numbers.insert(factor.name.clone(), Vec::new());
             } else {
-                results.words.insert(factor.name.clone(), Words::default());
+                results.words.insert(factor.name.clone(), CategoricalColumn::default());
             }
         }
         for name in ["run", "passed"] {
             results.numbers.insert(name.to_owned(), Vec::new());
         }
-        results.words.insert("ended".to_owned(), Words::default());
+        results.words.insert("ended".to_owned(), CategoricalColumn::default());
         let confusion = campaign.file.confusion.iter().flatten();
         for name in confusion.filter(|name| !results.numbers.contains_key(*name)).cloned().collect::<Vec<_>>()
         {
@@ -169,7 +169,7 @@ impl Results {
         let (ended, because) = (place("ended"), place("because"));
         for row in reader.records().map_while(Result::ok) {
             let cell = |place: Option<usize>| place.and_then(|place| row.get(place)).unwrap_or_default();
-            if cell(ended) != "done" && self.unfinished.len() < MOST_TOLD {
+            if cell(ended) != "done" && self.unfinished.len() < MAX_REPORTED {
                 let (ended, because) = (cell(ended).to_owned(), cell(because).to_owned());
                 self.unfinished.push(Unfinished { run: self.runs, ended, because });
             }
@@ -200,7 +200,7 @@ impl Results {
     }
 
     #[must_use]
-    pub(crate) fn words(&self, name: &str) -> Option<&Words> {
+    pub(crate) fn words(&self, name: &str) -> Option<&CategoricalColumn> {
         self.words.get(name)
     }
 }

@@ -6,8 +6,8 @@ use crate::child::{Cut, Limit, Own};
 use crate::condition::{Condition, ConditionError};
 use crate::edits;
 use crate::factor::Value;
+use crate::inputs::CampaignInputs;
 use crate::outcome::{Ended, Outcome};
-use crate::shelf::CampaignInputs;
 use axis_control::experiment::Experiment;
 use figures::top::POSITIONS;
 use figures::{SummaryError, join};
@@ -45,14 +45,14 @@ pub(crate) enum ProcessesError {
 /// [`ProcessesError`]; a rig or controllers that fail are a result.
 pub(crate) fn run(
     condition: &Condition<'_>,
-    shelf: &CampaignInputs,
+    inputs: &CampaignInputs,
     (run, seconds): (u64, f64),
     programs: &Programs,
     folder: &Path,
     limit: Limit<'_>,
 ) -> Result<Outcome, ProcessesError> {
     let system = |what: &str| system(run, what);
-    let files = Files::write(condition, shelf, run, folder)?;
+    let files = Files::write(condition, inputs, run, folder)?;
     // The socket's path may not be long, and a folder's may.
     let private =
         tempfile::Builder::new().prefix("airbench-").tempdir().map_err(system("a folder for the bus"))?;
@@ -153,7 +153,7 @@ struct Files {
 impl Files {
     fn write(
         condition: &Condition<'_>,
-        shelf: &CampaignInputs,
+        inputs: &CampaignInputs,
         run: u64,
         folder: &Path,
     ) -> Result<Self, ProcessesError> {
@@ -169,7 +169,7 @@ impl Files {
         let read = Experiment::from_toml(&condition.experiment_toml, &experiment.path, stroke_m)
             .map_err(|error| refused(error.to_string()))?;
         let program = |axis, section: Option<&axis_control::experiment::AxisExperiment>| {
-            let source = condition.program(shelf, axis, &section?.program.written)?;
+            let source = condition.program(inputs, axis, &section?.program.written)?;
             Some(fs::canonicalize(&source.path).unwrap_or(source.path))
         };
         Ok(Self {

@@ -5,8 +5,8 @@
 
 use crate::condition::{Condition, ConditionError};
 use crate::factor::Value;
+use crate::inputs::CampaignInputs;
 use crate::outcome::{Ended, Outcome};
-use crate::shelf::CampaignInputs;
 use axis_control::axis::{AxisController, AxisRecord};
 use axis_control::setup::{Inputs, Mode};
 use figures::record::{MEASURED, Record, TRUE};
@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 /// [`ConditionError`] when experiment, programs and variables do not go together: not a result but a mistake in the campaign.
 pub(crate) fn rehearse(
     condition: &Condition<'_>,
-    shelf: &CampaignInputs,
+    campaign_inputs: &CampaignInputs,
     run: u64,
     seconds: f64,
 ) -> Result<Outcome, ConditionError> {
@@ -36,7 +36,7 @@ pub(crate) fn rehearse(
     let inputs = Inputs::of_sources(
         &condition.nominal.nominal,
         (&condition.experiment.path, &condition.experiment_toml),
-        |axis, written| condition.program(shelf, axis, written),
+        |axis, written| condition.program(campaign_inputs, axis, written),
         &condition.set,
     )
     .map_err(|error| refused(error.to_string()))?;

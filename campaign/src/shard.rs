@@ -35,7 +35,7 @@ pub(crate) const INDEX_VARIABLES: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "JOB_COMPL
 
 /// `--shard` as it is written: the index may be left to the batch system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Asked {
+pub(crate) struct ShardArgument {
     index: Option<u32>,
     count: u32,
 }
@@ -50,7 +50,7 @@ impl Shard {
     }
 }
 
-impl Asked {
+impl ShardArgument {
     /// The shard, with the index of the batch system where none was written; `variable` tells the environment's.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl Asked {
     }
 }
 
-impl FromStr for Asked {
+impl FromStr for ShardArgument {
     type Err = ShardError;
 
     fn from_str(text: &str) -> Result<Self, ShardError> {
@@ -83,7 +83,7 @@ impl FromStr for Asked {
         if count == 0 || index.is_some_and(|index| index >= count) {
             Err(bad())
         } else {
-            Ok(Asked { index, count })
+            Ok(ShardArgument { index, count })
         }
     }
 }
@@ -101,7 +101,7 @@ mod tests {
     fn shard(text: &str, variable: Option<(&str, &str)>) -> Result<Shard, ShardError> {
         let reported =
             |name: &str| variable.filter(|(own, _)| *own == name).map(|(_, value)| value.to_owned());
-        text.parse::<Asked>()?.shard(reported)
+        text.parse::<ShardArgument>()?.shard(reported)
     }
 
     #[test]

@@ -8,7 +8,7 @@ use pagekit::grid::Grid;
 use pagekit::page::escaped;
 
 /// Number of runs shown for each figure.
-const TOLD: usize = 8;
+const RUNS_SHOWN: usize = 8;
 
 /// The worst of each figure that is shown.
 pub(super) fn section(
@@ -20,7 +20,7 @@ pub(super) fn section(
     let mut text = "<h2>Worst cases</h2>\n".to_owned();
     if !results.unfinished.is_empty() {
         let head = ["run", "ended", "because", "with", "repeated by"];
-        let rows = results.unfinished.iter().take(TOLD).map(|Unfinished { run, ended, because }| {
+        let rows = results.unfinished.iter().take(RUNS_SHOWN).map(|Unfinished { run, ended, because }| {
             vec![run.to_string(), ended.clone(), because.clone(), values(campaign, *run), repeat(*run)]
         });
         text += "<h3>Runs that did not come to their end, the first</h3>\n";
@@ -32,7 +32,7 @@ pub(super) fn section(
         // Of equals the first.
         runs.sort_by(|one, other| column[*other].total_cmp(&column[*one]));
         let head = [&*name(figure), "run", "with", "repeated by"];
-        let rows = runs.iter().take(TOLD).map(|run| {
+        let rows = runs.iter().take(RUNS_SHOWN).map(|run| {
             let number = *run as u64;
             vec![value(figure, column[*run]), number.to_string(), values(campaign, number), repeat(number)]
         });

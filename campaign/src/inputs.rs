@@ -23,18 +23,17 @@ pub(crate) struct CampaignInputs {
     programs: BTreeMap<PathBuf, Source>,
     /// Hashes of what experiments and programs name in their turn, tables of set-points and libraries, by their names there.
     further: BTreeSet<(String, String)>,
-    /// Where names are looked up.
     folders: Folders,
     /// The experiment and the rig where they are not varied.
     usual: [String; 2],
 }
 
-/// Where names are looked up.
+/// Folders in which the names of files are looked up.
 #[derive(Debug)]
 struct Folders {
-    /// Of the campaign's file.
-    own: PathBuf,
-    /// With the shipped `experiments` and `programs`.
+    /// The one of the campaign's file.
+    campaign: PathBuf,
+    /// The one with the shipped `experiments` and `programs`.
     shipped: PathBuf,
 }
 
@@ -49,7 +48,7 @@ impl Folders {
     }
 
     fn experiment(&self, name: &str) -> PathBuf {
-        self.file(name, "experiments", &self.own)
+        self.file(name, "experiments", &self.campaign)
     }
 
     /// A program as an experiment names it.
@@ -59,7 +58,7 @@ impl Folders {
 
     /// A program as a `[[vary]]` names it.
     fn chosen_program(&self, name: &str) -> PathBuf {
-        self.file(name, "programs", &self.own)
+        self.file(name, "programs", &self.campaign)
     }
 }
 
@@ -79,7 +78,7 @@ pub(crate) struct RigFile {
 /// A file that a campaign names and that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{campaign}: {message}")]
-pub(crate) struct ShelfError {
+pub(crate) struct InputsError {
     campaign: String,
     message: String,
 }
@@ -90,10 +89,10 @@ impl CampaignInputs {
         file: &CampaignFile,
         kind: &ExperimentKind,
         shipped: &Path,
-    ) -> Result<Self, ShelfError> {
-        let error = |message: String| ShelfError { campaign: file.path.display().to_string(), message };
-        let own = file.path.parent().unwrap_or(Path::new("")).to_owned();
-        let folders = Folders { own, shipped: shipped.to_owned() };
+    ) -> Result<Self, InputsError> {
+        let error = |message: String| InputsError { campaign: file.path.display().to_string(), message };
+        let campaign = file.path.parent().unwrap_or(Path::new("")).to_owned();
+        let folders = Folders { campaign, shipped: shipped.to_owned() };
         let read = |path: PathBuf| {
             let text = std::fs::read_to_string(&path)
                 .map_err(|reported| error(format!("{}: {reported}", path.display())))?;
@@ -102,7 +101,7 @@ impl CampaignInputs {
         let chosen = |choice| names(&file.factors, choice);
         let mut rigs = BTreeMap::new();
         for name in kind.rig.clone().into_iter().chain(chosen(FileChoice::Rig)) {
-            rigs.insert(name.clone(), rig_file(read(folders.own.join(&name))?).map_err(error)?);
+            rigs.insert(name.clone(), rig_file(read(folders.campaign.join(&name))?).map_err(error)?);
         }
         if rigs.is_empty() {
             let text = Text { path: "rig.toml".into(), text: RigParameters::BASELINE_TOML.to_owned() };
