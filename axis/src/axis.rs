@@ -18,7 +18,7 @@ mod slow;
 mod work;
 
 pub use changes::PlannedChange;
-pub use record::{Answer, AxisRecord};
+pub use record::{Answer, AxisRecord, NumberColumn, StateColumn};
 pub use work::{ForcePlan, Plan};
 
 use crate::chains::leading::{Leading, LeadingInputs};

@@ -108,37 +108,6 @@ fn passed(
     Ok(Some(ended == Ended::Done && judged.values().all(|bound| bound.kept)))
 }
 
-/// A column of a controller's table.
-type OfAxis = (&'static str, fn(&AxisRecord) -> Option<f64>);
-
-/// In the words of the controller's own table.
-const OF_AXIS: [OfAxis; 10] = [
-    ("set_position_m", |row| row.set_position.map(|point| point.position_m)),
-    ("set_velocity_m_per_s", |row| row.set_position.map(|point| point.velocity_m_per_s)),
-    ("set_force_N", |row| row.set_force.map(|point| point.force_n)),
-    ("position_m", |row| Some(row.position_m)),
-    ("velocity_m_per_s", |row| Some(row.velocity_m_per_s)),
-    ("force_N", |row| Some(row.force_n)),
-    ("wanted_velocity_m_per_s", |row| Some(row.wanted_velocity_m_per_s)),
-    ("opening", |row| Some(row.opening)),
-    ("enabled", |row| Some(f64::from(u8::from(row.enabled)))),
-    ("moving", |row| {
-        let moving = row.set_position.is_some_and(|point| point.moving)
-            || row.set_force.is_some_and(|point| point.moving);
-        Some(f64::from(u8::from(moving)))
-    }),
-];
-
-/// A chain of a controller's table.
-type Chain = (&'static str, fn(&AxisRecord) -> &'static str);
-
-const CHAINS: [Chain; 4] = [
-    ("main_chain", |row| row.main.name()),
-    ("force_chain", |row| row.force_chain.name()),
-    ("matching_chain", |row| row.matching.name()),
-    ("emergency_stop_chain", |row| row.emergency_stop.name()),
-];
-
 struct Columns {
     axes: [AxisColumns; 2],
     measured: Vec<Series>,
@@ -147,8 +116,8 @@ struct Columns {
 
 #[derive(Default)]
 struct AxisColumns {
-    numbers: [Series; OF_AXIS.len()],
-    states: [Vec<StateSpan>; CHAINS.len()],
+    numbers: [Series; AxisRecord::NUMBERS.len()],
+    states: [Vec<StateSpan>; AxisRecord::CHAINS.len()],
 }
 
 impl Columns {
@@ -195,20 +164,22 @@ impl Columns {
 
 impl AxisColumns {
     fn push(&mut self, row: &AxisRecord, time_s: f64) {
-        for (column, (_, value)) in self.numbers.iter_mut().zip(OF_AXIS) {
-            if let Some(value) = value(row) {
-                column.push(time_s, value);
+        for (series, column) in self.numbers.iter_mut().zip(&AxisRecord::NUMBERS) {
+            if let Some(value) = (column.value)(row) {
+                series.push(time_s, value);
             }
         }
-        for (column, (_, state)) in self.states.iter_mut().zip(CHAINS) {
-            enter(column, state(row), time_s);
+        for (spans, column) in self.states.iter_mut().zip(&AxisRecord::CHAINS) {
+            enter(spans, (column.state)(row), time_s);
         }
     }
 
     fn table(self) -> Table {
         let mut table = Table::default();
-        OF_AXIS.iter().zip(self.numbers).for_each(|((name, _), column)| table.set_numbers(name, column));
-        CHAINS.iter().zip(self.states).for_each(|((name, _), column)| table.set_states(name, column));
+        let numbers = AxisRecord::NUMBERS.into_iter().zip(self.numbers);
+        numbers.for_each(|(column, series)| table.set_numbers(column.name, series));
+        let states = AxisRecord::CHAINS.into_iter().zip(self.states);
+        states.for_each(|(column, spans)| table.set_states(column.name, spans));
         table
     }
 }

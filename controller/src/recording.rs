@@ -19,8 +19,6 @@ use xcp::parameter_files::ParameterFileWorker;
 
 const POLL_PERIOD: Duration = Duration::from_millis(4);
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
-const HEAD: &str = "time_s,main_chain,force_chain,matching_chain,emergency_stop_chain,set_position_m,\
-set_velocity_m_per_s,set_force_N,position_m,velocity_m_per_s,force_N,wanted_velocity_m_per_s,opening,enabled,moving";
 
 pub(crate) struct Tables {
     tables: Vec<(Axis, LineFile)>,
@@ -30,7 +28,7 @@ impl Tables {
     pub(crate) fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
         let tables = axes.iter().map(|axis| {
             let mut table = LineFile::create(&folder.join(format!("controller-{}.csv", axis.name())))?;
-            writeln!(table.lines(), "{HEAD}")?;
+            writeln!(table.lines(), "{}", head())?;
             Ok((*axis, table))
         });
         Ok(Self { tables: tables.collect::<io::Result<_>>()? })
@@ -40,40 +38,31 @@ impl Tables {
         let Some((_, table)) = self.tables.iter_mut().find(|(axis, _)| *axis == record.axis) else {
             return Ok(());
         };
-        let AxisRecord { cycle, main, force_chain, matching, emergency_stop, .. } = record;
         let out = table.lines();
-        write!(
-            out,
-            "{}.{:03},{main},{force_chain},{matching},{emergency_stop},",
-            cycle / 1000,
-            cycle % 1000
-        )?;
-        match &record.set_position {
-            Some(point) => write!(out, "{},{},", point.position_m, point.velocity_m_per_s)?,
-            None => write!(out, ",,")?,
+        write!(out, "{}.{:03}", record.cycle / 1000, record.cycle % 1000)?;
+        for column in &AxisRecord::CHAINS {
+            write!(out, ",{}", (column.state)(record))?;
         }
-        if let Some(point) = &record.set_force {
-            write!(out, "{}", point.force_n)?;
+        for column in &AxisRecord::NUMBERS {
+            match (column.value)(record) {
+                Some(value) if column.exponent => write!(out, ",{value:?}")?,
+                Some(value) => write!(out, ",{value}")?,
+                None => write!(out, ",")?,
+            }
         }
-        let moving = record.set_position.is_some_and(|point| point.moving)
-            || record.set_force.is_some_and(|point| point.moving);
-        writeln!(
-            out,
-            ",{},{:?},{},{:?},{},{},{}",
-            record.position_m,
-            record.velocity_m_per_s,
-            record.force_n,
-            record.wanted_velocity_m_per_s,
-            record.opening,
-            u8::from(record.enabled),
-            u8::from(moving)
-        )?;
+        writeln!(out)?;
         table.write_when_full()
     }
 
     pub(crate) fn write_out(&mut self) -> io::Result<()> {
         self.tables.iter_mut().try_for_each(|(_, table)| table.write_out())
     }
+}
+
+fn head() -> String {
+    let chains = AxisRecord::CHAINS.map(|column| column.name);
+    let numbers = AxisRecord::NUMBERS.map(|column| column.name);
+    [&["time_s"][..], &chains[..], &numbers[..]].concat().join(",")
 }
 
 pub(crate) struct Writer {
@@ -168,5 +157,53 @@ pub(crate) fn sentence(news: NodeEvent) -> String {
         NodeEvent::BusLost => "the bus is gone; trying to come back".into(),
         NodeEvent::BusBack => "the bus is back".into(),
         NodeEvent::SensorsSilent => "no sensors for 0.2 s; waiting for the rig".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axis_control::set_point::{ForceSetPoint, SetPoint};
+    use protocol::frames::{EmergencyStopChainState, ForceChainState, MatchingChainState};
+
+    #[test]
+    fn a_row_has_a_cell_for_each_column_and_an_empty_one_for_a_set_point_that_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut tables = Tables::create(folder.path(), &[Axis::Drive]).unwrap();
+        let by_position = AxisRecord {
+            axis: Axis::Drive,
+            cycle: 12_034,
+            main: MainChainState::Experiment,
+            force_chain: ForceChainState::Idle,
+            matching: MatchingChainState::Matched,
+            emergency_stop: EmergencyStopChainState::Ready,
+            set_position: Some(SetPoint { velocity_m_per_s: 1e-7, moving: true, ..SetPoint::at_rest(0.25) }),
+            set_force: None,
+            position_m: 0.125,
+            velocity_m_per_s: 1e-7,
+            force_n: -3.0,
+            wanted_velocity_m_per_s: -2e-7,
+            opening: 0.5,
+            enabled: true,
+        };
+        let by_force = AxisRecord {
+            cycle: 12_035,
+            set_position: None,
+            set_force: Some(ForceSetPoint::at_rest(100.0)),
+            velocity_m_per_s: 0.0,
+            enabled: false,
+            ..by_position
+        };
+        tables.write(&by_position).unwrap();
+        tables.write(&by_force).unwrap();
+        tables.write(&AxisRecord { axis: Axis::Load, ..by_force }).unwrap();
+        tables.write_out().unwrap();
+        assert_eq!(
+            std::fs::read_to_string(folder.path().join("controller-drive.csv")).unwrap(),
+            "time_s,main_chain,force_chain,matching_chain,emergency_stop_chain,set_position_m,set_velocity_m_per_s,\
+             set_force_N,position_m,velocity_m_per_s,force_N,wanted_velocity_m_per_s,opening,enabled,moving\n\
+             12.034,experiment,idle,matched,ready,0.25,0.0000001,,0.125,1e-7,-3,-2e-7,0.5,1,1\n\
+             12.035,experiment,idle,matched,ready,,,100,0.125,0.0,-3,-2e-7,0.5,0,0\n"
+        );
     }
 }

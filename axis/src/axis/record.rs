@@ -1,4 +1,7 @@
 //! What an axis hands over in a cycle: to the bus, to a person, to the record.
+//!
+//! The columns of the record, `controller-drive.csv` and `controller-load.csv`, stand here: who writes the tables, and who makes
+//! figures of the rows in memory, goes through [`AxisRecord::CHAINS`] and [`AxisRecord::NUMBERS`].
 
 use super::AxisController;
 use crate::node::NodeEvent;
@@ -42,6 +45,67 @@ pub struct AxisRecord {
     /// Opening sent, -1 to 1.
     pub opening: f64,
     pub enabled: bool,
+}
+
+/// A column of the record that holds the state of a chain.
+#[derive(Clone, Copy, Debug)]
+pub struct StateColumn {
+    /// Name in the head of the table.
+    pub name: &'static str,
+    /// The state, as `rig.dbc` names it.
+    pub state: fn(&AxisRecord) -> &'static str,
+}
+
+/// A column of the record that holds a number.
+#[derive(Clone, Copy, Debug)]
+pub struct NumberColumn {
+    /// Name in the head of the table, ending in the SI unit where there is one.
+    pub name: &'static str,
+    /// The number in that unit; none is an empty cell.
+    pub value: fn(&AxisRecord) -> Option<f64>,
+    /// Whether a tiny number is written with an exponent, in place of its zeros.
+    pub exponent: bool,
+}
+
+impl NumberColumn {
+    const fn new(name: &'static str, value: fn(&AxisRecord) -> Option<f64>) -> Self {
+        Self { name, value, exponent: false }
+    }
+
+    const fn with_exponent(self) -> Self {
+        Self { exponent: true, ..self }
+    }
+}
+
+impl AxisRecord {
+    /// The first columns of the table, behind `time_s`.
+    pub const CHAINS: [StateColumn; 4] = [
+        StateColumn { name: "main_chain", state: |row| row.main.name() },
+        StateColumn { name: "force_chain", state: |row| row.force_chain.name() },
+        StateColumn { name: "matching_chain", state: |row| row.matching.name() },
+        StateColumn { name: "emergency_stop_chain", state: |row| row.emergency_stop.name() },
+    ];
+
+    /// The columns behind the chains. Flags are 0 and 1.
+    pub const NUMBERS: [NumberColumn; 10] = [
+        NumberColumn::new("set_position_m", |row| row.set_position.map(|point| point.position_m)),
+        NumberColumn::new("set_velocity_m_per_s", |row| row.set_position.map(|point| point.velocity_m_per_s)),
+        NumberColumn::new("set_force_N", |row| row.set_force.map(|point| point.force_n)),
+        NumberColumn::new("position_m", |row| Some(row.position_m)),
+        NumberColumn::new("velocity_m_per_s", |row| Some(row.velocity_m_per_s)).with_exponent(),
+        NumberColumn::new("force_N", |row| Some(row.force_n)),
+        NumberColumn::new("wanted_velocity_m_per_s", |row| Some(row.wanted_velocity_m_per_s)).with_exponent(),
+        NumberColumn::new("opening", |row| Some(row.opening)),
+        NumberColumn::new("enabled", |row| Some(f64::from(u8::from(row.enabled)))),
+        NumberColumn::new("moving", |row| Some(f64::from(u8::from(row.moving())))),
+    ];
+
+    /// Whether the set-point in force changes, of position or force.
+    #[must_use]
+    pub fn moving(&self) -> bool {
+        self.set_position.is_some_and(|point| point.moving)
+            || self.set_force.is_some_and(|point| point.moving)
+    }
 }
 
 impl AxisController {

@@ -106,11 +106,7 @@ fn controller<'a>(rows: impl Iterator<Item = (f64, &'a AxisRecord)> + Clone) -> 
     put("velocity_m_per_s", |row| Some(row.velocity_m_per_s));
     put("force_N", |row| Some(row.force_n));
     put("opening", |row| Some(row.opening));
-    put("moving", |row| {
-        let moves = row.set_position.is_some_and(|point| point.moving)
-            || row.set_force.is_some_and(|point| point.moving);
-        Some(f64::from(u8::from(moves)))
-    });
+    put("moving", |row| Some(f64::from(u8::from(row.moving()))));
     table.set_states("main_chain", states(rows.clone().map(|(time_s, row)| (time_s, row.main.name()))));
     table.set_states("force_chain", states(rows.map(|(time_s, row)| (time_s, row.force_chain.name()))));
     table
