@@ -12,7 +12,7 @@
 //! A value reference is the place in the list, from 0, whatever the type.
 
 use plant::parameters::table::KEYS;
-use plant::{Plant, RigParameters, Setup, SetupError, Truth};
+use plant::{Axis, Plant, RigParameters, Setup, SetupError, Truth};
 
 /// What a variable stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,8 +92,6 @@ pub fn start_setup(rig: &RigParameters) -> Setup {
     Setup { carriage_position_m: setup.carriage_position_m.min(rig.cylinder().stroke_m), ..setup }
 }
 
-const AXES: [&str; 2] = ["drive", "load"];
-
 fn variable(name: impl Into<String>, role: Role, kind: Kind, about: impl Into<String>) -> Variable {
     let (name, about) = (name.into(), about.into());
     let unit = unit_of(&name);
@@ -102,7 +100,7 @@ fn variable(name: impl Into<String>, role: Role, kind: Kind, about: impl Into<St
 
 fn inputs() -> Vec<Variable> {
     let mut list = Vec::new();
-    for (place, axis) in AXES.iter().enumerate() {
+    for (place, axis) in Axis::ALL.map(Axis::name).into_iter().enumerate() {
         let about = format!(
             "Valve command of the {axis}, rounded to 1/2047; set before a step, it acts from one millisecond after the step's begin, as on the bus"
         );
@@ -177,7 +175,7 @@ fn measured() -> Vec<Variable> {
     let channels =
         ["position_measured_m", "force_measured_N", "pressure_a_measured_Pa", "pressure_b_measured_Pa"];
     let mut list = Vec::new();
-    for (axis, name) in AXES.iter().enumerate() {
+    for (axis, name) in Axis::ALL.map(Axis::name).into_iter().enumerate() {
         for (channel, suffix) in channels.iter().enumerate() {
             let about = "What the sensor shows, with noise, rounded and clipped, as in measurement.csv";
             let role = Role::Measured(axis, channel);

@@ -7,6 +7,7 @@
 
 use crate::effects::Terms;
 use crate::sensors::AxisReadings;
+use crate::state::Axis;
 use crate::truth::Truth;
 use std::io::{self, Write};
 
@@ -26,7 +27,7 @@ pub struct CycleRecord {
 }
 
 /// Columns of `measurement.csv` after `time_s`, for one axis; each is prefixed with `drive_` or `load_`.
-const AXIS_COLUMNS: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
+pub const AXIS_COLUMNS: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
 
 /// Writes the head of `measurement.csv`, whose comment line tells how the rig was set up.
 ///
@@ -40,9 +41,9 @@ pub fn write_measurement_head(out: &mut impl Write, linked: bool, added_mass_kg:
 
 /// Columns of `measurement.csv` after `time_s`.
 pub fn measurement_columns() -> impl Iterator<Item = String> {
-    ["drive", "load"]
+    Axis::ALL
         .into_iter()
-        .flat_map(|axis| AXIS_COLUMNS.iter().map(move |column| format!("{axis}_{column}")))
+        .flat_map(|axis| AXIS_COLUMNS.iter().map(move |column| format!("{}_{column}", axis.name())))
 }
 
 impl CycleRecord {

@@ -6,6 +6,7 @@
 
 mod rows;
 
+use plant::Axis;
 use plant::faults::SensorFault;
 use protocol::bus::WireNode;
 use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_SENSORS, LOAD_VALVE_COMMAND, MESSAGES};
@@ -120,7 +121,7 @@ impl Places {
         let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         let frame = |name: &str| format!("bus.{name}");
         match self {
-            Self::Axis => own(&["drive", "load"]),
+            Self::Axis => own(&Axis::ALL.map(Axis::name)),
             Self::Chamber => own(&["drive.a", "drive.b", "load.a", "load.b"]),
             Self::Supply => own(&["supply"]),
             Self::Linkage => own(&["linkage"]),

@@ -4,6 +4,7 @@
 
 use crate::event::Event;
 use crate::exchange::{AxisCycle, RoundTrip, TimingRecord};
+use plant::Axis;
 use protocol::frames::{MessageSpec, RIG_STATUS};
 use realtime::stages::Further;
 use realtime::{Percentiles, WallClockStep, WallClockWatch};
@@ -15,8 +16,6 @@ use std::io;
 
 /// Name of this process in tags and folders.
 pub(crate) const PROCESS: &str = "emulator";
-/// Names of the axes in tags.
-const AXES: [&str; 2] = ["drive", "load"];
 /// Steps of the wall clock that are kept.
 const MOST_STEPS: usize = 100;
 
@@ -48,8 +47,8 @@ pub(crate) struct RigTiming {
 impl RigTiming {
     pub(crate) fn create(setup: TimingSetup) -> io::Result<Self> {
         let mut recorder = TimingRecorder::create(setup)?;
-        let round_trip = AXES.map(|axis| recorder.add(&format!("{axis}-round-trip")));
-        let command_age = AXES.map(|axis| recorder.add(&format!("{axis}-command-age")));
+        let round_trip = Axis::ALL.map(|axis| recorder.add(&format!("{}-round-trip", axis.name())));
+        let command_age = Axis::ALL.map(|axis| recorder.add(&format!("{}-command-age", axis.name())));
         Ok(Self {
             recorder,
             round_trip,

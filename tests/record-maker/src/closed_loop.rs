@@ -154,7 +154,7 @@ fn record(recipe: &Recipe, scene: &Scene, rows: usize) -> Record {
 }
 
 fn check(row: &Row) -> Result<(), MakeError> {
-    for (axis, name) in row.axes.iter().zip(["drive", "load"]) {
+    for (axis, name) in row.axes.iter().zip(Axis::ALL.map(Axis::name)) {
         let [a, b] = axis.pressure_pa;
         let finite = axis.extension_m.is_finite() && axis.rod_velocity_m_per_s.is_finite();
         if !(finite && a > 0.0 && b > 0.0 && a.is_finite() && b.is_finite() && axis.spool.is_finite()) {

@@ -4,6 +4,7 @@
 //! fewest digits that read back to the same bits.
 
 use super::{Experiment, MakeError, Recipe, Record, Row, hidden, simulate};
+use plant::tables::AXIS_COLUMNS;
 use plant::{Axis, RigParameters};
 use serde_json::{Value, json};
 use std::io::Write as _;
@@ -12,7 +13,6 @@ use std::path::Path;
 /// A column: its name, and its value in a row of an axis.
 type Column = (&'static str, fn(&Row, usize) -> f64);
 
-const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
 const TRUE: [Column; 21] = [
     ("extension_m", |row, i| row.axes[i].extension_m),
     ("rod_velocity_m_per_s", |row, i| row.axes[i].rod_velocity_m_per_s),
@@ -75,7 +75,7 @@ pub(super) fn measurement_csv(record: &Record) -> Vec<u8> {
     let mut out = Vec::with_capacity(record.rows.len() * 64);
     put(&mut out, format_args!("# linked={} added_mass_kg={}\ntime_s", record.linked, record.added_mass_kg));
     for axis in recorded(record) {
-        MEASURED.iter().for_each(|column| put(&mut out, format_args!(",{}_{column}", axis.name())));
+        AXIS_COLUMNS.iter().for_each(|column| put(&mut out, format_args!(",{}_{column}", axis.name())));
     }
     for (cycle, row) in record.rows.iter().enumerate() {
         put(&mut out, format_args!("\n{}.{:03}", cycle / 1000, cycle % 1000));
