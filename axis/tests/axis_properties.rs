@@ -3,16 +3,33 @@
 //!
 //! Whatever comes, the opening is a number within the valve, and the valve is shut in every state that has no control.
 
+use algorithms::algorithm::Quantity;
 use axis_control::axis::{Answer, AxisController};
-use plant::Axis;
+use axis_control::program::file::Source;
+use plant::{Axis, RigParameters};
 use proptest::prelude::*;
 use protocol::frames::{
     ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, EmergencyStopReason, Frame,
     MainChainState, RigStatus, RunControl, RunControlCommand, Sensors,
 };
+use std::path::Path;
 
-const POSITION_PROGRAMS: [&str; 4] = ["position-p", "position-pid", "position-cascade", "position-linked"];
-const FORCE_PROGRAMS: [&str; 3] = ["force-p", "force-pid-map", "force-manual"];
+/// The shipped programs whose algorithm controls `quantity`, by name, sorted.
+fn programs(quantity: Quantity) -> Vec<String> {
+    let rig = RigParameters::baseline();
+    let controls = |path: &Path| {
+        let program = Source::read(path).and_then(|source| source.program(Axis::Drive, &rig, false));
+        program.unwrap_or_else(|error| panic!("{error}")).controls()
+    };
+    let folder = std::fs::read_dir(crate::shipped("controller/programs")).expect("the shipped programs");
+    let paths = folder.map(|entry| entry.expect("an entry").path());
+    let files = paths.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    let chosen = files.filter(|path| controls(path) == quantity);
+    let mut names: Vec<_> =
+        chosen.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
 
 /// The controller of `axis` for the shipped experiment load-step, with another program.
 fn controller(axis: Axis, program: &str) -> AxisController {
@@ -169,25 +186,26 @@ fn drive_through(
     Ok(())
 }
 
+// About sixteen courses for each of five programs.
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 80, ..ProptestConfig::default() })]
 
     #[test]
     fn a_position_axis_keeps_its_valve_in_range_and_shut_without_control(
-        program in 0..POSITION_PROGRAMS.len(),
+        program in prop::sample::select(programs(Quantity::Position)),
         goes_along in any::<bool>(),
         course in prop::collection::vec((sensors(), happening()), 1..120),
     ) {
-        drive_through(controller(Axis::Drive, POSITION_PROGRAMS[program]), &course, goes_along)?;
+        drive_through(controller(Axis::Drive, &program), &course, goes_along)?;
     }
 
     #[test]
     fn a_force_axis_keeps_its_valve_in_range_and_shut_without_control(
-        program in 0..FORCE_PROGRAMS.len(),
+        program in prop::sample::select(programs(Quantity::Force)),
         goes_along in any::<bool>(),
         course in prop::collection::vec((sensors(), happening()), 1..120),
     ) {
-        drive_through(controller(Axis::Load, FORCE_PROGRAMS[program]), &course, goes_along)?;
+        drive_through(controller(Axis::Load, &program), &course, goes_along)?;
     }
 }
 
