@@ -65,8 +65,9 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
             "the simulated rig broke in cycle {cycle}: {error}; its file makes it so"
         )));
     }
-    let ended = Ended { rehearsal, interrupted, reported, news, took_s: started.elapsed().as_secs_f64() };
-    save(arguments, &inputs, &scene, ended)
+    let finished =
+        FinishedRehearsal { rehearsal, interrupted, reported, news, took_s: started.elapsed().as_secs_f64() };
+    save(arguments, &inputs, &scene, finished)
 }
 
 /// Removes what runs in real time left; a rehearsal has no timing.
@@ -92,7 +93,7 @@ fn end_when_stuck() {
     });
 }
 
-struct Ended {
+struct FinishedRehearsal {
     rehearsal: Rehearsal,
     interrupted: bool,
     reported: Vec<RehearsalEvent>,
@@ -108,13 +109,13 @@ fn save(
     arguments: &RehearseArguments,
     inputs: &Inputs,
     scene: &impl serde::Serialize,
-    ended: Ended,
+    finished: FinishedRehearsal,
 ) -> Result<Exit, RunError> {
-    let node = ended.rehearsal.node();
+    let node = finished.rehearsal.node();
     let axes = report::of_node(node, inputs);
     let stopped = report::stopped(&axes);
     let (exit, ended_because) = match stopped {
-        _ if ended.interrupted => {
+        _ if finished.interrupted => {
             (Exit::Interrupted, "interrupted; everything recorded so far is saved".into())
         }
         Some((name, axis)) => {
@@ -124,12 +125,12 @@ fn save(
         None if arguments.files.repeat => (Exit::Good, "the time asked for is over".to_owned()),
         None => (Exit::BoundBroken, "the time asked for was over before the experiment was done".to_owned()),
     };
-    let cycles = ended.rehearsal.cycles();
+    let cycles = finished.rehearsal.cycles();
     let simulated_s = cycles as f64 * CYCLE_S;
     protocol::say!(
         "controller: {ended_because}; {simulated_s} s rehearsed in {:.2} s, {:.0} times real time",
-        ended.took_s,
-        simulated_s / ended.took_s
+        finished.took_s,
+        simulated_s / finished.took_s
     );
     let out = &arguments.files.out;
     let report = Report {
@@ -154,7 +155,7 @@ fn save(
         realtime_granted: Vec::new(),
         realtime_refused: Vec::new(),
         axes,
-        news: ended.news,
+        news: finished.news,
     };
     write_json(&out.join("controller.json"), &report).map_err(RunError::output)?;
     let run = RehearsalDescription {
@@ -171,7 +172,7 @@ fn save(
         cycles,
         ended_because,
         passed: exit == Exit::Good,
-        events: ended.reported,
+        events: finished.reported,
         ..RehearsalSummary::default()
     };
     write_json(&out.join("summary.json"), &summary).map_err(RunError::output)?;

@@ -127,7 +127,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         let work = scope.spawn(|| parts.run());
         let finished = join(work);
         let written = join(writer);
-        save(arguments, &inputs, Ended { started, finished: finished?, written })
+        save(arguments, &inputs, FinishedRun { started, finished: finished?, written })
     })
 }
 
@@ -208,7 +208,7 @@ struct Finished {
     records_dropped: u64,
 }
 
-struct Ended {
+struct FinishedRun {
     started: RunStart,
     finished: Finished,
     written: Written,
@@ -274,8 +274,8 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
     grants
 }
 
-fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
-    let Finished { outcome, axes, .. } = &ended.finished;
+fn verdict(arguments: &RunArguments, run: &FinishedRun) -> (Exit, String) {
+    let Finished { outcome, axes, .. } = &run.finished;
     let done = arguments.files.repeat || axes.values().all(report::is_done);
     let stopped = report::stopped(axes);
     let aborted = || {
@@ -283,7 +283,7 @@ fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
         (Exit::BoundBroken, format!("stopped before the end{why}"))
     };
     match outcome.end {
-        _ if ended.written.failure.is_some() => (Exit::BadInput, "the output could not be written".into()),
+        _ if run.written.failure.is_some() => (Exit::BadInput, "the output could not be written".into()),
         End::Stopped => aborted(),
         End::RigEnded if stopped.is_some() => aborted(),
         End::RigEnded if done => (Exit::Good, "done, and the rig has ended".into()),
@@ -299,9 +299,9 @@ fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
     }
 }
 
-fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit, RunError> {
-    let (exit, ended_because) = verdict(arguments, &ended);
-    let Ended { started, finished, written } = ended;
+fn save(arguments: &RunArguments, inputs: &Inputs, run: FinishedRun) -> Result<Exit, RunError> {
+    let (exit, ended_because) = verdict(arguments, &run);
+    let FinishedRun { started, finished, written } = run;
     let Finished { outcome, grants, bus, axes, .. } = finished;
     let sum = |of: fn(&AxisReport) -> u64| axes.values().map(of).sum::<u64>();
     protocol::say!(

@@ -54,9 +54,9 @@ struct Running {
     reported: bool,
 }
 
-/// What an importer may set, save the numbers of the rig.
+/// What an importer may set, except the numbers of the rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Asked {
+struct Settings {
     valve: [f64; 2],
     hand_n: [f64; 2],
     emergency_stop: bool,
@@ -72,7 +72,7 @@ pub struct Simulation {
     rig: Arc<RigParameters>,
     /// Keys of the rig that were set, in the rig file's units.
     numbers: BTreeMap<usize, Vec<f64>>,
-    asked: Asked,
+    settings: Settings,
     start_s: f64,
     mode: Mode,
     /// There from the initialisation on.
@@ -86,10 +86,10 @@ impl Simulation {
     /// [`SetupError`]: the rig does not take the default set-up.
     pub fn new(rig: RigParameters) -> Result<Self, SetupError> {
         let variables = Arc::new(variables::of(&rig)?);
-        let asked = Asked { setup: variables::start_setup(&rig), seed: 1, ..Asked::default() };
+        let settings = Settings { setup: variables::start_setup(&rig), seed: 1, ..Settings::default() };
         let (rig, numbers) = (Arc::new(rig), BTreeMap::new());
         let (mode, running) = (Mode::Instantiated, None);
-        Ok(Self { variables, rig, numbers, asked, start_s: 0.0, mode, running })
+        Ok(Self { variables, rig, numbers, settings, start_s: 0.0, mode, running })
     }
 
     /// Back to where it was instantiated, all values at their start.
@@ -168,11 +168,11 @@ impl Simulation {
                 format!("a step of {step_s} s: the plant moves by whole milliseconds, from 0.001 s on");
             return Err(Refusal::Time(text));
         }
-        let asked = self.asked;
+        let settings = self.settings;
         let running = self.running.as_mut().expect("there from the initialisation on");
-        let warning = running.act(&asked);
+        let warning = running.act(&settings);
         for _ in 0..periods as u64 {
-            running.period(&asked);
+            running.period(&settings);
         }
         if !running.plant.state().is_finite() {
             self.mode = Mode::Failed;
@@ -199,17 +199,17 @@ impl Simulation {
             self.ready()?;
         }
         let running = self.running.as_deref();
-        let inputs = inputs(&self.asked, running.map_or([0.0; 2], |running| running.acting));
+        let inputs = inputs(&self.settings, running.map_or([0.0; 2], |running| running.acting));
         let truth = running.filter(|_| outputs).map(|running| running.plant.truth(&inputs).values());
         let terms = running
             .filter(|_| list.iter().any(|instance| matches!(instance.role, Role::Term(_))))
             .map(|running| running.plant.terms(&inputs));
         for (instance, value) in list.iter().zip(values) {
             *value = match instance.role {
-                Role::Valve(axis) => self.asked.valve[axis],
-                Role::Hand(place) => self.asked.hand_n[place],
-                Role::CarriagePosition => self.asked.setup.carriage_position_m,
-                Role::AddedMass => self.asked.setup.added_mass_kg,
+                Role::Valve(axis) => self.settings.valve[axis],
+                Role::Hand(place) => self.settings.hand_n[place],
+                Role::CarriagePosition => self.settings.setup.carriage_position_m,
+                Role::AddedMass => self.settings.setup.added_mass_kg,
                 Role::Rig(key, place) => self.number(key)[place],
                 Role::Truth(place) => truth.map_or(0.0, |truth| truth[place]),
                 Role::Term(place) => terms.map_or(0.0, |terms| terms.values()[place]),
@@ -236,8 +236,8 @@ impl Simulation {
         let plant = self.running.as_ref().map(|running| &running.plant);
         for (instance, value) in list.iter().zip(values) {
             *value = match instance.role {
-                Role::EmergencyStop => self.asked.emergency_stop,
-                Role::Link => self.asked.link,
+                Role::EmergencyStop => self.settings.emergency_stop,
+                Role::Link => self.settings.link,
                 Role::Linked => plant.is_some_and(Plant::linked),
                 _ => plant.is_some_and(Plant::check_valves_shut),
             };
@@ -251,7 +251,7 @@ impl Simulation {
     /// [`Refusal::Reference`].
     pub fn integers(&self, references: &[u32], values: &mut [i32]) -> Result<(), Refusal> {
         find(&self.variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
-        values.fill(self.asked.seed);
+        values.fill(self.settings.seed);
         Ok(())
     }
 
@@ -268,10 +268,10 @@ impl Simulation {
         }
         for (instance, value) in list.iter().zip(values) {
             match instance.role {
-                Role::Valve(axis) => self.asked.valve[axis] = *value,
-                Role::Hand(place) => self.asked.hand_n[place] = *value,
-                Role::CarriagePosition => self.asked.setup.carriage_position_m = *value,
-                Role::AddedMass => self.asked.setup.added_mass_kg = *value,
+                Role::Valve(axis) => self.settings.valve[axis] = *value,
+                Role::Hand(place) => self.settings.hand_n[place] = *value,
+                Role::CarriagePosition => self.settings.setup.carriage_position_m = *value,
+                Role::AddedMass => self.settings.setup.added_mass_kg = *value,
                 Role::Rig(key, place) => {
                     let mut numbers = self.number(key).to_vec();
                     numbers[place] = *value;
@@ -294,8 +294,8 @@ impl Simulation {
         list.iter().try_for_each(|instance| self.settable(instance))?;
         for (instance, value) in list.iter().zip(values) {
             match instance.role {
-                Role::EmergencyStop => self.asked.emergency_stop = *value,
-                _ => self.asked.link = *value,
+                Role::EmergencyStop => self.settings.emergency_stop = *value,
+                _ => self.settings.link = *value,
             }
         }
         self.changed();
@@ -314,7 +314,7 @@ impl Simulation {
             in_range(instance, f64::from(*value))?;
         }
         if let Some(value) = values.last() {
-            self.asked.seed = *value;
+            self.settings.seed = *value;
         }
         self.changed();
         Ok(())
@@ -361,13 +361,13 @@ impl Simulation {
         let paths: Vec<_> =
             self.numbers.iter().map(|(key, numbers)| (KEYS[*key].path(), numbers.as_slice())).collect();
         let rig = self.rig.with_all(paths.iter().map(|(path, numbers)| (path.as_str(), *numbers)))?;
-        let setup = Setup { linked: self.asked.link, ..self.asked.setup };
+        let setup = Setup { linked: self.settings.link, ..self.settings.setup };
         let mut plant = Plant::new(&rig, &setup)?;
-        if self.asked.emergency_stop {
+        if self.settings.emergency_stop {
             plant.trip_emergency_stop();
         }
-        let mut sensors = Sensors::new(&rig, u64::from(self.asked.seed.cast_unsigned()));
-        let inputs = inputs(&self.asked, [0.0; 2]);
+        let mut sensors = Sensors::new(&rig, u64::from(self.settings.seed.cast_unsigned()));
+        let inputs = inputs(&self.settings, [0.0; 2]);
         // The emulator draws once before its first cycle; equal draws give equal noise.
         sensors.sample(&plant, &inputs);
         let readings = sensors.sample(&plant, &inputs);
@@ -379,13 +379,13 @@ impl Simulation {
 
 impl Running {
     /// What people do at the begin of a step.
-    fn act(&mut self, asked: &Asked) -> Option<String> {
-        if asked.emergency_stop && !self.plant.emergency_stop() {
+    fn act(&mut self, settings: &Settings) -> Option<String> {
+        if settings.emergency_stop && !self.plant.emergency_stop() {
             self.plant.trip_emergency_stop();
-        } else if !asked.emergency_stop && self.plant.emergency_stop() {
+        } else if !settings.emergency_stop && self.plant.emergency_stop() {
             self.plant.release_emergency_stop();
         }
-        if !asked.link {
+        if !settings.link {
             self.reported = false;
             self.plant.unlink();
             return None;
@@ -396,16 +396,16 @@ impl Running {
     }
 
     /// One period: what acts acts, the command is latched for the next one, the sensors are sampled at its begin.
-    fn period(&mut self, asked: &Asked) {
-        self.plant.step(&inputs(asked, self.acting));
-        self.acting = asked.valve.map(plant::quantise_valve);
-        self.readings = self.sensors.sample(&self.plant, &inputs(asked, self.acting));
+    fn period(&mut self, settings: &Settings) {
+        self.plant.step(&inputs(settings, self.acting));
+        self.acting = settings.valve.map(plant::quantise_valve);
+        self.readings = self.sensors.sample(&self.plant, &inputs(settings, self.acting));
         self.period += 1;
     }
 }
 
-fn inputs(asked: &Asked, valve: [f64; 2]) -> Inputs {
-    let [hand_force_carriage_n, hand_force_load_n] = asked.hand_n;
+fn inputs(settings: &Settings, valve: [f64; 2]) -> Inputs {
+    let [hand_force_carriage_n, hand_force_load_n] = settings.hand_n;
     Inputs { valve, hand_force_carriage_n, hand_force_load_n }
 }
 

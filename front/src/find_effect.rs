@@ -161,13 +161,13 @@ impl Search<'_> {
 
         let report = judge::read(&workflow.join("report.json"))?;
         let sealed = fs::read_to_string(&sealed).map_err(|error| FrontError::input(&sealed, &error))?;
-        let judged = judge::judge(&sealed, &report)?;
-        let told = folder.join("told.txt");
-        fs::write(&told, judged.lines.join("\n") + "\n")
-            .map_err(|error| FrontError::output(&told, &error))?;
-        judged.lines.iter().for_each(|line| say(&format!("  {line}")));
+        let judgement = judge::judge(&sealed, &report)?;
+        let path = folder.join("told.txt");
+        fs::write(&path, judgement.lines.join("\n") + "\n")
+            .map_err(|error| FrontError::output(&path, &error))?;
+        judgement.lines.iter().for_each(|line| say(&format!("  {line}")));
         say(&format!("  report: {}", workflow.join("report.html").display()));
-        Ok(judged.right)
+        Ok(judgement.right)
     }
 
     /// Draws what is hidden.

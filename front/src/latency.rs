@@ -15,7 +15,7 @@ use protocol::exit::Exit;
 use runlog::conditions::Conditions;
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use rustix::thread::{CpuSet, sched_getaffinity};
-use slices::{Bench, Slice, logs};
+use slices::{Slice, SliceRunner, logs};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -23,7 +23,7 @@ use std::time::Instant;
 
 /// Measures. Returns the exit code.
 pub(crate) fn latency(arguments: &LatencyArguments, front: &Front) -> Result<u8, FrontError> {
-    let asked = Asked::of(arguments, front)?;
+    let plan = Plan::of(arguments, front)?;
     let out = front.results(arguments.out.as_deref(), "latency")?;
     if out.join("pair-01").exists() {
         let out = out.display();
@@ -47,17 +47,17 @@ pub(crate) fn latency(arguments: &LatencyArguments, front: &Front) -> Result<u8,
     }
     let private = PrivateFolder::make()?;
     let mut measurement = Measurement {
-        bench: Bench {
+        runner: SliceRunner {
             children,
             emulator: front.places.program("emulator")?,
             controller: front.places.program("controller")?,
             bench: front.places.program("bench")?,
             rig: front.places.data("rig.toml")?,
             programs: front.places.data("programs")?,
-            experiment: asked.experiment.clone(),
+            experiment: plan.experiment.clone(),
             bus: arguments.bus.clone().unwrap_or_else(|| private.bus()),
             embedded: private.bus(),
-            cpus: asked.cpus,
+            cpus: plan.cpus,
             seconds: arguments.seconds,
             priority: arguments.priority,
             spin_us: arguments.spin_us,
@@ -70,11 +70,11 @@ pub(crate) fn latency(arguments: &LatencyArguments, front: &Front) -> Result<u8,
         load,
     };
     measurement.measure()?;
-    measurement.report(&asked)
+    measurement.report(&plan)
 }
 
 /// What the command line asks for, checked.
-struct Asked {
+struct Plan {
     experiment: PathBuf,
     /// Of the rig and of the controller.
     cpus: [usize; 2],
@@ -82,7 +82,7 @@ struct Asked {
     spin_bounds: Option<PathBuf>,
 }
 
-impl Asked {
+impl Plan {
     fn of(arguments: &LatencyArguments, front: &Front) -> Result<Self, FrontError> {
         let refused = |why: &str| Err(FrontError::Input(why.into()));
         let cpus = allowed_cpus();
@@ -159,7 +159,7 @@ fn get(
 }
 
 struct Measurement<'a> {
-    bench: Bench,
+    runner: SliceRunner,
     front: &'a Front,
     arguments: &'a LatencyArguments,
     out: PathBuf,
@@ -176,10 +176,10 @@ impl Measurement<'_> {
         let mut slices = vec![Slice::Cyclictest, Slice::Run, Slice::Bus, Slice::Socketpair];
         slices.extend((self.arguments.spin_us != 0).then_some(Slice::Spin));
         // On a real CAN the claim is about that bus; the embedded one stands beside it.
-        slices.extend(self.bench.bus.starts_with("can://").then_some(Slice::Embedded));
+        slices.extend(self.runner.bus.starts_with("can://").then_some(Slice::Embedded));
         let (pairs, seconds) = (self.arguments.pairs, self.arguments.seconds);
         let total = pairs * slices.len() as u64;
-        let [cpu, controller_cpu] = self.bench.cpus;
+        let [cpu, controller_cpu] = self.runner.cpus;
         say(&format!(
             "{pairs} pairs of {} slices of {seconds} s on CPU {cpu} (controller {controller_cpu}), about {} min; files in {}",
             slices.len(),
@@ -196,7 +196,7 @@ impl Measurement<'_> {
                 order.reverse();
             }
             for slice in order {
-                if self.bench.children.interrupted() {
+                if self.runner.children.interrupted() {
                     break;
                 }
                 // By what the slices took until now; by their length before there are any.
@@ -209,13 +209,13 @@ impl Measurement<'_> {
                     "pair {pair} of {pairs}, {:<11} {minutes} min {seconds:02} s left",
                     format!("{}:", slice.name())
                 ));
-                let load = self.bench.start_load(&self.load, &self.out.join("load.log"))?;
-                self.bench.measure(slice, &folder, self.front)?;
-                load.iter().for_each(|load| self.bench.end(*load));
+                let load = self.runner.start_load(&self.load, &self.out.join("load.log"))?;
+                self.runner.measure(slice, &folder, self.front)?;
+                load.iter().for_each(|load| self.runner.end(*load));
                 done += 1;
             }
             self.gather(&folder, pair)?;
-            if self.bench.children.interrupted() {
+            if self.runner.children.interrupted() {
                 break;
             }
         }
@@ -237,8 +237,8 @@ impl Measurement<'_> {
             }
         }
         let reference = run.join("cyclictest.json");
-        let (command, missing) = match (reference.is_file(), &self.bench.reference_missing) {
-            (true, _) => (Some(self.bench.cyclictest_words().join(" ")), None),
+        let (command, missing) = match (reference.is_file(), &self.runner.reference_missing) {
+            (true, _) => (Some(self.runner.cyclictest_words().join(" ")), None),
             (false, Some(why)) => (None, Some(why.clone())),
             (false, None) => (None, Some("interrupted before cyclictest's turn".into())),
         };
@@ -270,7 +270,7 @@ impl Measurement<'_> {
     }
 
     /// Reports of what was measured, and the table of ratios.
-    fn report(&mut self, asked: &Asked) -> Result<u8, FrontError> {
+    fn report(&mut self, plan: &Plan) -> Result<u8, FrontError> {
         let pairs: Vec<_> = (1..=self.arguments.pairs).map(|pair| self.pair_folder(pair)).collect();
         // What a killed slice left is no run: the emulator tells of itself at its end.
         let runs = |name: &str| -> Vec<PathBuf> {
@@ -278,13 +278,13 @@ impl Measurement<'_> {
             runs.filter(|run| run.join("summary.json").is_file()).collect()
         };
         let (plain, spinning) = (runs("run"), runs("run-spin"));
-        let interrupted = self.bench.children.interrupted();
+        let interrupted = self.runner.children.interrupted();
         if plain.is_empty() {
             let nothing = FrontError::Process("no run was measured".into());
             return Err(if interrupted { FrontError::Interrupted } else { nothing });
         }
         let report = |runs: &[PathBuf], out: &Path, bounds: &Option<PathBuf>| {
-            let mut command = Command::new(&self.bench.bench);
+            let mut command = Command::new(&self.runner.bench);
             command.arg("report").args(runs).arg("--out").arg(out);
             if let Some(bounds) = bounds {
                 command.arg("--bounds").arg(bounds);
@@ -292,15 +292,15 @@ impl Measurement<'_> {
             command
         };
         let made = self.out.join("report.json");
-        let mut plain = report(&plain, &self.out, &asked.bounds);
-        let mut code = self.bench.children.call(&mut plain)?;
-        let mut table = Command::new(&self.bench.bench);
+        let mut plain = report(&plain, &self.out, &plan.bounds);
+        let mut code = self.runner.children.call(&mut plain)?;
+        let mut table = Command::new(&self.runner.bench);
         table.arg("latency-table").arg(&made);
         if !spinning.is_empty() {
             let (out, log) = (self.out.join("spin"), self.out.join("spin.log"));
             let file = File::create(&log).map_err(|error| FrontError::output(&log, &error))?;
-            let mut spinning = report(&spinning, &out, &asked.spin_bounds);
-            match self.bench.children.call(spinning.stdout(file))? {
+            let mut spinning = report(&spinning, &out, &plan.spin_bounds);
+            match self.runner.children.call(spinning.stdout(file))? {
                 0 => {}
                 1 => {
                     let page = out.join("report.md");
@@ -323,18 +323,18 @@ impl Measurement<'_> {
         }
         let file = self.out.join("table.md");
         let written = File::create(&file).map_err(|error| FrontError::output(&file, &error))?;
-        if self.bench.children.call(table.args(["--made-by", &self.front.typed]).stdout(written))? != 0 {
+        if self.runner.children.call(table.args(["--made-by", &self.front.typed]).stdout(written))? != 0 {
             return Err(FrontError::Input("no table of ratios could be made".into()));
         }
         say(&format!("\n{}", last_lines(&file, usize::MAX)));
-        let interrupted = self.bench.children.interrupted();
+        let interrupted = self.runner.children.interrupted();
         if let Some(checkout) = self.front.places.checkout().filter(|_| self.arguments.write && !interrupted)
         {
             // The marks of all pages are the scripts' affair.
             let put =
                 "root=$1; . \"$root/scripts/tables.sh\"; put_table latency \"$2\" bench/docs/latency.md";
             let put = self
-                .bench
+                .runner
                 .children
                 .call(Command::new("bash").args(["-euc", put, "bash"]).arg(checkout).arg(&file))?;
             code = if put == 0 { code } else { put };

@@ -21,15 +21,15 @@ pub(crate) enum Source {
     Measured(usize),
     /// Sum of columns of `truth.csv`, each with this factor.
     Truth(Vec<String>, f64),
-    /// What the controller of an axis says that it does.
-    Said(usize, Said),
+    /// A signal of the controller of this axis.
+    Controller(usize, ControllerSignal),
     /// The supply's pressure, which the bus tells too.
     Supply,
 }
 
-/// What a controller says.
+/// A signal that a controller sends in its ChainValues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Said {
+pub(crate) enum ControllerSignal {
     /// Set-point of the position.
     Position,
     /// Set-point of the force.
@@ -74,8 +74,8 @@ fn of_axis(axis: usize) -> Vec<Column> {
     let friction = ["viscous_friction_N", "sliding_friction_N", "holding_force_N"];
     [
         ("position_m", "m", measured("position_m")),
-        ("set_point_m", "m", Source::Said(axis, Said::Position)),
-        ("control_error_m", "m", Source::Said(axis, Said::Error)),
+        ("set_point_m", "m", Source::Controller(axis, ControllerSignal::Position)),
+        ("control_error_m", "m", Source::Controller(axis, ControllerSignal::Error)),
         ("true_position_m", "m", truth(&["position_m"], 1.0)),
         ("velocity_m_per_s", "m/s", truth(&["rod_velocity_m_per_s"], along_x)),
         ("pressure_a_pa", "Pa", measured("pressure_a_Pa")),
@@ -85,7 +85,7 @@ fn of_axis(axis: usize) -> Vec<Column> {
         ("valve_opening", "1", measured("valve")),
         ("spool_opening", "1", truth(&["spool"], 1.0)),
         ("force_n", "N", measured("force_N")),
-        ("force_set_point_n", "N", Source::Said(axis, Said::Force)),
+        ("force_set_point_n", "N", Source::Controller(axis, ControllerSignal::Force)),
         ("flow_a_m3_per_s", "m^3/s", truth(&["flow_a_m3_per_s"], 1.0)),
         ("flow_b_m3_per_s", "m^3/s", truth(&["flow_b_m3_per_s"], 1.0)),
         ("pneumatic_force_n", "N", truth(&["pneumatic_force_N"], along_x)),

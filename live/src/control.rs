@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "command", rename_all = "kebab-case", deny_unknown_fields)]
-enum Asked {
+enum Request {
     EmergencyStop {},
     Release {},
     Start {},
@@ -37,7 +37,7 @@ enum Asked {
         all: bool,
     },
     SetPoint {
-        axis: AskedAxis,
+        axis: RequestAxis,
         position_m: Option<f64>,
         force_n: Option<f64>,
     },
@@ -48,7 +48,7 @@ enum Asked {
 
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-enum AskedAxis {
+enum RequestAxis {
     Drive,
     Load,
 }
@@ -74,34 +74,34 @@ pub(crate) enum Order {
 }
 
 pub(crate) fn read(body: &[u8]) -> Result<Order, String> {
-    let asked: Asked = serde_json::from_slice(body).map_err(|error| error.to_string())?;
+    let request: Request = serde_json::from_slice(body).map_err(|error| error.to_string())?;
     let run = |command| Order::Frame(Frame::RunControl(RunControl { command, experiment: 0 }));
     let line = |line: &str| Order::Line(line.to_owned());
-    Ok(match asked {
-        Asked::EmergencyStop {} => Order::Stop,
-        Asked::Release {} => Order::Release,
-        Asked::Start {} => run(RunControlCommand::Start),
-        Asked::Abort {} => run(RunControlCommand::Abort),
-        Asked::Link {} => line("link"),
-        Asked::Unlink {} => line("unlink"),
-        Asked::Weights { kg } => Order::Line(format!("weights {kg}")),
-        Asked::Hand { on, newton } => Order::Line(format!("hand {} {newton}", word(&on)?)),
-        Asked::Fault { name, place, values } => {
+    Ok(match request {
+        Request::EmergencyStop {} => Order::Stop,
+        Request::Release {} => Order::Release,
+        Request::Start {} => run(RunControlCommand::Start),
+        Request::Abort {} => run(RunControlCommand::Abort),
+        Request::Link {} => line("link"),
+        Request::Unlink {} => line("unlink"),
+        Request::Weights { kg } => Order::Line(format!("weights {kg}")),
+        Request::Hand { on, newton } => Order::Line(format!("hand {} {newton}", word(&on)?)),
+        Request::Fault { name, place, values } => {
             let mut text = format!("fault {}", at(&name, place.as_deref())?);
             for (key, value) in &values {
                 let _ = write!(text, " {}={value}", word(key)?);
             }
             Order::Line(text)
         }
-        Asked::Mend { all: true, name: None, place: None } => line("mend all"),
-        Asked::Mend { all: false, name: Some(name), place } => {
+        Request::Mend { all: true, name: None, place: None } => line("mend all"),
+        Request::Mend { all: false, name: Some(name), place } => {
             Order::Line(format!("mend {}", at(&name, place.as_deref())?))
         }
-        Asked::Mend { .. } => return Err("mend takes a name and a place, or \"all\": true".into()),
-        Asked::SetPoint { axis, position_m, force_n } => {
+        Request::Mend { .. } => return Err("mend takes a name and a place, or \"all\": true".into()),
+        Request::SetPoint { axis, position_m, force_n } => {
             let (axis, is_fitting) = match axis {
-                AskedAxis::Drive => (HandSetPointAxis::Drive, position_m.is_some() && force_n.is_none()),
-                AskedAxis::Load => (HandSetPointAxis::Load, position_m.is_some() != force_n.is_some()),
+                RequestAxis::Drive => (HandSetPointAxis::Drive, position_m.is_some() && force_n.is_none()),
+                RequestAxis::Load => (HandSetPointAxis::Load, position_m.is_some() != force_n.is_some()),
             };
             if !is_fitting {
                 return Err(
@@ -111,8 +111,8 @@ pub(crate) fn read(body: &[u8]) -> Result<Order, String> {
             }
             Order::SetPoint { axis, position_m, force_n }
         }
-        Asked::Save { seconds } if seconds > 0.0 && seconds <= LONGEST_S => Order::Save(seconds),
-        Asked::Save { .. } => return Err(format!("seconds: more than 0, at most {LONGEST_S}")),
+        Request::Save { seconds } if seconds > 0.0 && seconds <= LONGEST_S => Order::Save(seconds),
+        Request::Save { .. } => return Err(format!("seconds: more than 0, at most {LONGEST_S}")),
     })
 }
 

@@ -4,7 +4,7 @@
 //! their own. A row waits until the values after it are there, and takes what lies between them; where there is nothing on both
 //! sides, it has none: a set-point drawn beside a sensor of another cycle would be an error that nobody made.
 
-use super::columns::{COLUMNS, Said, Source};
+use super::columns::{COLUMNS, ControllerSignal, Source};
 use super::state::NewestRow;
 use protocol::frames::ChainValues;
 use serde_json::{Map, Value, json};
@@ -65,8 +65,8 @@ impl Rows {
             }
             let Some(mut row) = self.waiting.pop_front() else { return };
             for (value, column) in row.values.iter_mut().zip(COLUMNS.iter()) {
-                if let Source::Said(axis, what) = column.source {
-                    *value = between(&self.chain_values[axis], row.cycle, what).map(|value| value as f32);
+                if let Source::Controller(axis, signal) = column.source {
+                    *value = between(&self.chain_values[axis], row.cycle, signal).map(|value| value as f32);
                 }
             }
             self.kept.push_back(row);
@@ -98,11 +98,11 @@ impl Rows {
 }
 
 /// What a controller said of a cycle, or between what it said before and after.
-fn between(chain_values: &VecDeque<(u64, ChainValues)>, cycle: u64, what: Said) -> Option<f64> {
-    let value = |values: &ChainValues| match what {
-        Said::Position => values.position_set_point_m,
-        Said::Force => values.force_set_point_n,
-        Said::Error => values.control_error_m,
+fn between(chain_values: &VecDeque<(u64, ChainValues)>, cycle: u64, signal: ControllerSignal) -> Option<f64> {
+    let value = |values: &ChainValues| match signal {
+        ControllerSignal::Position => values.position_set_point_m,
+        ControllerSignal::Force => values.force_set_point_n,
+        ControllerSignal::Error => values.control_error_m,
     };
     let after = chain_values.iter().find(|(at, _)| *at >= cycle);
     let before = chain_values.iter().rev().find(|(at, _)| *at <= cycle);

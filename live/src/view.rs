@@ -142,7 +142,7 @@ impl View {
                 Source::Measured(index) => measured[*index],
                 Source::Truth(_, factor) => self.layout.truth(place, *factor, values),
                 Source::Supply => supply_pa,
-                Source::Said(..) => None,
+                Source::Controller(..) => None,
             })
             .collect();
         self.rows.add(cycle, &row);
@@ -151,7 +151,7 @@ impl View {
     pub(crate) fn frame(&mut self, record: FrameRecord, now_ms: u64) {
         self.minute.frame(record);
         match self.wire.take(&record.frame, now_ms) {
-            Some(News::Said(axis, cycle, values)) => self.rows.hear(axis, cycle, values),
+            Some(News::ChainValues(axis, cycle, values)) => self.rows.hear(axis, cycle, values),
             Some(News::Cycle(cycle, anew)) if !self.telemetry => self.row_of_bus(cycle, anew),
             _ => {}
         }
@@ -167,7 +167,7 @@ impl View {
         let of = |source: &Source| match source {
             Source::Measured(index) => measured[*index],
             Source::Supply => self.supply_on_bus_pa(),
-            Source::Truth(..) | Source::Said(..) => None,
+            Source::Truth(..) | Source::Controller(..) => None,
         };
         let row: Vec<_> = COLUMNS.iter().map(|column| of(&column.source)).collect();
         self.rows.add(cycle, &row);

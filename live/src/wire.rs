@@ -26,8 +26,8 @@ pub(crate) const CONSOLE: usize = 0;
 pub(crate) enum News {
     /// The rig is at this cycle, and started anew if that is reported.
     Cycle(u64, bool),
-    /// The controller of an axis says what it does, in its answer to the sensors of this cycle.
-    Said(usize, u64, ChainValues),
+    /// What the controller of an axis sends of itself, in its answer to the sensors of this cycle.
+    ChainValues(usize, u64, ChainValues),
 }
 
 /// Frames of the bus, taken in.
@@ -115,7 +115,7 @@ impl Wire {
 
     fn hear(&mut self, axis: usize, values: ChainValues) -> Option<News> {
         self.chain_values[axis] = Some(values);
-        Some(News::Said(axis, self.answered(axis)?, values))
+        Some(News::ChainValues(axis, self.answered(axis)?, values))
     }
 
     /// The cycle that a controller answered last. Newer sensors may have passed since: a late answer is of its own cycle.
@@ -439,7 +439,7 @@ mod tests {
         wire.take(&Frame::DriveValveCommand(command).encode().unwrap(), 0);
         let reported = wire.take(&chain_values, 0);
         assert!(
-            matches!(reported, Some(News::Said(0, 154, _))),
+            matches!(reported, Some(News::ChainValues(0, 154, _))),
             "the newest sensors are of 157: {reported:?}"
         );
     }

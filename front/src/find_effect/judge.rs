@@ -13,9 +13,9 @@ use std::path::Path;
 /// The most effects that a named one may stand for.
 const MOST_ALTERNATIVES: usize = 2;
 
-/// What a person is told, and whether all was right.
+/// The lines that are printed and written, and whether all was right.
 #[derive(Debug, PartialEq)]
-pub(super) struct Judged {
+pub(super) struct Judgement {
     pub(super) lines: Vec<String>,
     pub(super) right: bool,
 }
@@ -29,14 +29,14 @@ pub(super) fn read(file: &Path) -> Result<Report, FrontError> {
 ///
 /// # Errors
 /// [`FrontError::Input`] if the sealed file cannot be read as one.
-pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judged, FrontError> {
+pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judgement, FrontError> {
     let hidden = Hidden::of(sealed)?;
     let mut lines: Vec<String> =
-        hidden.iter().map(|hidden| told("hidden", &hidden.to_string(), &hidden.written)).collect();
+        hidden.iter().map(|hidden| line("hidden", &hidden.to_string(), &hidden.written)).collect();
     if hidden.is_empty() {
         lines.push("hidden: nothing".into());
     }
-    lines.extend(report.named.iter().map(|effect| told("named", &name(effect), &numbers(effect))));
+    lines.extend(report.named.iter().map(|effect| line("named", &name(effect), &numbers(effect))));
     if report.named.is_empty() {
         lines.push(format!("named: nothing ({})", report.verdict.name()));
     }
@@ -44,7 +44,7 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judged, FrontError>
         report.named.iter().flat_map(|effect| &effect.alternatives).collect();
     if !alternatives.is_empty() {
         let names: Vec<String> = alternatives.iter().map(|effect| name(effect)).collect();
-        lines.push(format!("not to be told apart by this record: {}", names.join(", ")));
+        lines.push(format!("indistinguishable in this record: {}", names.join(", ")));
     }
     let is_named =
         |hidden: &&Hidden| report.named.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
@@ -75,10 +75,10 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judged, FrontError>
         (right, verdict) = (false, "wrong, nothing was hidden");
     }
     lines.push(verdict.into());
-    Ok(Judged { lines, right })
+    Ok(Judgement { lines, right })
 }
 
-fn told(what: &str, name: &str, numbers: &str) -> String {
+fn line(what: &str, name: &str, numbers: &str) -> String {
     if numbers.is_empty() { format!("{what}: {name}") } else { format!("{what}: {name} ({numbers})") }
 }
 
@@ -206,7 +206,7 @@ mod tests {
     fn effects_and_terms_of_a_sealed_file_are_told_with_what_is_written() {
         let sealed = "[effects.piston-leakage.load]\nleakage_nl_per_min = 5.89\nshare = 0.5\n\n[effects.a.drive.x]\n\
                       [[terms]]\nname = 'brake'\nplace = 'drive.force'\nadd = '-(30[N s/m])*v'\n";
-        let told: Vec<(String, String)> = Hidden::of(sealed)
+        let read: Vec<(String, String)> = Hidden::of(sealed)
             .expect("a sealed file")
             .iter()
             .map(|hidden| (hidden.to_string(), hidden.written.clone()))
@@ -216,7 +216,7 @@ mod tests {
             ("piston-leakage at load", "leakage_nl_per_min 5.89, share 0.5"),
             ("brake at drive.force", "-(30[N s/m])*v"),
         ];
-        assert_eq!(told, expected.map(|(name, written)| (name.to_owned(), written.to_owned())));
+        assert_eq!(read, expected.map(|(name, written)| (name.to_owned(), written.to_owned())));
         assert!(Hidden::of("effects = 3").is_err());
     }
 }

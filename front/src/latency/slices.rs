@@ -43,8 +43,8 @@ impl Slice {
     }
 }
 
-/// The programs, and the conditions that are the same in all slices.
-pub(super) struct Bench {
+/// Measures slices: the programs, and the conditions that are the same in all slices.
+pub(super) struct SliceRunner {
     pub(super) children: Children,
     pub(super) emulator: PathBuf,
     pub(super) controller: PathBuf,
@@ -52,11 +52,11 @@ pub(super) struct Bench {
     pub(super) rig: PathBuf,
     pub(super) programs: PathBuf,
     pub(super) experiment: PathBuf,
-    /// Of the runs.
+    /// URL of the bus on which runs and its round trips are measured.
     pub(super) bus: String,
-    /// An embedded one.
+    /// URL of an embedded bus, for the round trips beside a real one.
     pub(super) embedded: String,
-    /// Of the rig and of the controller.
+    /// Numbers of the CPUs of the rig and of the controller.
     pub(super) cpus: [usize; 2],
     pub(super) seconds: u64,
     pub(super) priority: u64,
@@ -65,7 +65,7 @@ pub(super) struct Bench {
     pub(super) reference_missing: Option<String>,
 }
 
-impl Bench {
+impl SliceRunner {
     /// Measures a slice into the folder of its pair.
     pub(super) fn measure(&mut self, slice: Slice, folder: &Path, front: &Front) -> Result<(), FrontError> {
         match slice {
