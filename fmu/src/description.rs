@@ -5,7 +5,7 @@
 use crate::MODEL_IDENTIFIER;
 use crate::variables::{self, Causality, Kind, Variable};
 use crc::{CRC_64_XZ, Crc};
-use expression::mathml::escaped;
+use pagekit::page::escaped;
 use plant::{RigParameters, SetupError};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -114,6 +114,7 @@ fn variable(out: &mut String, place: usize, instance: &Variable) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::variables::Role;
 
     #[test]
     fn another_rig_file_has_another_identity_and_the_same_one_the_same() {
@@ -128,5 +129,23 @@ mod tests {
     #[test]
     fn what_xml_keeps_for_itself_is_escaped() {
         assert_eq!(escaped("a<b & \"c\">"), "a&lt;b &amp; &quot;c&quot;&gt;");
+    }
+
+    #[test]
+    fn a_control_character_in_a_name_is_none_in_the_description() {
+        let instance = Variable {
+            name: "leak\u{1}<\u{1b}".into(),
+            role: Role::Linked,
+            kind: Kind::Boolean(None),
+            causality: Causality::Output,
+            discrete: false,
+            unit: "",
+            range: None,
+            about: "a bell \u{7} and a null \u{0}".into(),
+        };
+        let mut out = String::new();
+        variable(&mut out, 0, &instance);
+        assert!(out.contains("name=\"leak\u{fffd}&lt;\u{fffd}\""), "{out:?}");
+        assert!(!out.contains(|letter: char| letter.is_control() && letter != '\n'), "{out:?}");
     }
 }
