@@ -69,8 +69,7 @@ pub fn name(name: &str) -> String {
 }
 
 /// A text as it may stand in XML, between tags or in an attribute's double quotes.
-#[must_use]
-pub fn escaped(text: &str) -> String {
+fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
