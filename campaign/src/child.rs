@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Between two looks at it.
+/// Time between two looks at whether a process has ended.
 const LOOK: Duration = Duration::from_millis(2);
 /// How long a process that was asked to end may take to save what it has.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -84,12 +84,12 @@ pub(crate) struct Limit<'a> {
     pub began: Instant,
     /// Longest time, s of the wall clock.
     pub longest_s: f64,
-    /// Set to stop at once.
+    /// Set from outside to end the run at once.
     pub stop: &'a AtomicBool,
 }
 
 impl<'a> Limit<'a> {
-    /// From now on.
+    /// A limit of `longest_s` that begins now.
     #[must_use]
     pub(crate) fn of(longest_s: f64, stop: &'a AtomicBool) -> Self {
         Self { began: Instant::now(), longest_s, stop }

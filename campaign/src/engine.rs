@@ -21,9 +21,9 @@ const TELL_EACH: Duration = Duration::from_secs(2);
 pub(crate) struct Done {
     /// Runs that this start did.
     pub runs: u64,
-    /// Of the rig's time, s.
+    /// Simulated time of these runs, s.
     pub simulated_s: f64,
-    /// Of the wall clock, s.
+    /// Time that the start took on the wall clock, s.
     pub wall_s: f64,
     /// Parts of this shard that are still missing.
     pub missing: u64,
@@ -48,12 +48,12 @@ pub(crate) enum EngineError {
 pub(crate) struct Start<'a> {
     pub campaign: &'a Campaign,
     pub out: &'a Path,
-    /// Which of them are this start's.
+    /// Which parts are this start's.
     pub shard: Shard,
     pub jobs: usize,
-    /// Set to stop.
+    /// Set from outside to end the start.
     pub stop: &'a AtomicBool,
-    /// Told a line now and then.
+    /// Takes a line of progress every few seconds.
     pub say: &'a (dyn Fn(&str) + Sync),
 }
 

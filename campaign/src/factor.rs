@@ -53,7 +53,7 @@ pub(crate) struct FaultNumber {
     pub fault: String,
     /// Where; none for a fault that has one place.
     pub at: Option<String>,
-    /// Which of its numbers.
+    /// Key of the number that is varied.
     pub key: String,
     /// From when, s of the rig's time.
     pub from_s: f64,
@@ -71,9 +71,9 @@ pub(crate) enum FileChoice {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Values {
-    /// Gone through.
+    /// Values that are combined with all those of the other lists.
     List(Vec<Value>),
-    /// Drawn.
+    /// A range from which each draw of the campaign takes a value.
     Range(Range),
 }
 
@@ -142,7 +142,7 @@ impl Values {
 
 /// Keys that say what is changed.
 const SUBJECTS: [&str; 5] = ["rig", "experiment", "set", "fault", "choose"];
-/// Keys of a fault besides.
+/// Keys that only a fault has.
 const OF_A_FAULT: [&str; 4] = ["at", "key", "from_s", "to_s"];
 
 /// What `choose` may name; `None`: a hidden effect.

@@ -40,14 +40,14 @@ pub(crate) struct CampaignFile {
     pub programs: Vec<String>,
     /// Runs of each combination of lists.
     pub draws: u64,
-    /// Of all that is drawn.
+    /// Seed of everything that is drawn.
     pub seed: u64,
     /// Runs that are written together; by the number of runs where it is left out.
     pub runs_per_part: Option<u64>,
     pub factors: Vec<Factor>,
     /// Columns that are collected; of an experiment all figures when there are none.
     pub figures: Vec<String>,
-    /// Of these the page shows the largest.
+    /// Columns of which the page shows the largest values, each with its run.
     pub worst: Vec<String>,
     /// Columns of truth and answer, of which the page shows a confusion matrix.
     pub confusion: Vec<[String; 2]>,

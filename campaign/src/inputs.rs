@@ -18,7 +18,7 @@ const SHIPPED: &str = "shipped";
 pub(crate) struct CampaignInputs {
     /// Experiments by the name that the file gives them.
     experiments: BTreeMap<String, Text>,
-    /// Rigs likewise.
+    /// Rigs by the name that the file gives them.
     rigs: BTreeMap<String, RigFile>,
     programs: BTreeMap<PathBuf, Source>,
     /// Hashes of what experiments and programs name in their turn, tables of set-points and libraries, by their names there.

@@ -33,11 +33,11 @@ pub(crate) enum MergeError {
 #[derive(Debug, Default)]
 pub(crate) struct Results {
     pub runs: u64,
-    /// Of the rig's time, s.
+    /// Simulated time of all runs, s.
     pub simulated_s: f64,
     /// Numbers by the name of their column; NaN where a run has none.
     numbers: BTreeMap<String, Vec<f64>>,
-    /// Words by the name of their column: places in the list of different ones.
+    /// Categorical columns by their name.
     words: BTreeMap<String, CategoricalColumn>,
     /// The first of the runs that did not come to their end.
     pub unfinished: Vec<Unfinished>,
@@ -47,7 +47,7 @@ pub(crate) struct Results {
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Unfinished {
     pub run: u64,
-    /// How it ended instead.
+    /// `time-over`, `stopped` or `failed`.
     pub ended: String,
     pub because: String,
 }
@@ -58,9 +58,9 @@ const MAX_REPORTED: usize = 100;
 /// A column of words, each kept once.
 #[derive(Debug, Default)]
 pub(crate) struct CategoricalColumn {
-    /// The different ones, in the order in which they came.
+    /// The different words, in the order of their first run.
     pub known: Vec<String>,
-    /// The word of each run.
+    /// For each run the place of its word in `known`.
     pub places: Vec<u32>,
 }
 

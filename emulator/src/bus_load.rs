@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-/// Prints what was asked for.
+/// Prints the bus load of the rig's messages and the response times, or the page's table.
 ///
 /// # Errors
 /// [`RunError::Input`] when the run's summary cannot be read, or is of a bus that took no time.

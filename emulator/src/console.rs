@@ -57,7 +57,7 @@ pub(crate) struct Limits {
     pub hosts_bus: bool,
 }
 
-/// The way to the rig loop.
+/// The sending end of the console's commands, which checks them.
 #[derive(Clone)]
 pub(crate) struct Console {
     limits: Limits,

@@ -38,7 +38,7 @@ pub(crate) enum TimingRecord {
     Stopped { first: u64, skipped: u64, late_ns: u64, woke_ns: u64 },
 }
 
-/// A command that came.
+/// Round trip of a command: from sensors sent to the command that answers them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundTrip {
     /// 0 for drive, 1 for load.

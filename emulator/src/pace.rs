@@ -70,7 +70,7 @@ pub(crate) enum End {
 /// What both paces share with the rest of the program.
 #[derive(Default)]
 pub(crate) struct Shared {
-    /// Set by a signal.
+    /// Set by the signals that end a run.
     pub interrupt: Interrupt,
     /// Set by the signal that freezes the flight recorder.
     pub freeze: Freeze,

@@ -166,7 +166,7 @@ pub(crate) struct RunStart {
     pub(crate) unix_s: Option<f64>,
     /// What turns the run's clock into the stamps of `bus.log`.
     pub(crate) epoch_offset_ns: u64,
-    /// On the clock of all stamps.
+    /// The start on CLOCK_MONOTONIC, the clock of all stamps.
     pub(crate) monotonic: realtime::Instant,
 }
 

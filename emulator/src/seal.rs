@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
-/// For the owner alone.
+/// Mode of the sealed file: only its owner reads and writes it.
 const MODE: u32 = 0o600;
 
 /// Draws and writes what the command line asks for.

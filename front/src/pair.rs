@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// Time in which the other notices a failure by itself.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// The two before they start.
+/// Emulator and controller before they start.
 pub(crate) struct Pair {
     pub(crate) emulator: Command,
     pub(crate) controller: Command,

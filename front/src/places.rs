@@ -30,7 +30,7 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// Of this process.
+    /// The places for the program that runs, by where it lies and by the variables AIRBENCH_BIN and AIRBENCH_SHARE.
     pub(crate) fn find() -> Result<Self, String> {
         let own = std::env::current_exe().map_err(|error| format!("cannot find where it lies: {error}"))?;
         Ok(Self::of(&own, |name| std::env::var_os(name).filter(|value| !value.is_empty())))

@@ -8,7 +8,7 @@ use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 
-/// Removed when it goes.
+/// A folder for sockets that is removed with all its files on drop.
 #[derive(Debug)]
 pub(crate) struct PrivateFolder(PathBuf);
 
@@ -37,7 +37,7 @@ impl PrivateFolder {
         &self.0
     }
 
-    /// An embedded bus in it.
+    /// URL of the embedded bus whose socket lies in the folder.
     pub(crate) fn bus(&self) -> String {
         format!("unix://{}/bus0", self.0.display())
     }
@@ -52,7 +52,7 @@ impl Drop for PrivateFolder {
 /// The bus of a run, and what goes with it.
 #[derive(Default)]
 pub(crate) struct RunBus {
-    /// As the programs take it.
+    /// URL of the bus, `can://…` or `unix://…`.
     pub(crate) url: String,
     /// A folder for sockets, where the run has one of its own.
     pub(crate) private: Option<PrivateFolder>,

@@ -9,9 +9,9 @@ use std::sync::LazyLock;
 
 /// Columns of `measurement.csv` for one axis, in its order: those that the bus tells too.
 pub(crate) const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
-/// How many there are of both axes.
+/// Number of measured columns of both axes.
 pub(crate) const MEASURED_COUNT: usize = 2 * MEASURED.len();
-/// The axes as names begin.
+/// Names of the axes, with which the names of their columns begin.
 pub(crate) const AXES: [&str; 2] = ["drive", "load"];
 
 /// Where a value comes from.

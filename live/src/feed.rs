@@ -22,7 +22,7 @@ pub(super) struct Feed {
 }
 
 impl Feed {
-    /// Not connected yet.
+    /// A feed from the emulator's socket at `path`; the first turn connects.
     pub(super) fn new(path: PathBuf) -> Self {
         Self {
             path,

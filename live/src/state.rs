@@ -54,7 +54,7 @@ pub(crate) struct EmergencyStopState {
 pub(crate) struct ActiveFault {
     pub name: String,
     pub place: String,
-    /// By key.
+    /// Numbers of the fault by their keys.
     pub values: BTreeMap<String, f64>,
     pub cause: String,
 }

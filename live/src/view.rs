@@ -46,7 +46,7 @@ pub(crate) struct View {
     records_lost: u64,
     /// Those that are put into the run, by number.
     faults: BTreeMap<u16, ActiveFault>,
-    /// As the telemetry tells it.
+    /// Set-up of the rig, from the telemetry.
     set_up: SetUp,
     messages: VecDeque<Message>,
     fresh: Vec<Message>,
@@ -63,7 +63,7 @@ pub(crate) struct Audience {
 }
 
 impl View {
-    /// Nothing heard yet.
+    /// A view before the first frame and packet; `folder` is the run's, if it is known.
     pub(crate) fn new(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(Path::to_path_buf), light: Light::new(folder), ..Self::default() }
     }

@@ -156,7 +156,7 @@ fn start(command: &[OsString], report: &Sender<Started>, end: &Receiver<()>) {
         }
         Err(error) => report.send(Started::Program(Err(error))),
     };
-    // Nothing is ever sent.
+    // Returns when the sender is dropped: nothing is ever sent.
     let _ = end.recv();
 }
 

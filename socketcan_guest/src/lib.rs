@@ -54,7 +54,7 @@ use std::time::Duration;
 /// An interface for the programs: its name, and the socket of the embedded bus that it stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// 1 to 15 bytes.
+    /// Name of the CAN interface, 1 to 15 bytes.
     pub name: String,
     /// Path of the bus's socket.
     pub path: PathBuf,
@@ -83,11 +83,11 @@ pub enum GuestError {
          'emulator run' and 'emulator bus'; --pair opens one without a rig"
     )]
     NoHost {
-        /// Of the CAN interface.
+        /// Name of the CAN interface.
         name: String,
-        /// Where its bus was looked for.
+        /// Path of the bus's socket.
         path: String,
-        /// And for how long.
+        /// How long a host was waited for, s.
         waited_s: u64,
     },
     /// The kernel or a container refuses the filter.
@@ -103,12 +103,12 @@ pub enum GuestError {
     /// The program cannot be started.
     #[error("cannot start the command {}: {error}", name.display())]
     Command {
-        /// Its first word.
+        /// The program, the first word of the command.
         name: OsString,
         /// What the system says.
         error: io::Error,
     },
-    /// The system is out of something.
+    /// The system refuses a thread, a descriptor or another resource.
     #[error("{0}")]
     System(io::Error),
 }

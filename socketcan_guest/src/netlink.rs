@@ -68,7 +68,7 @@ const LONGEST_REQUEST: usize = 1024;
 /// A request for links that a guest has sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct LinkRequest {
-    /// The socket by its inode.
+    /// Inode of the guest's socket.
     inode: u64,
     sequence: u32,
     /// The place of the one interface that it asks for; `None` for the whole list.

@@ -27,9 +27,9 @@ const BATCHES: usize = 64;
 /// Which of the frames that pass an interface is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum From {
-    /// One of the bus.
+    /// A frame that came over the bus.
     Bus,
-    /// One of a guest's socket.
+    /// A frame that the guest's socket with this inode sent.
     Guest(u64),
 }
 

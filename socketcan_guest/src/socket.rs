@@ -61,7 +61,7 @@ pub(crate) enum Kind {
 
 /// A CAN socket of a guest.
 pub(crate) struct GuestSocket {
-    /// Our end.
+    /// This process's end of the pair of sockets; the guest holds the other one.
     end: OwnedFd,
     pub(crate) kind: Kind,
     /// Index of its interface, 0 for any; `None` before `bind`.

@@ -7,12 +7,12 @@
 
 use crate::daq::{LISTS, LONGEST_ENTRY};
 use crate::image::{
-    CHANNEL_STEP, CONTROL, DESCRIPTION, NARROW, PARAMETERS, SIGNAL, TRACE_CHANNELS, TRACE_CYCLES, TRACE_TOLD,
-    WIDE,
+    CHANNEL_STEP, CONTROL, DESCRIPTION, NARROW, PARAMETERS, SIGNAL, TRACE_CHANNELS, TRACE_CYCLES,
+    TRACE_STATUS, WIDE,
 };
 use crate::signals::{Format, SIGNALS};
 use crate::slave::{BLOCK_PACKETS, Texts};
-use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, TOLD};
+use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, STATUS};
 use crate::{EVENT_NAME, identifiers};
 use a2lfile::{
     A2lFile, A2lObjectName, AddrType, Characteristic, CharacteristicType, CompuMethod, CompuTabRef,
@@ -82,7 +82,7 @@ pub(crate) fn description(described: &Described<'_>) -> Result<Description, A2lE
     Ok(Description { bytes, texts })
 }
 
-/// The A2L file.
+/// The text of the A2L file of an axis.
 pub fn text(described: &Described<'_>) -> Result<String, A2lError> {
     let error = |reason: String| A2lError { axis: described.axis.name(), reason };
     let (mut file, warnings) =
@@ -140,7 +140,7 @@ fn layout(format: Format) -> &'static str {
     if format == Format::Long { "count" } else { "number" }
 }
 
-/// Fills a module.
+/// Adds objects to a module, and keeps their names for its groups.
 struct Maker<'a> {
     module: &'a mut Module,
     axis: &'static str,
@@ -298,9 +298,9 @@ impl Maker<'_> {
 
     fn trace(&mut self) {
         let mut reported = Vec::new();
-        for ((name, meaning), at) in TOLD.iter().zip(0_u32..) {
+        for ((name, meaning), at) in STATUS.iter().zip(0_u32..) {
             let conversion = if at == 0 { self.names("trace", trace::STATES) } else { self.unit("") };
-            let place = Place { address: TRACE_TOLD + at * NARROW, format: Format::Long, conversion };
+            let place = Place { address: TRACE_STATUS + at * NARROW, format: Format::Long, conversion };
             reported.push(self.measurement(name, meaning, [0.0, f64::from(u32::MAX)], place));
         }
         let cycles = Parameter::new(

@@ -17,7 +17,7 @@ use crate::image::Image;
 use crate::packet::{BYTES, LAST_PID, Packet, Refusal};
 use std::collections::VecDeque;
 
-/// Most lists.
+/// Largest number of DAQ lists.
 pub(crate) const LISTS: usize = 8;
 /// Most ODTs of all lists together; each has one packet.
 pub(crate) const ODTS: usize = 32;
@@ -37,7 +37,7 @@ const RUNNING: u8 = 0x40;
 
 const _: () = assert!(ODTS <= LAST_PID as usize, "an ODT's number is its packet's first byte");
 
-/// A piece of memory.
+/// An entry of an ODT: the memory that is sent.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Entry {
     pub address: u32,
@@ -60,7 +60,7 @@ struct List {
     priority: u8,
     selected: bool,
     running: bool,
-    /// Cycles until it is due.
+    /// Cycles until its next sample.
     wait: u8,
 }
 

@@ -16,7 +16,7 @@
 
 use crate::packet::Refusal;
 use crate::signals::{COUNT, Format, SIGNALS};
-use crate::trace::{self, ARM, CAPACITY, CHANNELS, CONTROLS, LOAD_SET, TOLD, Trace};
+use crate::trace::{self, ARM, CAPACITY, CHANNELS, CONTROLS, LOAD_SET, STATUS, Trace};
 use axis_control::program::Variable;
 
 /// First addresses of the regions.
@@ -24,7 +24,7 @@ pub(crate) const DESCRIPTION: u32 = 0x0001_0000;
 pub(crate) const PARAMETERS: u32 = 0x1000_0000;
 pub(crate) const CONTROL: u32 = 0x2000_0000;
 pub(crate) const SIGNAL: u32 = 0x3000_0000;
-pub(crate) const TRACE_TOLD: u32 = 0x4000_0000;
+pub(crate) const TRACE_STATUS: u32 = 0x4000_0000;
 pub(crate) const TRACE_CYCLES: u32 = 0x5000_0000;
 /// That of the first channel; from channel to channel it is [`CHANNEL_STEP`].
 pub(crate) const TRACE_CHANNELS: u32 = 0x5100_0000;
@@ -53,7 +53,7 @@ enum Region {
     Parameters,
     Controls,
     Signals,
-    TraceTold,
+    TraceStatus,
     TraceCycles,
     TraceChannel(usize),
 }
@@ -160,7 +160,7 @@ impl Image {
             Region::Parameters => (self.parameters.len() as u32, WIDE),
             Region::Controls => (CONTROLS.len() as u32, WIDE),
             Region::Signals => (COUNT as u32, NARROW),
-            Region::TraceTold => (TOLD.len() as u32, NARROW),
+            Region::TraceStatus => (STATUS.len() as u32, NARROW),
             Region::TraceCycles => (CAPACITY as u32, NARROW),
             Region::TraceChannel(_) => (CAPACITY as u32, WIDE),
         }
@@ -175,7 +175,7 @@ impl Image {
             Region::Controls if place == ARM => long(u32::from(self.trace.runs())),
             Region::Controls => trace::control_format(place).encode(self.controls[place]),
             Region::Signals => SIGNALS[place].format.encode(self.signals[place]),
-            Region::TraceTold => long(self.trace.reported()[place]),
+            Region::TraceStatus => long(self.trace.reported()[place]),
             Region::TraceCycles => long(self.trace.cycle(place)),
             Region::TraceChannel(channel) => Format::Double.encode(self.trace.value(channel, place)),
         }
@@ -303,7 +303,7 @@ fn region(address: u32) -> Option<(Region, u32)> {
         0x10 => Some((Region::Parameters, PARAMETERS)),
         0x20 => Some((Region::Controls, CONTROL)),
         0x30 => Some((Region::Signals, SIGNAL)),
-        0x40 => Some((Region::TraceTold, TRACE_TOLD)),
+        0x40 => Some((Region::TraceStatus, TRACE_STATUS)),
         0x50 => Some((Region::TraceCycles, TRACE_CYCLES)),
         high => {
             let number = (high as usize).checked_sub(0x51).filter(|number| *number < CHANNELS)?;
@@ -458,7 +458,7 @@ pub(super) mod tests {
     #[test]
     fn signals_and_the_description_cannot_be_written() {
         let (mut image, mut notes) = (image(), Notes::default());
-        for address in [DESCRIPTION, SIGNAL, TRACE_TOLD, TRACE_CYCLES, TRACE_CHANNELS] {
+        for address in [DESCRIPTION, SIGNAL, TRACE_STATUS, TRACE_CYCLES, TRACE_CHANNELS] {
             assert_eq!(image.write(address, &[1], &mut notes), Err(Refusal::WriteProtected), "{address:#x}");
         }
         assert_eq!(image.write(0x6000_0000, &[1], &mut notes), Err(Refusal::AccessDenied));
@@ -481,7 +481,7 @@ pub(super) mod tests {
             image.refresh(cycle, &[cycle as f64; COUNT], &[25.0, 1.0, 15.0]);
         }
         assert_eq!(read::<4>(&image, CONTROL + ARM as u32 * WIDE), 0_u32.to_le_bytes());
-        assert_eq!(read::<8>(&image, TRACE_TOLD), [4, 0, 0, 0, 4, 0, 0, 0]);
+        assert_eq!(read::<8>(&image, TRACE_STATUS), [4, 0, 0, 0, 4, 0, 0, 0]);
         assert_eq!(read::<4>(&image, TRACE_CYCLES + 8), 102_u32.to_le_bytes());
         assert_eq!(read::<8>(&image, TRACE_CHANNELS + CHANNEL_STEP + 16), 102.0_f64.to_le_bytes());
     }

@@ -40,7 +40,7 @@ pub(crate) struct Lock {
 /// What became of a part of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Turned {
-    /// More of it is to come.
+    /// A part was taken; more of the key is to come.
     Halfway,
     Open,
     /// It was a wrong one: the session ends.
@@ -123,7 +123,7 @@ impl Lock {
     }
 }
 
-/// The key to a seed.
+/// The key to a seed: the first bytes of its HMAC with the secret.
 pub fn key(secret: &[u8], seed: [u8; BYTES]) -> [u8; BYTES] {
     let whole = mac(secret).chain_update(seed).finalize().into_bytes();
     std::array::from_fn(|byte| whole[byte])

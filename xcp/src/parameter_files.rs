@@ -53,11 +53,11 @@ pub struct AxisParameters {
     pub variables: Vec<Variable>,
     /// Their values at the start.
     pub values: Vec<f64>,
-    /// Back to its port.
+    /// Where a copy of the parameters goes back to the port.
     pub returned: Sender<Returned>,
 }
 
-/// Does what ports ask for.
+/// Stores and loads parameter sets for the ports, and reports their notes; it runs outside the 1 ms path.
 pub struct ParameterFileWorker {
     notes: Receiver<Note>,
     axes: Vec<AxisParameters>,

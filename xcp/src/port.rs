@@ -93,7 +93,7 @@ impl ParameterActions for Act<'_> {
     }
 }
 
-/// A slave on the bus.
+/// An XCP slave with its two identifiers on the bus and its queues to the worker for files.
 pub struct Port {
     axis: Axis,
     command_id: u16,

@@ -17,7 +17,7 @@ use settings::parameters::Parameter;
 
 /// Samples that the buffer holds at most.
 pub(crate) const CAPACITY: usize = 4096;
-/// Signals that it records.
+/// Number of signals that the buffer records.
 pub(crate) const CHANNELS: usize = 4;
 
 /// Places in [`CONTROLS`], which says what each is.
@@ -92,8 +92,8 @@ pub(crate) enum State {
     Ready = 4,
 }
 
-/// What it tells of itself, each a count of four bytes, in this order.
-pub(crate) const TOLD: [(&str, &str); 4] = [
+/// Name and meaning of the counts that the buffer reports, four bytes each, in this order.
+pub(crate) const STATUS: [(&str, &str); 4] = [
     ("trace.state", "what the trigger buffer does"),
     ("trace.samples", "samples that can be read"),
     ("trace.trigger_cycle", "the rig's cycle of the trigger; 0 before it"),
@@ -112,7 +112,7 @@ struct Settings {
     channels: [usize; CHANNELS],
 }
 
-/// The trigger buffer.
+/// State and samples of the trigger buffer, a ring of [`CAPACITY`] places for each channel.
 #[derive(Clone)]
 pub(crate) struct Trace {
     settings: Settings,
@@ -242,8 +242,8 @@ impl Trace {
         }
     }
 
-    /// What it tells of itself, in the order of [`TOLD`].
-    pub(crate) fn reported(&self) -> [u32; TOLD.len()] {
+    /// The counts of [`STATUS`], in its order.
+    pub(crate) fn reported(&self) -> [u32; STATUS.len()] {
         [self.state as u32, self.samples() as u32, self.trigger_cycle, self.triggers]
     }
 

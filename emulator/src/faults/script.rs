@@ -52,9 +52,9 @@ pub struct Planned {
     pub line: u32,
     /// First cycle in which it may be.
     pub from: u64,
-    /// What has to hold as well.
+    /// What has to hold besides for the fault to begin.
     pub when: Option<Condition>,
-    /// `None`: never.
+    /// When it ends; `None`: never.
     pub(crate) until: Option<Until>,
 }
 
@@ -66,7 +66,7 @@ pub(crate) enum Until {
     After(u64),
 }
 
-/// Something that has to hold.
+/// A signal that has to be above or below a threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     signal: usize,

@@ -50,18 +50,18 @@ pub(crate) enum Kind {
     /// Of a sensor: which channel of the axis, or that of the chamber.
     Sensor(Channel, SensorKind),
     ValveStuck,
-    /// A lag before the spool.
+    /// A first-order lag before the spool.
     ValveSlow,
-    /// Added to the command.
+    /// An opening that is added to the command.
     ValveOffset,
-    /// The most opening.
+    /// The opening is limited to this magnitude.
     ValveLimited,
     ValveDead,
     SupplySag,
     SupplyLoss,
-    /// A gap to the atmosphere.
+    /// A laminar gap from a chamber to the atmosphere.
     Leak,
-    /// A hole to the atmosphere.
+    /// A hole from a chamber to the atmosphere, with the valve's law of flow.
     Burst,
     FrictionRise,
     Unlink,

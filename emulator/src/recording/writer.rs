@@ -53,7 +53,7 @@ pub(crate) struct WriterSetup {
     pub faults: bool,
     /// How to record the timing; `None` in lockstep.
     pub timing: Option<TimingSetup>,
-    /// Who looks on.
+    /// Where rows and frames go for viewers, besides the files.
     pub telemetry: Option<Telemetry>,
 }
 

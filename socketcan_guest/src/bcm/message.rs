@@ -15,7 +15,7 @@ use std::time::Duration;
 /// `sizeof(struct bcm_msg_head)`.
 pub(super) const HEAD_BYTES: usize = 56;
 
-/// What a message says.
+/// Opcodes of `struct bcm_msg_head`.
 pub(super) mod opcode {
     pub(in crate::bcm) const TX_SETUP: u32 = 1;
     pub(in crate::bcm) const TX_DELETE: u32 = 2;
@@ -31,7 +31,7 @@ pub(super) mod opcode {
     pub(in crate::bcm) const RX_CHANGED: u32 = 12;
 }
 
-/// Flags of a job.
+/// Flags of `struct bcm_msg_head`.
 pub(super) mod flag {
     pub(in crate::bcm) const SETTIMER: u32 = 0x1;
     pub(in crate::bcm) const STARTTIMER: u32 = 0x2;

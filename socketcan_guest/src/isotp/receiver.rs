@@ -22,7 +22,7 @@ struct Reception {
     last: Option<Instant>,
 }
 
-/// What is being received.
+/// The receiving side of a socket, with the message that is being received, if any.
 #[derive(Debug, Default)]
 pub(super) struct Receiver(Option<Reception>);
 

@@ -22,7 +22,7 @@ enum State {
     Sends { due: Instant, until: Instant },
 }
 
-/// How far a message is.
+/// How much of a message has been sent.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
     state: State,
@@ -33,7 +33,7 @@ pub(crate) struct Progress {
     sent_in_block: u8,
 }
 
-/// A message on its way.
+/// The sending side of a socket, with the message that is being sent.
 #[derive(Debug, Default)]
 pub(super) struct Sender {
     message: Vec<u8>,

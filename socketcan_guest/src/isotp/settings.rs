@@ -33,7 +33,7 @@ const NO_FRAME_TIME: u32 = u32::MAX;
 const CLASSIC_MTU: u8 = 16;
 const FD_MTU: u8 = 72;
 
-/// What was set.
+/// The options of an ISO-TP socket, as `setsockopt` set them.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
     flags: u32,

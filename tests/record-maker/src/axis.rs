@@ -34,7 +34,7 @@ pub(super) struct AirLaws {
     pub(super) form: Form,
     /// Heat transfer coefficient, W/(m^2 K).
     pub(super) heat_w_per_m2_k: Option<f64>,
-    /// From 6 to 1 bar, m^3/s.
+    /// Normal flow past the piston from 6 to 1 bar, m^3/s.
     pub(super) piston_leakage: f64,
     pub(super) rod_leakage: [f64; 2],
     /// In place of the baseline's.

@@ -22,7 +22,7 @@ pub const SIGNALS: [&str; 4] = ["position", "force", "pressure a", "pressure b"]
 #[derive(Debug, Clone, Default)]
 pub struct Difference {
     pub windows: Vec<f64>,
-    /// Samples left out, of all.
+    /// Number of samples left out, number of all samples.
     pub left_out: [usize; 2],
     squares: f64,
     samples: usize,

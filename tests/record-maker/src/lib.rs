@@ -126,7 +126,7 @@ pub struct Record {
     pub recipe: Recipe,
     pub linked: bool,
     pub added_mass_kg: f64,
-    /// One for each millisecond.
+    /// A row for each millisecond.
     pub rows: Vec<Row>,
 }
 
@@ -142,7 +142,7 @@ pub struct Row {
     pub without_noise: [[f64; 4]; 2],
     pub axes: [TrueAxis; 2],
     pub supply_pressure_pa: f64,
-    /// F_c, N, positive in +x on the carriage.
+    /// Contact force F_c of the linkage, N, positive in +x on the carriage.
     pub contact_force_n: f64,
 }
 
@@ -152,7 +152,7 @@ pub struct TrueAxis {
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 while friction holds it.
     pub rod_velocity_m_per_s: f64,
-    /// And the rate of that, m/s^2.
+    /// Rate of the velocity, m/s^2.
     pub rod_acceleration_m_per_s2: f64,
     pub spool: f64,
     /// Absolute pressures of a and b, Pa.
@@ -167,7 +167,7 @@ pub struct TrueAxis {
     pub edge_flow_m3_per_s: [f64; 2],
     /// Pressure behind the exhaust edges, Pa.
     pub exhaust_pressure_pa: f64,
-    /// F_pn, N.
+    /// Pneumatic force F_pn, N.
     pub pneumatic_force_n: f64,
     /// All friction, viscous included; what holds a resting piston, N.
     pub friction_n: f64,

@@ -25,7 +25,7 @@ pub(super) struct MotionLaws {
     pub(super) friction_over_way: Option<[f64; 6]>,
     /// Growth after 10 s and onset s.
     pub(super) rest_growth: Option<[f64; 2]>,
-    /// N in +x of the rig.
+    /// Force of the rig's inclination, N in +x of the rig.
     pub(super) inclination_n: f64,
     /// Spring N, ripple N, pitch m, over x of the rig and in +x.
     pub(super) force_over_way: Option<[f64; 3]>,

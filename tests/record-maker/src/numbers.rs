@@ -35,7 +35,7 @@ pub(super) struct Numbers {
     pub(super) opening: [f64; VALVE_POINTS],
     /// c of the supply edge at these openings, m^3/s per Pa.
     pub(super) supply_edge_m3_per_s_pa: [f64; VALVE_POINTS],
-    /// c of the exhaust edge.
+    /// c of the exhaust edge at these openings, m^3/s per Pa.
     pub(super) exhaust_edge_m3_per_s_pa: [f64; VALVE_POINTS],
     pub(super) stroke_m: f64,
     pub(super) piston_m2: f64,

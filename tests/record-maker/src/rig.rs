@@ -82,7 +82,7 @@ pub(super) struct Evaluated {
 }
 
 impl Rig {
-    /// At rest, extensions in m.
+    /// The state at rest at these extensions, m.
     pub(super) fn start(&self, extension_m: [f64; 2]) -> State {
         let y = [0, 1].map(|i| self.axes[i].start(extension_m[i]));
         let line = |i: usize| {
@@ -117,7 +117,7 @@ impl Rig {
         }
     }
 
-    /// Of both chambers' lines.
+    /// Delays of both chambers' lines, in steps; `None` without the effect.
     fn delay_steps(&self, axis: usize) -> Option<[f64; 2]> {
         let laws = &self.axes[axis].laws;
         let pure = laws.form.of([1.0, 1.0 - LINE_LAG_SHARE, 1.0]);

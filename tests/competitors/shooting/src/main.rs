@@ -33,7 +33,7 @@ enum Cli {
         rig: PathBuf,
         #[arg(long, required = true, num_args = 1..)]
         train: Vec<PathBuf>,
-        /// Not opened.
+        /// Held-out record, as the workflow takes one; it is not opened.
         #[arg(long)]
         test: PathBuf,
         /// Folder that report.json goes into.

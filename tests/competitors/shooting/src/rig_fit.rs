@@ -65,10 +65,11 @@ impl Term {
     }
 }
 
-/// A fitted model.
+/// Terms that were fitted to the record by multiple shooting.
 pub(crate) struct Fit {
     pub(crate) terms: Vec<Term>,
     residual: DVector<f64>,
+    /// Sum of the squares of `residual`.
     squares: f64,
     /// Sensitivities to all numbers of the terms, one column each; none of a rough fit.
     columns: DMatrix<f64>,
