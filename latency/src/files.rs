@@ -161,7 +161,7 @@ impl RunFiles {
 
     /// What the flight recorder's dumps tell, and their rows for processes that did not write all of theirs.
     fn take_flights(&mut self) {
-        let Ok(entries) = std::fs::read_dir(self.folder.join("flight")) else { return };
+        let Ok(entries) = std::fs::read_dir(self.folder.join(flight_dump::FOLDER)) else { return };
         let mut names: Vec<_> =
             entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
         names.sort();
@@ -173,14 +173,15 @@ impl RunFiles {
                 continue;
             }
             let process = process.to_owned();
-            let event = self.parse(&format!("flight/{name}/event.json"), |text| serde_json::from_str(text));
+            let dump = format!("{}/{name}", flight_dump::FOLDER);
+            let event = self.parse(&format!("{dump}/event.json"), |text| serde_json::from_str(text));
             if let Some(flight_dump::Event { cycle, late_ns, .. }) = event {
                 self.recorded_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
             }
             if self.rows.contains_key(&process) {
                 continue;
             }
-            let rows = self.parse(&format!("flight/{name}/timing.csv"), timing::read).unwrap_or_default();
+            let rows = self.parse(&format!("{dump}/timing.csv"), timing::read).unwrap_or_default();
             taken.entry(process).or_default().extend(rows.into_iter().map(|row| (row.cycle, row)));
         }
         for (process, rows) in taken {

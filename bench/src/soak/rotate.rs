@@ -1,6 +1,7 @@
 //! Big files of older segments go, so that a soak of any length needs a known room: the newest and the failed ones keep theirs.
 
 use super::model::Segment;
+use runlog::flight_dump;
 use std::io;
 use std::path::Path;
 
@@ -9,8 +10,6 @@ const BIG: &[&str] =
     &["bus.log", "measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv", "probe.csv"];
 /// Ends of names of further ones.
 const BIG_ENDS: &[&str] = &["-timing.csv", ".hlog"];
-/// Folder of the flight recorder's dumps.
-const FLIGHT: &str = "flight";
 
 /// Removes the big files of segments that keep theirs no longer; marks them.
 pub(super) fn rotate(out: &Path, segments: &mut [Segment], keep: u64, keep_failed: u64) -> io::Result<()> {
@@ -41,7 +40,7 @@ fn remove_big(folder: &Path) -> io::Result<()> {
         let name = entry?.file_name();
         let name = name.to_string_lossy();
         let path = folder.join(&*name);
-        if name == FLIGHT {
+        if name == flight_dump::FOLDER {
             gone(std::fs::remove_dir_all(&path))?;
         } else if BIG.contains(&&*name) || BIG_ENDS.iter().any(|end| name.ends_with(end)) {
             gone(std::fs::remove_file(&path))?;
