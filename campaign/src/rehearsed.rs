@@ -183,3 +183,15 @@ impl AxisColumns {
         table
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use axis_control::set_point::force::KINDS;
+    use figures::record::STATE_DEPENDENT;
+
+    #[test]
+    fn figures_know_every_load_of_the_set_points() {
+        let loads: Vec<_> = KINDS.iter().map(|kind| kind.name).collect();
+        assert_eq!(loads, STATE_DEPENDENT, "a load that is not listed has no load_law_error figures");
+    }
+}

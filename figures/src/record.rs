@@ -49,8 +49,9 @@ pub const TRUE: &[&str] = &[
     "supply_pressure_Pa",
     "check_valves_shut",
 ];
-/// Laws of the load's set-point that follow from the motion.
-const STATE_DEPENDENT: &[&str] = &["spring", "damper", "mass", "dry-friction"];
+/// Laws of the load's set-point that follow from the motion: the names of `axis_control::set_point::force::KINDS` in their
+/// order. This crate does not know those; a test of `campaign` compares both lists.
+pub const STATE_DEPENDENT: &[&str] = &["spring", "damper", "mass", "dry-friction"];
 
 #[derive(Clone, Debug, Default)]
 pub struct Record {
