@@ -10,6 +10,7 @@
 use super::kinds;
 use super::model::{Comparison, ComparisonCell, ComparisonRow, RunPart};
 use super::samples::Pick;
+use figures::median::median;
 use std::collections::BTreeSet;
 
 /// Probability below which a difference is taken as none of chance.
@@ -66,11 +67,11 @@ fn cells(values: &[Vec<u64>]) -> Vec<ComparisonCell> {
     let first = &values[0];
     let cell = |(place, own): (usize, &Vec<u64>)| {
         let change = || {
-            let (before, after) = (median(first) as f64, median(own) as f64);
+            let (before, after) = (median_ns(first) as f64, median_ns(own) as f64);
             (before > 0.0).then(|| (after / before - 1.0) * 100.0)
         };
         ComparisonCell {
-            median_ns: median(own),
+            median_ns: median_ns(own),
             range_ns: (
                 own.iter().copied().min().unwrap_or_default(),
                 own.iter().copied().max().unwrap_or_default(),
@@ -82,14 +83,9 @@ fn cells(values: &[Vec<u64>]) -> Vec<ComparisonCell> {
     values.iter().enumerate().map(cell).collect()
 }
 
-fn median(values: &[u64]) -> u64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable();
-    match sorted.len() {
-        0 => 0,
-        count if count % 2 == 1 => sorted[count / 2],
-        count => u64::midpoint(sorted[count / 2 - 1], sorted[count / 2]),
-    }
+/// The median in whole ns, half a ns cut off; 0 of no values. Below 2^53 ns, which is 104 days, no digit is lost.
+fn median_ns(values_ns: &[u64]) -> u64 {
+    median(values_ns.iter().map(|ns| *ns as f64).collect()).map_or(0, |median| median.value as u64)
 }
 
 /// Whether two groups differ beyond chance; nothing when there are too few values to tell.
