@@ -29,7 +29,7 @@ pub struct Cli {
 pub(crate) enum Command {
     /// Join what emulator and controllers left in a run's folder, judge it, draw it, and print a short table.
     Summary {
-        /// The run's folder.
+        /// Folder that emulator and controllers of one run wrote.
         folder: PathBuf,
     },
     /// Lay runs of one experiment side by side: figures with their change against the first run, curves over each other.
@@ -48,7 +48,7 @@ pub(crate) enum Command {
     },
     /// Check the bounds of an experiment file: figures that exist, numbers that make sense.
     CheckExperiment {
-        /// The experiment file.
+        /// Experiment file in TOML, such as controller/experiments/point-to-point.toml.
         file: PathBuf,
     },
     /// Run emulator and controllers over hours, segment by segment, and account for every frame.

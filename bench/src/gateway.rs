@@ -84,7 +84,7 @@ struct Report {
     frames_not_taken: u64,
     /// Remote requests and error frames, for which the protocol has no form that clients read.
     frames_not_carried: u64,
-    /// The last hundred.
+    /// Clients that have gone: the last [`REPORTS_KEPT`].
     clients: VecDeque<ClientReport>,
     bus_counters: BusCounters,
 }

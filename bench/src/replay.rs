@@ -160,7 +160,7 @@ fn tell(schedule: &Schedule, played: &Played) {
     };
     say(&format!("sent {} of {total} frames{how}", played.sent));
     for (count, what) in [
-        (*left_out, "frames of the log left out, as told"),
+        (*left_out, "frames of the log left out, as requested"),
         (*error_frames, "error frames of the log left out: nobody can send them"),
         (*disordered, "frames with a stamp before an earlier line's, sent with that one"),
         (played.dropped, "frames that the bus did not take"),

@@ -105,7 +105,7 @@ fn missing(runs: &[RunFiles], conditions: &Conditions, counts: &[CycleCount]) ->
     let mut reasons = Vec::new();
     let unknown = runs.iter().filter(|run| run.run.is_null() || run.controllers.is_empty()).count();
     if unknown > 0 {
-        reasons.push(format!("What was granted is not told by all processes of {unknown} run(s)."));
+        reasons.push(format!("Not all processes of {unknown} run(s) reported their real-time grants."));
     }
     let pairs = runs.iter().filter(|run| run.reference.is_some()).count();
     if let Some(why) = &conditions.reference_missing_because {
@@ -293,7 +293,7 @@ mod tests {
                 run.controllers.get_mut("controller").unwrap()["realtime_granted"] =
                     json!([LOCKED, "SCHED_FIFO priority 80"]);
             }),
-            ("not told by all", |run| run.controllers.clear()),
+            ("reported their real-time grants", |run| run.controllers.clear()),
             ("did not alternate", |run| run.reference = None),
             ("too few", |run| {
                 run.summary["cycles"] = json!(20_000);
