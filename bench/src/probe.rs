@@ -63,15 +63,15 @@ pub(crate) enum ProbeError {
     Signals(io::Error),
 }
 
-/// What one CPU showed.
+/// Gaps that were seen on one CPU, by what ran in them.
 #[derive(Clone, Copy, Debug, Default)]
-struct Seen {
+struct CpuGaps {
     stood_still: Total,
     another_ran: Total,
 }
 
-/// What the watching threads share with the writer.
-struct Watched {
+/// State that the watching threads share with the writer.
+struct ProbeState {
     stop: Interrupt,
     dropped: AtomicU64,
 }
@@ -87,15 +87,16 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     // A page that is not there would be a gap of the probe's own making.
     realtime::acquire(&Request { lock_memory: true, ..Request::default() });
 
-    let watched = Watched { stop: Interrupt::default(), dropped: AtomicU64::new(0) };
+    let state = ProbeState { stop: Interrupt::default(), dropped: AtomicU64::new(0) };
     let (sender, gaps) = bounded(QUEUE);
     let began_ns = MonotonicClock.now().as_nanos();
-    let mut table = Table { file, rows: 0, seen: cpus.iter().map(|&cpu| (cpu, Seen::default())).collect() };
+    let mut table =
+        Table { file, rows: 0, seen: cpus.iter().map(|&cpu| (cpu, CpuGaps::default())).collect() };
     std::thread::scope(|scope| {
         let (ready, all_ready) = bounded(cpus.len());
         for &cpu in &cpus {
-            let (sender, ready, continued, watched) =
-                (sender.clone(), ready.clone(), continued.clone(), &watched);
+            let (sender, ready, continued, state) =
+                (sender.clone(), ready.clone(), continued.clone(), &state);
             let gap_ns = arguments.gap_us * 1000;
             scope.spawn(move || {
                 let begun = begin(cpu);
@@ -105,7 +106,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
                 // Whoever waits for it takes what comes.
                 let _ = ready.send(begun);
                 if good {
-                    looking.go_on(cpu, &sender, watched);
+                    looking.go_on(cpu, &sender, state);
                 }
             });
         }
@@ -122,14 +123,14 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
             }
             Ok(())
         });
-        watched.stop.ask();
+        state.stop.ask();
         reported
     })?;
     // A gap that was going on at the end was reported when its thread ran again.
     table.take(&gaps)?;
     let Table { rows, seen, .. } = table;
     tell(&seen, MonotonicClock.now().as_nanos() - began_ns);
-    let dropped = watched.dropped.load(Ordering::Relaxed);
+    let dropped = state.dropped.load(Ordering::Relaxed);
     if dropped > 0 {
         eprintln!("bench: warning: {dropped} gaps were seen and not kept: the queue to the writer was full");
     }
@@ -145,7 +146,7 @@ fn cpus(list: Option<&str>) -> Result<Vec<usize>, ProbeError> {
     let Some(list) = list else {
         let allowed = rustix::thread::sched_getaffinity(None).map_err(|errno| ProbeError::Thread {
             cpu: 0,
-            reason: format!("the allowed CPUs are not told ({errno}); name them with --cpus"),
+            reason: format!("cannot read the CPU affinity ({errno}); name the CPUs with --cpus"),
         })?;
         return Ok((0..rustix::thread::CpuSet::MAX_CPU).filter(|&cpu| allowed.is_set(cpu)).collect());
     };
@@ -179,15 +180,15 @@ impl Looking {
         Self { vitals, watch: GapWatch::new(gap_ns, MonotonicClock.now().as_nanos()) }
     }
 
-    fn go_on(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, watched: &Watched) {
+    fn go_on(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, state: &ProbeState) {
         let mut going_on = true;
         while going_on {
             // Looked at before the clock, so that a gap that outlasts the run is reported too.
-            going_on = !watched.stop.came();
+            going_on = !state.stop.came();
             if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), || self.vitals.read())
                 && gaps.try_send((cpu, gap)).is_err()
             {
-                watched.dropped.fetch_add(1, Ordering::Relaxed);
+                state.dropped.fetch_add(1, Ordering::Relaxed);
             }
         }
     }
@@ -197,7 +198,7 @@ impl Looking {
 struct Table {
     file: LineFile,
     rows: u64,
-    seen: BTreeMap<usize, Seen>,
+    seen: BTreeMap<usize, CpuGaps>,
 }
 
 impl Table {
@@ -226,14 +227,14 @@ impl Table {
     }
 }
 
-fn tell(seen: &BTreeMap<usize, Seen>, length_ns: u64) {
+fn tell(seen: &BTreeMap<usize, CpuGaps>, length_ns: u64) {
     let part = |total: &Total| {
         let share_percent = 100.0 * total.together_ns as f64 / length_ns.max(1) as f64;
         format!("{:>7}  {:>10.1}  {share_percent:>7.3}", total.count, total.longest_ns as f64 / 1e3)
     };
     say("       the CPU stood still             another thread ran");
     say("  CPU     gaps  longest us   time %       gaps  longest us   time %");
-    for (cpu, Seen { stood_still, another_ran }) in seen {
+    for (cpu, CpuGaps { stood_still, another_ran }) in seen {
         say(&format!("{cpu:>5}  {}    {}", part(stood_still), part(another_ran)));
     }
 }

@@ -285,7 +285,7 @@ mod tests {
 
     use super::account::Row;
     use super::memory::Memory;
-    use super::merged::Kept;
+    use super::merged::StoredDistribution;
     use super::model::{Check, CheckResult, Figures, Segment, Soak};
 
     #[test]
@@ -293,7 +293,7 @@ mod tests {
         let mut segment = segment(1, &[("account", CheckResult::Passed)]);
         segment.account = vec![Row::default()];
         segment.memory = [("emulator".into(), Memory::default())].into();
-        let distributions = [("emulator-wakeup".into(), Kept::default())].into();
+        let distributions = [("emulator-wakeup".into(), StoredDistribution::default())].into();
         let soak = Soak { distributions, segments: vec![segment], ..Soak::default() };
         let file = serde_json::to_value(soak).unwrap();
         runlog::golden::check("soak.keys", &runlog::golden::keys(&file));

@@ -19,7 +19,7 @@ use super::findings::lost_by_gaps;
 use super::model::{AroundRow, Event, ProbeGap};
 use super::probe::{self, Gap};
 use protocol::periods::CYCLE_NS;
-use rules::{Known, Seen};
+use rules::{Known, LatenessEvidence};
 use runlog::timing::CycleTiming;
 use std::collections::BTreeMap;
 
@@ -70,13 +70,13 @@ pub(crate) fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
     events
 }
 
-/// The worst first.
+/// Sorts by lateness or slowness, whichever is larger, falling; equal ones by run and cycle.
 pub(crate) fn sort_by_severity(events: &mut [Event]) {
     events.sort_by_key(|event| (std::cmp::Reverse(event.late_ns.max(event.slow_ns)), event.run, event.cycle));
 }
 
 /// One event for each moment: what several processes suffered at once, by the same cause, stands under the worst of them.
-/// Wants the worst first.
+/// `events` are sorted by [`sort_by_severity`].
 pub(crate) fn one_of_each_moment(events: Vec<Event>) -> Vec<Event> {
     let severity_ns = |event: &Event| event.late_ns.max(event.slow_ns);
     let from_ns = |event: &Event| event.cycle * CYCLE_NS;
@@ -199,7 +199,7 @@ fn seen(
     worst: &Late,
     run: &RunFiles,
     all_late: &[(&str, Vec<Late>)],
-) -> Seen {
+) -> LatenessEvidence {
     let rows = &run.rows[process];
     let row = rows[worst.place];
     let (from_ns, to_ns) = (worst.due_ns, row.done_ns);
@@ -219,7 +219,7 @@ fn seen(
         gaps.map(|gap| gap.within_ns(from_ns, to_ns)).max().unwrap_or_default()
     };
     let cpu = row.vitals.cpu;
-    Seen {
+    LatenessEvidence {
         process: process.to_owned(),
         late_ns: worst.late_ns,
         slow_ns: worst.slow_ns,

@@ -104,9 +104,9 @@ impl ReportError {
     }
 }
 
-/// A report with what its files are made of.
+/// A report with the runs and distributions that its files are made of.
 #[derive(Debug)]
-pub struct Made {
+pub struct ReportWithSources {
     pub report: Report,
     pub runs: Vec<RunFiles>,
     /// The distributions of each run, by tag.
@@ -116,7 +116,7 @@ pub struct Made {
 }
 
 /// Makes the report of these runs, with groups side by side if asked for.
-pub fn make(chosen: &[Chosen], title: Option<&str>, compare: bool) -> Made {
+pub fn make(chosen: &[Chosen], title: Option<&str>, compare: bool) -> ReportWithSources {
     let runs = chosen.iter().map(|chosen| RunFiles::read(&chosen.folder)).collect();
     let groups: Vec<_> = chosen.iter().map(|chosen| chosen.group.as_deref()).collect();
     from_files(runs, &groups, title, compare)
@@ -128,7 +128,7 @@ pub(crate) fn from_files(
     groups: &[Option<&str>],
     title: Option<&str>,
     compare: bool,
-) -> Made {
+) -> ReportWithSources {
     let series: Vec<_> = runs.iter_mut().map(distributions::of_run).collect();
     let sums = distributions::add_up(&series);
     let part = |(place, run): (usize, &RunFiles)| {
@@ -159,7 +159,7 @@ pub(crate) fn from_files(
         runs: parts,
         bounds: Vec::new(),
     };
-    Made { report, runs, series, sums }
+    ReportWithSources { report, runs, series, sums }
 }
 
 fn default_title(runs: &[RunFiles]) -> String {
@@ -169,7 +169,7 @@ fn default_title(runs: &[RunFiles]) -> String {
     }
 }
 
-impl Made {
+impl ReportWithSources {
     /// Holds the bounds of a threshold file against the report.
     pub fn judge(&mut self, file: &Path) -> Result<(), ReportError> {
         let text = read_text(file)?;

@@ -9,14 +9,14 @@
 //! | `jitterdebugger.json` | jitterplot and its like |
 
 use super::hlog::{self, Interval};
-use super::{Made, ReportError, jitterdebugger, markdown, page};
+use super::{ReportError, ReportWithSources, jitterdebugger, markdown, page};
 use runlog::run_folder::write_json;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Writes the files into `folder`, or only the Markdown.
-pub fn write(made: &Made, folder: &Path, markdown_only: bool) -> Result<(), ReportError> {
+pub fn write(made: &ReportWithSources, folder: &Path, markdown_only: bool) -> Result<(), ReportError> {
     std::fs::create_dir_all(folder).map_err(|error| ReportError::write(folder, error))?;
     let text = |name: &str, text: String| {
         let path = folder.join(name);
@@ -37,7 +37,7 @@ pub fn write(made: &Made, folder: &Path, markdown_only: bool) -> Result<(), Repo
 }
 
 /// Each distribution of each run as one interval, from the run's start on; the base time is that of the first run.
-fn log(made: &Made, path: &Path) -> std::io::Result<()> {
+fn log(made: &ReportWithSources, path: &Path) -> std::io::Result<()> {
     let starts = made.runs.iter().filter_map(super::files::RunFiles::started_unix_s);
     let base_unix_s = starts.fold(f64::INFINITY, f64::min);
     let base_unix_s = if base_unix_s.is_finite() { base_unix_s } else { 0.0 };

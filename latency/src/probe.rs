@@ -24,23 +24,27 @@ impl Gap {
     }
 }
 
-/// Whether a probe watched a CPU.
+/// Whether a probe watched a CPU at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Watched {
-    Yes,
-    No,
+pub(crate) enum ProbeCoverage {
+    Watched,
+    Unwatched,
     /// Its table does not say.
     NotReported,
 }
 
 /// Whether a CPU was watched at a time, by the rows of a table.
-pub(crate) fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
-    let Some(gaps) = gaps else { return Watched::No };
+pub(crate) fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> ProbeCoverage {
+    let Some(gaps) = gaps else { return ProbeCoverage::Unwatched };
     if gaps.iter().any(|gap| gap.cpu == cpu && gap.from_ns <= at_ns) {
-        return Watched::Yes;
+        return ProbeCoverage::Watched;
     }
     // A table that names the CPUs names them all.
-    if gaps.iter().any(|gap| gap.from_ns == gap.to_ns) { Watched::No } else { Watched::NotReported }
+    if gaps.iter().any(|gap| gap.from_ns == gap.to_ns) {
+        ProbeCoverage::Unwatched
+    } else {
+        ProbeCoverage::NotReported
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -83,11 +87,11 @@ mod tests {
     fn a_cpu_without_gaps_was_watched_when_the_table_says_so() {
         let row = |cpu, from_ns, to_ns| Gap { cpu, from_ns, to_ns, another_ran: false };
         let table = [row(0, 100, 100), row(1, 100, 100), row(0, 150, 250)];
-        assert_eq!(watched(Some(&table), 1, 500), Watched::Yes);
-        assert_eq!(watched(Some(&table), 2, 500), Watched::No);
-        assert_eq!(watched(Some(&table), 1, 50), Watched::No, "it began later");
-        assert_eq!(watched(Some(&table[2..]), 1, 500), Watched::NotReported);
-        assert_eq!(watched(None, 1, 500), Watched::No);
+        assert_eq!(watched(Some(&table), 1, 500), ProbeCoverage::Watched);
+        assert_eq!(watched(Some(&table), 2, 500), ProbeCoverage::Unwatched);
+        assert_eq!(watched(Some(&table), 1, 50), ProbeCoverage::Unwatched, "it began later");
+        assert_eq!(watched(Some(&table[2..]), 1, 500), ProbeCoverage::NotReported);
+        assert_eq!(watched(None, 1, 500), ProbeCoverage::Unwatched);
     }
 
     #[test]

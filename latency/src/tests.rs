@@ -4,14 +4,14 @@ use super::files::RunFiles;
 use super::made_up;
 use super::model::{Cause, Report, Source};
 use super::samples::Samples;
-use super::{Made, choice, from_files, hlog, make, output};
+use super::{ReportWithSources, choice, from_files, hlog, make, output};
 use std::path::Path;
 
 pub(super) fn report_of(runs: Vec<RunFiles>) -> Report {
     from_files(runs, &[], None, true).report
 }
 
-fn made_in(folder: &Path) -> Made {
+fn made_in(folder: &Path) -> ReportWithSources {
     make(&choice::choose(&[folder.into()], &[]).unwrap(), Some("Test"), true)
 }
 

@@ -4,7 +4,7 @@
 //! `docs/buses.md`.
 
 use super::cli::{CheckPace, ConformanceArguments};
-use super::observer::{Received, What, Wrong};
+use super::observer::{MalformedCommand, ObservedFrame, Received};
 use crate::junit::Case;
 use crate::soak::model::{Check, CheckResult};
 use protocol::commands::STALE_AFTER_CYCLES;
@@ -24,20 +24,20 @@ const MOST: f64 = 0.99;
 pub(super) struct Phase<'a> {
     /// Cycles whose sensors were sent, with their stamps; `None` for the time of a cycle that this process disturbed.
     pub(super) cycles: &'a [(u64, Option<u64>)],
-    /// What came in them.
+    /// Frames that came in them.
     pub(super) received: &'a [Received],
 }
 
 impl Phase<'_> {
     fn commands(&self) -> impl Iterator<Item = (&Received, f64, Option<u64>, Option<u8>)> {
-        self.received.iter().filter_map(|received| match received.what {
-            What::Command { opening, age, step } => Some((received, opening, age, step)),
+        self.received.iter().filter_map(|received| match received.frame {
+            ObservedFrame::Command { opening, age, step } => Some((received, opening, age, step)),
             _ => None,
         })
     }
 
-    fn broken(&self, wrong: Wrong) -> usize {
-        self.received.iter().filter(|received| received.what == What::Broken(wrong)).count()
+    fn broken(&self, wrong: MalformedCommand) -> usize {
+        self.received.iter().filter(|received| received.frame == ObservedFrame::Broken(wrong)).count()
     }
 }
 
@@ -58,10 +58,10 @@ pub(super) fn regular(phase: &Phase<'_>, arguments: &ConformanceArguments) -> Ve
     let commands = phase.commands().count();
     let mut cases = vec![every_cycle("regular", phase, arguments)];
     for (name, wrong, what) in [
-        ("length", Wrong::Length, "other than 5 bytes"),
-        ("checksum", Wrong::Checksum, "a wrong checksum"),
-        ("reserved-bits", Wrong::Reserved, "bits that no signal covers"),
-        ("range", Wrong::Range, "an opening beyond -2047 to 2047 counts"),
+        ("length", MalformedCommand::Length, "other than 5 bytes"),
+        ("checksum", MalformedCommand::Checksum, "a wrong checksum"),
+        ("reserved-bits", MalformedCommand::Reserved, "bits that no signal covers"),
+        ("range", MalformedCommand::Range, "an opening beyond -2047 to 2047 counts"),
     ] {
         let broken = phase.broken(wrong);
         let detail = format!("{broken} commands with {what}, {commands} good ones");
@@ -134,8 +134,8 @@ fn command_age(phase: &Phase<'_>) -> Case {
 
 /// It sends nothing but what is its own to send, as rig.dbc has it.
 fn identifiers(phase: &Phase<'_>) -> Case {
-    let mut others = phase.received.iter().filter_map(|received| match &received.what {
-        What::NotItsOwn(frame) => Some(frame),
+    let mut others = phase.received.iter().filter_map(|received| match &received.frame {
+        ObservedFrame::NotItsOwn(frame) => Some(frame),
         _ => None,
     });
     let (first, more) = (others.next(), others.count());
@@ -210,7 +210,7 @@ fn during<'a>(received: &'a [Received], window: &'a Range<u64>) -> impl Iterator
 fn last_open(received: &[Received], window: Range<u64>) -> Option<u64> {
     let open = |received: &&Received| {
         window.contains(&received.cycle)
-            && matches!(received.what, What::Command { opening, .. } if opening != 0.0)
+            && matches!(received.frame, ObservedFrame::Command { opening, .. } if opening != 0.0)
     };
     received.iter().rev().find(open).map(|received| received.cycle)
 }
@@ -237,11 +237,11 @@ pub(super) fn sensor_loss(received: &[Received], window: Range<u64>, back: Range
     let class = "sensor-loss";
     let [without, again] = [&window, &back].map(|window| {
         during(received, window)
-            .filter(|received| matches!(received.what, What::Command { age: None, .. }))
+            .filter(|received| matches!(received.frame, ObservedFrame::Command { age: None, .. }))
             .count()
     });
     let reported = during(received, &window)
-        .find(|received| matches!(&received.what, What::Stop(stop) if !stop.release));
+        .find(|received| matches!(&received.frame, ObservedFrame::Stop(stop) if !stop.release));
     let reported = match reported {
         Some(received) => (
             CheckResult::Passed,
@@ -270,7 +270,7 @@ pub(super) fn sensor_loss(received: &[Received], window: Range<u64>, back: Range
     ]
 }
 
-/// The value that this share of sorted values does not exceed.
+/// Quantile of sorted values: the value at rank ⌈share · n⌉, which this share of them does not exceed; `None` of no values.
 fn quantile(sorted: &[u64], share: f64) -> Option<u64> {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.max(1) - 1).copied()

@@ -11,8 +11,9 @@ use protocol::frames::{ALIVE_RANGE, DecodeError, ECHO_RANGE, EmergencyStop, Fram
 /// Frames that are kept of one controller; one that babbles is cut off here.
 const MOST_FRAMES: usize = 500_000;
 
+/// A frame of the controller under test, as the bus contract sees it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum What {
+pub(super) enum ObservedFrame {
     Command {
         /// Opening that it asks for, 0 without its enable bit.
         opening: f64,
@@ -22,7 +23,7 @@ pub(super) enum What {
         step: Option<u8>,
     },
     /// A command that the rig would not take.
-    Broken(Wrong),
+    Broken(MalformedCommand),
     Stop(EmergencyStop),
     /// Another frame that it may send.
     Own,
@@ -30,14 +31,16 @@ pub(super) enum What {
     NotItsOwn(String),
 }
 
+/// Why the rig would not take a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wrong {
+pub(super) enum MalformedCommand {
     /// It has not five bytes.
     Length,
     /// Its checksum is not that of its identifier and data.
     Checksum,
     /// Bits that no signal covers are not 0.
     Reserved,
+    /// Its opening is beyond -2047 to 2047 counts.
     Range,
 }
 
@@ -46,7 +49,7 @@ pub(super) struct Received {
     /// The newest cycle that was sent when it came.
     pub(super) cycle: u64,
     pub(super) stamp_ns: u64,
-    pub(super) what: What,
+    pub(super) frame: ObservedFrame,
 }
 
 pub(super) struct Observer {
@@ -84,12 +87,9 @@ impl Observer {
     /// Takes a frame that came at `stamp_ns`, after the cycle noted last.
     pub(super) fn take(&mut self, frame: &CanFrame, stamp_ns: u64) {
         if self.received.len() < MOST_FRAMES {
-            let what = self.judge(frame);
-            self.received.push(Received {
-                cycle: (self.sent.len() as u64).saturating_sub(1),
-                stamp_ns,
-                what,
-            });
+            let frame = self.judge(frame);
+            let cycle = (self.sent.len() as u64).saturating_sub(1);
+            self.received.push(Received { cycle, stamp_ns, frame });
         }
     }
 
@@ -98,7 +98,7 @@ impl Observer {
         self.received.len() >= MOST_FRAMES
     }
 
-    fn judge(&mut self, frame: &CanFrame) -> What {
+    fn judge(&mut self, frame: &CanFrame) -> ObservedFrame {
         if frame.standard_id() == Some(self.command.id) {
             return self.judge_command(frame);
         }
@@ -108,33 +108,35 @@ impl Observer {
             .is_some_and(|spec| self.nodes.contains(&spec.sender));
         match Frame::decode(frame) {
             Ok(Frame::DriveEmergencyStop(stop) | Frame::LoadEmergencyStop(stop)) if allowed => {
-                What::Stop(stop)
+                ObservedFrame::Stop(stop)
             }
-            Ok(_) if allowed => What::Own,
-            _ => What::NotItsOwn(frame.to_string()),
+            Ok(_) if allowed => ObservedFrame::Own,
+            _ => ObservedFrame::NotItsOwn(frame.to_string()),
         }
     }
 
-    fn judge_command(&mut self, frame: &CanFrame) -> What {
+    fn judge_command(&mut self, frame: &CanFrame) -> ObservedFrame {
         let data = frame.data();
         if data.len() != usize::from(self.command.length) {
-            return What::Broken(Wrong::Length);
+            return ObservedFrame::Broken(MalformedCommand::Length);
         }
         let (crc, before) = data.split_last().expect("a command has five bytes");
         if checksum::of(self.command.id, before) != *crc {
-            return What::Broken(Wrong::Checksum);
+            return ObservedFrame::Broken(MalformedCommand::Checksum);
         }
         let command = match Frame::decode(frame) {
             Ok(Frame::DriveValveCommand(command) | Frame::LoadValveCommand(command)) => command,
-            Err(DecodeError::ReservedBits { .. }) => return What::Broken(Wrong::Reserved),
-            _ => return What::Broken(Wrong::Range),
+            Err(DecodeError::ReservedBits { .. }) => {
+                return ObservedFrame::Broken(MalformedCommand::Reserved);
+            }
+            _ => return ObservedFrame::Broken(MalformedCommand::Range),
         };
         let modulo = ALIVE_RANGE as u8;
         let step = self.last_alive.replace(command.alive);
         let step = step.map(|last| (command.alive + modulo - last) % modulo);
         let opening = if command.enable { command.opening } else { 0.0 };
         self.opening = opening;
-        What::Command { opening, age: self.age(u64::from(command.echo)), step }
+        ObservedFrame::Command { opening, age: self.age(u64::from(command.echo)), step }
     }
 
     /// How old the newest cycle is that was sent and ends with these bits.
@@ -157,11 +159,11 @@ mod tests {
     }
 
     /// What a controller is asked to have sent, after cycles up to 4999 of which 4990 was skipped.
-    fn judged(frames: &[CanFrame]) -> Vec<What> {
+    fn judged(frames: &[CanFrame]) -> Vec<ObservedFrame> {
         let mut observer = Observer::new(CheckedAxis::Drive, false);
         (0..5000).filter(|cycle| *cycle != 4990).for_each(|cycle| observer.note_sent(cycle, cycle != 4995));
         frames.iter().for_each(|frame| observer.take(frame, 0));
-        observer.received.into_iter().map(|received| received.what).collect()
+        observer.received.into_iter().map(|received| received.frame).collect()
     }
 
     #[test]
@@ -169,7 +171,7 @@ mod tests {
         let echo = |cycle: u16| cycle % 4096;
         let frames =
             [command(15, echo(4999)), command(0, echo(4998)), command(2, echo(4990)), command(2, echo(4995))];
-        let of = |age, step| What::Command { opening: 1.0, age, step };
+        let of = |age, step| ObservedFrame::Command { opening: 1.0, age, step };
         let expected = [of(Some(0), None), of(Some(1), Some(1)), of(None, Some(2)), of(None, Some(0))];
         assert_eq!(judged(&frames), expected);
         // Of a cycle to come: the 12 bits are those of one long ago, which was sent.
@@ -191,7 +193,13 @@ mod tests {
             with(&|data| data[3] |= 0x80, true),
             with(&|data| (data[0], data[1]) = (0, data[1] & 0xF0 | 0x08), true),
         ];
-        let expected = [Wrong::Length, Wrong::Checksum, Wrong::Reserved, Wrong::Range].map(What::Broken);
+        let expected = [
+            MalformedCommand::Length,
+            MalformedCommand::Checksum,
+            MalformedCommand::Reserved,
+            MalformedCommand::Range,
+        ]
+        .map(ObservedFrame::Broken);
         assert_eq!(judged(&frames), expected);
     }
 
@@ -205,8 +213,14 @@ mod tests {
             CanFrame::new(0x150, &[0; 4]),
             CanFrame::from_raw(0x8000_0110, &[]),
         ];
-        let not = |text: &str| What::NotItsOwn(text.into());
-        let expected = [What::Stop(stop), not("10B#0300"), What::Own, not("150#00000000"), not("00000110#")];
+        let not = |text: &str| ObservedFrame::NotItsOwn(text.into());
+        let expected = [
+            ObservedFrame::Stop(stop),
+            not("10B#0300"),
+            ObservedFrame::Own,
+            not("150#00000000"),
+            not("00000110#"),
+        ];
         assert_eq!(judged(&frames), expected);
     }
 }

@@ -15,7 +15,8 @@ use std::path::Path;
 /// Standard deviations that the injected loss may be away from its probability.
 const LOSS_DEVIATIONS: f64 = 5.0;
 
-pub(super) struct Judged {
+/// Checks of a finished segment, with the figures that they rest on.
+pub(super) struct SegmentVerdict {
     pub checks: Vec<Check>,
     pub figures: Figures,
     pub account: Account,
@@ -24,7 +25,7 @@ pub(super) struct Judged {
     pub machine: Value,
 }
 
-pub(super) fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: bool) -> Judged {
+pub(super) fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: bool) -> SegmentVerdict {
     let evidence = SegmentFiles::read(spec, folder);
     let account = evidence.account(outcome);
     let memory: BTreeMap<_, _> =
@@ -49,7 +50,7 @@ pub(super) fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positio
     ]);
     let account = account.unwrap_or_default();
     let machine = evidence.machine.clone();
-    Judged { checks, figures: evidence.figures(), account, memory, machine }
+    SegmentVerdict { checks, figures: evidence.figures(), account, memory, machine }
 }
 
 /// Passed when nothing is broken.

@@ -23,7 +23,7 @@ pub(super) struct Merged(BTreeMap<String, Histogram<u64>>);
 
 /// A distribution as `soak.json` keeps it: figures for people, and the histogram to go on with.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Kept {
+pub(crate) struct StoredDistribution {
     /// Half of the samples were at most this, ns.
     pub p50_ns: u64,
     pub p90_ns: u64,
@@ -74,7 +74,7 @@ impl Merged {
     }
 
     /// Takes up what an earlier start kept.
-    pub(super) fn from_kept(kept: &BTreeMap<String, Kept>) -> io::Result<Self> {
+    pub(super) fn from_kept(kept: &BTreeMap<String, StoredDistribution>) -> io::Result<Self> {
         let mut merged = Self::default();
         for (tag, kept) in kept {
             let histogram = decode(&kept.hdr_v2_base64, &mut Deserializer::new());
@@ -87,7 +87,7 @@ impl Merged {
     ///
     /// # Errors
     /// A histogram that cannot be written, which no counts of ours bring about.
-    pub(super) fn keep(&self) -> io::Result<BTreeMap<String, Kept>> {
+    pub(super) fn keep(&self) -> io::Result<BTreeMap<String, StoredDistribution>> {
         self.0.iter().map(|(tag, histogram)| Ok((tag.clone(), kept(histogram)?))).collect()
     }
 
@@ -101,10 +101,10 @@ impl Merged {
     }
 }
 
-fn kept(histogram: &Histogram<u64>) -> io::Result<Kept> {
+fn kept(histogram: &Histogram<u64>) -> io::Result<StoredDistribution> {
     let mut bytes = Vec::new();
     V2DeflateSerializer::new().serialize(histogram, &mut bytes).map_err(io::Error::other)?;
-    Ok(Kept {
+    Ok(StoredDistribution {
         p50_ns: histogram.value_at_quantile(0.5),
         p90_ns: histogram.value_at_quantile(0.9),
         p99_ns: histogram.value_at_quantile(0.99),

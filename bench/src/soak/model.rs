@@ -2,7 +2,7 @@
 
 use super::account::Row;
 use super::memory::Memory;
-use super::merged::Kept;
+use super::merged::StoredDistribution;
 use super::plan::Spec;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -37,7 +37,7 @@ pub(crate) struct Soak {
     /// Sums over all segments.
     pub totals: Totals,
     /// Distributions of all segments together, by tag.
-    pub distributions: BTreeMap<String, Kept>,
+    pub distributions: BTreeMap<String, StoredDistribution>,
     pub folder_bytes: u64,
     /// Resident memory of the soak itself after the last segment.
     pub own_rss_kib: u64,

@@ -19,7 +19,7 @@
 //! once: there a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
 
 use crate::model::Cause;
-use crate::probe::Watched;
+use crate::probe::ProbeCoverage;
 use realtime::VitalCounts;
 
 /// Faults in a cycle from which on they are a cause by themselves: a locked process has none.
@@ -35,9 +35,9 @@ pub(crate) enum Known {
     No,
 }
 
-/// What was seen of an event, at its worst cycle.
+/// Evidence of an event, at its worst cycle.
 #[derive(Clone, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct LatenessEvidence {
     pub process: String,
     pub late_ns: u64,
     /// How much slower than usual, ns.
@@ -54,7 +54,7 @@ pub(crate) struct Seen {
     pub waited_ns: u64,
     /// Lateness or slowness of all cycles of the event, ns.
     pub together_ns: u64,
-    pub probe_watched: Watched,
+    pub probe_watched: ProbeCoverage,
     /// Longest gap of that probe within the event in which no thread had the CPU, ns.
     pub still_ns: u64,
     /// Longest in which another one had, ns.
@@ -74,12 +74,12 @@ pub(crate) struct Explanation {
     pub evidence: Vec<String>,
 }
 
-pub(crate) fn cause(seen: &Seen) -> Explanation {
+pub(crate) fn cause(seen: &LatenessEvidence) -> Explanation {
     let cause = first_that_holds(seen);
     Explanation { cause, sentence: sentence(cause, seen), evidence: evidence(seen) }
 }
 
-fn first_that_holds(seen: &Seen) -> Cause {
+fn first_that_holds(seen: &LatenessEvidence) -> Cause {
     let bad_ns = seen.bad_ns();
     let waited = seen.waited_half();
     let slow = seen.slow_ns > seen.late_ns;
@@ -99,15 +99,15 @@ fn first_that_holds(seen: &Seen) -> Cause {
         let elsewhere = seen.still_elsewhere_ns.saturating_mul(2) >= bad_ns || seen.other_stood_still();
         return if elsewhere { Cause::MachineStoodStill } else { Cause::Unexplained };
     }
-    let cpu_was_free =
-        seen.probe_watched == Watched::Yes && seen.still_ns.max(seen.another_ns).saturating_mul(4) < bad_ns;
+    let cpu_was_free = seen.probe_watched == ProbeCoverage::Watched
+        && seen.still_ns.max(seen.another_ns).saturating_mul(4) < bad_ns;
     if cpu_was_free || seen.run_delay == Known::No {
         return Cause::Unexplained;
     }
     Cause::MachineStoodStill
 }
 
-impl Seen {
+impl LatenessEvidence {
     /// What is to be explained, ns.
     fn bad_ns(&self) -> u64 {
         self.late_ns.max(self.slow_ns)
@@ -154,8 +154,8 @@ pub(crate) fn in_words(ns: u64) -> String {
     }
 }
 
-fn sentence(cause: Cause, seen: &Seen) -> String {
-    let Seen { process, missed, vitals, .. } = seen;
+fn sentence(cause: Cause, seen: &LatenessEvidence) -> String {
+    let LatenessEvidence { process, missed, vitals, .. } = seen;
     let what = if seen.slow_ns > seen.late_ns {
         format!("The {process} was {} slower than usual", in_words(seen.slow_ns))
     } else {
@@ -207,7 +207,7 @@ fn sentence(cause: Cause, seen: &Seen) -> String {
             in_words(seen.together_ns),
             if seen.faults() == 0 { "no".to_owned() } else { seen.faults().to_string() }
         ),
-        _ if seen.probe_watched == Watched::Yes && seen.slow_ns <= seen.late_ns => {
+        _ if seen.probe_watched == ProbeCoverage::Watched && seen.slow_ns <= seen.late_ns => {
             format!("and nothing explains it: the probe saw CPU {cpu} free in that time")
         }
         _ if seen.slow_ns > seen.late_ns => {
@@ -219,8 +219,8 @@ fn sentence(cause: Cause, seen: &Seen) -> String {
     format!("{what}{and_missed}, {because}.")
 }
 
-fn evidence(seen: &Seen) -> Vec<String> {
-    let Seen { vitals, .. } = seen;
+fn evidence(seen: &LatenessEvidence) -> Vec<String> {
+    let LatenessEvidence { vitals, .. } = seen;
     let mut reported = Vec::new();
     if seen.continued > 0 {
         reported.push(format!("SIGCONT was counted {} time(s) in these cycles.", seen.continued));
@@ -257,11 +257,11 @@ fn evidence(seen: &Seen) -> Vec<String> {
     reported
 }
 
-fn probe_evidence(seen: &Seen) -> String {
+fn probe_evidence(seen: &LatenessEvidence) -> String {
     let cpu = seen.vitals.cpu;
-    let mut text = if seen.probe_watched == Watched::No {
+    let mut text = if seen.probe_watched == ProbeCoverage::Unwatched {
         format!("No probe watched CPU {cpu}: whether it stood still was not seen directly.")
-    } else if seen.probe_watched == Watched::NotReported {
+    } else if seen.probe_watched == ProbeCoverage::NotReported {
         format!("The probe's table has no gap of CPU {cpu}, and does not tell whether that CPU was watched.")
     } else if seen.still_ns > 0 {
         format!(
