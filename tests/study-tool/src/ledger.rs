@@ -3,8 +3,11 @@
 //! ```text
 //! seed < 100        development: thresholds may be chosen on its draws
 //! any other seed    SHA-256 of the frozen program's sources, entered as [[fresh]] before its first draw is made
-//! opened            development from then on; figures of its first opening stand beside those of any later one
+//! opened            by a draw, a figure or a failure: development from then on, for every later program; the frozen one may
+//!                   go on with draws that nobody has seen; figures of the first opening stand beside those of any later one
 //! ```
+//!
+//! Worlds and twins of a seed are draws of different random streams ([`crate::draws`]): each opening says which it saw.
 //!
 //! A figure that was measured on draws whose failures had been read before is optimistic by an unknown amount. The ledger
 //! makes that visible; it cannot prevent somebody from drawing with another copy of this program.
@@ -112,7 +115,7 @@ impl Ledger {
         if seed < FIRST_FRESH_SEED || is_entered() { Ok(()) } else { Err(SeedError::NotEntered(seed)) }
     }
 
-    /// Every opening, and for each study of a seed its figures side by side, the first opening first.
+    /// Every opening, every entered seed, and for each study of a seed its figures side by side, the first opening first.
     pub fn markdown(&self) -> String {
         let heads = [
             "seed",
@@ -121,7 +124,7 @@ impl Ledger {
             "commit",
             "program, CRC-32",
             "opened by",
-            "after its failures were read",
+            "what was changed afterwards",
         ];
         let openings = self.opening.iter().map(|opening| {
             let Opening { seed, study, date, commit, crc32, command, after, .. } = opening;
@@ -136,14 +139,16 @@ impl Ledger {
                 after.clone(),
             ]
         });
-        let mut text = grid(&heads.map(str::to_owned), openings);
+        let mut text = format!("## Openings\n\n{}", grid(&heads.map(str::to_owned), openings));
+        text.push_str("\n## Seeds entered before their first draw\n\n");
         for fresh in &self.fresh {
             let Fresh { seed, sha256, commit, date } = fresh;
             let _ = writeln!(
                 text,
-                "\nSeed {seed} was entered on {date} for the sources of {commit}, SHA-256 {sha256}."
+                "- Seed {seed} was entered on {date} for the sources of {commit}, SHA-256\n  {sha256}."
             );
         }
+        text.push_str("\n## First runs and later ones\n");
         let mut studies: Vec<(u64, &str)> = Vec::new();
         for opening in self.opening.iter().filter(|opening| !opening.figures.is_empty()) {
             if !studies.contains(&(opening.seed, &opening.study)) {
@@ -216,7 +221,7 @@ mod tests {
     fn the_page_shows_the_committed_ledger() {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let table = Ledger::read(&tests.join("study/evidence/ledger.toml")).unwrap().markdown();
-        let page = std::fs::read_to_string(tests.join("docs/study.md")).unwrap();
+        let page = std::fs::read_to_string(tests.join("docs/seeds.md")).unwrap();
         assert!(page.contains(table.trim()), "run scripts/study ledger --write");
     }
 
@@ -224,6 +229,10 @@ mod tests {
     fn the_first_opening_stands_beside_later_ones_and_counts_are_counts() {
         let text = [opening("a", "9/10"), opening("b", "10/10")].concat();
         let page = ledger(&text).unwrap().markdown();
+        let heads: Vec<&str> = page.lines().filter(|line| line.starts_with("## ")).collect();
+        let wanted =
+            ["## Openings", "## Seeds entered before their first draw", "## First runs and later ones"];
+        assert_eq!(heads, wanted);
         assert!(page.contains("| s, seed 4 | first opening, a | opened again, b |"), "{page}");
         assert!(page.contains("| named | 9/10 (60 to 98 %) | 10/10 (72 to 100 %) |"), "{page}");
         for bad in ["11/10", "9 of 10", "0/0"] {

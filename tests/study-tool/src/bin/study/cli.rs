@@ -299,7 +299,7 @@ pub(crate) struct CurveArguments {
 
 #[derive(Args)]
 pub(crate) struct LedgerArguments {
-    /// Writes the tables into tests/docs/study.md.
+    /// Writes the tables into tests/docs/seeds.md.
     #[arg(long)]
     pub(crate) write: bool,
 }

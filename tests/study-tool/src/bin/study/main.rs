@@ -75,6 +75,8 @@ fn committed(name: &str) -> PathBuf {
 }
 
 const PAGE: &str = "docs/study.md";
+/// Seeds and their openings.
+const SEEDS_PAGE: &str = "docs/seeds.md";
 /// Tables that only studies of earlier programs have.
 const EARLIER: &str = "docs/study-earlier.md";
 const FORMS_PAGE: &str = "docs/record-maker.md";
@@ -133,7 +135,7 @@ fn forms(arguments: &FormsArguments, stop: &AtomicBool) -> Done {
 fn ledger(arguments: &LedgerArguments) -> Done {
     let text = Ledger::read(&committed(LEDGER))?.markdown();
     if arguments.write {
-        document::put(&committed(PAGE), "ledger", &text)?;
+        document::put(&committed(SEEDS_PAGE), "ledger", &text)?;
     } else {
         say(&format!("\n{text}"));
     }
