@@ -20,6 +20,7 @@
 //! | [`leave_out`] | one case whose effect is left out of the program's catalogue |
 //! | [`resolve`] | whether the experiment that a program proposes resolves what it could not tell apart |
 //! | [`interval`] | what so many of so many prove |
+//! | [`target`] | what is wanted of a rate, and whether it is reached |
 //! | [`score`] | all cases: rates, confusion matrix, parameters, time |
 //! | [`page`] | the score as one page |
 //! | [`probability`] | whether the probabilities of explanations keep what they promise |
@@ -34,7 +35,7 @@
 //! | [`compute`] | both, for all places and draws |
 //! | [`document`] | both as tables of a page |
 //!
-//! The commands: `scripts/study --help`; what they found: `tests/docs/study.md`.
+//! The commands: `scripts/study --help`; what they found: `tests/docs/study.md`; on which seeds: `tests/docs/seeds.md`.
 
 pub mod answer;
 pub mod classes;
@@ -59,6 +60,7 @@ pub mod resolve;
 pub mod score;
 pub mod signature;
 pub mod step;
+pub mod target;
 pub mod trajectory;
 pub mod twins;
 pub mod worlds;

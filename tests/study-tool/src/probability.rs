@@ -18,6 +18,8 @@ use serde::Serialize;
 const EDGES: [f64; 5] = [0.01, 0.1, 0.5, 0.9, 0.99];
 /// Explanations that a bin holds at least.
 const LEAST_IN_BIN: usize = 60;
+/// Least probability in a bin from which on it tests high ones.
+const HIGH: f64 = 0.5;
 /// Share of the weight that records with nothing hidden have.
 const NULL_SHARE: f64 = 1.0 / 3.0;
 const CONFIDENCE: f64 = 0.95;
@@ -118,6 +120,13 @@ pub struct Reliability {
 }
 
 impl Reliability {
+    /// The calibration error where a bin lies wholly from one half on; elsewhere it says nothing of high probabilities. One
+    /// event of each report is right, so that the means of a single bin agree by construction.
+    pub fn shown_error(&self) -> Option<f64> {
+        let is_high = self.bins.len() > 1 && self.bins.iter().any(|bin| bin.between[0] >= HIGH);
+        is_high.then_some(self.calibration_error)
+    }
+
     /// Of reports by the kind of their draw; weighted so that a third are of nothing hidden.
     pub fn of(reports: &[(Kind, &[Said])]) -> Self {
         let given: Vec<_> = reports.iter().filter(|(_, said)| !said.is_empty()).collect();
@@ -265,10 +274,20 @@ mod tests {
                 .all(|bin| bin.explanations == 80 && bin.band[0] < bin.right && bin.right < bin.band[1])
         );
         assert_eq!(good.first_right, [60, 80]);
+        assert_eq!(good.shown_error(), Some(good.calibration_error));
         let overconfident = reliability(&of(1));
         assert!((overconfident.calibration_error - 0.5).abs() < 1e-12, "{overconfident:?}");
         // A bin that would hold too few joins its neighbour.
-        assert_eq!(reliability(&of(3)[..20]).bins.len(), 1);
+        let few = reliability(&of(3)[..20]);
+        assert_eq!((few.bins.len(), few.shown_error()), (1, None));
+    }
+
+    #[test]
+    fn no_calibration_error_is_shown_where_no_bin_is_high() {
+        // 64 and 64 events below one half, in two bins: their means say nothing of what is said at 90 %.
+        let report = [said(0.45, true), said(0.45, false), said(0.05, false), said(0.05, false)];
+        let low = Reliability::of(&[(Kind::Single, &report[..]); 32]);
+        assert_eq!((low.bins.len(), low.shown_error()), (2, None));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::leave_out::tables::STILL_CLOSED;
 use crate::probability::{Reliability, Said, by_marginal};
 use crate::score::tables::{Spread, hidden, is_clear, over_limit};
 use crate::score::{Case, Score};
+use crate::target::{Outcome, Target};
 use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF};
 use std::collections::BTreeMap;
@@ -18,6 +19,10 @@ use std::fmt::Write;
 const MUCH_OFF: f64 = 0.02;
 /// Multiple of the limit that parts weak and strong effects.
 const STRONG: f64 = 10.0;
+/// Targets in the exact world and beside a background: median and longest wall time of a draw, s; calibration error, points.
+const MEDIAN_S: [f64; 2] = [12.0, 15.0];
+const LONGEST_S: [f64; 2] = [60.0, 90.0];
+const CALIBRATION_POINTS: [u32; 2] = [5, 10];
 
 #[derive(Debug, Serialize)]
 pub struct Worlds {
@@ -31,6 +36,8 @@ pub struct Worlds {
     /// The same of those reports that have marginal likelihoods: by the rule that decides, and by these.
     pub rules: [[Reliability; 2]; 2],
     pub wall_s: [Spread; 2],
+    /// Draws that took longer than the target of the median, and than that of the longest, in each world.
+    pub longer: [[Rate; 2]; 2],
     pub errors: usize,
     /// Other programs on the same draws.
     pub others: Vec<Paired>,
@@ -83,7 +90,16 @@ fn mcnemar(one: usize, other: usize) -> f64 {
 pub struct Row {
     pub name: &'static str,
     pub rates: [Rate; 2],
-    pub wanted: [&'static str; 2],
+    pub wanted: [Target; 2],
+    /// `None` without a target.
+    pub outcomes: [Option<Outcome>; 2],
+}
+
+impl Row {
+    fn new(name: &'static str, rates: [Rate; 2], wanted: [Target; 2]) -> Self {
+        let outcomes = [0, 1].map(|world: usize| Outcome::of(&rates[world], wanted[world]));
+        Row { name, rates, wanted, outcomes }
+    }
 }
 
 impl Worlds {
@@ -114,6 +130,9 @@ impl Worlds {
             ]
         });
         let cases = || worlds.iter().chain(&left).flatten();
+        let longer = [MEDIAN_S, LONGEST_S].map(|limits_s| {
+            [0, 1].map(|world: usize| Rate::of(&worlds[world], |case: &Case| case.wall_s > limits_s[world]))
+        });
         Worlds {
             rows,
             done: [worlds.iter().map(Vec::len).sum(), draws],
@@ -121,6 +140,7 @@ impl Worlds {
             reliability,
             rules,
             wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
+            longer,
             others: others.iter().map(|other| Paired::of(score, other)).collect(),
             errors: cases().filter(|case| case.judgement.error.is_some()).count(),
         }
@@ -131,25 +151,24 @@ impl Worlds {
         let mut text = format!(
             "{} of {} draws, and {} with what is hidden left out of the catalogue; {} without a good report, which count as \
              wrong.\n\n\
-             | | exact world | wanted | background | wanted |\n|---|---|---|---|---|\n",
+             | | exact world | wanted | outcome | background | wanted | outcome |\n|---|---|---|---|---|---|---|\n",
             self.done[0], self.done[1], self.left_out, self.errors
         );
-        for Row { name, rates, wanted } in &self.rows {
-            let [exact, background] = rates.map(in_words);
-            let _ = writeln!(text, "| {name} | {exact} | {} | {background} | {} |", wanted[0], wanted[1]);
-        }
-        for (at, name) in ["median", "longest"].into_iter().enumerate() {
-            let told = self.wall_s.map(|spread| {
-                spread
-                    .quantiles
-                    .map_or_else(String::new, |quantiles| format!("{:.0} s", quantiles[1 + 2 * at]))
+        for Row { name, rates, wanted, outcomes } in &self.rows {
+            let cells = [0, 1].map(|world: usize| {
+                format!("{} | {} | {}", in_words(rates[world]), wanted[world], outcome_cell(outcomes[world]))
             });
-            let wanted = [["12 s", "15 s"], ["60 s", "90 s"]][at];
-            let _ = writeln!(
-                text,
-                "| {name} of the wall time | {} | {} | {} | {} |",
-                told[0], wanted[0], told[1], wanted[1]
-            );
+            let _ = writeln!(text, "| {name} | {} |", cells.join(" | "));
+        }
+        for (at, (name, limits_s)) in [("median", MEDIAN_S), ("longest", LONGEST_S)].into_iter().enumerate() {
+            let cells = [0, 1].map(|world: usize| {
+                let quantiles = self.wall_s[world].quantiles;
+                let time =
+                    quantiles.map_or_else(String::new, |quantiles| format!("{:.0} s", quantiles[1 + 2 * at]));
+                let outcome = Outcome::of(&self.longer[at][world], self.longer_wanted(at));
+                format!("{time} | {} s | {}", limits_s[world], outcome_cell(outcome))
+            });
+            let _ = writeln!(text, "| {name} of the wall time | {} |", cells.join(" | "));
         }
         for (label, world, [both, ours, theirs, neither]) in self.others.iter().flat_map(|paired| {
             let worlds = ["exact world", "background"].into_iter().zip(paired.counts);
@@ -163,19 +182,24 @@ impl Worlds {
                 mcnemar(ours, theirs)
             );
         }
-        for (world, reliability) in ["exact world", "background"].into_iter().zip(&self.reliability) {
+        for (at, (world, reliability)) in
+            ["exact world", "background"].into_iter().zip(&self.reliability).enumerate()
+        {
             let [right, of] = reliability.first_right;
-            // One event of each report is right: the means of a single bin agree by construction.
-            let error = match reliability.bins.len() {
-                0 | 1 => "too few for a calibration error".to_owned(),
-                _ => {
-                    format!("expected calibration error {:.1} points", 100.0 * reliability.calibration_error)
-                }
-            };
+            let error = reliability.shown_error().map_or_else(
+                || "too few for a calibration error: no bin lies above 50 %".to_owned(),
+                |error| {
+                    let wanted = CALIBRATION_POINTS[at];
+                    format!(
+                        "expected calibration error {:.1} points (wanted: at most {wanted})",
+                        100.0 * error
+                    )
+                },
+            );
             let _ = write!(
                 text,
                 "\nProbabilities, {world}, draws left out included: \
-                 the most probable explanation is right for {right} of {of}; {error}.\n\n\
+                 the most probable explanation is right for {right} of {of};\n{error}.\n\n\
                  | said | explanations | mean said | right | band |\n|---|---|---|---|---|\n"
             );
             for bin in &reliability.bins {
@@ -194,20 +218,37 @@ impl Worlds {
             let (Some(of_deciding), Some(of_marginal)) = (decides.log_loss, marginal.log_loss) else {
                 continue;
             };
+            let errors = match (marginal.shown_error(), decides.shown_error()) {
+                (Some(own), Some(other)) => {
+                    format!("expected calibration error {:.1} and {:.1} points, ", 100.0 * own, 100.0 * other)
+                }
+                _ => String::new(),
+            };
             let _ = writeln!(
                 text,
                 "\nBy the marginal likelihood, {world}: of {} reports that have it, its most probable explanation is right \
-                 for {}, that of the rule that decides for {}; expected calibration error {:.1} and {:.1} points, mean log loss \
-                 {of_marginal:.2} and {of_deciding:.2}.",
-                marginal.first_right[1],
-                marginal.first_right[0],
-                decides.first_right[0],
-                100.0 * marginal.calibration_error,
-                100.0 * decides.calibration_error
+                 for {}, that of the rule that decides for {}; {errors}mean log loss {of_marginal:.2} and {of_deciding:.2}.",
+                marginal.first_right[1], marginal.first_right[0], decides.first_right[0]
             );
         }
         text
     }
+
+    /// What is wanted of the draws that took longer than the target of the median (0), and than that of the longest (1).
+    fn longer_wanted(&self, at: usize) -> Target {
+        let [done, draws] = self.done;
+        match at {
+            // The median is below what no more than half of the draws exceed.
+            0 => Target::AtMost(50),
+            // Some of the draws prove nothing of the longest of all.
+            _ if done < draws => Target::NoneOf(usize::MAX),
+            _ => Target::NoneOf(1),
+        }
+    }
+}
+
+fn outcome_cell(outcome: Option<Outcome>) -> String {
+    outcome.map_or_else(String::new, |outcome| outcome.to_string())
 }
 
 fn in_words(rate: Rate) -> String {
@@ -219,16 +260,18 @@ fn in_words(rate: Rate) -> String {
 /// The rate of those cases of `all` that `is` holds for.
 fn row(
     name: &'static str,
-    wanted: [&'static str; 2],
+    wanted: [Target; 2],
     worlds: &[Vec<Case>; 2],
     all: impl Fn(&Case) -> bool,
     is: impl Fn(&Case) -> bool,
 ) -> Row {
     let of_world = |world: &Vec<Case>| Rate::of(world.iter().filter(|case| all(case)), &is);
-    Row { name, rates: worlds.each_ref().map(of_world), wanted }
+    Row::new(name, worlds.each_ref().map(of_world), wanted)
 }
 
 fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
+    use Target::{AtLeast, AtMost, Between, NoneOf, Reported, Unasked};
+
     let single = |case: &Case| case.kind == Kind::Single && is_clear(case);
     let ordinary = |case: &Case| single(case) && !case.foreign_form && !case.beyond_drawn;
     let strong = |case: &Case| over_limit(case).is_some_and(|ratio| ratio >= STRONG);
@@ -246,52 +289,66 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
         worlds.each_ref().map(|world| Rate::of(world.iter().flat_map(reported), |covered| covered))
     };
     vec![
-        row("one effect of the catalogue's form: class named", ["97 %", "88 %"], worlds, ordinary, named),
-        row("the same, 3 to 10 limits", ["", ""], worlds, |case| ordinary(case) && !strong(case), named),
-        row("the same, 10 limits and more", ["", ""], worlds, |case| ordinary(case) && strong(case), named),
+        row(
+            "one effect of the catalogue's form: class named",
+            [AtLeast(97), AtLeast(88)],
+            worlds,
+            ordinary,
+            named,
+        ),
+        row("the same, 3 to 10 limits", [Unasked; 2], worlds, |case| ordinary(case) && !strong(case), named),
+        row(
+            "the same, 10 limits and more",
+            [Unasked; 2],
+            worlds,
+            |case| ordinary(case) && strong(case),
+            named,
+        ),
         row(
             "another form, or beyond the drawn range: class named",
-            ["92 %", "80 %"],
+            [AtLeast(92), AtLeast(80)],
             worlds,
             |case| single(case) && !ordinary(case),
             named,
         ),
-        row("one effect: name, place, nothing beside", ["92 %", "75 %"], worlds, single, |case| {
+        row("one effect: name, place, nothing beside", [AtLeast(92), AtLeast(75)], worlds, single, |case| {
             case.judgement.alone && hidden(case).where_right
         }),
         row(
             "class named: place and element right",
-            ["97 %", "92 %"],
+            [AtLeast(97), AtLeast(92)],
             worlds,
             |case| single(case) && named(case),
             |case| hidden(case).where_right,
         ),
-        row("nothing hidden: a name, or no report", ["none of 200", "at most 5 %"], worlds, null, |case| {
+        row("nothing hidden: a name, or no report", [NoneOf(200), AtMost(5)], worlds, null, |case| {
             !is_no_name(case)
         }),
         row(
             "nothing hidden: a parameter off that the file has right",
-            ["at most 2 %", "at most 10 %"],
+            [AtMost(2), AtMost(10)],
             worlds,
             null,
             |case| !case.parameter_errors.is_empty(),
         ),
-        row("the same by more than 2 % of its value", ["", "none"], worlds, null, much_off),
-        row("two effects: both classes named", ["88 %", "70 %"], worlds, pair, all_named),
-        row("two effects: no third", ["95 %", "90 %"], worlds, pair, |case| case.judgement.too_many == 0),
+        row("the same by more than 2 % of its value", [Unasked, NoneOf(200)], worlds, null, much_off),
+        row("two effects: both classes named", [AtLeast(88), AtLeast(70)], worlds, pair, all_named),
+        row("two effects: no third", [AtLeast(95), AtLeast(90)], worlds, pair, |case| {
+            case.judgement.too_many == 0
+        }),
         row(
             "three effects: all classes named",
-            ["60 %", "reported"],
+            [AtLeast(60), Reported],
             worlds,
             |case| case.kind == Kind::Triple && case.separable,
             all_named,
         ),
-        Row {
-            name: "numbers within two standard errors, catalogue's form",
-            rates: of_form(false),
-            wanted: ["93 to 97 %", "85 %"],
-        },
-        Row { name: "the same, another form", rates: of_form(true), wanted: ["85 %", "85 %"] },
+        Row::new(
+            "numbers within two standard errors, catalogue's form",
+            of_form(false),
+            [Between(93, 97), AtLeast(85)],
+        ),
+        Row::new("the same, another form", of_form(true), [AtLeast(85); 2]),
     ]
 }
 
@@ -300,32 +357,40 @@ fn hidden_numbers(case: &Case) -> &[NumberJudged] {
 }
 
 fn left_out_rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
+    use Target::{AtLeast, Reported};
+
     let is = |case: &Case, is: &dyn Fn(&LeftOut) -> bool| case.left_out.as_ref().is_some_and(is);
     let closed = |case: &Case| case.judgement.claimed_joint_ratio.is_some_and(|ratio| ratio >= STILL_CLOSED);
     let remembers = |case: &Case| is(case, &|left| left.with_memory);
     vec![
         row(
             "left out: no wrong name",
-            ["94 %", "88 %"],
+            [AtLeast(94), AtLeast(88)],
             worlds,
             |_| true,
             |case| is(case, &|left| left.no_wrong_name),
         ),
         row(
             "left out: balance, and variable among the first two",
-            ["85 %", "75 %"],
+            [AtLeast(85), AtLeast(75)],
             worlds,
             |_| true,
             |case| is(case, &|left| left.balance_right && left.variable_right),
         ),
         row(
             "left out: 60 % of the gap closed, without memory",
-            ["95 %", "reported"],
+            [AtLeast(95), Reported],
             worlds,
             |case| !remembers(case),
             closed,
         ),
-        row("left out: 60 % of the gap closed, with memory", ["70 %", "reported"], worlds, remembers, closed),
+        row(
+            "left out: 60 % of the gap closed, with memory",
+            [AtLeast(70), Reported],
+            worlds,
+            remembers,
+            closed,
+        ),
     ]
 }
 
@@ -356,6 +421,8 @@ mod tests {
         assert_eq!(rate("left out: no wrong name")[0].of, 0);
         let text = table.markdown();
         assert!(text.contains("of 100 draws") && text.lines().count() > 20, "{text}");
+        assert!(text.contains("| none of 200 | not resolved (estimate reaches) |"), "{text}");
+        assert!(text.contains("| reported |  |") && text.contains("| 94 % | no draw |"), "{text}");
     }
 
     #[test]
@@ -380,6 +447,29 @@ mod tests {
             table.markdown().contains("*other* alone 1 (exact McNemar test: p = 1.00)"),
             "{}",
             table.markdown()
+        );
+    }
+
+    #[test]
+    fn times_are_missed_by_one_draw_that_is_longer_and_by_a_median_that_is_resolved() {
+        let mut score = scored("truth");
+        for (at, case) in score.cases.iter_mut().enumerate() {
+            case.background = at % 2 == 1;
+            case.wall_s = if case.background { 20.0 } else { 10.0 };
+        }
+        let (all, slow) = (score.cases.len(), score.cases.iter().position(|case| case.background).unwrap());
+        score.cases[slow].wall_s = 91.0;
+        let text = |draws: usize| Worlds::of(&score, None, &[], draws).markdown();
+        let row = |draws: usize, name: &str| {
+            text(draws).lines().find(|line| line.starts_with(name)).unwrap_or_default().to_owned()
+        };
+        let median = "| median of the wall time | 10 s | 12 s | reached | 20 s | 15 s | missed |";
+        assert_eq!(row(all + 1, "| median of the wall time"), median);
+        let of_some = "| longest of the wall time | 10 s | 60 s | not resolved (estimate reaches) | 91 s | 90 s | missed |";
+        assert_eq!(row(all + 1, "| longest of the wall time"), of_some);
+        assert_eq!(
+            row(all, "| longest of the wall time"),
+            of_some.replace("not resolved (estimate reaches)", "reached")
         );
     }
 
