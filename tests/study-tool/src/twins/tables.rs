@@ -11,12 +11,13 @@ use crate::program::{Identity, Taken};
 use crate::report::{self, Report};
 use crate::resolve::{self, Outcome, ambiguous, judge, leaves_open};
 use crate::step::read_result;
+use crate::target::{self, Target};
 use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
 
-/// What is wanted of the twins that are left ambiguous, in the exact world and beside a background.
-const WANTED: [&str; 2] = ["80 %", "70 %"];
+/// What is wanted of all twins, in the exact world and beside a background.
+const WANTED: [Target; 2] = [Target::AtLeast(80), Target::AtLeast(70)];
 
 /// What a program said of the first record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -107,23 +108,30 @@ impl Table {
     }
 
     fn rows(&self) -> Vec<Vec<String>> {
-        let row = |what: &str, of: &dyn Fn(&Case) -> bool, is: &dyn Fn(&Case) -> bool, wanted: [&str; 2]| {
-            let cell = |background: bool| {
-                let cases = self.cases.iter().filter(|case| case.background == background && of(case));
-                reported(&Rate::of(cases, is))
+        let row =
+            |what: &str, of: &dyn Fn(&Case) -> bool, is: &dyn Fn(&Case) -> bool, wanted: [Target; 2]| {
+                let cells = |background: bool, wanted: Target| {
+                    let cases = self.cases.iter().filter(|case| case.background == background && of(case));
+                    let rate = Rate::of(cases, is);
+                    let outcome = target::Outcome::of(&rate, wanted);
+                    let wanted = outcome.map_or_else(String::new, |outcome| format!("{wanted}: {outcome}"));
+                    [reported(&rate), wanted]
+                };
+                let [exact, beside] = [cells(false, wanted[0]), cells(true, wanted[1])];
+                [&[what.to_owned()][..], &exact[..], &beside[..]].concat()
             };
-            let [exact, beside] = wanted.map(str::to_owned);
-            vec![what.to_owned(), cell(false), exact, cell(true), beside]
-        };
         let all = |_: &Case| true;
         let open = |case: &Case| case.first == First::Ambiguous;
         let first = |first: First| move |case: &Case| case.first == first;
         let then = |outcome: Outcome| move |case: &Case| case.outcome == Some(outcome);
-        let none = ["", ""];
+        let none = [Target::Unasked; 2];
+        let right_at_last =
+            |case: &Case| case.first == First::Right || case.outcome == Some(Outcome::Resolved);
         vec![
+            row("of all: the right one named at the end", &all, &right_at_last, WANTED),
             row("ambiguous at first, the truth among the names", &all, &open, none),
             row("of these: the rival among the names", &open, &|case| case.rival_named, none),
-            row("of these: told apart by the proposed experiment", &open, &then(Outcome::Resolved), WANTED),
+            row("of these: told apart by the proposed experiment", &open, &then(Outcome::Resolved), none),
             row("of these: still ambiguous", &open, &then(Outcome::StillAmbiguous), none),
             row(
                 "of these: still ambiguous, the rival gone",

@@ -2,12 +2,13 @@
 
 use super::certificate::{in_experiment, probability, with_noise};
 use super::search::{Refusal, twin_of};
-use super::tables::{First, Table, first};
+use super::tables::{Case, First, Table, first};
 use super::*;
 use crate::SCHEMA_VERSION;
 use crate::draws::twins::{Start, start};
 use crate::judge::tests::{TAKEN, draw, reported};
 use crate::program::{Ended, Taken};
+use crate::resolve::Outcome;
 use discrepancy::next::menu::{Entry, MENU};
 
 fn entry() -> &'static Entry {
@@ -93,6 +94,43 @@ fn a_twin_is_alike_in_its_record_and_apart_in_an_experiment() {
     let table = Table::of(&twins, folder.path(), "none").unwrap();
     assert!(
         table.cases.is_empty() && table.markdown().contains("told apart by the proposed experiment | none")
+    );
+}
+
+/// A twin of which this was said at first, and then.
+fn case(first: First, outcome: Option<Outcome>) -> Case {
+    Case {
+        number: 0,
+        background: false,
+        hidden: "valve-offset drive".to_owned(),
+        rival: "valve-dead-zone drive".to_owned(),
+        first,
+        rival_named: first == First::Ambiguous,
+        named: [Vec::new(), Vec::new()],
+        experiment: None,
+        certified: None,
+        outcome,
+        rival_left: false,
+        problem: None,
+        wall_s: 1.0,
+    }
+}
+
+#[test]
+fn the_target_is_of_all_twins_and_not_of_those_that_are_left_ambiguous() {
+    let resolved = case(First::Ambiguous, Some(Outcome::Resolved));
+    let others = [case(First::Right, None), case(First::NoName, None), case(First::NoName, None)];
+    let cases = std::iter::once(resolved).chain(others).collect();
+    let label = "ours".to_owned();
+    let table = Table { schema_version: SCHEMA_VERSION, label, program: None, seed: 31, cases };
+    let text = table.markdown();
+    // Wilson's interval of 2 of 4 is 15 to 85 %.
+    let all = "| of all: the right one named at the end | 2/4 (15 to 85 %) | 80 %: not resolved (estimate misses) \
+               | none | 70 %: no draw |";
+    assert!(text.contains(all), "{text}");
+    assert!(
+        text.contains("told apart by the proposed experiment | 1/1 (21 to 100 %) |  | none |  |"),
+        "{text}"
     );
 }
 
