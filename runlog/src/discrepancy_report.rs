@@ -72,7 +72,7 @@ pub struct Report {
     /// The missing term outside the catalogue.
     pub outside: Option<Outside>,
     /// The effect of the catalogue that comes nearest to a term outside it.
-    #[serde(skip_deserializing)]
+    #[serde(default)]
     pub nearest: Option<NamedEffect>,
     /// Where an inadequate model, or the nearest effect, still disagrees with the training records.
     #[serde(skip_deserializing)]

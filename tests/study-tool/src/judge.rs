@@ -33,6 +33,8 @@ pub struct Judgement {
     /// Whether the first name is the one hidden effect itself.
     pub top: bool,
     pub alone: bool,
+    /// Whether something was said to be outside the catalogue and to resemble the one hidden effect, or one of its class.
+    pub resembled: bool,
     /// Names that stand for nothing hidden.
     pub too_many: usize,
     /// With nothing hidden: whether anything was called missing.
@@ -114,6 +116,11 @@ pub fn judge(
         hidden: judged.collect(),
         top,
         alone: top && verdict == Some(Verdict::Named) && names.len() == 1 && names[0].alternatives.is_empty(),
+        resembled: single.is_some_and(|hidden| {
+            let nearest = good.and_then(|report| report.nearest.as_ref());
+            verdict == Some(Verdict::OutsideCatalogue)
+                && nearest.is_some_and(|name| effects(hidden, class(0)).contains(name.sheet.name))
+        }),
         too_many: names.len() - matched.len(),
         false_alarm: hidden.is_empty() && missing,
         parameter_right: draw.kind == Kind::Parameter

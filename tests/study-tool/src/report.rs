@@ -18,6 +18,8 @@ pub struct Report {
     pub verdict: Verdict,
     /// What is missing, the best first.
     pub named: Vec<Named>,
+    /// What comes nearest to something outside the catalogue.
+    pub nearest: Option<Named>,
     pub parameters: Vec<Quantity>,
     pub misfit: BTreeMap<String, Misfit>,
     /// What is missing that the catalogue does not have.
@@ -53,6 +55,7 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     let raw: report::Report =
         serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
     let named = raw.named.into_iter().map(known).collect::<Result<Vec<_>, _>>()?;
+    let nearest = raw.nearest.map(known).transpose()?;
     let says_names = matches!(raw.verdict, Verdict::Named | Verdict::Ambiguous);
     if says_names && named.is_empty() {
         return Err(format!("verdict {:?} without a name", raw.verdict));
@@ -67,7 +70,18 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     }
     let dependence = raw.location.and_then(|location| location.dependence);
     let report::Report { verdict, parameters, misfit, outside, verification, explanations, next, .. } = raw;
-    Ok(Report { verdict, named, parameters, misfit, outside, dependence, verification, explanations, next })
+    Ok(Report {
+        verdict,
+        named,
+        nearest,
+        parameters,
+        misfit,
+        outside,
+        dependence,
+        verification,
+        explanations,
+        next,
+    })
 }
 
 fn known(raw: NamedEffect) -> Result<Named, String> {

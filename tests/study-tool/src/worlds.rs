@@ -296,7 +296,16 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
             ordinary,
             named,
         ),
-        row("the same, 3 to 10 limits", [Unasked; 2], worlds, |case| ordinary(case) && !strong(case), named),
+        row("the same, named or resembled", [Unasked; 2], worlds, ordinary, |case| {
+            named(case) || case.judgement.resembled
+        }),
+        row(
+            "the catalogue's form, 3 to 10 limits",
+            [Unasked; 2],
+            worlds,
+            |case| ordinary(case) && !strong(case),
+            named,
+        ),
         row(
             "the same, 10 limits and more",
             [Unasked; 2],
@@ -310,6 +319,13 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
             worlds,
             |case| single(case) && !ordinary(case),
             named,
+        ),
+        row(
+            "the same, named or resembled",
+            [Unasked; 2],
+            worlds,
+            |case| single(case) && !ordinary(case),
+            |case| named(case) || case.judgement.resembled,
         ),
         row("one effect: name, place, nothing beside", [AtLeast(92), AtLeast(75)], worlds, single, |case| {
             case.judgement.alone && hidden(case).where_right

@@ -58,6 +58,23 @@ fn the_effect_itself_at_its_place_is_right_alone() {
 }
 
 #[test]
+fn what_is_outside_the_catalogue_resembles_the_hidden_effect_or_another() {
+    let class = [twin("friction-asymmetry", "drive", 0.97)];
+    let of = |verdict: &str, nearest: &str| {
+        let text = format!(r#"{{"verdict": "{verdict}", "nearest": {}}}"#, entry(nearest));
+        judge(&draw(Kind::Single, &["inclination"]), &[class.to_vec()], &TAKEN, &parse(text.as_bytes()))
+    };
+    assert!(
+        of("outside-catalogue", "inclination").resembled
+            && of("outside-catalogue", "friction-asymmetry").resembled
+    );
+    assert!(
+        !of("outside-catalogue", "valve-offset").resembled && !of("nothing-missing", "inclination").resembled
+    );
+    assert!(!of("outside-catalogue", "inclination").hidden[0].right, "no name");
+}
+
+#[test]
 fn a_twin_is_right_and_a_stranger_is_not() {
     let class = [twin("friction-asymmetry", "drive", 0.97), twin("valve-offset", "drive", 0.94)];
     let twin = single(&class, "named", &["friction-asymmetry"]);
