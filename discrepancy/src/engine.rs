@@ -96,6 +96,24 @@ impl<'a> Engine<'a> {
         self.on(windows, scaled_dof)
     }
 
+    /// Start sensitivities of the windows of each record.
+    pub(crate) fn start_sensitivities(&self) -> Vec<Vec<Vec<Vec<f64>>>> {
+        self.windows.iter().map(Windows::sensitivities).collect()
+    }
+
+    /// Other records of the same runs in the same windows, whose start states are estimated with the sensitivities of these:
+    /// [`Windows::replicated`].
+    pub(crate) fn replicated<'r>(
+        &self,
+        records: &'r [GriddedRecord],
+        sensitivities: &[Vec<Vec<Vec<f64>>>],
+    ) -> Option<Engine<'r>> {
+        let all = self.windows.iter().zip(records).zip(sensitivities);
+        let windows: Option<_> =
+            all.map(|((windows, record), sensitivities)| windows.replicated(record, sensitivities)).collect();
+        Some(self.on(windows?, self.scaled_dof.clone()))
+    }
+
     /// Synthetic records in the same windows, which a rig made whose readings are `simulated`: [`Windows::drawn`].
     pub(crate) fn drawn(&self, simulated: &[f64], random: &mut Pcg64) -> Engine<'a> {
         let mut at = 0;
@@ -108,7 +126,7 @@ impl<'a> Engine<'a> {
         self.on(windows, self.scaled_dof.clone())
     }
 
-    fn on(&self, windows: Vec<Windows<'a>>, scaled_dof: Vec<f64>) -> Engine<'a> {
+    fn on<'r>(&self, windows: Vec<Windows<'r>>, scaled_dof: Vec<f64>) -> Engine<'r> {
         Engine {
             windows,
             rig: self.rig.clone(),

@@ -76,13 +76,26 @@ impl Setting<'_> {
         let run = drive(entry, self.baseline, &self.explanations[truth].rig, seeds.run).ok()?;
         let run = Some(run).filter(|run| run.ends_well(self.baseline.cylinder().stroke_m))?;
         let measured = if run.linked { [true, true] } else { self.measured };
+        let record =
+            |number: u64| self.noise.record(&run, self.baseline, measured, (seeds.run << 32) + number);
+        let first = record(0);
+        let engines = record_engines(self, &first, &run);
+        // Of linked rods the search for start states takes most of the time: that of the first record serves all.
+        let of_starts: Vec<_> =
+            engines.iter().filter(|_| run.linked).map(Engine::start_sensitivities).collect();
         let mut fits: Vec<Refits> = Vec::new();
-        let trials = (0..seeds.records).map(|number| {
-            let seed = (seeds.run << 32) + number;
-            let record = self.noise.record(&run, self.baseline, measured, seed);
-            self.trial(&record_engines(self, &record, &run), truth, &mut fits)
-        });
-        let trials = trials.collect::<Option<_>>()?;
+        let mut trials = vec![self.trial(&engines, truth, &mut fits)?];
+        for number in 1..seeds.records {
+            let record = record(number);
+            let all: Option<Vec<_>> = engines
+                .iter()
+                .zip(&of_starts)
+                .map(|(engine, of_starts)| engine.replicated(std::slice::from_ref(&record), of_starts))
+                .collect();
+            let engines = all.filter(|all| !all.is_empty());
+            let engines = engines.unwrap_or_else(|| record_engines(self, &record, &run));
+            trials.push(self.trial(&engines, truth, &mut fits)?);
+        }
         let clearance_m = run.clearance_m(self.baseline.cylinder().stroke_m)?;
         Some(Trials { trials, clearance_m })
     }

@@ -197,6 +197,22 @@ impl Windows<'_> {
         windows
     }
 
+    /// The same windows in another record of the same run, which differs by noise alone: its start states are estimated with these
+    /// `sensitivities`, of the windows of this record. `None` where a window is left out of one of the two.
+    pub(crate) fn replicated<'r>(
+        &self,
+        record: &'r GriddedRecord,
+        sensitivities: &[Vec<Vec<f64>>],
+    ) -> Option<Windows<'r>> {
+        let mut windows = Windows::with_recorded_starts(record, &self.rig);
+        if windows.starts != self.starts {
+            return None;
+        }
+        windows.estimate_starts_by(0, |_| Cow::Borrowed(sensitivities));
+        windows.bases.clone_from(&self.bases);
+        Some(windows)
+    }
+
     /// The same without estimates: `simulated` plus drawn noise of `variance_factor` times the power, with start states that are
     /// off by drawn errors of the record's points.
     pub(crate) fn drawn(&self, simulated: &[f64], variance_factor: f64, random: &mut Pcg64) -> Self {
