@@ -59,7 +59,10 @@ impl CycleCount {
     /// From `summary.json`; 0 where it is missing.
     fn of(run: &RunFiles) -> Self {
         let summary = run.counted();
-        Self { cycles: summary.cycles.unwrap_or_default(), skipped: summary.skipped.unwrap_or_default() }
+        Self {
+            cycles: summary.and_then(|summary| summary.cycles).unwrap_or_default(),
+            skipped: summary.and_then(|summary| summary.skipped).unwrap_or_default(),
+        }
     }
 }
 
@@ -86,7 +89,7 @@ fn not_granted(runs: &[RunFiles]) -> Vec<String> {
         (|grant| matches!(grant, Grant::Cpu(_)), "a CPU of its own"),
     ];
     for (is_needed, lack) in needed {
-        let without = |(process, granted): (&str, Vec<Grant>)| {
+        let without = |(process, granted): (&str, &[Grant])| {
             (!granted.iter().any(is_needed)).then(|| process.to_owned())
         };
         let mut who: Vec<_> =
@@ -103,7 +106,7 @@ fn not_granted(runs: &[RunFiles]) -> Vec<String> {
 /// Evidence that the runs lack.
 fn missing(runs: &[RunFiles], conditions: &Conditions, counts: &[CycleCount]) -> Vec<String> {
     let mut reasons = Vec::new();
-    let unknown = runs.iter().filter(|run| run.run.is_null() || run.controllers.is_empty()).count();
+    let unknown = runs.iter().filter(|run| run.run.is_none() || run.controllers.is_empty()).count();
     if unknown > 0 {
         reasons.push(format!("Not all processes of {unknown} run(s) reported their real-time grants."));
     }
@@ -152,7 +155,7 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions, counts: &[CycleCount]) 
         add(shared_cpu(run));
         add(of_the_run(run, *count));
     }
-    if runs.iter().any(|run| run.description().counts_allocations) {
+    if runs.iter().filter_map(RunFiles::description).any(|description| description.counts_allocations) {
         reasons.push("The build counts allocations, which costs time.".into());
     }
     reasons
@@ -161,7 +164,7 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions, counts: &[CycleCount]) 
 /// CPU of each process of a run that has one of its own, in their order.
 pub(super) fn cpus(run: &RunFiles) -> Vec<(u64, &str)> {
     let cpu =
-        |(process, granted): (_, Vec<Grant>)| Some((granted.iter().find_map(Grant::cpu)? as u64, process));
+        |(process, granted): (_, &[Grant])| Some((granted.iter().find_map(Grant::cpu)? as u64, process));
     let mut cpus: Vec<_> = run.granted().filter_map(cpu).collect();
     cpus.sort_unstable();
     cpus
@@ -213,12 +216,12 @@ fn shared_cpu(run: &RunFiles) -> Vec<String> {
 /// What the run itself, its build and its machine forbid.
 fn of_the_run(run: &RunFiles, count: CycleCount) -> Vec<String> {
     let mut found = Vec::new();
-    let machine = run.description().machine;
+    let machine = run.machine();
     let build = &machine.build;
     if build.profile.is_for_debugging() || build.debug_assertions {
         found.push(format!("The emulator is a build for debugging ({}).", build.profile));
     }
-    if run.counted().passed == Some(false) {
+    if run.counted().is_some_and(|summary| summary.passed == Some(false)) {
         found.push("The verdict of a run itself is not passed.".into());
     }
     let (skipped, cycles) = (count.skipped as f64, count.cycles as f64);
@@ -256,7 +259,7 @@ pub(super) fn virtual_machine(runs: &[RunFiles]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::conditions::conditions;
-    use crate::made_up;
+    use crate::made_up::{self, edit_controller, edit_run, edit_summary};
     use realtime::machine::{BuildProfile, HypervisorSign};
     use serde_json::json;
 
@@ -264,7 +267,7 @@ mod tests {
 
     fn good() -> Vec<RunFiles> {
         let mut run = made_up::run(10);
-        run.summary["cycles"] = json!(60_000);
+        edit_summary(&mut run, |summary| summary["cycles"] = json!(60_000));
         made_up::reference(&mut run, (0..60_000).map(|_| 13_000).collect());
         vec![run.clone(), run]
     }
@@ -288,19 +291,22 @@ mod tests {
     fn each_reason_is_told() {
         type Spoil = fn(&mut RunFiles);
         let cases: [(&str, Spoil); 18] = [
-            ("SCHED_FIFO", |run| run.run["realtime_granted"] = json!([LOCKED, "pinned to CPU 0"])),
+            ("SCHED_FIFO", |run| {
+                edit_run(run, |file| file["realtime_granted"] = json!([LOCKED, "pinned to CPU 0"]));
+            }),
             ("a CPU of its own", |run| {
-                run.controllers.get_mut("controller").unwrap()["realtime_granted"] =
-                    json!([LOCKED, "SCHED_FIFO priority 80"]);
+                edit_controller(run, |file| {
+                    file["realtime_granted"] = json!([LOCKED, "SCHED_FIFO priority 80"])
+                });
             }),
             ("reported their real-time grants", |run| run.controllers.clear()),
             ("did not alternate", |run| run.reference = None),
             ("too few", |run| {
-                run.summary["cycles"] = json!(20_000);
+                edit_summary(run, |file| file["cycles"] = json!(20_000));
                 made_up::reference(run, (0..20_000).map(|_| 13_000).collect());
             }),
             ("probe", |run| run.conditions.get_or_insert_default().probe = true),
-            ("did not reach", |run| run.summary["records_dropped"] = json!(3)),
+            ("did not reach", |run| edit_summary(run, |file| file["records_dropped"] = json!(3))),
             ("priority 70, the rig 80", |run| reference_line(run, "cyclictest -p 70 -a 0 -i 1000")),
             ("CPU 1, the rig 0", |run| reference_line(run, "cyclictest --priority=80 --affinity=1")),
             ("CPU none, the rig 0", |run| reference_line(run, "cyclictest -p80 -i1000")),
@@ -308,15 +314,18 @@ mod tests {
                 made_up::reference(run, (0..9_000).map(|_| 13_000).collect());
             }),
             ("shared CPU 0", |run| {
-                run.controllers.get_mut("controller").unwrap()["realtime_granted"][2] =
-                    json!("pinned to CPU 0");
+                edit_controller(run, |file| file["realtime_granted"][2] = json!("pinned to CPU 0"));
             }),
-            ("debugging", |run| run.run["machine"]["build"]["profile"] = json!("debug, opt-level 0")),
-            ("not passed", |run| run.summary["passed"] = json!(false)),
-            ("missed 0.2 %", |run| run.summary["skipped"] = json!(120)),
-            ("QEMU (TCG)", |run| run.run["machine"]["processor"] = json!("QEMU TCG CPU version 2.5+")),
+            ("debugging", |run| {
+                edit_run(run, |file| file["machine"]["build"]["profile"] = json!("debug, opt-level 0"));
+            }),
+            ("not passed", |run| edit_summary(run, |file| file["passed"] = json!(false))),
+            ("missed 0.2 %", |run| edit_summary(run, |file| file["skipped"] = json!(120))),
+            ("QEMU (TCG)", |run| {
+                edit_run(run, |file| file["machine"]["processor"] = json!("QEMU TCG CPU version 2.5+"));
+            }),
             ("nobody committed", |run| run.conditions.get_or_insert_default().uncommitted_files = Some(2)),
-            ("counts allocations", |run| run.run["counts_allocations"] = json!(true)),
+            ("counts allocations", |run| edit_run(run, |file| file["counts_allocations"] = json!(true))),
         ];
         for (words, spoil) in cases {
             let mut runs = good();
@@ -331,7 +340,7 @@ mod tests {
     fn a_claim_of_a_virtual_machine_follows_from_the_hypervisor_of_any_run() {
         let with = |hypervisor: Hypervisor| {
             let mut runs = good();
-            runs[1].run["machine"]["hypervisor"] = json!(hypervisor);
+            edit_run(&mut runs[1], |file| file["machine"]["hypervisor"] = json!(hypervisor));
             (virtual_machine(&runs), judged(&runs).sentence.contains("virtual machine"))
         };
         let signs = vec![HypervisorSign::CpuFlag, HypervisorSign::ClockSource("kvm-clock".into())];
@@ -346,7 +355,7 @@ mod tests {
     fn a_build_for_debugging_is_a_reason_by_its_profile() {
         let with = |profile: BuildProfile| {
             let mut runs = good();
-            runs[0].run["machine"]["build"]["profile"] = json!(profile);
+            edit_run(&mut runs[0], |file| file["machine"]["build"]["profile"] = json!(profile));
             judged(&runs).supported
         };
         assert!(!with(BuildProfile::Debug { settings: String::new() }));
@@ -358,7 +367,9 @@ mod tests {
     fn what_was_not_controlled_is_said_and_weakens_the_sentence() {
         let mut runs = good();
         for run in &mut runs {
-            run.run["machine"] = json!({ "kernel": "PREEMPT_DYNAMIC", "hypervisor": "KVM" });
+            edit_run(run, |file| {
+                file["machine"] = json!({ "kernel": "PREEMPT_DYNAMIC", "hypervisor": "KVM" });
+            });
             run.conditions.get_or_insert_default().load_generator = None;
         }
         let reported = judged(&runs);

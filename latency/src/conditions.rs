@@ -68,13 +68,18 @@ impl Facts {
 fn machine(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
-        flatten(&mut facts, "", &run.run["machine"]);
+        if let Some(file) = &run.run {
+            flatten(&mut facts, "", &file.json["machine"]);
+        }
         if let Some(files) = run.circumstances().uncommitted_files {
             facts.add("uncommitted files", &files.to_string());
         }
-        for key in ["emulator_version", "counts_allocations", "bus", "pace"] {
-            if !run.run[key].is_null() {
-                facts.add(&key.replace('_', " "), &text(&run.run[key]));
+        if let Some(file) = &run.run {
+            for key in ["emulator_version", "counts_allocations", "bus", "pace"] {
+                // An older file without the key has no such fact.
+                if let Some(value) = file.json.get(key).filter(|value| !value.is_null()) {
+                    facts.add(&key.replace('_', " "), &text(value));
+                }
             }
         }
         for (process, reported) in
@@ -112,10 +117,10 @@ fn text(value: &Value) -> String {
 fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
-        let emulator = run.description().emulator_command_line.join(" ");
-        let controllers =
-            run.controller_reports().map(|(process, reported)| (process, reported.command_line.join(" ")));
-        let lines = std::iter::once(("emulator", emulator)).chain(controllers);
+        let emulator = run.description().map(|description| ("emulator", &description.emulator_command_line));
+        let controllers = run.controller_reports().map(|(process, report)| (process, &report.command_line));
+        let lines =
+            emulator.into_iter().chain(controllers).map(|(process, words)| (process, words.join(" ")));
         lines.filter(|(_, line)| !line.is_empty()).for_each(|(process, line)| facts.add(process, &line));
         if let Some(command) = run.circumstances().command {
             facts.add("measured by", &command);
@@ -130,17 +135,18 @@ fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
 fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
-        let lines = |granted: Vec<Grant>| granted.into_iter().map(String::from).collect::<Vec<_>>();
-        let emulator = run.description();
-        let emulator = ("emulator", [lines(emulator.realtime_granted), emulator.realtime_refused]);
+        let emulator = run
+            .description()
+            .map(|description| ("emulator", &description.realtime_granted, &description.realtime_refused));
         let controllers = run.controller_reports();
-        let controllers = controllers.map(|(process, reported)| {
-            (process, [lines(reported.realtime_granted), reported.realtime_refused])
-        });
-        for (process, lists) in std::iter::once(emulator).chain(controllers) {
-            for (list, word) in lists.iter().zip(["granted", "refused"]).filter(|(list, _)| !list.is_empty())
-            {
-                facts.add(&format!("{process}, {word}"), &list.join(", "));
+        let controllers = controllers
+            .map(|(process, report)| (process, &report.realtime_granted, &report.realtime_refused));
+        for (process, granted, refused) in emulator.into_iter().chain(controllers) {
+            let granted: Vec<String> = granted.iter().map(Grant::to_string).collect();
+            for (list, word) in [(&granted, "granted"), (refused, "refused")] {
+                if !list.is_empty() {
+                    facts.add(&format!("{process}, {word}"), &list.join(", "));
+                }
             }
         }
     }
@@ -175,7 +181,7 @@ mod tests {
     #[test]
     fn facts_that_differ_are_all_told() {
         let mut other = made_up::run(10);
-        other.run["machine"]["kernel"] = "another".into();
+        made_up::edit_run(&mut other, |file| file["machine"]["kernel"] = "another".into());
         let reported = conditions(&[made_up::run(10), other]);
         let kernel = reported.machine.iter().find(|fact| fact.name == "kernel").unwrap();
         assert!(kernel.value.ends_with("; another"), "{kernel:?}");

@@ -35,7 +35,8 @@ pub(crate) fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<
 }
 
 fn of_run(run: &RunFiles) -> Vec<String> {
-    let machine = &run.description().machine;
+    let machine = run.machine();
+    let machine: &Machine = &machine;
     let cpus: BTreeSet<u64> = cpus(run).into_iter().map(|(cpu, _)| cpu).collect();
     let mut reported = governors(machine);
     if !machine.is_preempt_rt() {
@@ -210,7 +211,7 @@ mod tests {
         ];
         for (key, value, words) in cases {
             let mut run = made_up::run(10);
-            run.run["machine"][key] = value;
+            made_up::edit_run(&mut run, |file| file["machine"][key] = value);
             let reported = of_run(&run);
             assert!(reported.len() == 1 && reported[0].contains(words), "{words}: {reported:?}");
         }
@@ -263,7 +264,7 @@ mod tests {
         ];
         for (key, value, words) in cases {
             let mut run = made_up::run(10);
-            run.run["machine"][key] = value;
+            made_up::edit_run(&mut run, |file| file["machine"][key] = value);
             let conditions = Conditions { load_generator: Some("none".into()), ..Conditions::default() };
             let reported = not_controlled(&[run], &conditions);
             assert!(reported.len() == 1 && reported[0].contains(words), "{words}: {reported:?}");
@@ -273,8 +274,10 @@ mod tests {
     #[test]
     fn a_refused_latency_tells_the_idle_states() {
         let mut run = made_up::run(10);
-        run.run["realtime_granted"].as_array_mut().unwrap().remove(0);
-        run.run["machine"]["idle_states"] = json!(["C6: 133 us to leave"]);
+        made_up::edit_run(&mut run, |file| {
+            file["realtime_granted"].as_array_mut().unwrap().remove(0);
+            file["machine"]["idle_states"] = json!(["C6: 133 us to leave"]);
+        });
         let reported = of_run(&run);
         assert!(reported.len() == 1 && reported[0].starts_with("emulator did not hold"), "{reported:?}");
         assert!(reported[0].contains("(C6: 133 us to leave)"), "{reported:?}");

@@ -2,22 +2,24 @@
 
 use super::hlog::{self, Passing};
 use super::joined::Series;
+use super::json_files::{ControllerFile, RunFile, SummaryFile};
 use super::kinds::PING_PONGS;
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
 use protocol::periods::CYCLE_S;
-use realtime::Grant;
 use realtime::machine::Hypervisor;
+use realtime::{Grant, Machine};
 use runlog::conditions::Conditions;
 use runlog::controller_report::ControllerReport;
 use runlog::flight_dump;
 use runlog::ping_pong::PingPongFile;
-use runlog::summary::{NotedEvent, ProcessReport, RunDescription, Summary};
+use runlog::run_folder::read_json;
+use runlog::summary::{ProcessReport, RunDescription, Summary};
 use runlog::timing::{self, CycleTiming};
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -31,14 +33,14 @@ const LONGEST_SECOND_S: f64 = 1.5;
 #[derive(Clone, Debug, Default)]
 pub struct RunFiles {
     pub folder: PathBuf,
-    /// `summary.json` as it stands, since the report lists every count in it; null when missing.
-    pub summary: Value,
-    /// `run.json` as it stands, since the report lists every fact of the machine; null when missing.
-    pub run: Value,
+    /// `summary.json`; `None` when missing.
+    pub(crate) summary: Option<SummaryFile>,
+    /// `run.json`; `None` when missing.
+    pub(crate) run: Option<RunFile>,
     /// `conditions.json`; `None` when missing.
     pub conditions: Option<Conditions>,
-    /// `controller*.json` by process, as they stand.
-    pub controllers: BTreeMap<String, Value>,
+    /// `controller*.json` by process.
+    pub(crate) controllers: BTreeMap<String, ControllerFile>,
     /// Distributions of all logs by tag, with the maximum of each second.
     pub logged: BTreeMap<String, Series>,
     /// End of the last interval of a log, s from its base time.
@@ -69,15 +71,17 @@ pub(crate) fn is_run(folder: &Path) -> bool {
 impl RunFiles {
     pub fn read(folder: &Path) -> Self {
         let mut run = Self { folder: folder.into(), ..Self::default() };
-        run.summary = run.json("summary.json");
-        run.run = run.json("run.json");
+        run.summary = SummaryFile::of(run.json("summary.json"));
+        run.run = RunFile::of(run.json("run.json"));
         run.conditions = run.json("conditions.json");
-        run.judge_types();
+        run.note_misfit("summary.json", run.summary.as_ref().and_then(|file| file.misfit.clone()));
+        run.note_misfit("run.json", run.run.as_ref().and_then(|file| file.misfit.clone()));
         for process in PROCESSES {
             if process != "emulator" {
-                let reported: Value = run.json(&format!("{process}.json"));
-                if !reported.is_null() {
-                    run.controllers.insert(process.into(), reported);
+                let name = format!("{process}.json");
+                if let Some(file) = ControllerFile::of(run.json(&name)) {
+                    run.note_misfit(&name, file.misfit.clone());
+                    run.controllers.insert(process.into(), file);
                 }
             }
             run.take_log(&format!("{process}.hlog"));
@@ -92,6 +96,15 @@ impl RunFiles {
         run.take_ping_pongs();
         run.tell_what_is_missing();
         run
+    }
+
+    /// Reads `run.json` of a run that still goes on, unless it was read before. Returns whether it is known; a file that is not
+    /// whole yet is not.
+    pub fn read_description(&mut self, folder: &Path) -> bool {
+        if self.run.is_none() {
+            self.run = read_json::<Value>(&folder.join("run.json")).ok().and_then(RunFile::of);
+        }
+        self.run.is_some()
     }
 
     /// The text of a file, nothing when it is not there.
@@ -189,26 +202,21 @@ impl RunFiles {
         }
     }
 
-    /// Says which files are not as their types have them.
-    fn judge_types(&mut self) {
-        let summary =
-            (!self.summary.is_null()).then(|| Summary::<NotedEvent>::deserialize(&self.summary).err());
-        let run = (!self.run.is_null()).then(|| RunDescription::<Value>::deserialize(&self.run).err());
-        for (name, error) in [("summary.json", summary), ("run.json", run)] {
-            if let Some(error) = error.flatten() {
-                self.lacks.push(format!("{name} is not as this version writes it: {error}"));
-            }
+    /// Says that a file is not as its type has it, if so.
+    fn note_misfit(&mut self, name: &str, misfit: Option<String>) {
+        if let Some(reason) = misfit {
+            self.lacks.push(format!("{name} is not as this version writes it: {reason}"));
         }
     }
 
     fn tell_what_is_missing(&mut self) {
         let mut lack = |what: &str| self.lacks.push(what.to_owned());
-        if self.summary.is_null() {
+        if self.summary.is_none() {
             lack(
                 "no readable summary.json: the emulator was killed or still runs; what it counted is not known",
             );
         }
-        if self.run.is_null() {
+        if self.run.is_none() {
             lack("no readable run.json: machine and command line are not known");
         }
         if self.controllers.is_empty() {
@@ -226,66 +234,62 @@ impl RunFiles {
     }
 
     /// When the run began, s since 1970; nothing when it is not reported.
-    pub fn started_unix_s(&self) -> Option<f64> {
-        self.description().started_unix_s
+    pub(crate) fn started_unix_s(&self) -> Option<f64> {
+        self.description()?.started_unix_s
     }
 
-    pub fn duration_s(&self) -> f64 {
-        let cycles = self.counted().cycles;
+    /// Length of the run, s: its cycles, or what the logs hold.
+    pub(crate) fn duration_s(&self) -> f64 {
+        let cycles = self.counted().and_then(|summary| summary.cycles);
         cycles.map_or(self.logged_until_s, |cycles| cycles as f64 * CYCLE_S)
     }
 
-    /// `summary.json`; empty when missing.
-    pub fn counted(&self) -> Summary {
-        typed(&self.summary)
+    /// `summary.json`; `None` when missing.
+    pub(crate) fn counted(&self) -> Option<&Summary> {
+        self.summary.as_ref().map(|file| &file.summary)
     }
 
-    /// `run.json`; empty when missing.
-    pub(crate) fn description(&self) -> RunDescription {
-        typed(&self.run)
+    /// `run.json`; `None` when missing.
+    pub(crate) fn description(&self) -> Option<&RunDescription> {
+        self.run.as_ref().map(|file| &file.description)
     }
 
-    /// The hypervisor in `run.json`, read by itself: damage elsewhere in the file must not hide it.
-    pub fn hypervisor(&self) -> Hypervisor {
-        typed(&self.run["machine"]["hypervisor"])
+    /// The machine in `run.json`; without facts when missing.
+    pub(crate) fn machine(&self) -> Cow<'_, Machine> {
+        self.description().map_or_else(Cow::default, |description| Cow::Borrowed(&description.machine))
+    }
+
+    /// The hypervisor in `run.json`; not recorded when missing.
+    pub(crate) fn hypervisor(&self) -> Hypervisor {
+        self.run.as_ref().map(|file| file.hypervisor.clone()).unwrap_or_default()
     }
 
     /// `conditions.json`; empty when missing.
-    pub fn circumstances(&self) -> Conditions {
+    pub(crate) fn circumstances(&self) -> Conditions {
         self.conditions.clone().unwrap_or_default()
     }
 
     /// Each `controller*.json` by process.
-    pub(crate) fn controller_reports(&self) -> impl Iterator<Item = (&str, ControllerReport)> {
-        self.controllers.iter().map(|(process, reported)| (process.as_str(), typed(reported)))
+    pub(crate) fn controller_reports(&self) -> impl Iterator<Item = (&str, &ControllerReport)> {
+        self.controllers.iter().map(|(process, file)| (process.as_str(), &file.report))
     }
 
-    /// What `summary.json` and each `controller*.json` have in common, by process.
-    pub(crate) fn process_reports(&self) -> impl Iterator<Item = (&str, ProcessReport)> {
-        self.reports().map(|(process, reported)| (process, typed(reported)))
+    /// Figures that `summary.json` and each `controller*.json` have in common, by process.
+    pub(crate) fn process_reports(&self) -> impl Iterator<Item = (&str, &ProcessReport)> {
+        let emulator = self.summary.iter().map(|file| ("emulator", &file.process));
+        emulator.chain(self.controllers.iter().map(|(process, file)| (process.as_str(), &file.process)))
     }
 
     /// `summary.json` and each `controller*.json` as they stand, by process.
-    pub fn reports(&self) -> impl Iterator<Item = (&str, &Value)> {
-        let emulator = std::iter::once(("emulator", &self.summary));
-        emulator.chain(self.controllers.iter().map(|(process, reported)| (process.as_str(), reported)))
+    pub(crate) fn reports_as_they_stand(&self) -> impl Iterator<Item = (&str, &Value)> {
+        let emulator = self.summary.iter().map(|file| ("emulator", &file.json));
+        emulator.chain(self.controllers.iter().map(|(process, file)| (process.as_str(), &file.json)))
     }
 
     /// What each process was granted for real time.
-    pub fn granted(&self) -> impl Iterator<Item = (&str, Vec<Grant>)> {
-        let emulator = (!self.run.is_null()).then(|| ("emulator", grants_of(&self.run)));
+    pub(crate) fn granted(&self) -> impl Iterator<Item = (&str, &[Grant])> {
+        let emulator = self.run.iter().map(|file| ("emulator", file.granted.as_slice()));
         emulator
-            .into_iter()
-            .chain(self.controllers.iter().map(|(process, reported)| (process.as_str(), grants_of(reported))))
+            .chain(self.controllers.iter().map(|(process, file)| (process.as_str(), file.granted.as_slice())))
     }
-}
-
-/// A file as its type; empty where it is missing or not as its type has it, which [`RunFiles::lacks`] says.
-fn typed<T: DeserializeOwned + Default>(value: &Value) -> T {
-    T::deserialize(value).unwrap_or_default()
-}
-
-fn grants_of(report: &Value) -> Vec<Grant> {
-    let lines = report["realtime_granted"].as_array().into_iter().flatten().filter_map(Value::as_str);
-    lines.map(Grant::from).collect()
 }

@@ -123,9 +123,9 @@ fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
     for run in runs {
         let rows = run.rows.get("emulator").map(Vec::as_slice).unwrap_or_default();
         let summary = run.counted();
-        let counted = summary.skipped;
+        let counted = summary.and_then(|summary| summary.skipped);
         let logged = run.logged.get("emulator-wakeup").and_then(|series| series.samples.max_ns());
-        let longest_ns = logged.or(summary.wakeup_ns.max);
+        let longest_ns = logged.or(summary.and_then(|summary| summary.wakeup_ns.max));
         let missing = counted.unwrap_or_default().saturating_sub(rows.iter().map(|row| row.skipped).sum());
         let late_ns = |row: &CycleTiming| (row.woke_ns + row.skipped * CYCLE_NS).saturating_sub(row.due_ns);
         let of_rows_ns = rows.iter().map(late_ns).max().unwrap_or_default();
@@ -200,7 +200,8 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
     let mut count = 0;
     let mut who = Vec::new();
     for run in runs {
-        for peer in run.counted().bus_host.iter().flat_map(|host| &host.peers) {
+        let host = run.counted().and_then(|summary| summary.bus_host.as_ref());
+        for peer in host.into_iter().flat_map(|host| &host.peers) {
             let dropped = peer.dropped_at_queue.total();
             if dropped > 0 {
                 count += dropped;
@@ -213,7 +214,7 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
             }
         }
         for (process, report) in run.process_reports() {
-            let dropped = report.bus.unwrap_or_default().dropped_on_receive;
+            let dropped = report.bus.map_or(0, |bus| bus.dropped_on_receive);
             if dropped > 0 {
                 count += dropped;
                 who.push(process.to_owned());
@@ -235,19 +236,21 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
 
 /// Frames that never came, by gaps in the counters at rig and controllers.
 pub(crate) fn lost_by_gaps(run: &RunFiles) -> u64 {
-    let summary = run.counted();
-    let by_axis = summary.drive_commands.lost + summary.load_commands.lost;
+    let at_rig = run.counted().map_or(0, |summary| {
+        let by_axis = summary.drive_commands.lost + summary.load_commands.lost;
+        summary.frames_lost_at_rig.unwrap_or(by_axis)
+    });
     let of_process =
-        |report: ControllerReport| report.axes.values().filter_map(|axis| axis.sensors_lost).sum::<u64>();
+        |report: &ControllerReport| report.axes.values().filter_map(|axis| axis.sensors_lost).sum::<u64>();
     let at_controllers = run.controller_reports().map(|(_, report)| of_process(report)).sum::<u64>();
-    summary.frames_lost_at_rig.unwrap_or(by_axis) + at_controllers
+    at_rig + at_controllers
 }
 
 fn frame_loss(runs: &[RunFiles]) -> Option<Finding> {
     let (mut lost, mut at_queues, mut on_wire) = (0, 0, 0);
     for run in runs {
         lost += lost_by_gaps(run);
-        if let Some(host) = run.counted().bus_host {
+        if let Some(host) = run.counted().and_then(|summary| summary.bus_host.as_ref()) {
             on_wire += host.injected_loss.total();
             // A listener's queue says nothing of what rig and controllers missed.
             let ours = host.peers.iter().filter(|peer| peer.frames_received > 0);
@@ -277,7 +280,7 @@ fn frame_loss(runs: &[RunFiles]) -> Option<Finding> {
 fn clock_step(runs: &[RunFiles]) -> Option<Finding> {
     let reports = runs.iter().flat_map(RunFiles::process_reports);
     let steps: Vec<f64> =
-        reports.flat_map(|(_, report)| report.wall_clock_steps).map(|step| step.step_s).collect();
+        reports.flat_map(|(_, report)| &report.wall_clock_steps).map(|step| step.step_s).collect();
     let largest = steps.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
     Some(Finding {
         cause: Cause::ClockStep,

@@ -49,7 +49,7 @@ fn one(tag: &str, samples: &Samples) -> Value {
 
 /// What `uname` would have said on the machine of the first run, as far as run.json tells.
 fn sysinfo(runs: &[RunFiles]) -> Value {
-    let machine = runs.first().map(|run| run.description().machine).unwrap_or_default();
+    let machine = runs.first().map(RunFiles::machine).unwrap_or_default();
     // "Linux version 6.1.0 (builder) (compiler) #1 SMP date".
     let kernel = machine.kernel.as_str();
     let release =

@@ -5,6 +5,8 @@
 //! | [`model`] | what a report says: `report.json` |
 //! | [`choice`] | which runs, in which groups |
 //! | [`files`] | what a run left in its folder |
+//! | [`json_files`] | its JSON files as their types |
+//! | [`frame_faults`] | lost, late, duplicate and malformed frames in them |
 //! | [`hlog`] | interval logs, read and written |
 //! | [`probe`] | gaps that the spin-gap probe saw |
 //! | [`mod@reference`] | cyclictest's own JSON |
@@ -40,9 +42,11 @@ mod distributions;
 mod explain;
 pub mod files;
 mod findings;
+mod frame_faults;
 pub mod hlog;
 mod jitterdebugger;
 mod joined;
+mod json_files;
 pub mod kinds;
 pub mod markdown;
 pub mod model;

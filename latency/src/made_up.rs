@@ -1,11 +1,13 @@
 //! Runs that never were, for tests: regular rows of a rig and a controller, and what is done to them.
 
 use super::files::RunFiles;
+use super::json_files::{ControllerFile, RunFile, SummaryFile};
 use super::samples::Samples;
 use protocol::periods::CYCLE_NS;
 use realtime::VitalCounts;
 use runlog::conditions::Conditions;
 use runlog::timing::{CycleTiming, Exchange};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -23,7 +25,7 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
     let mut run = RunFiles { whole: true, folder: "made-up".into(), ..RunFiles::default() };
     let (rig, controller) = (0..cycles).map(both).unzip();
     run.rows = BTreeMap::from([("emulator".into(), rig), ("controller".into(), controller)]);
-    run.summary = serde_json::json!({
+    run.summary = SummaryFile::of(json!({
         "cycles": cycles, "skipped": 0, "overruns": 0, "frames_lost_at_rig": 0, "records_dropped": 0, "passed": true,
         "drive_commands": { "lost": 0 }, "load_commands": { "lost": 0 },
         "bus": { "dropped_on_receive": 0 },
@@ -31,10 +33,10 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
             { "name": "process 1", "frames_received": 5 * cycles, "dropped_at_queue": {} },
             { "name": "process 2", "frames_received": 4 * cycles, "dropped_at_queue": {} },
         ] },
-    });
+    }));
     let dma = "/dev/cpu_dma_latency held at 0 us";
     let granted = [dma, "memory locked, current and future", "pinned to CPU 0", "SCHED_FIFO priority 80"];
-    run.run = serde_json::json!({
+    run.run = RunFile::of(json!({
         "started_unix_s": 1.79e9, "realtime_granted": granted, "realtime_refused": [], "counts_allocations": false,
         "emulator_command_line": ["emulator", "run"],
         "machine": { "kernel": "Linux version 6.1.0-rt (x) #1 SMP PREEMPT_RT", "processors": 2,
@@ -43,19 +45,40 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
             "smt": "no CPUs share a core (control: off)", "rt_throttling": { "about": "off" },
             "interrupts": { "CPU 0": "may come: none; do come: none", "CPU 1": "may come: none; do come: none" },
             "memory": { "swap_used_kib": 0 }, "build": { "profile": "release, opt-level 3" } },
-    });
+    }));
     let granted = [dma, "memory locked, current and future", "pinned to CPU 1", "SCHED_FIFO priority 80"];
-    let controller = serde_json::json!({
+    let controller = ControllerFile::of(json!({
         "realtime_granted": granted, "axes": { "drive": { "sensors_lost": 0 }, "load": { "sensors_lost": 0 } },
         "bus": { "dropped_on_receive": 0 },
-    });
-    run.controllers.insert("controller".into(), controller);
+    }));
+    run.controllers.extend(controller.map(|file| ("controller".to_owned(), file)));
     run.conditions = Some(Conditions {
         load_generator: Some("none, idle machine".into()),
         group: Some("a".into()),
         ..Conditions::default()
     });
     run
+}
+
+/// Changes `summary.json` of a run.
+pub(crate) fn edit_summary(run: &mut RunFiles, change: impl FnOnce(&mut Value)) {
+    let mut json = run.summary.take().map(|file| file.json).unwrap_or_default();
+    change(&mut json);
+    run.summary = SummaryFile::of(json);
+}
+
+/// Changes `run.json` of a run.
+pub(crate) fn edit_run(run: &mut RunFiles, change: impl FnOnce(&mut Value)) {
+    let mut json = run.run.take().map(|file| file.json).unwrap_or_default();
+    change(&mut json);
+    run.run = RunFile::of(json);
+}
+
+/// Changes `controller.json` of a run.
+pub(crate) fn edit_controller(run: &mut RunFiles, change: impl FnOnce(&mut Value)) {
+    let mut json = run.controllers.remove("controller").map(|file| file.json).unwrap_or_default();
+    change(&mut json);
+    run.controllers.extend(ControllerFile::of(json).map(|file| ("controller".to_owned(), file)));
 }
 
 fn both(cycle: u64) -> (CycleTiming, CycleTiming) {
@@ -154,12 +177,11 @@ pub(crate) fn reference(run: &mut RunFiles, samples: Samples) {
 /// Writes the files of a run into a folder, as the processes would.
 pub(crate) fn write(run: &RunFiles, folder: &Path) {
     std::fs::create_dir_all(folder).unwrap();
-    let json =
-        |name: &str, value: &serde_json::Value| std::fs::write(folder.join(name), value.to_string()).unwrap();
-    json("summary.json", &run.summary);
-    json("run.json", &run.run);
-    json("conditions.json", &serde_json::json!(run.conditions));
-    run.controllers.iter().for_each(|(process, reported)| json(&format!("{process}.json"), reported));
+    let write = |name: &str, json: &Value| std::fs::write(folder.join(name), json.to_string()).unwrap();
+    run.summary.iter().for_each(|file| write("summary.json", &file.json));
+    run.run.iter().for_each(|file| write("run.json", &file.json));
+    write("conditions.json", &json!(run.conditions));
+    run.controllers.iter().for_each(|(process, file)| write(&format!("{process}.json"), &file.json));
     for (process, rows) in &run.rows {
         let mut table = Vec::new();
         runlog::timing::write_head(&mut table).unwrap();

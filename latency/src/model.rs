@@ -6,6 +6,7 @@
 use super::resolution::Verdict;
 /// In ns; null when nothing was measured, or too little for that percentile to differ from the maximum.
 pub use realtime::Percentiles as PercentilesNs;
+use runlog::timing_recorder::CommandAges;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -247,6 +248,12 @@ pub struct RunPart {
     pub duration_s: f64,
     /// Figures that are counts: cycles, skipped, frames lost and the like, by their keys in summary.json.
     pub counts: BTreeMap<String, u64>,
+    /// Frames that did not come as they should.
+    #[serde(default)]
+    pub frame_faults: FrameFaults,
+    /// Cycles sent, by the age in cycles of the command that acted; empty when it was not counted.
+    #[serde(default)]
+    pub command_ages: CommandAges,
     /// Percentiles of each distribution of this run, the reference beside it included.
     pub percentiles_ns: BTreeMap<String, PercentilesNs>,
     /// Gaps and bursts of each cyclic frame at each receiver.
@@ -256,6 +263,29 @@ pub struct RunPart {
     /// What this run's folder does not hold, or holds damaged, and what the report therefore does not say.
     #[serde(default)]
     pub lacks: Vec<String>,
+}
+
+/// Frames of a run that did not come as they should, by receiver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrameFaults {
+    pub rig: FrameFaultCounts,
+    /// Those of all controllers' processes together.
+    pub controllers: FrameFaultCounts,
+}
+
+/// Frames that did not come to a receiver as they should; null where it did not count them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrameFaultCounts {
+    /// Frames that never came, by gaps in their counters.
+    pub lost: Option<u64>,
+    /// Commands accepted too late to act in their cycle, or sensors that came after newer ones.
+    pub late: Option<u64>,
+    /// Frames that came again.
+    pub duplicate: Option<u64>,
+    /// Frames that are not as `rig.dbc` says.
+    pub malformed: Option<u64>,
 }
 
 /// How regularly a cyclic frame came.

@@ -3,7 +3,7 @@
 use super::distributions::percentiles;
 use super::files::RunFiles;
 use super::findings;
-use super::model::{ArrivalRow, PercentilesNs, RunPart};
+use super::model::{ArrivalRow, FrameFaults, PercentilesNs, RunPart};
 use realtime::ArrivalFigures;
 use runlog::summary::ProcessReport;
 use serde_json::Value;
@@ -24,9 +24,11 @@ pub(crate) fn part(
         started_unix_s: run.started_unix_s().unwrap_or_default(),
         duration_s: run.duration_s(),
         counts: counts(run),
+        frame_faults: frame_faults(run),
+        command_ages: run.summary.as_ref().map(|file| file.command_ages.clone()).unwrap_or_default(),
         percentiles_ns,
         arrivals: arrivals(run),
-        passed: run.counted().passed.unwrap_or_default(),
+        passed: run.counted().and_then(|summary| summary.passed).unwrap_or_default(),
         lacks: run.lacks.clone(),
     }
 }
@@ -35,7 +37,7 @@ pub(crate) fn part(
 fn counts(run: &RunFiles) -> BTreeMap<String, u64> {
     const NO_COUNTS: [&str; 3] = ["schema_version", "thresholds", "figures"];
     let mut counts = BTreeMap::new();
-    for (process, reported) in run.reports() {
+    for (process, reported) in run.reports_as_they_stand() {
         let prefix = if process == "emulator" { String::new() } else { format!("{process}.") };
         for (key, value) in reported.as_object().into_iter().flatten() {
             // Percentiles are no counts, and what joining copied from the controllers' own files stands there.
@@ -48,7 +50,7 @@ fn counts(run: &RunFiles) -> BTreeMap<String, u64> {
             }
         }
     }
-    if !run.summary.is_null() || !run.controllers.is_empty() {
+    if run.summary.is_some() || !run.controllers.is_empty() {
         counts.insert("frames_lost_by_gaps".into(), findings::lost_by_gaps(run));
     }
     counts
@@ -65,18 +67,25 @@ fn add(counts: &mut BTreeMap<String, u64>, name: &str, value: &Value) {
     }
 }
 
+fn frame_faults(run: &RunFiles) -> FrameFaults {
+    FrameFaults {
+        rig: run.summary.as_ref().map(|file| file.frame_faults).unwrap_or_default(),
+        controllers: run.controllers.values().map(|file| file.frame_faults).sum(),
+    }
+}
+
 fn arrivals(run: &RunFiles) -> Vec<ArrivalRow> {
-    let of_process = |(receiver, report): (&str, ProcessReport)| {
-        let row = |reported: ArrivalFigures| ArrivalRow {
+    let of_process = |(receiver, report): (&str, &ProcessReport)| {
+        let row = |reported: &ArrivalFigures| ArrivalRow {
             receiver: receiver.to_owned(),
-            frame: reported.frame.into_owned(),
+            frame: reported.frame.to_string(),
             period_ms: reported.period_ms,
             count: reported.count,
             gaps: reported.gaps,
             bursts: reported.bursts,
             interval_ns: percentiles(&reported.interval_ns).unwrap_or_default(),
         };
-        report.timing.arrivals.into_iter().map(row).collect::<Vec<_>>()
+        report.timing.arrivals.iter().map(row).collect::<Vec<_>>()
     };
     run.process_reports().flat_map(of_process).collect()
 }
@@ -90,8 +99,10 @@ mod tests {
     #[test]
     fn counts_keep_their_keys_and_percentiles_are_none() {
         let mut run = made_up::run(50);
-        run.summary["wakeup_ns"] = json!({ "p50": 3, "count": 50 });
-        run.summary["vitals"] = json!({ "minor_faults": 4, "run_delay_ns": 5 });
+        made_up::edit_summary(&mut run, |summary| {
+            summary["wakeup_ns"] = json!({ "p50": 3, "count": 50 });
+            summary["vitals"] = json!({ "minor_faults": 4, "run_delay_ns": 5 });
+        });
         let reported = part(&run, None, BTreeMap::new());
         assert_eq!(reported.counts["cycles"], 50);
         assert_eq!(reported.counts["vitals.minor_faults"], 4);
@@ -109,9 +120,11 @@ mod tests {
             json!([{ "frame": frame, "period_ms": 1, "count": 49, "gaps": 2, "bursts": 1,
             "interval_ns": { "p50": 1_000_000, "max": 2_000_000, "count": 49 } }])
         };
-        run.summary["arrivals"] = row("DriveValveCommand");
-        run.summary["arrivals"][0]["bursts"] = json!(null);
-        run.controllers.get_mut("controller").unwrap()["arrivals"] = row("DriveSensors");
+        made_up::edit_summary(&mut run, |summary| {
+            summary["arrivals"] = row("DriveValveCommand");
+            summary["arrivals"][0]["bursts"] = json!(null);
+        });
+        made_up::edit_controller(&mut run, |controller| controller["arrivals"] = row("DriveSensors"));
         let reported = arrivals(&run);
         let names: Vec<_> =
             reported.iter().map(|row| (row.receiver.as_str(), row.frame.as_str(), row.gaps)).collect();

@@ -64,7 +64,7 @@ mod tests {
         assert!(sentence.contains("the machine stood still"), "{sentence}");
         let mut unrecorded = run.clone();
         unrecorded.rows.clear();
-        unrecorded.summary["skipped"] = 3.into();
+        made_up::edit_summary(&mut unrecorded, |summary| summary["skipped"] = 3.into());
         assert_eq!(name(&report_of(vec![unrecorded])).0, "unknown");
         assert_eq!(name(&report_of(vec![crate::files::RunFiles::default()])).0, "unknown");
         made_up::stall(&mut run, "controller", 700, 5_300_000).vitals.continued = 1;

@@ -8,7 +8,6 @@
 use latency::claim::{self, CycleCount};
 use latency::conditions::conditions;
 use latency::files::RunFiles;
-use runlog::run_folder::read_json;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -43,12 +42,9 @@ impl Light {
 
     /// Judges anew, after so many cycles of which so many were skipped.
     pub(crate) fn judge(&mut self, cycles: u64, skipped: u64) -> Judgement {
-        if self.run.run.is_null() {
-            // The emulator writes it when it has asked for its privileges, which is after it let viewers in.
-            let path = self.folder.as_ref().map(|folder| folder.join("run.json"));
-            self.run.run = path.and_then(|path| read_json(&path).ok()).unwrap_or_default();
-        }
-        if self.run.run.is_null() {
+        // The emulator writes run.json when it has asked for its privileges, which is after it let viewers in.
+        let is_known = self.folder.as_deref().is_some_and(|folder| self.run.read_description(folder));
+        if !is_known {
             let reason = "What the emulator was granted is not known: its run.json was not found.";
             return Judgement { supported: Support::Doubtful, reasons: vec![reason.to_owned()] };
         }

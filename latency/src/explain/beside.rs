@@ -20,7 +20,8 @@ pub(crate) fn add(event: &mut Event, run: &RunFiles) {
         event.frames = frames(&run.folder.join(&dump).join("bus.log"));
         event.dump = Some(dump);
     }
-    event.rig_events = rig_events(&run.counted(), event.cycle, last);
+    event.rig_events =
+        run.counted().map(|summary| rig_events(summary, event.cycle, last)).unwrap_or_default();
 }
 
 /// The folder of the dump of these cycles, within the run's.
@@ -84,13 +85,15 @@ mod tests {
         let mut run = made_up::run(500);
         made_up::stall(&mut run, "emulator", 100, 3_700_000);
         run.folder = folder.path().into();
-        run.summary["event_count"] = json!(4);
-        run.summary["events"] = json!([
-            { "cycle": 20, "kind": "emergency_stop" },
-            { "cycle": 99, "kind": { "skipped": { "cycles": 3 } } },
-            { "cycle": 103, "kind": { "stale": { "axis": "drive" } } },
-            { "cycle": 112, "kind": "bus_lost" },
-        ]);
+        made_up::edit_summary(&mut run, |summary| {
+            summary["event_count"] = json!(4);
+            summary["events"] = json!([
+                { "cycle": 20, "kind": "emergency_stop" },
+                { "cycle": 99, "kind": { "skipped": { "cycles": 3 } } },
+                { "cycle": 103, "kind": { "stale": { "axis": "drive" } } },
+                { "cycle": 112, "kind": "bus_lost" },
+            ]);
+        });
         for name in ["emulator-0000000103-overrun", "controller-0000000103-late", "emulator-0000000300-late"]
         {
             let dump = folder.path().join("flight").join(name);

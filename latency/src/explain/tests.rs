@@ -48,7 +48,7 @@ fn a_stopped_controller_is_late_from_the_first_sensors_that_it_let_wait() {
 fn the_flight_recorder_knows_how_long_sensors_waited() {
     let mut run = made_up::run(500);
     made_up::stall(&mut run, "controller", 200, 1_300_000).vitals.continued = 1;
-    run.summary["frames_lost_at_rig"] = 9.into();
+    made_up::edit_summary(&mut run, |summary| summary["frames_lost_at_rig"] = 9.into());
     let quiet = events(0, &run);
     assert!(quiet.iter().all(|event| event.skipped == 0), "a single cycle may have been lost: {quiet:#?}");
     run.recorded_late_ns.insert("controller".into(), BTreeMap::from([(201, 1_310_000)]));

@@ -27,27 +27,31 @@ fn counters_speak_without_any_late_cycle() {
     for (path, value, cause) in cases {
         let mut run = made_up::run(100);
         let (parent, key) = path.trim_start_matches("/summary").rsplit_once('/').unwrap();
-        run.summary.pointer_mut(parent).unwrap()[key] = value;
+        made_up::edit_summary(&mut run, |summary| summary.pointer_mut(parent).unwrap()[key] = value);
         assert_eq!(found(run), [cause], "{path}");
     }
     let mut run = made_up::run(100);
-    run.controllers.get_mut("controller").unwrap()["vitals"] = json!({ "continued": 2 });
+    made_up::edit_controller(&mut run, |controller| controller["vitals"] = json!({ "continued": 2 }));
     assert_eq!(found(run), [Cause::ControllerStopped]);
 }
 
 #[test]
 fn a_listener_that_does_not_read_costs_nobody_else_a_frame() {
     let mut run = made_up::run(100);
-    let peers = run.summary.pointer_mut("/bus_host/peers").unwrap().as_array_mut().unwrap();
-    peers.push(json!({ "name": "process 3", "frames_received": 0, "dropped_at_queue": { "120": 40 } }));
+    made_up::edit_summary(&mut run, |summary| {
+        let peers = summary.pointer_mut("/bus_host/peers").unwrap().as_array_mut().unwrap();
+        peers.push(json!({ "name": "process 3", "frames_received": 0, "dropped_at_queue": { "120": 40 } }));
+    });
     assert_eq!(found(run), [Cause::SlowListener]);
 }
 
 #[test]
 fn what_a_queue_of_ours_dropped_is_not_lost_on_the_wire() {
     let mut run = made_up::run(100);
-    run.summary["bus_host"]["peers"][1]["dropped_at_queue"] = json!({ "110": 5 });
-    run.summary["frames_lost_at_rig"] = json!(5);
+    made_up::edit_summary(&mut run, |summary| {
+        summary["bus_host"]["peers"][1]["dropped_at_queue"] = json!({ "110": 5 });
+        summary["frames_lost_at_rig"] = json!(5);
+    });
     assert_eq!(found(run), [Cause::SlowListener]);
 }
 
@@ -96,8 +100,10 @@ fn waiting_of_a_machine_that_nobody_saw_running_is_no_hog() {
 fn lateness_without_rows_is_no_undisturbed_run() {
     let mut run = made_up::run(500);
     made_up::stall(&mut run, "emulator", 100, 5_400_000);
-    run.summary["wakeup_ns"] = json!({ "max": 5_400_000, "count": 500 });
-    run.summary["skipped"] = json!(5);
+    made_up::edit_summary(&mut run, |summary| {
+        summary["wakeup_ns"] = json!({ "max": 5_400_000, "count": 500 });
+        summary["skipped"] = json!(5);
+    });
     assert_eq!(found(run.clone()), [Cause::MachineStoodStill], "its rows tell it");
     run.rows.clear();
     let reported = find(&[run.clone()], &[]);
@@ -106,10 +112,12 @@ fn lateness_without_rows_is_no_undisturbed_run() {
         reported[0].sentence.starts_with("5 cycles skipped, worst wake-up 5.40 ms; no rows"),
         "{reported:?}"
     );
-    run.summary["skipped"] = json!(0);
-    run.summary["wakeup_ns"]["max"] = json!(150_000);
+    made_up::edit_summary(&mut run, |summary| {
+        summary["skipped"] = json!(0);
+        summary["wakeup_ns"]["max"] = json!(150_000);
+    });
     assert_eq!(found(run.clone()), [], "counts tell that nothing was late");
-    run.summary = json!({});
+    made_up::edit_summary(&mut run, |summary| *summary = json!({}));
     assert_eq!(found(run), [Cause::Unknown]);
 }
 

@@ -1,6 +1,7 @@
 //! A report as a session of ten pairs might leave it, made up: every list has entries, some numbers are missing or none.
 
 use latency::model::*;
+use runlog::timing_recorder::CommandAges;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
@@ -274,6 +275,16 @@ fn run(place: usize) -> RunPart {
         started_unix_s: 1_795_170_592.0 + 70.0 * place as f64,
         duration_s: SECONDS as f64,
         counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
+        frame_faults: FrameFaults {
+            rig: FrameFaultCounts {
+                lost: None,
+                late: Some(place as u64 / 4),
+                duplicate: Some(0),
+                malformed: Some(0),
+            },
+            controllers: FrameFaultCounts::default(),
+        },
+        command_ages: CommandAges::default(),
         percentiles_ns: ["emulator-wakeup", "drive-round-trip"]
             .map(|name| (name.to_owned(), interval_ns))
             .into(),
