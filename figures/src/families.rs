@@ -62,6 +62,7 @@ impl Worst {
     }
 }
 
+/// A figure: its name, its unit and how it is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Definition {
     /// Its key, unit included; without a unit it is a number or a ratio.
@@ -70,6 +71,7 @@ pub struct Definition {
     pub unit: &'static str,
     /// Which repetition's value is the run's.
     pub(crate) worst: Worst,
+    /// How it is measured, in words.
     pub meaning: &'static str,
 }
 
@@ -78,6 +80,7 @@ pub struct Definition {
 pub struct Family {
     /// What they are about.
     pub title: &'static str,
+    /// The figures, in the order in which they are listed.
     pub definitions: &'static [Definition],
     /// Computes those that the record has.
     compute: fn(&Record, &mut Figures),
@@ -102,6 +105,7 @@ pub(crate) const FAMILIES: &[Family] = &[
     emergency_stop::FAMILY,
 ];
 
+/// The figures of a run, each finite; one without anything to measure is absent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Figures {
     values: BTreeMap<&'static str, f64>,
@@ -118,6 +122,7 @@ impl Figures {
         }
     }
 
+    /// The value of a figure, in the unit of its [`Definition`]; `None` when it was not measured.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied()
     }
@@ -154,14 +159,17 @@ pub fn of(record: &Record) -> Figures {
     figures
 }
 
+/// All figures, family by family.
 pub fn definitions() -> impl Iterator<Item = &'static Definition> {
     FAMILIES.iter().flat_map(|family| family.definitions)
 }
 
+/// The figure of this name; `None` of a name that no family has.
 pub fn definition(name: &str) -> Option<&'static Definition> {
     definitions().find(|definition| definition.name == name)
 }
 
+/// All figures with unit and meaning, a line each under the title of their family: `bench figures`.
 pub fn list() -> String {
     let width = definitions().map(|definition| definition.name.len()).max().unwrap_or(0);
     let mut out = String::new();

@@ -24,6 +24,7 @@ pub struct Joined {
     pub summary: JoinedSummary,
     /// `run.json` as written.
     pub run: JoinedRun,
+    /// The tables that the figures are measured on.
     pub record: Record,
 }
 

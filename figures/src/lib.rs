@@ -13,6 +13,8 @@
 //! | [`table`] | the summary as a short table |
 //! | [`median`](mod@median) | a median with its interval |
 
+#![warn(missing_docs)] // an interface of other crates
+
 mod families;
 pub mod join;
 pub mod median;
@@ -33,15 +35,20 @@ use std::path::PathBuf;
 /// What keeps a run's folder from being summed up.
 #[derive(Debug, thiserror::Error)]
 pub enum SummaryError {
+    /// A file that cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The folder without a summary.
     #[error(
         "{0} has no summary.json: the emulator was killed or is still running; the rows that it recorded are readable"
     )]
     NoSummary(PathBuf),
+    /// A bound of the experiment that makes no sense.
     #[error("[passed] {key} = {value}: {problem}")]
     Threshold {
+        /// Figure or number that it bounds.
         key: String,
+        /// The bound as it was written.
         value: String,
         /// What is wrong, and what would be right.
         problem: String,

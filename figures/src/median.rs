@@ -23,6 +23,7 @@ pub struct Median {
     pub value: f64,
     /// Its interval, least and most.
     pub interval: Option<(f64, f64)>,
+    /// Probability that the interval holds the true median, such as 0.979 for ten values.
     pub confidence: Option<f64>,
 }
 

@@ -53,9 +53,12 @@ pub const TRUE: &[&str] = &[
 /// order. This crate does not know those; a test of `campaign` compares both lists.
 pub const STATE_DEPENDENT: &[&str] = &["spring", "damper", "mass", "dry-friction"];
 
+/// The tables of a run; one that is not there is empty.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
+    /// `controller-drive.csv`.
     pub drive: Table,
+    /// `controller-load.csv`.
     pub load: Table,
     /// Sensors and valves.
     pub measured: Table,
@@ -176,15 +179,18 @@ pub fn common(these: &[Span], those: &[Span]) -> Vec<Span> {
 /// A jump of a set-point between two values at which it stays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// First instant of the new value.
+    /// First instant of the new value, s.
     pub at_s: f64,
+    /// Value before it, in the set-point's unit.
     pub before_value: f64,
+    /// Value after it, in the set-point's unit.
     pub after_value: f64,
-    /// Until when the new value stays.
+    /// End of the new value, s.
     pub until_s: f64,
 }
 
 impl Step {
+    /// Value after the step less value before it.
     pub fn height_value(&self) -> f64 {
         self.after_value - self.before_value
     }
@@ -243,6 +249,7 @@ pub mod made {
             .collect()
     }
 
+    /// A table of columns by their names.
     pub fn table(columns: &[(&'static str, &Series)]) -> Table {
         let mut table = Table::default();
         for (name, column) in columns {

@@ -9,20 +9,24 @@ const SAME_S: f64 = 1e-7;
 /// Longest gap that does not end a stretch, s: cycles that a late rig skipped are in no table of a controller, and time went on.
 const LONGEST_GAP_S: f64 = 0.1;
 
+/// Samples of a quantity at growing times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     time_s: Vec<f64>,
     values: Vec<f64>,
 }
 
+/// A stretch of time, half open.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
+    /// The first instant of it, s.
     pub from_s: f64,
-    /// The first instant after it.
+    /// The first instant after it, s.
     pub to_s: f64,
 }
 
 impl Span {
+    /// Its length, s.
     pub fn length_s(&self) -> f64 {
         self.to_s - self.from_s
     }
@@ -32,6 +36,7 @@ impl Span {
         time_s >= self.from_s - SAME_S && time_s < self.to_s - SAME_S
     }
 
+    /// What it has in common with another stretch; `None` when that has no length.
     #[must_use]
     pub fn common(&self, other: &Self) -> Option<Self> {
         let both = Self { from_s: self.from_s.max(other.from_s), to_s: self.to_s.min(other.to_s) };
@@ -53,6 +58,7 @@ impl FromIterator<(f64, f64)> for Series {
 }
 
 impl Series {
+    /// A series without samples.
     pub const NONE: &'static Self = &Self { time_s: Vec::new(), values: Vec::new() };
 
     /// Adds a sample; `time_s` is later than those before.
@@ -66,14 +72,17 @@ impl Series {
         self.time_s.iter().copied().zip(self.values.iter().copied())
     }
 
+    /// The values of all samples, in the order of their times.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
+    /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -89,6 +98,7 @@ impl Series {
         steps.fold(f64::INFINITY, f64::min).min(1.0)
     }
 
+    /// The samples inside `span`.
     #[must_use]
     pub fn within(&self, span: &Span) -> Self {
         let place = |time_s: f64| self.time_s.partition_point(|time| *time < time_s - SAME_S);
@@ -186,29 +196,32 @@ impl Series {
         slopes.filter_map(|(time, window)| Some((*time, slope(window)?))).collect()
     }
 
+    /// Mean of the values; `None` of no sample.
     pub fn mean(&self) -> Option<f64> {
         (!self.is_empty()).then(|| self.values.iter().sum::<f64>() / self.len() as f64)
     }
 
-    /// Root of the mean square.
+    /// Root of the mean square; `None` of no sample.
     pub fn rms(&self) -> Option<f64> {
         self.map(|value| value * value).mean().map(f64::sqrt)
     }
 
+    /// Least value; `None` of no sample.
     pub fn least(&self) -> Option<f64> {
         self.values.iter().copied().reduce(f64::min)
     }
 
+    /// Largest value; `None` of no sample.
     pub fn most(&self) -> Option<f64> {
         self.values.iter().copied().reduce(f64::max)
     }
 
-    /// Largest size of a value.
+    /// Largest absolute value; `None` of no sample.
     pub fn largest(&self) -> Option<f64> {
         self.map(f64::abs).most()
     }
 
-    /// Largest less least value.
+    /// Largest less least value; `None` of no sample.
     pub fn peak_to_peak(&self) -> Option<f64> {
         Some(self.most()? - self.least()?)
     }

@@ -6,10 +6,12 @@ use runlog::run_folder::FileError;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// A state of a chain, and for how long it lasted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateSpan {
     /// The state's name, as `rig.dbc` has it.
     pub state: String,
+    /// From its first row to that of the next state.
     pub span: Span,
 }
 
@@ -58,10 +60,12 @@ impl Table {
         Self { numbers: numbers.collect(), states: states.collect() }
     }
 
+    /// Puts in a column of numbers, in place of one of the same name.
     pub fn set_numbers(&mut self, name: &'static str, column: Series) {
         self.numbers.insert(name, column);
     }
 
+    /// Puts in a column of states, in place of one of the same name.
     pub fn set_states(&mut self, name: &'static str, column: Vec<StateSpan>) {
         self.states.insert(name, column);
     }

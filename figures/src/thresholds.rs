@@ -38,6 +38,7 @@ const WITH_PARTS: &[&str] = &[
 /// What a run has under a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Found {
+    /// A number, in the key's unit.
     Number(f64),
     /// The key is there, the run had nothing to measure.
     NotMeasured,

@@ -3,9 +3,11 @@
 /// A figure at the top of a summary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TopFigure {
+    /// Its key in the summary, unit included.
     pub name: &'static str,
     /// Its unit; 1 for a count.
     pub unit: &'static str,
+    /// What it is of.
     pub kind: Kind,
     /// Whether runs are compared by it too.
     pub is_compared: bool,
@@ -57,6 +59,7 @@ pub const TOP: [TopFigure; 16] = [
     count("event_count"),
 ];
 
+/// The figure of this name; `None` of a name that is not at the top.
 pub fn find(name: &str) -> Option<&'static TopFigure> {
     TOP.iter().find(|figure| figure.name == name)
 }
