@@ -8,12 +8,16 @@ use std::path::{Path, PathBuf};
 /// A run's folder and the group it was put in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chosen {
+    /// The run's folder.
     pub folder: PathBuf,
     /// Its group; nothing when its conditions.json says which.
     pub group: Option<String>,
 }
 
 /// The runs in `folders`, then those of `groups`, each NAME=FOLDER. A folder that is no run stands for the runs in it, by name.
+///
+/// # Errors
+/// [`ReportError`]: a folder that cannot be read or holds no run, a group that is not written so.
 pub fn choose(folders: &[PathBuf], groups: &[String]) -> Result<Vec<Chosen>, ReportError> {
     let mut chosen = Vec::new();
     for folder in folders {

@@ -22,7 +22,8 @@ const SAME_LENGTH: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Interval of the reference: the cycle's.
 const INTERVAL_US: &str = "1000";
 
-pub fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
+/// Judges runs that ended.
+pub(crate) fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
     let reasons = reasons(runs, conditions);
     let not_controlled = not_controlled(runs, conditions);
     let supported = reasons.is_empty();

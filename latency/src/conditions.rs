@@ -8,6 +8,7 @@ use serde_json::Value;
 /// Values of a fact that are shown when runs differ.
 const VALUES_SHOWN: usize = 3;
 
+/// The conditions of all runs together: a fact that differs has the values of all, up to three.
 pub fn conditions(runs: &[RunFiles]) -> Conditions {
     let one_of = |of: fn(&runlog::conditions::Conditions) -> Option<String>| {
         runs.iter().filter_map(|run| run.conditions.as_ref()).find_map(of)

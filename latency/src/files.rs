@@ -30,36 +30,39 @@ pub(crate) const PROCESSES: [&str; 4] = ["emulator", "controller", "controller-d
 /// Longest interval of a log whose maximum is one of a second; older logs hold the run in one interval.
 const LONGEST_SECOND_S: f64 = 1.5;
 
+/// What a run left in its folder.
 #[derive(Clone, Debug, Default)]
 pub struct RunFiles {
-    pub folder: PathBuf,
+    /// The run's folder.
+    pub(crate) folder: PathBuf,
     /// `summary.json`; `None` when missing.
     pub(crate) summary: Option<SummaryFile>,
     /// `run.json`; `None` when missing.
     pub(crate) run: Option<RunFile>,
     /// `conditions.json`; `None` when missing.
-    pub conditions: Option<Conditions>,
+    pub(crate) conditions: Option<Conditions>,
     /// `controller*.json` by process.
     pub(crate) controllers: BTreeMap<String, ControllerFile>,
     /// Distributions of all logs by tag, with the maximum of each second.
-    pub logged: BTreeMap<String, Series>,
+    pub(crate) logged: BTreeMap<String, Series>,
     /// End of the last interval of a log, s from its base time.
-    pub logged_until_s: f64,
+    pub(crate) logged_until_s: f64,
     /// Rows of each process, rising by cycle: of the whole run, or those of the flight recorder.
-    pub rows: BTreeMap<String, Vec<CycleTiming>>,
+    pub(crate) rows: BTreeMap<String, Vec<CycleTiming>>,
     /// Whether the rows are those of the whole run.
-    pub whole: bool,
+    pub(crate) whole: bool,
     /// Lateness of a process in a cycle as the flight recorder noted it, ns; it counts sensors that waited and were overtaken.
-    pub recorded_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
+    pub(crate) recorded_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
     /// Gaps that the probe saw; nothing when it did not run.
-    pub gaps: Option<Vec<Gap>>,
-    pub reference: Option<Reference>,
+    pub(crate) gaps: Option<Vec<Gap>>,
+    /// `cyclictest.json`; `None` when missing.
+    pub(crate) reference: Option<Reference>,
     /// Ping-pongs beside this run, by tag.
-    pub ping_pongs: BTreeMap<String, Samples>,
+    pub(crate) ping_pongs: BTreeMap<String, Samples>,
     /// `ping-pong.json`; empty when missing.
-    pub ping_pong: PingPongFile,
+    pub(crate) ping_pong: PingPongFile,
     /// What is missing or damaged, a sentence each.
-    pub lacks: Vec<String>,
+    pub(crate) lacks: Vec<String>,
 }
 
 /// Whether a folder holds anything of a run.
@@ -69,7 +72,8 @@ pub(crate) fn is_run(folder: &Path) -> bool {
 }
 
 impl RunFiles {
-    pub fn read(folder: &Path) -> Self {
+    /// Reads the folder of a run that ended. What is missing or damaged stands in `lacks`.
+    pub(crate) fn read(folder: &Path) -> Self {
         let mut run = Self { folder: folder.into(), ..Self::default() };
         run.summary = SummaryFile::of(run.json("summary.json"));
         run.run = RunFile::of(run.json("run.json"));

@@ -25,7 +25,9 @@ pub struct Interval {
     pub tag: String,
     /// Start, s from the log's base time.
     pub start_s: f64,
+    /// Length, s.
     pub duration_s: f64,
+    /// What was measured in it, ns.
     pub samples: Samples,
 }
 
@@ -33,7 +35,9 @@ pub struct Interval {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
 pub struct LogError {
+    /// The line, from 1.
     pub line: usize,
+    /// What is wrong with it.
     pub reason: String,
 }
 
@@ -44,7 +48,9 @@ pub struct Passing<'a> {
     pub tag: &'a str,
     /// Start, s from the log's base time.
     pub start_s: f64,
+    /// Length, s.
     pub duration_s: f64,
+    /// What was measured in it, ns.
     pub histogram: &'a Histogram<u64>,
 }
 

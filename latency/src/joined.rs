@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Samples, and the largest of each second.
 #[derive(Clone, Debug, Default)]
-pub struct Series {
+pub(crate) struct Series {
     pub samples: Samples,
     /// Largest of each second of the run, ns.
     pub maxima_ns: BTreeMap<u64, u64>,
@@ -24,7 +24,7 @@ pub struct Series {
 
 impl Series {
     /// Counts one sample of a cycle of the rig.
-    pub fn record(&mut self, cycle: u64, ns: u64) {
+    pub(crate) fn record(&mut self, cycle: u64, ns: u64) {
         self.samples.record(ns, 1);
         let largest = self.maxima_ns.entry(cycle * CYCLE_NS / 1_000_000_000).or_default();
         *largest = ns.max(*largest);

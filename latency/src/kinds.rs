@@ -40,10 +40,14 @@ const PROCESSES: [(&str, Source, &str); 4] = [
     ("controller", Source::Controller, "controller"),
 ];
 
+/// A distribution that a report knows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kind {
+    /// Its name in logs and reports, such as `emulator-wakeup`.
     pub tag: String,
+    /// Which process measures it.
     pub source: Source,
+    /// What it is, in words.
     pub about: String,
 }
 

@@ -32,6 +32,8 @@
 //! | [`page`] | the report as one page |
 //! | [`table`] | the table of ratios that `scripts/latency` ends with |
 
+#![warn(missing_docs)] // an interface of other crates
+
 mod bounds;
 pub mod choice;
 pub mod claim;
@@ -83,23 +85,34 @@ const WORST: usize = 10;
 /// What keeps a report from being made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
+    /// A folder that is no run and holds none.
     #[error(
         "{0} holds no run, nor do the folders in it: name a folder with summary.json, run.json, emulator.hlog or \
          emulator-timing.csv"
     )]
     NoRun(PathBuf),
+    /// A comparison of one run.
     #[error(
         "--compare: one run cannot be compared; name another folder, or put folders into groups with --group NAME=FOLDER"
     )]
     OneRun,
+    /// A group that is not written as NAME=FOLDER.
     #[error("--group {0}: write it as NAME=FOLDER")]
     Group(String),
+    /// A file that cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A threshold file with a mistake.
     #[error(transparent)]
     Bounds(#[from] SettingsError),
+    /// A file of the report that cannot be written.
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
-    Write { file: PathBuf, reason: String },
+    Write {
+        /// The file, or the folder that cannot be made.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
 }
 
 impl ReportError {
@@ -111,12 +124,14 @@ impl ReportError {
 /// A report with the runs and distributions that its files are made of.
 #[derive(Debug)]
 pub struct ReportWithSources {
+    /// What `report.json` holds.
     pub report: Report,
-    pub runs: Vec<RunFiles>,
+    /// The runs that it is of, in its order.
+    pub(crate) runs: Vec<RunFiles>,
     /// The distributions of each run, by tag.
-    pub series: Vec<BTreeMap<String, Series>>,
+    pub(crate) series: Vec<BTreeMap<String, Series>>,
     /// Those of all runs.
-    pub sums: BTreeMap<String, Samples>,
+    pub(crate) sums: BTreeMap<String, Samples>,
 }
 
 /// Makes the report of these runs, with groups side by side if asked for.
@@ -175,6 +190,9 @@ fn default_title(runs: &[RunFiles]) -> String {
 
 impl ReportWithSources {
     /// Holds the bounds of a threshold file against the report.
+    ///
+    /// # Errors
+    /// [`ReportError::File`] and [`ReportError::Bounds`]: the file cannot be read, or bounds what no report has.
     pub fn judge(&mut self, file: &Path) -> Result<(), ReportError> {
         let text = read_text(file)?;
         self.report.bounds = bounds::judge(&text, file, &self.report)?;

@@ -8,7 +8,8 @@ use super::tallies;
 use pagekit::grid::Grid;
 use std::fmt::Write as _;
 
-pub fn summary(report: &Report) -> String {
+/// The report in Markdown, for a merge request.
+pub(crate) fn summary(report: &Report) -> String {
     let mut out = String::new();
     let mut section = |heading: &str, text: &str| {
         if !text.trim().is_empty() {
@@ -32,6 +33,7 @@ pub fn summary(report: &Report) -> String {
     out.trim_end().to_owned() + "\n"
 }
 
+/// The report in short, for a terminal: percentiles, then what a person must know of them.
 pub fn table(report: &Report) -> String {
     let mut out = percentiles(&report.distributions).markdown();
     let mut add = |text: &str| {

@@ -10,19 +10,25 @@ use runlog::timing_recorder::CommandAges;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// Name of the schema, in [`Report::schema`].
 pub const SCHEMA: &str = "airbench-latency-report";
 /// Goes up when a key changes its meaning or goes.
 pub const SCHEMA_VERSION: u32 = 1;
 
+/// What a report says: `report.json`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
+    /// [`SCHEMA`].
     pub schema: String,
+    /// [`SCHEMA_VERSION`] of the program that made it.
     pub schema_version: u32,
+    /// Heading of the report.
     pub title: String,
     /// When the report was made, s since 1970.
     pub made_unix_s: f64,
     /// May these figures be quoted as latencies of this machine, and what was left uncontrolled.
     pub claim: Claim,
+    /// Where and how it was measured.
     pub conditions: Conditions,
     /// All runs together: distributions added up, the reference's too.
     pub distributions: Vec<Distribution>,
@@ -32,6 +38,7 @@ pub struct Report {
     pub worst: Vec<Event>,
     /// What disturbed the runs, the most telling first; empty when nothing was found.
     pub findings: Vec<Finding>,
+    /// The runs one by one; other parts name a run by its place here, from 0.
     pub runs: Vec<RunPart>,
     /// Groups of runs side by side, when several were compared.
     pub comparison: Option<Comparison>,
@@ -44,16 +51,20 @@ pub struct Report {
 pub struct Claim {
     /// Whether they do.
     pub supported: bool,
+    /// The verdict in a sentence.
     pub sentence: String,
     /// Why not, or what weakens it, a sentence each.
     pub reasons: Vec<String>,
+    /// What another machine or another hour may do differently, a sentence each.
     pub not_controlled: Vec<String>,
 }
 
+/// Where and how it was measured.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Conditions {
     /// Facts of machine, kernel, limits and build, in the order in which they are shown.
     pub machine: Vec<Fact>,
+    /// Command line of each process, and the command that measured.
     pub command_lines: Vec<Fact>,
     /// What the system granted and refused.
     pub privileges: Vec<Fact>,
@@ -70,7 +81,9 @@ pub struct Conditions {
 /// A name and what stands behind it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fact {
+    /// Such as `kernel` or `preemption: model`.
     pub name: String,
+    /// Its value; those of runs that differ are joined by semicolons.
     pub value: String,
 }
 
@@ -79,7 +92,9 @@ pub struct Fact {
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
     #[default]
+    /// The rig's process.
     Emulator,
+    /// A controller's process.
     Controller,
     /// Both, joined on one clock.
     Joined,
@@ -92,8 +107,11 @@ pub enum Source {
 pub struct Distribution {
     /// Tag in the `.hlog`, such as `emulator-wakeup`.
     pub name: String,
+    /// Which process measured it.
     pub source: Source,
+    /// What it is, in words.
     pub about: String,
+    /// Percentiles of all runs together, ns.
     pub percentiles_ns: PercentilesNs,
     /// Bins on a logarithmic axis, those that are not empty, rising.
     pub bins: Vec<Bin>,
@@ -101,20 +119,25 @@ pub struct Distribution {
     pub maxima: Vec<Maximum>,
 }
 
+/// Samples between two lengths of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bin {
     /// Lower end, ns, included.
     pub from_ns: u64,
     /// Upper end, ns, not included.
     pub to_ns: u64,
+    /// Number of samples.
     pub count: u64,
 }
 
 /// The largest value of a second.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Maximum {
+    /// Place of the run in [`Report::runs`].
     pub run: usize,
+    /// Second of the run, from 0.
     pub second: u64,
+    /// The largest value, ns.
     pub max_ns: u64,
 }
 
@@ -163,21 +186,29 @@ pub enum Cause {
 /// One late cycle, or several in a row.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Event {
+    /// Place of the run in [`Report::runs`].
     pub run: usize,
     /// Which process: `emulator`, `controller`, `controller-drive`, `controller-load`.
     pub process: String,
+    /// The rig's cycle in which it began.
     pub cycle: u64,
+    /// When, s from cycle 0.
     pub at_s: f64,
+    /// How late it woke at worst, ns.
     pub late_ns: u64,
     /// How much later than usual it was done after waking, ns.
     pub slow_ns: u64,
+    /// Cycles that it missed.
     pub skipped: u64,
+    /// What caused it.
     pub cause: Cause,
+    /// What happened and why, in a sentence.
     pub sentence: String,
     /// What speaks for it, and what against, a sentence each.
     pub evidence: Vec<String>,
     /// Rows of both processes around it, by process.
     pub around: BTreeMap<String, Vec<AroundRow>>,
+    /// Gaps that the probe saw around it, by time.
     pub probe: Vec<ProbeGap>,
     /// How long it was ready and waited for a CPU, over all its cycles, ns.
     #[serde(default)]
@@ -205,21 +236,26 @@ pub struct AroundRow {
     pub due_us: f64,
     /// Wake-up latency, us.
     pub late_us: f64,
+    /// From waking to the end of the work, us.
     pub execution_us: f64,
     /// Time that it waited for the CPU, us.
     pub run_delay_us: f64,
     /// Page faults, minor and major.
     pub faults: u64,
+    /// Times that the thread was taken from its CPU.
     pub involuntary_switches: u64,
+    /// CPU that it ran on.
     pub cpu: u64,
 }
 
 /// A gap that a spinning thread saw.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProbeGap {
+    /// CPU of the spinning thread.
     pub cpu: u64,
     /// Its beginning, us from the event's due time.
     pub from_us: f64,
+    /// Its length, us.
     pub length_us: f64,
     /// Whether another thread had that CPU; if not, the CPU itself stood still.
     pub another_ran: bool,
@@ -228,6 +264,7 @@ pub struct ProbeGap {
 /// Something that disturbed the runs.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Finding {
+    /// What it was.
     pub cause: Cause,
     /// How often, in events or frames.
     pub count: u64,
@@ -237,14 +274,20 @@ pub struct Finding {
     /// Whether machines do this by themselves, as far as was seen; then it is not named as what was done to the runs.
     #[serde(default)]
     pub by_itself: bool,
+    /// What was found, in a sentence.
     pub sentence: String,
 }
 
+/// A run of a report: its counts and percentiles.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RunPart {
+    /// Its folder as it was named.
     pub folder: String,
+    /// Group that it is compared in; `all` when nobody named one.
     pub group: String,
+    /// When it began, s since 1970; 0 when it is not reported.
     pub started_unix_s: f64,
+    /// Its length, s.
     pub duration_s: f64,
     /// Figures that are counts: cycles, skipped, frames lost and the like, by their keys in summary.json.
     pub counts: BTreeMap<String, u64>,
@@ -269,6 +312,7 @@ pub struct RunPart {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FrameFaults {
+    /// Commands, at the rig.
     pub rig: FrameFaultCounts,
     /// Those of all controllers' processes together.
     pub controllers: FrameFaultCounts,
@@ -295,13 +339,16 @@ pub struct ArrivalRow {
     pub receiver: String,
     /// The frame, such as `DriveSensors`.
     pub frame: String,
+    /// Its period, ms.
     pub period_ms: u64,
+    /// Frames that came.
     pub count: u64,
     /// Intervals longer than one and a half periods.
     pub gaps: u64,
     /// Intervals shorter than half a period; none of a frame that is sent on change too.
     #[serde(default)]
     pub bursts: Option<u64>,
+    /// Intervals between one frame and the next, ns.
     pub interval_ns: PercentilesNs,
 }
 
@@ -310,6 +357,7 @@ pub struct ArrivalRow {
 pub struct Comparison {
     /// Names of the groups, the first being what the others are held against.
     pub groups: Vec<String>,
+    /// A row for each figure that all groups have.
     pub rows: Vec<ComparisonRow>,
 }
 
@@ -318,9 +366,11 @@ pub struct Comparison {
 pub struct ComparisonRow {
     /// Such as `emulator-wakeup p99`.
     pub figure: String,
+    /// A cell for each group, in the order of [`Comparison::groups`].
     pub cells: Vec<ComparisonCell>,
 }
 
+/// A figure in a group.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ComparisonCell {
     /// Median over the group's runs, ns.
@@ -340,7 +390,9 @@ pub struct BoundResult {
     pub figure: String,
     /// Its value; null when it was not measured, which breaks the bound.
     pub value: Option<f64>,
+    /// Least value that keeps the bound, in the figure's unit; null without one.
     pub min: Option<f64>,
+    /// Largest value that keeps the bound, in the figure's unit; null without one.
     pub max: Option<f64>,
     /// Whether it was kept; false too when that is not resolved.
     pub kept: bool,

@@ -16,6 +16,9 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Writes the files into `folder`, or only the Markdown.
+///
+/// # Errors
+/// [`ReportError::Write`] with the file that cannot be written.
 pub fn write(made: &ReportWithSources, folder: &Path, markdown_only: bool) -> Result<(), ReportError> {
     std::fs::create_dir_all(folder).map_err(|error| ReportError::write(folder, error))?;
     let text = |name: &str, text: String| {

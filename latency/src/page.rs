@@ -26,6 +26,7 @@ use crate::model::{Claim, Report};
 use pagekit::number;
 use pagekit::page::{document, escaped};
 
+/// The report as one HTML page that needs nothing from outside.
 pub fn page(report: &Report) -> String {
     let families = families::families(&report.distributions);
     let sections = [

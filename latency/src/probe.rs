@@ -6,12 +6,13 @@
 
 const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
 
+/// A gap on one CPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Gap {
+pub(crate) struct Gap {
     pub cpu: u64,
     /// Last look before, ns of CLOCK_MONOTONIC.
     pub from_ns: u64,
-    /// First look after.
+    /// First look after, ns of CLOCK_MONOTONIC.
     pub to_ns: u64,
     /// Whether another thread had the CPU.
     pub another_ran: bool,

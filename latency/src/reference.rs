@@ -17,7 +17,8 @@ pub(crate) const TAG: &str = "cyclictest";
 
 /// A run of cyclictest.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub(crate) struct Reference {
+    /// How it was called; empty when its file does not say.
     pub command_line: String,
     /// Whether its samples are whole us.
     pub whole_us: bool,

@@ -31,6 +31,7 @@ const MOST_PAIRS: f64 = 1e5;
 /// What pairs say of a bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
+    /// The interval lies within the bound.
     Kept,
     /// The interval lies beyond the bound.
     Broken,

@@ -49,6 +49,7 @@ impl Samples {
         self.histogram.saturating_record_n(ns.min(BOUND_NS), n);
     }
 
+    /// Adds all samples of another.
     pub fn add(&mut self, other: &Self) {
         self.add_histogram(&other.histogram);
     }
@@ -61,6 +62,7 @@ impl Samples {
         }
     }
 
+    /// Number of samples.
     pub fn count(&self) -> u64 {
         self.histogram.len()
     }
@@ -70,6 +72,7 @@ impl Samples {
         (!self.histogram.is_empty()).then(|| self.histogram.max())
     }
 
+    /// The histogram of the samples, ns.
     pub fn histogram(&self) -> &Histogram<u64> {
         &self.histogram
     }

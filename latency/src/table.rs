@@ -43,6 +43,10 @@ const SPIN_ROW: &str = "emulator-wakeup p99, spinning / claimed";
 const FACTS: [&str; 6] =
     ["processor", "kernel", "preemption: model", "hypervisor", "frequency", "clock source"];
 
+/// The table in Markdown, under the facts of the machine.
+///
+/// # Errors
+/// [`FileError::Read`]: a report that cannot be read.
 pub fn table(arguments: &LatencyTableArguments) -> Result<String, FileError> {
     let plain: Report = read_json(&arguments.report)?;
     let spin: Option<Report> = arguments.spin.as_deref().map(read_json).transpose()?;
