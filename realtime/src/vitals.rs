@@ -150,7 +150,8 @@ mod tests {
     fn pages_touched_for_the_first_time_and_waits_are_counted_in_their_reading_alone() {
         const PAGES: usize = 512;
         let mut vitals = VitalsReader::new(Continued::default());
-        let fresh = vec![1_u8; PAGES * 4096];
+        // An optimising compiler would leave out what nobody reads.
+        let fresh = std::hint::black_box(vec![1_u8; PAGES * 4096]);
         std::thread::sleep(Duration::from_millis(2));
         let counts = vitals.read();
         // A kernel with large pages may serve them all with a few faults.
