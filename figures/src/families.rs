@@ -186,6 +186,7 @@ pub fn list() -> String {
 mod tests {
     use super::*;
     use crate::record::made::{chain, each_ms, table};
+    use settings::unit_of;
     use std::collections::BTreeSet;
     use std::f64::consts::PI;
 
@@ -194,15 +195,8 @@ mod tests {
         let names: BTreeSet<_> = definitions().map(|definition| definition.name).collect();
         assert_eq!(names.len(), definitions().count());
         for Definition { name, unit, meaning, .. } in definitions() {
-            let ending = match *unit {
-                "m" => name.ends_with("_m"),
-                "s" => name.ends_with("_s"),
-                "N" => name.ends_with("_n"),
-                "m/s" => name.ends_with("_m_per_s"),
-                "1" => !["_m", "_s", "_n"].iter().any(|unit| name.ends_with(unit)),
-                _ => false,
-            };
-            assert!(ending, "{name} in {unit}");
+            assert_eq!(unit_of(name).unwrap_or("1"), *unit, "{name}");
+            assert_eq!(*name, name.to_lowercase());
             assert!(!meaning.is_empty() && list().contains(name));
         }
     }

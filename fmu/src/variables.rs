@@ -13,6 +13,7 @@
 
 use plant::parameters::table::KEYS;
 use plant::{Axis, Plant, RigParameters, Setup, SetupError, Truth};
+use settings::unit_of;
 
 /// What a variable stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +95,7 @@ pub fn start_setup(rig: &RigParameters) -> Setup {
 
 fn variable(name: impl Into<String>, role: Role, kind: Kind, about: impl Into<String>) -> Variable {
     let (name, about) = (name.into(), about.into());
-    let unit = unit_of(&name);
+    let unit = unit_of(&name).unwrap_or_default();
     Variable { name, role, kind, causality: Causality::Output, discrete: false, unit, range: None, about }
 }
 
@@ -189,30 +190,6 @@ fn measured() -> Vec<Variable> {
     list.into_iter().map(|instance| Variable { discrete: true, ..instance }).collect()
 }
 
-/// Endings of names and the units that they say; longer ones first.
-const UNITS: &[(&str, &str)] = &[
-    ("_m_per_s2", "m/s^2"),
-    ("_m3_per_s", "m^3/s"),
-    ("_m_per_s", "m/s"),
-    ("_n_s_per_m", "N s/m"),
-    ("_n_per_m", "N/m"),
-    ("_m2", "m^2"),
-    ("_m3", "m^3"),
-    ("_kg", "kg"),
-    ("_Pa", "Pa"),
-    ("_pa", "Pa"),
-    ("_J", "J"),
-    ("_N", "N"),
-    ("_n", "N"),
-    ("_m", "m"),
-    ("_k", "K"),
-    ("_s", "s"),
-];
-
-fn unit_of(name: &str) -> &'static str {
-    UNITS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("", |(_, unit)| unit)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,7 +232,7 @@ mod tests {
             ("supply_pressure_Pa", "Pa"),
             ("drive_spool", ""),
         ] {
-            assert_eq!(unit_of(name), unit, "{name}");
+            assert_eq!(variable(name, Role::Linked, Kind::Real(None), "").unit, unit, "{name}");
         }
     }
 }

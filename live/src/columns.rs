@@ -144,20 +144,15 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use settings::unit_of;
 
     #[test]
     fn names_are_unique_and_end_with_their_unit() {
         for (place, column) in COLUMNS.iter().enumerate() {
             assert!(COLUMNS[..place].iter().all(|other| other.name != column.name), "{}", column.name);
-            let end = match column.unit {
-                "m" => "_m",
-                "m/s" => "_m_per_s",
-                "Pa" => "_pa",
-                "N" => "_n",
-                "m^3/s" => "_m3_per_s",
-                _ => "_opening",
-            };
-            assert!(column.name.ends_with(end), "{}", column.name);
+            assert_eq!(unit_of(&column.name).unwrap_or("1"), column.unit, "{}", column.name);
+            assert_eq!(column.unit == "1", column.name.ends_with("_opening"), "{}", column.name);
+            assert_eq!(column.name, column.name.to_lowercase());
         }
     }
 

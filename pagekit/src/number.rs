@@ -53,9 +53,7 @@ pub fn compact(value: f64) -> String {
 /// A figure's name for people: words instead of underscores, no unit.
 #[must_use]
 pub fn without_unit(name: &str) -> String {
-    let units = ["_m_per_s", "_m", "_s", "_n"];
-    let bare = units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
-    bare.replace('_', " ")
+    settings::without_unit(name).replace('_', " ")
 }
 
 /// A value in the unit that people use for it.
@@ -196,6 +194,7 @@ mod tests {
             assert_eq!(in_use(value, unit), expected);
         }
         assert_eq!(without_unit("stop_speed_m_per_s"), "stop speed");
+        assert_eq!(without_unit("supply_pressure_Pa"), "supply pressure");
         assert_eq!(without_unit("force_aperiodic"), "force aperiodic");
     }
 }

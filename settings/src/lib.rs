@@ -1,4 +1,4 @@
-//! Settings files: the one reader of TOML sections, parameters with unit and range, and places for messages.
+//! Settings files: the one reader of TOML sections, parameters with unit and range, units in names, and places for messages.
 //!
 //! Texts become types here; callers read the files. A message names file, line, key, value and what is allowed.
 
@@ -8,9 +8,11 @@ pub mod parameters;
 mod section;
 mod source;
 mod spelling;
+mod unit;
 
 pub use section::{Section, Text};
 pub use source::{Result, SettingsError, Source};
+pub use unit::{unit_of, without_unit};
 
 use std::ops::Range;
 use toml::Value;

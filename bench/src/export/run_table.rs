@@ -4,6 +4,7 @@
 
 use crate::warn;
 use runlog::run_folder::FileError;
+use settings::unit_of;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -19,19 +20,6 @@ const WORDS: [&str; 9] = [
     "at",
     "numbers",
     "cause",
-];
-
-/// Ends of names and the units that they say; an end comes after those that end with it.
-const UNITS: [(&str, &str); 9] = [
-    ("_m_per_s2", "m/s^2"),
-    ("_m3_per_s", "m^3/s"),
-    ("_m_per_s", "m/s"),
-    ("_Pa", "Pa"),
-    ("_N", "N"),
-    ("_J", "J"),
-    ("_K", "K"),
-    ("_m", "m"),
-    ("_s", "s"),
 ];
 
 pub(super) struct RunTable {
@@ -135,7 +123,7 @@ pub(super) fn holds_words(column: &str) -> bool {
 
 /// Unit of a column by the end of its name; empty for a plain number and for words.
 pub(super) fn unit(column: &str) -> &'static str {
-    UNITS.iter().find(|(end, _)| column.ends_with(end)).map_or("", |(_, unit)| unit)
+    unit_of(column).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use crate::inputs::Inputs;
 use plant::{Truth, tables};
 use runlog::run_folder::SCHEMA_VERSION;
 use runlog::telemetry::{Column, Description, DroppedEvents, Experiment, RigFigures, SetUp, Table};
+use settings::unit_of;
 use std::path::Path;
 
 pub(crate) struct Described<'a> {
@@ -80,20 +81,9 @@ fn experiment(file: &Path, inputs: &Inputs) -> Experiment {
     }
 }
 
-/// Ends of a column's name, the longer ones first, and the unit that each stands for.
-const UNITS: [(&str, &str); 6] = [
-    ("_m3_per_s", "m^3/s"),
-    ("_m_per_s2", "m/s^2"),
-    ("_m_per_s", "m/s"),
-    ("_Pa", "Pa"),
-    ("_J", "J"),
-    ("_N", "N"),
-];
-
 /// Unit of a column of a run's tables, whose name ends with it; `1` for a plain number.
 fn unit(column: &str) -> &'static str {
-    let metre = column.ends_with("_m").then_some("m");
-    UNITS.iter().find(|(end, _)| column.ends_with(end)).map(|(_, unit)| *unit).or(metre).unwrap_or("1")
+    unit_of(column).unwrap_or("1")
 }
 
 #[cfg(test)]
