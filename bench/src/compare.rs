@@ -12,6 +12,7 @@ use figures::SummaryError;
 use pagekit::grid::Grid;
 use pagekit::number::{in_use, without_unit};
 use pagekit::page::{document, escaped};
+use runlog::Axis;
 use runlog::run_folder::FileError;
 use std::path::{Path, PathBuf};
 
@@ -74,7 +75,7 @@ fn entry(run: &Run) -> String {
         let program = run.record.experiment.get(axis)?.get("program")?.as_str()?;
         Some(format!("{axis}: {program}"))
     };
-    let programs: Vec<_> = ["drive", "load"].into_iter().filter_map(program).collect();
+    let programs: Vec<_> = Axis::NAMES.into_iter().filter_map(program).collect();
     let programs = if programs.is_empty() { String::new() } else { format!(" ({})", programs.join(", ")) };
     let folder = run.folder.display().to_string();
     format!("<li><b>{}</b>{} in {}</li>\n", escaped(&run.name), escaped(&programs), escaped(&folder))

@@ -8,6 +8,7 @@ use figures::emergency_stop;
 use figures::record::{Record, largest_step};
 use figures::series::{Series, Span};
 use plotters::style::RGBColor;
+use runlog::Axis;
 use runlog::run_folder::FileError;
 use std::path::Path;
 
@@ -92,7 +93,7 @@ fn text(record: &Record, path: &[&str]) -> Option<String> {
 fn caption(record: &Record) -> String {
     let about = text(record, &["about"]);
     let program = |axis: &str| text(record, &[axis, "program"]).map(|program| format!("{axis}: {program}"));
-    let programs: Vec<_> = ["drive", "load"].into_iter().filter_map(program).collect();
+    let programs: Vec<_> = Axis::NAMES.into_iter().filter_map(program).collect();
     let programs = (!programs.is_empty()).then(|| programs.join("   "));
     about.into_iter().chain(programs).collect::<Vec<_>>().join("\n")
 }

@@ -4,6 +4,7 @@ use figures::SummaryError;
 use figures::join;
 use figures::record::{self, Record};
 use figures::top::TOP;
+use runlog::Axis;
 use runlog::run_folder::{FileError, in_order};
 use std::path::{Path, PathBuf};
 
@@ -103,7 +104,7 @@ fn asked(experiment: &toml::Table) -> toml::Table {
     // `start` is left out too: runs are laid over each other from their experiment's begin, whoever gave the sign for it.
     const OWN: [&str; 3] = ["program", "change", "start"];
     let mut asked = toml::Table::new();
-    for key in ["rig", "run", "drive", "load"] {
+    for key in ["rig", "run"].into_iter().chain(Axis::NAMES) {
         if let Some(table) = experiment.get(key).and_then(toml::Value::as_table) {
             let kept = table.iter().filter(|(key, _)| !OWN.contains(&key.as_str()));
             let kept: toml::Table = kept.map(|(key, value)| (key.clone(), value.clone())).collect();

@@ -2,7 +2,8 @@
 
 use crate::faults::mark::Mark;
 use plant::scene::{HandForces, Outcome};
-use runlog::event::{self, Axis, FaultMark};
+use runlog::Axis;
+use runlog::event::{self, FaultMark};
 use serde::{Serialize, Serializer};
 
 pub(crate) type Event = event::Event<Mark>;

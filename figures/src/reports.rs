@@ -5,6 +5,7 @@
 //! it may be writing. So the reports say which tables are of this run: those of the axes that they name.
 
 use crate::SummaryError;
+use runlog::Axis;
 use runlog::controller_report::PartedReport;
 use runlog::run_folder::read_json;
 use serde_json::{Map, Value};
@@ -29,7 +30,7 @@ pub(crate) fn read(folder: &Path) -> Result<Reports, SummaryError> {
         return Ok(Reports::Both(Box::new(both)));
     }
     let mut each = Vec::new();
-    for axis in ["drive", "load"] {
+    for axis in Axis::NAMES {
         each.extend(read(&format!("controller-{axis}.json"))?.map(|reported| (axis, reported)));
     }
     Ok(if each.is_empty() { Reports::None } else { Reports::Each(each) })

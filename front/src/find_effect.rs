@@ -14,6 +14,7 @@ use crate::pair::{Pair, PairError};
 use crate::private::RunBus;
 use crate::{Front, FrontError, last_lines, make_folder, say};
 use protocol::exit::Exit;
+use runlog::Axis;
 use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, File};
 use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
@@ -106,7 +107,7 @@ fn is_program(path: &Path) -> bool {
 /// An experiment begins when the initial positioning is over, whatever a hidden effect does to standstill and error: all runs of
 /// an experiment are driven at the same times. An axis that it does not drive has no settling to set.
 fn unsettled(experiment: &str) -> Vec<String> {
-    let driven = ["drive", "load"]
+    let driven = Axis::NAMES
         .into_iter()
         .filter(|axis| experiment.lines().any(|line| line.starts_with(&format!("[{axis}]"))));
     let limits = ["still_m=0.1", "position_error_m=0.5", "force_error_n=2000"];

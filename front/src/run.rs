@@ -13,6 +13,7 @@ use crate::cli::RunArguments;
 use crate::private::{PrivateFolder, RunBus};
 use crate::{Front, FrontError, make_folder, say};
 use protocol::exit::Exit;
+use runlog::Axis;
 use rustix::process::Pid;
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -108,7 +109,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
             emulate.arg("--console").arg("--telemetry").arg(telemetry);
         }
         run.join(&mut emulate)?;
-        for axis in if arguments.two { &["drive", "load"][..] } else { &["both"] } {
+        for axis in if arguments.two { &Axis::NAMES[..] } else { &["both"] } {
             let mut one = Command::new(&controller);
             one.args(control.get_args()).args(["--bus", &bus, "--axis", axis]);
             run.join(&mut one)?;

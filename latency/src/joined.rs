@@ -11,6 +11,7 @@
 use super::files::{PROCESSES, RunFiles};
 use super::samples::Samples;
 use protocol::periods::CYCLE_NS;
+use runlog::Axis;
 use runlog::timing::{CycleTiming, Exchange};
 use std::collections::{BTreeMap, HashMap};
 
@@ -45,7 +46,8 @@ type OfAxis = fn(&CycleTiming) -> Exchange;
 pub(crate) fn one_way(run: &RunFiles) -> OneWay {
     let mut found = OneWay::default();
     let Some(rig) = run.rows.get("emulator") else { return found };
-    let axes: [(&str, OfAxis); 2] = [("drive", |row| row.drive), ("load", |row| row.load)];
+    let axes: [(&str, OfAxis); 2] =
+        [(Axis::Drive.name(), |row| row.drive), (Axis::Load.name(), |row| row.load)];
     for (axis, exchange) in axes {
         let controllers = PROCESSES.iter().filter(|process| **process != "emulator");
         let rows = controllers.filter_map(|process| run.rows.get(*process)).flatten();

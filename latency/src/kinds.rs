@@ -2,6 +2,7 @@
 
 use super::model::Source;
 use super::reference;
+use runlog::Axis;
 
 /// What follows the process in a tag: emulator-, controller-, controller-drive-, controller-load-.
 const OF_A_PROCESS: [(&str, &str); 7] = [
@@ -69,7 +70,7 @@ pub fn all() -> Vec<Kind> {
             kinds.push(Kind { tag: format!("{process}-{what}"), source, about });
         }
     }
-    for axis in ["drive", "load"] {
+    for axis in Axis::NAMES {
         for (what, source, about) in OF_AN_AXIS {
             kinds.push(Kind {
                 tag: format!("{axis}-{what}"),

@@ -4,6 +4,7 @@
 //! the controllers say comes from their ChainValues on the bus. Without telemetry the measured ones come from the bus, and what
 //! only a simulation knows is none.
 
+use runlog::Axis;
 use runlog::telemetry::Table;
 use std::sync::LazyLock;
 
@@ -12,7 +13,7 @@ pub(crate) const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "press
 /// Number of measured columns of both axes.
 pub(crate) const MEASURED_COUNT: usize = 2 * MEASURED.len();
 /// Names of the axes, with which the names of their columns begin.
-pub(crate) const AXES: [&str; 2] = ["drive", "load"];
+pub(crate) const AXES: [&str; 2] = Axis::NAMES;
 
 /// Where a value comes from.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,6 +8,7 @@ use protocol::frames::{
     ALIVE_RANGE, BIT_RATE_PER_S, ChainStatus, ChainValues, DecodeError, ECHO_RANGE, EmergencyStop, Frame,
     HandSetPoint, HandSetPointAxis, MESSAGES, RigStatus, Sensors, Tick,
 };
+use runlog::Axis;
 use std::collections::BTreeMap;
 
 /// Who stopped or failed to is known by a frame every 100 ms; one that is silent for so long holds nothing any more.
@@ -17,7 +18,7 @@ const STATUS_HOLDS_MS: u64 = 1000;
 /// Values of the tick's count of skipped cycles.
 const SKIPPED_RANGE: u64 = 1 << 16;
 /// Senders of emergency stops.
-pub(crate) const STOPPERS: [&str; 4] = ["console", "rig", "drive", "load"];
+pub(crate) const STOPPERS: [&str; 4] = ["console", "rig", Axis::Drive.name(), Axis::Load.name()];
 /// Place of the console among them, whose frames are sent from here too.
 pub(crate) const CONSOLE: usize = 0;
 

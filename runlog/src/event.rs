@@ -4,6 +4,7 @@
 //! [`FaultMark`]. In JSON a kind without details is its name in kebab case, another one an object of its name and its details:
 //! `"linked"`, `{"weights":{"added_mass_kg":2.5}}`.
 
+use crate::axis::Axis;
 use protocol::commands::STALE_AFTER_CYCLES;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -16,16 +17,6 @@ pub struct Event<M = FaultMark> {
     pub cycle: u64,
     /// What happened.
     pub kind: EventKind<M>,
-}
-
-/// An axis of the rig.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Axis {
-    /// The axis whose rod moves the carriage.
-    Drive,
-    /// The axis whose rod ends in the load eye.
-    Load,
 }
 
 /// The kinds of events.
@@ -114,16 +105,6 @@ pub enum EventKind<M = FaultMark> {
     /// The bus is there again after a loss.
     #[error("the bus is back")]
     BusBack,
-}
-
-impl Axis {
-    /// `drive` or `load`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Drive => "drive",
-            Self::Load => "load",
-        }
-    }
 }
 
 impl<M> EventKind<M> {

@@ -2,6 +2,7 @@
 
 #![warn(missing_docs)] // an interface of other crates
 
+mod axis;
 pub mod candump;
 pub mod conditions;
 pub mod controller_report;
@@ -15,3 +16,5 @@ pub mod summary;
 pub mod telemetry;
 pub mod timing;
 pub mod timing_recorder;
+
+pub use axis::Axis;

@@ -280,7 +280,7 @@ mod tests {
     use crate::recording::queues;
     use plant::tables::CycleRecord;
     use plant::{Inputs, Plant, RigParameters, Scene, Sensors};
-    use runlog::event::Axis;
+    use runlog::Axis;
     use std::path::Path;
 
     fn writer_into(folder: &Path) -> Writer {

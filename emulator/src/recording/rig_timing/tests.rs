@@ -102,7 +102,7 @@ fn a_late_cycle_a_fault_and_a_signal_leave_a_dump_each() {
     };
     run_until(&mut timing, 2000, 1500);
     timing.event(&Event { cycle: 2000, kind: EventKind::Linked });
-    timing.event(&Event { cycle: 2000, kind: EventKind::TwoSources(runlog::event::Axis::Drive) });
+    timing.event(&Event { cycle: 2000, kind: EventKind::TwoSources(runlog::Axis::Drive) });
     run_until(&mut timing, 3000, 0);
     timing.poll(at(3000), true).unwrap();
     // The last window is not over: the end of the run hands it out.
