@@ -26,7 +26,7 @@ use crate::recorded_log::{RecordedLog, RecordedLogError};
 use crate::{say, warn};
 use cli::{ExportArguments, Format};
 use protocol::exit::Exit;
-use runlog::run_folder::FileError;
+use runlog::run_folder::{FileError, MEASUREMENT_CSV};
 use signals::{LEFT_OUT, Signals};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -164,7 +164,7 @@ fn run_folder(log: &RecordedLog) -> Option<&Path> {
     if log.cycle_zero_ns.is_some() {
         return Some(folder);
     }
-    if folder.join("measurement.csv").exists() {
+    if folder.join(MEASUREMENT_CSV).exists() {
         let folder = folder.display();
         warn(&format!(
             "{folder}: no summary.json says when cycle 0 of this log was: the tables are left out"

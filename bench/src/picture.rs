@@ -9,7 +9,7 @@ use figures::record::{Record, largest_step};
 use figures::series::{Series, Span};
 use plotters::style::RGBColor;
 use runlog::Axis;
-use runlog::run_folder::FileError;
+use runlog::run_folder::{FileError, PICTURE_SVG, STEP_SVG, STOP_SVG};
 use std::path::Path;
 
 pub(crate) const METRE_IN_MM: f64 = 1e3;
@@ -24,15 +24,15 @@ const APART_M: f64 = 0.002;
 /// Draws the pictures of a run into `folder`; returns their names.
 pub(crate) fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
     let whole = whole(record);
-    let mut pictures = vec![("picture.svg", whole.clone())];
+    let mut pictures = vec![(PICTURE_SVG, whole.clone())];
     if let Some((what, at_s)) = step(record) {
-        pictures.push(("step.svg", zoom(&whole, &what, at_s)));
+        pictures.push((STEP_SVG, zoom(&whole, &what, at_s)));
     }
     if let Some(at_s) = emergency_stop::first_trip_s(record) {
-        pictures.push(("stop.svg", zoom(&whole, "emergency stop", at_s)));
+        pictures.push((STOP_SVG, zoom(&whole, "emergency stop", at_s)));
     }
     // An earlier summary may have drawn one that this one does not.
-    for name in ["step.svg", "stop.svg"] {
+    for name in [STEP_SVG, STOP_SVG] {
         let _ = std::fs::remove_file(folder.join(name));
     }
     for (name, picture) in &pictures {

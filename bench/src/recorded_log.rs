@@ -7,13 +7,12 @@
 
 use crate::warn;
 use runlog::candump::{LogError, LogLine, LogReader};
-use runlog::run_folder::read_json;
+use runlog::run_folder::{BUS_LOG, SUMMARY_JSON, read_json};
 use runlog::summary::JoinedSummary;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-const LOG_NAME: &str = "bus.log";
 /// A summary whose cycle 0 lies farther from the log's first frame is of another run, s.
 const NEAR_ZERO_S: f64 = 60.0;
 
@@ -57,7 +56,7 @@ pub(crate) struct RecordedLog {
 impl RecordedLog {
     /// Reads `path`, a run's folder or a log; with `interface`, what was seen there alone.
     pub(crate) fn read(path: &Path, interface: Option<&str>) -> Result<Self, RecordedLogError> {
-        let file = if path.is_dir() { path.join(LOG_NAME) } else { path.to_owned() };
+        let file = if path.is_dir() { path.join(BUS_LOG) } else { path.to_owned() };
         let opened = File::open(&file).map_err(|error| {
             let (file, reason) = (file.clone(), error.to_string());
             RecordedLogError::Open { file, reason }
@@ -104,10 +103,10 @@ impl RecordedLog {
 
 /// When cycle 0 began, from the `summary.json` beside a run's log.
 fn told_zero_ns(file: &Path, first_ns: u64) -> Option<u64> {
-    if file.file_name()? != LOG_NAME {
+    if file.file_name()? != BUS_LOG {
         return None;
     }
-    let summary: JoinedSummary = read_json(&file.parent()?.join("summary.json")).ok()?;
+    let summary: JoinedSummary = read_json(&file.parent()?.join(SUMMARY_JSON)).ok()?;
     let zero_s = summary.bus_log_cycle_zero_s?;
     // Stamps of a log are whole microseconds, and so is its zero: a number of this size is not exact below them.
     let near = zero_s >= 0.0 && (zero_s - first_ns as f64 * 1e-9).abs() < NEAR_ZERO_S;

@@ -43,12 +43,15 @@ use protocol::bus::BusUrl;
 use protocol::exit::Exit;
 use realtime::Interrupt;
 use runlog::conditions::Conditions;
-use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
+use runlog::process::Process;
+use runlog::run_folder::{CONDITIONS_JSON, FileError, SCHEMA_VERSION, write_json};
 use segment::{Common, End, Outcome};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// The rig among the processes of a segment.
+const EMULATOR: &str = Process::Emulator.name();
 /// Time between two lines of progress, s.
 const PROGRESS_S: f64 = 10.0;
 /// Segments in a row that end before their time, after which the soak gives up: the fault is none of a moment.
@@ -258,7 +261,7 @@ impl Soaking<'_> {
 
 /// What a latency report wants to know of a run.
 fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Result<(), SoakError> {
-    let path = folder.join("conditions.json");
+    let path = folder.join(CONDITIONS_JSON);
     let conditions = Conditions {
         schema_version: SCHEMA_VERSION,
         load_generator: Some(load.unwrap_or("none").into()),

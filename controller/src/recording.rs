@@ -3,6 +3,7 @@
 //! A thread of its own polls the queues, so that the 1 ms path wakes nobody.
 
 use crate::reload::Reloader;
+use crate::report::axis_of;
 use crate::timing::queues::TimingQueues;
 use algorithms::guard::Stuck;
 use axis_control::axis::AxisRecord;
@@ -10,7 +11,7 @@ use axis_control::node::NodeEvent;
 use crossbeam_channel::{Receiver, TryRecvError};
 use nominal::Axis;
 use protocol::frames::MainChainState;
-use runlog::run_folder::LineFile;
+use runlog::run_folder::{LineFile, controller_csv};
 use runlog::timing_recorder::TimingFigures;
 use std::io::{self, Write};
 use std::path::Path;
@@ -27,7 +28,7 @@ pub(crate) struct Tables {
 impl Tables {
     pub(crate) fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
         let tables = axes.iter().map(|axis| {
-            let mut table = LineFile::create(&folder.join(format!("controller-{}.csv", axis.name())))?;
+            let mut table = LineFile::create(&folder.join(controller_csv(axis_of(*axis))))?;
             writeln!(table.lines(), "{}", head())?;
             Ok((*axis, table))
         });

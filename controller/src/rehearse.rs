@@ -16,7 +16,10 @@ use protocol::periods::CYCLE_S;
 use realtime::Interrupt;
 use rehearsal::{PlantTables, Rehearsal};
 use runlog::flight_dump;
-use runlog::run_folder::{SCHEMA_VERSION, clear, clear_results, controller_results, write_json};
+use runlog::process::Process;
+use runlog::run_folder::{
+    RUN_JSON, SCHEMA_VERSION, SUMMARY_JSON, clear, clear_results, controller_results, write_json,
+};
 use runlog::summary::{REHEARSAL, RehearsalDescription, RehearsalEvent, RehearsalSummary};
 use runlog::timing_recorder::TimingFigures;
 use std::path::Path;
@@ -72,13 +75,13 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
 
 /// Removes what runs in real time left; a rehearsal has no timing.
 fn clear_timing(out: &Path) -> std::io::Result<()> {
-    let mut names = vec![report::name(&Axis::ALL)];
-    names.extend(Axis::ALL.map(|axis| report::name(&[axis])));
-    for name in &names {
-        clear(out, &controller_results(name))?;
-        flight_dump::clear(out, name)?;
+    for process in Process::ALL {
+        if process != Process::Emulator {
+            clear(out, &controller_results(process))?;
+        }
+        flight_dump::clear(out, process.name())?;
     }
-    flight_dump::clear(out, "emulator")
+    Ok(())
 }
 
 /// Ends the process when an algorithm never returns, which this thread could not.
@@ -157,7 +160,7 @@ fn save(
         axes,
         news: finished.news,
     };
-    write_json(&out.join("controller.json"), &report).map_err(RunError::output)?;
+    write_json(&out.join(Process::Controller.report()), &report).map_err(RunError::output)?;
     let run = RehearsalDescription {
         schema_version: SCHEMA_VERSION,
         pace: REHEARSAL.into(),
@@ -166,7 +169,7 @@ fn save(
         experiment_toml: inputs.experiment_toml.clone(),
         rig_setup: scene,
     };
-    write_json(&out.join("run.json"), &run).map_err(RunError::output)?;
+    write_json(&out.join(RUN_JSON), &run).map_err(RunError::output)?;
     let summary = RehearsalSummary {
         schema_version: SCHEMA_VERSION,
         cycles,
@@ -175,6 +178,6 @@ fn save(
         events: finished.reported,
         ..RehearsalSummary::default()
     };
-    write_json(&out.join("summary.json"), &summary).map_err(RunError::output)?;
+    write_json(&out.join(SUMMARY_JSON), &summary).map_err(RunError::output)?;
     Ok(exit)
 }

@@ -6,6 +6,7 @@ use axis_control::setup::Inputs;
 use nominal::Axis;
 use protocol::frames::MainChainState;
 use runlog::controller_report::{self, ControllerReport};
+use runlog::process::Process;
 use std::collections::BTreeMap;
 use xcp::port::PortCounters;
 
@@ -70,10 +71,18 @@ pub(crate) fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &Axi
     })
 }
 
-/// Name of the report of a process with these axes, without its ending.
-pub(crate) fn name(axes: &[Axis]) -> String {
+/// The process that runs these axes, as its files are named.
+pub(crate) fn process(axes: &[Axis]) -> Process {
     match axes {
-        [axis] => format!("controller-{}", axis.name()),
-        _ => "controller".into(),
+        [axis] => Process::ControllerOf(axis_of(*axis)),
+        _ => Process::Controller,
+    }
+}
+
+/// The axis as files name it.
+pub(crate) fn axis_of(axis: Axis) -> runlog::Axis {
+    match axis {
+        Axis::Drive => runlog::Axis::Drive,
+        Axis::Load => runlog::Axis::Load,
     }
 }

@@ -88,11 +88,12 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let axes = arguments.axis.list();
     let controllers =
         axes.iter().map(|axis| inputs.controller(*axis, mode)).collect::<Result<Vec<_>, _>>()?;
+    let process = report::process(axes);
     let out = &arguments.files.out;
     std::fs::create_dir_all(out)
-        .and_then(|()| clear(out, &controller_results(&report::name(axes))))
+        .and_then(|()| clear(out, &controller_results(process)))
         .and_then(|()| clear(out, &axes.iter().map(|axis| a2l::file_name(*axis)).collect::<Vec<_>>()))
-        .and_then(|()| flight_dump::clear(out, &report::name(axes)))
+        .and_then(|()| flight_dump::clear(out, process.name()))
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     let tables = Tables::create(out, axes).map_err(RunError::output)?;
     let signals =
@@ -191,7 +192,7 @@ fn end_stuck(out: &Path, axes: &[Axis]) {
     let report = serde_json::json!({
         "schema_version": SCHEMA_VERSION, "ended_well": false, "ended_because": STUCK,
     });
-    if let Err(error) = write_json(&out.join(format!("{}.json", report::name(axes))), &report) {
+    if let Err(error) = write_json(&out.join(report::process(axes).report()), &report) {
         protocol::say!("controller: cannot write {error}");
     }
     std::process::exit(exit as i32);
@@ -334,7 +335,7 @@ fn save(arguments: &RunArguments, inputs: &Inputs, run: FinishedRun) -> Result<E
         axes,
         news: written.reported,
     };
-    let path = arguments.files.out.join(format!("{}.json", report::name(arguments.axis.list())));
+    let path = arguments.files.out.join(report::process(arguments.axis.list()).report());
     write_json(&path, &report).map_err(RunError::output)?;
     Ok(exit)
 }

@@ -7,7 +7,7 @@ use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
 use protocol::exit::Exit;
 use realtime::{Percentiles, Recorder as Histogram, allocations};
-use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use runlog::run_folder::{SCHEMA_VERSION, SUMMARY_JSON, write_json};
 use runlog::summary::Summary;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,7 +21,7 @@ pub(crate) fn finish(
 ) -> Result<Exit, RunError> {
     let (exit, reason) = verdict(&outcome.paced.end);
     protocol::say!("emulator: {reason}");
-    let path = arguments.out.join("summary.json");
+    let path = arguments.out.join(SUMMARY_JSON);
     let summary = summarise(outcome, written, started.epoch_offset_ns, reason, exit == Exit::Good);
     tell(&summary, &arguments.out);
     write_json(&path, &summary).map_err(|error| RunError::output(&path, &error))?;

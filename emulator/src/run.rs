@@ -31,7 +31,7 @@ use realtime::{
     allocations,
 };
 use runlog::flight_dump::{self, Log};
-use runlog::run_folder::{SCHEMA_VERSION, clear_results, write_json};
+use runlog::run_folder::{RUN_JSON, SCHEMA_VERSION, clear_results, write_json};
 use runlog::summary::RunDescription;
 use runlog::timing_recorder::{Due, TimingSetup};
 use std::io;
@@ -394,7 +394,7 @@ fn describe(
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
         machine: Machine::read(env!("AIRBENCH_BUILD_COMMIT")),
     };
-    let path = arguments.out.join("run.json");
+    let path = arguments.out.join(RUN_JSON);
     write_json(&path, &description).map_err(|error| RunError::output(&path, &error))
 }
 

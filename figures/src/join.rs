@@ -13,7 +13,7 @@ use crate::record::{self, Record};
 use crate::reports::{self, Reports};
 use crate::{SummaryError, thresholds};
 use runlog::controller_report::{ControllerFigures, reported_of_axis};
-use runlog::run_folder::{FileError, in_order, read_json, write_json};
+use runlog::run_folder::{FileError, RUN_JSON, SUMMARY_JSON, in_order, read_json, write_json};
 use runlog::summary::{JoinedRun, JoinedSummary, ReportedByControllers};
 use std::path::Path;
 
@@ -45,11 +45,11 @@ impl Joined {
 /// # Errors
 /// [`SummaryError`]: no summary, unreadable files.
 pub fn read(folder: &Path) -> Result<(JoinedSummary, JoinedRun), SummaryError> {
-    let summary_path = folder.join("summary.json");
+    let summary_path = folder.join(SUMMARY_JSON);
     if !summary_path.exists() {
         return Err(SummaryError::NoSummary(folder.into()));
     }
-    Ok((read_json(&summary_path)?, read_json(&folder.join("run.json"))?))
+    Ok((read_json(&summary_path)?, read_json(&folder.join(RUN_JSON))?))
 }
 
 /// Joins the files of `folder` and writes them back.
@@ -68,7 +68,7 @@ pub fn join(folder: &Path) -> Result<Joined, SummaryError> {
     summary.thresholds = thresholds::judge_summary(&passed, &summary)?;
     summary.not_passed_because = against(&summary, run.is_rehearsal());
     summary.passed = Some(summary.not_passed_because.is_empty());
-    for (name, file) in [("summary.json", in_order(&summary)), ("run.json", in_order(&run))] {
+    for (name, file) in [(SUMMARY_JSON, in_order(&summary)), (RUN_JSON, in_order(&run))] {
         let path = folder.join(name);
         write_json(&path, &file).map_err(|error| FileError::write(&path, error))?;
     }

@@ -8,6 +8,8 @@ use crate::SummaryError;
 use crate::reports;
 use crate::series::{Series, Span};
 use crate::tables_read::{self, StateSpan, Table};
+use runlog::Axis;
+use runlog::run_folder::{MEASUREMENT_CSV, TRUTH_CSV, controller_csv};
 use std::path::Path;
 
 /// Numbers of a controller's table.
@@ -76,15 +78,15 @@ pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryErr
         if path.exists() { tables_read::read(&path, numbers, states) } else { Ok(Table::default()) }
     };
     let axes = reports::read(folder)?.axes();
-    let of_axis = |axis: &str| {
-        let own = axes.contains_key(axis).then(|| format!("controller-{axis}.csv"));
+    let of_axis = |axis: Axis| {
+        let own = axes.contains_key(axis.name()).then(|| controller_csv(axis));
         own.map_or_else(|| Ok(Table::default()), |name| table(&name, CONTROLLER_NUMBERS, CHAINS))
     };
     Ok(Record {
-        drive: of_axis("drive")?,
-        load: of_axis("load")?,
-        measured: table("measurement.csv", MEASURED, &[])?,
-        truth: table("truth.csv", TRUE, &[])?,
+        drive: of_axis(Axis::Drive)?,
+        load: of_axis(Axis::Load)?,
+        measured: table(MEASUREMENT_CSV, MEASURED, &[])?,
+        truth: table(TRUTH_CSV, TRUE, &[])?,
         experiment,
     })
 }

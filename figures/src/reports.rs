@@ -7,6 +7,7 @@
 use crate::SummaryError;
 use runlog::Axis;
 use runlog::controller_report::PartedReport;
+use runlog::process::Process;
 use runlog::run_folder::read_json;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -26,12 +27,13 @@ pub(crate) fn read(folder: &Path) -> Result<Reports, SummaryError> {
         let path = folder.join(name);
         path.exists().then(|| read_json(&path)).transpose()
     };
-    if let Some(both) = read("controller.json")? {
+    if let Some(both) = read(&Process::Controller.report())? {
         return Ok(Reports::Both(Box::new(both)));
     }
     let mut each = Vec::new();
-    for axis in Axis::NAMES {
-        each.extend(read(&format!("controller-{axis}.json"))?.map(|reported| (axis, reported)));
+    for axis in Axis::ALL {
+        let reported = read(&Process::ControllerOf(axis).report())?;
+        each.extend(reported.map(|reported| (axis.name(), reported)));
     }
     Ok(if each.is_empty() { Reports::None } else { Reports::Each(each) })
 }

@@ -15,6 +15,7 @@ use crate::private::RunBus;
 use crate::{Front, FrontError, last_lines, make_folder, say};
 use protocol::exit::Exit;
 use runlog::Axis;
+use runlog::run_folder::TRUTH_CSV;
 use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, File};
 use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
@@ -199,7 +200,7 @@ impl Search<'_> {
         )?;
         // It names the terms of what is hidden.
         let truth = hidden.join(format!("truth-{}.csv", name.replace('/', "-")));
-        fs::rename(run.join("truth.csv"), &truth).map_err(|error| FrontError::output(&truth, &error))
+        fs::rename(run.join(TRUTH_CSV), &truth).map_err(|error| FrontError::output(&truth, &error))
     }
 
     /// Without the effect all rigs are the same one: run once, and copied for the following.

@@ -13,7 +13,9 @@ use crate::private::PrivateFolder;
 use crate::{Front, FrontError, last_lines, say};
 use protocol::exit::Exit;
 use runlog::conditions::Conditions;
-use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use runlog::run_folder::{
+    CONDITIONS_JSON, CYCLICTEST_JSON, PING_PONG_JSON, SCHEMA_VERSION, SUMMARY_JSON, write_json,
+};
 use rustix::thread::{CpuSet, sched_getaffinity};
 use slices::{Slice, SliceRunner, logs};
 use std::fs::{self, File};
@@ -231,12 +233,12 @@ impl Measurement<'_> {
         for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let histogram = name.starts_with("ping-pong-") && name.ends_with(".hlog");
-            if histogram || ["cyclictest.json", "ping-pong.json"].contains(&name.as_str()) {
+            if histogram || [CYCLICTEST_JSON, PING_PONG_JSON].contains(&name.as_str()) {
                 let kept = run.join(&name);
                 fs::rename(&path, &kept).map_err(|error| FrontError::output(&kept, &error))?;
             }
         }
-        let reference = run.join("cyclictest.json");
+        let reference = run.join(CYCLICTEST_JSON);
         let (command, missing) = match (reference.is_file(), &self.runner.reference_missing) {
             (true, _) => (Some(self.runner.cyclictest_words().join(" ")), None),
             (false, Some(why)) => (None, Some(why.clone())),
@@ -254,7 +256,7 @@ impl Measurement<'_> {
                 schema_version: SCHEMA_VERSION,
                 uncommitted_files: self.front.places.checkout().and_then(uncommitted_files),
             };
-            let file = folder.join("conditions.json");
+            let file = folder.join(CONDITIONS_JSON);
             write_json(&file, &conditions).map_err(|error| FrontError::output(&file, &error))
         };
         write(&run, "plain".into())?;
@@ -263,7 +265,7 @@ impl Measurement<'_> {
         }
         // The one reference of the pair stands beside both of its runs.
         if reference.is_file() {
-            let copy = spin.join("cyclictest.json");
+            let copy = spin.join(CYCLICTEST_JSON);
             fs::copy(&reference, &copy).map_err(|error| FrontError::output(&copy, &error))?;
         }
         write(&spin, format!("spin {} us", self.arguments.spin_us))
@@ -275,7 +277,7 @@ impl Measurement<'_> {
         // What a killed slice left is no run: the emulator tells of itself at its end.
         let runs = |name: &str| -> Vec<PathBuf> {
             let runs = pairs.iter().map(|pair| pair.join(name));
-            runs.filter(|run| run.join("summary.json").is_file()).collect()
+            runs.filter(|run| run.join(SUMMARY_JSON).is_file()).collect()
         };
         let (plain, spinning) = (runs("run"), runs("run-spin"));
         let interrupted = self.runner.children.interrupted();

@@ -14,6 +14,7 @@ use crate::private::{PrivateFolder, RunBus};
 use crate::{Front, FrontError, make_folder, say};
 use protocol::exit::Exit;
 use runlog::Axis;
+use runlog::run_folder::SUMMARY_JSON;
 use rustix::process::Pid;
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -55,7 +56,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     };
     make_folder(&out)?;
     // The emulator clears the folder of an earlier run; should it not get that far, no old figures may be told as this run's.
-    let _ = fs::remove_file(out.join("summary.json"));
+    let _ = fs::remove_file(out.join(SUMMARY_JSON));
 
     let RunBus { url: bus, mut private, reservation: _reservation } =
         RunBus::for_others(arguments.bus.as_deref(), arguments.lockstep || arguments.rehearse)?;
@@ -125,7 +126,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
         return Ok(first_code);
     }
     let mut summary_code = 0;
-    if out.join("summary.json").is_file() {
+    if out.join(SUMMARY_JSON).is_file() {
         let summary = Command::new(&bench).arg("summary").arg(&out).status();
         summary_code = code(
             summary.map_err(|reason| FrontError::Start { program: bench.display().to_string(), reason })?,

@@ -5,7 +5,7 @@
 //! controlled* is what another machine or another hour may do differently, and what a reader must know to judge.
 
 use super::controlled::not_controlled;
-use super::files::RunFiles;
+use super::files::{EMULATOR, RunFiles};
 use super::model::{Claim, Conditions};
 use super::reference;
 use realtime::Grant;
@@ -175,7 +175,7 @@ pub(super) fn cpus(run: &RunFiles) -> Vec<(u64, &str)> {
 fn unlike_reference(run: &RunFiles) -> Vec<String> {
     let Some(reported) = &run.reference else { return Vec::new() };
     let mut unlike = Vec::new();
-    let rig = run.granted().next().filter(|(process, _)| *process == "emulator");
+    let rig = run.granted().next().filter(|(process, _)| *process == EMULATOR);
     let granted = rig.map(|(_, granted)| granted).unwrap_or_default();
     let line = &reported.command_line;
     let mut compare = |what: &str, theirs: Option<&str>, ours: Option<String>| {

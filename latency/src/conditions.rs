@@ -1,6 +1,6 @@
 //! Where and how it was measured, as facts: each name with the value that all runs share, or those that they do not.
 
-use super::files::RunFiles;
+use super::files::{EMULATOR, RunFiles};
 use super::model::{Conditions, Fact};
 use realtime::Grant;
 use serde_json::Value;
@@ -118,7 +118,7 @@ fn text(value: &Value) -> String {
 fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
-        let emulator = run.description().map(|description| ("emulator", &description.emulator_command_line));
+        let emulator = run.description().map(|description| (EMULATOR, &description.emulator_command_line));
         let controllers = run.controller_reports().map(|(process, report)| (process, &report.command_line));
         let lines =
             emulator.into_iter().chain(controllers).map(|(process, words)| (process, words.join(" ")));
@@ -138,7 +138,7 @@ fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
     for run in runs {
         let emulator = run
             .description()
-            .map(|description| ("emulator", &description.realtime_granted, &description.realtime_refused));
+            .map(|description| (EMULATOR, &description.realtime_granted, &description.realtime_refused));
         let controllers = run.controller_reports();
         let controllers = controllers
             .map(|(process, report)| (process, &report.realtime_granted, &report.realtime_refused));

@@ -14,7 +14,7 @@
 pub(crate) mod beside;
 pub(crate) mod rules;
 
-use super::files::RunFiles;
+use super::files::{EMULATOR, RunFiles};
 use super::findings::lost_by_gaps;
 use super::model::{AroundRow, Event, ProbeGap};
 use super::probe::{self, Gap};
@@ -109,7 +109,7 @@ fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<Late> {
     let with_late = |place: usize| {
         let row = &rows[place];
         let (missed, due_ns) = match process {
-            "emulator" => (row.skipped, row.due_ns.saturating_sub(row.skipped * CYCLE_NS)),
+            EMULATOR => (row.skipped, row.due_ns.saturating_sub(row.skipped * CYCLE_NS)),
             _ => missed_by_controller(place, process, run, lost),
         };
         let late_ns = row.woke_ns.saturating_sub(due_ns);
@@ -135,7 +135,7 @@ fn missed_by_controller(place: usize, process: &str, run: &RunFiles, lost: u64) 
     let Some(before) = before.filter(|before| row.cycle > before.cycle + 1) else {
         return (0, came_ns.unwrap_or(row.due_ns));
     };
-    let Some(rig) = run.rows.get("emulator") else { return (0, came_ns.unwrap_or(row.due_ns)) };
+    let Some(rig) = run.rows.get(EMULATOR) else { return (0, came_ns.unwrap_or(row.due_ns)) };
     let from = rig.partition_point(|sent| sent.cycle <= before.cycle);
     let sent_ns = rig[from..].iter().take_while(|sent| sent.cycle < row.cycle).filter_map(|sent| {
         [sent.drive.sensors_ns, sent.load.sensors_ns].into_iter().filter(|ns| *ns > 0).min()

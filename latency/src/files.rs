@@ -3,7 +3,7 @@
 use super::hlog::{self, Passing};
 use super::joined::Series;
 use super::json_files::{ControllerFile, RunFile, SummaryFile};
-use super::kinds::PING_PONGS;
+use super::kinds::{PING_PONG, PING_PONGS};
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
@@ -14,7 +14,10 @@ use runlog::conditions::Conditions;
 use runlog::controller_report::ControllerReport;
 use runlog::flight_dump;
 use runlog::ping_pong::PingPongFile;
-use runlog::run_folder::read_json;
+use runlog::process::{HLOG_END, Process};
+use runlog::run_folder::{
+    CONDITIONS_JSON, CYCLICTEST_JSON, PING_PONG_JSON, PROBE_CSV, RUN_JSON, SUMMARY_JSON, read_json,
+};
 use runlog::summary::{ProcessReport, RunDescription, Summary};
 use runlog::timing::{self, CycleTiming};
 use serde::de::DeserializeOwned;
@@ -24,8 +27,8 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// Processes of a run that leave files, by the first part of their files' names.
-pub(crate) const PROCESSES: [&str; 4] = ["emulator", "controller", "controller-drive", "controller-load"];
+/// The emulator among the processes of a run.
+pub(crate) const EMULATOR: &str = Process::Emulator.name();
 
 /// Longest interval of a log whose maximum is one of a second; older logs hold the run in one interval.
 const LONGEST_SECOND_S: f64 = 1.5;
@@ -67,7 +70,8 @@ pub struct RunFiles {
 
 /// Whether a folder holds anything of a run.
 pub(crate) fn is_run(folder: &Path) -> bool {
-    let names = ["summary.json", "run.json", "emulator.hlog", "emulator-timing.csv"];
+    let emulator = Process::Emulator;
+    let names = [emulator.report(), RUN_JSON.to_owned(), emulator.hlog(), emulator.timing()];
     names.iter().any(|name| folder.join(name).is_file())
 }
 
@@ -75,28 +79,28 @@ impl RunFiles {
     /// Reads the folder of a run that ended. What is missing or damaged stands in `lacks`.
     pub(crate) fn read(folder: &Path) -> Self {
         let mut run = Self { folder: folder.into(), ..Self::default() };
-        run.summary = SummaryFile::of(run.json("summary.json"));
-        run.run = RunFile::of(run.json("run.json"));
-        run.conditions = run.json("conditions.json");
-        run.note_misfit("summary.json", run.summary.as_ref().and_then(|file| file.misfit.clone()));
-        run.note_misfit("run.json", run.run.as_ref().and_then(|file| file.misfit.clone()));
-        for process in PROCESSES {
-            if process != "emulator" {
-                let name = format!("{process}.json");
+        run.summary = SummaryFile::of(run.json(SUMMARY_JSON));
+        run.run = RunFile::of(run.json(RUN_JSON));
+        run.conditions = run.json(CONDITIONS_JSON);
+        run.note_misfit(SUMMARY_JSON, run.summary.as_ref().and_then(|file| file.misfit.clone()));
+        run.note_misfit(RUN_JSON, run.run.as_ref().and_then(|file| file.misfit.clone()));
+        for process in Process::ALL {
+            if process != Process::Emulator {
+                let name = process.report();
                 if let Some(file) = ControllerFile::of(run.json(&name)) {
                     run.note_misfit(&name, file.misfit.clone());
-                    run.controllers.insert(process.into(), file);
+                    run.controllers.insert(process.name().into(), file);
                 }
             }
-            run.take_log(&format!("{process}.hlog"));
-            if let Some(rows) = run.parse(&format!("{process}-timing.csv"), timing::read) {
+            run.take_log(&process.hlog());
+            if let Some(rows) = run.parse(&process.timing(), timing::read) {
                 run.whole = true;
-                run.rows.insert(process.into(), rows);
+                run.rows.insert(process.name().into(), rows);
             }
         }
         run.take_flights();
-        run.gaps = run.parse("probe.csv", probe::read);
-        run.reference = run.parse("cyclictest.json", reference::read);
+        run.gaps = run.parse(PROBE_CSV, probe::read);
+        run.reference = run.parse(CYCLICTEST_JSON, reference::read);
         run.take_ping_pongs();
         run.tell_what_is_missing();
         run
@@ -106,7 +110,7 @@ impl RunFiles {
     /// whole yet is not.
     pub fn read_description(&mut self, folder: &Path) -> bool {
         if self.run.is_none() {
-            self.run = read_json::<Value>(&folder.join("run.json")).ok().and_then(RunFile::of);
+            self.run = read_json::<Value>(&folder.join(RUN_JSON)).ok().and_then(RunFile::of);
         }
         self.run.is_some()
     }
@@ -150,9 +154,9 @@ impl RunFiles {
 
     /// The ping-pongs that `scripts/latency` put beside the run.
     fn take_ping_pongs(&mut self) {
-        self.ping_pong = self.json("ping-pong.json");
+        self.ping_pong = self.json(PING_PONG_JSON);
         for (name, _) in PING_PONGS {
-            let file = format!("ping-pong-{name}.hlog");
+            let file = format!("{PING_PONG}{name}{HLOG_END}");
             let Some(intervals) = self.parse(&file, hlog::read) else { continue };
             for interval in intervals {
                 self.ping_pongs.entry(interval.tag).or_default().add(&interval.samples);
@@ -186,7 +190,7 @@ impl RunFiles {
         for name in names {
             // PROCESS-CYCLE-TRIGGER, and a process may have a dash in its name.
             let Some(process) = name.rsplitn(3, '-').nth(2) else { continue };
-            if !PROCESSES.contains(&process) {
+            if Process::of_name(process).is_none() {
                 continue;
             }
             let process = process.to_owned();
@@ -280,19 +284,19 @@ impl RunFiles {
 
     /// Figures that `summary.json` and each `controller*.json` have in common, by process.
     pub(crate) fn process_reports(&self) -> impl Iterator<Item = (&str, &ProcessReport)> {
-        let emulator = self.summary.iter().map(|file| ("emulator", &file.process));
+        let emulator = self.summary.iter().map(|file| (EMULATOR, &file.process));
         emulator.chain(self.controllers.iter().map(|(process, file)| (process.as_str(), &file.process)))
     }
 
     /// `summary.json` and each `controller*.json` as they stand, by process.
     pub(crate) fn reports_as_they_stand(&self) -> impl Iterator<Item = (&str, &Value)> {
-        let emulator = self.summary.iter().map(|file| ("emulator", &file.json));
+        let emulator = self.summary.iter().map(|file| (EMULATOR, &file.json));
         emulator.chain(self.controllers.iter().map(|(process, file)| (process.as_str(), &file.json)))
     }
 
     /// What each process was granted for real time.
     pub(crate) fn granted(&self) -> impl Iterator<Item = (&str, &[Grant])> {
-        let emulator = self.run.iter().map(|file| ("emulator", file.granted.as_slice()));
+        let emulator = self.run.iter().map(|file| (EMULATOR, file.granted.as_slice()));
         emulator
             .chain(self.controllers.iter().map(|(process, file)| (process.as_str(), file.granted.as_slice())))
     }

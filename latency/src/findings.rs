@@ -6,7 +6,7 @@
 
 use super::explain::EVENT_OVER_NS;
 use super::explain::rules::in_words;
-use super::files::RunFiles;
+use super::files::{EMULATOR, RunFiles};
 use super::model::{Cause, Event, Finding};
 use protocol::periods::CYCLE_NS;
 use runlog::controller_report::ControllerReport;
@@ -67,7 +67,7 @@ fn explained_ns(events: &[Event], cause: Cause) -> u64 {
 fn stopped(runs: &[RunFiles], events: &[Event], cause: Cause) -> Option<Finding> {
     let is_rig = cause == Cause::EmulatorStopped;
     let reports = runs.iter().flat_map(RunFiles::process_reports);
-    let of_process = reports.filter(|(process, _)| (*process == "emulator") == is_rig);
+    let of_process = reports.filter(|(process, _)| (*process == EMULATOR) == is_rig);
     let counted = of_process.map(|(_, report)| report.timing.vitals.continued).sum::<u64>();
     let seen = of(events, cause).count() as u64;
     let count = counted.max(seen);
@@ -121,7 +121,7 @@ fn contention(events: &[Event]) -> Option<Finding> {
 fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
     let (mut skipped, mut worst_ns, mut unknown) = (0, 0, 0);
     for run in runs {
-        let rows = run.rows.get("emulator").map(Vec::as_slice).unwrap_or_default();
+        let rows = run.rows.get(EMULATOR).map(Vec::as_slice).unwrap_or_default();
         let summary = run.counted();
         let counted = summary.and_then(|summary| summary.skipped);
         let logged = run.logged.get("emulator-wakeup").and_then(|series| series.samples.max_ns());

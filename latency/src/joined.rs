@@ -8,7 +8,7 @@
 //! The later cycle of the rig says which cycle's sensors its command answers. Handing over is stamped before the call that sends,
 //! so the call itself is part of the way. What still comes out below zero counts as 0 and is counted.
 
-use super::files::{PROCESSES, RunFiles};
+use super::files::{EMULATOR, RunFiles};
 use super::samples::Samples;
 use protocol::periods::CYCLE_NS;
 use runlog::Axis;
@@ -45,12 +45,12 @@ type OfAxis = fn(&CycleTiming) -> Exchange;
 /// One-way latencies of a run with rows of both sides.
 pub(crate) fn one_way(run: &RunFiles) -> OneWay {
     let mut found = OneWay::default();
-    let Some(rig) = run.rows.get("emulator") else { return found };
+    let Some(rig) = run.rows.get(EMULATOR) else { return found };
     let axes: [(&str, OfAxis); 2] =
         [(Axis::Drive.name(), |row| row.drive), (Axis::Load.name(), |row| row.load)];
     for (axis, exchange) in axes {
-        let controllers = PROCESSES.iter().filter(|process| **process != "emulator");
-        let rows = controllers.filter_map(|process| run.rows.get(*process)).flatten();
+        let controllers = run.rows.iter().filter(|(process, _)| *process != EMULATOR);
+        let rows = controllers.flat_map(|(_, rows)| rows);
         // Whoever drives this axis has stamps of it.
         let answered: HashMap<u64, Exchange> = rows
             .map(|row| (row.cycle, exchange(row)))
@@ -104,7 +104,7 @@ pub(crate) fn of_rows(process: &str, rows: &[CycleTiming]) -> BTreeMap<String, S
     for row in rows {
         let late_ns = row.woke_ns.saturating_sub(row.due_ns);
         let completion_ns = row.done_ns.saturating_sub(row.due_ns);
-        if process == "emulator" {
+        if process == EMULATOR {
             // Each missed cycle was late too, against its own scheduled time, and done when this one was.
             for n in 1..=row.skipped.min(row.cycle) {
                 record("wakeup", row.cycle, late_ns + n * CYCLE_NS);

@@ -3,6 +3,7 @@
 use super::model::Source;
 use super::reference;
 use runlog::Axis;
+use runlog::process::Process;
 
 /// What follows the process in a tag: emulator-, controller-, controller-drive-, controller-load-.
 const OF_A_PROCESS: [(&str, &str); 7] = [
@@ -34,11 +35,11 @@ const OF_AN_AXIS: [(&str, Source, &str); 4] = [
     ("controller-to-rig", Source::Joined, "Bus latency one way, command from controller to rig"),
 ];
 
-const PROCESSES: [(&str, Source, &str); 4] = [
-    ("emulator", Source::Emulator, "emulator"),
-    ("controller-drive", Source::Controller, "drive controller"),
-    ("controller-load", Source::Controller, "load controller"),
-    ("controller", Source::Controller, "controller"),
+const PROCESSES: [(Process, Source, &str); 4] = [
+    (Process::Emulator, Source::Emulator, "emulator"),
+    (Process::ControllerOf(Axis::Drive), Source::Controller, "drive controller"),
+    (Process::ControllerOf(Axis::Load), Source::Controller, "load controller"),
+    (Process::Controller, Source::Controller, "controller"),
 ];
 
 /// A distribution that a report knows.
@@ -62,12 +63,12 @@ pub fn all() -> Vec<Kind> {
     let mut kinds = Vec::new();
     for (process, source, who) in PROCESSES {
         for (what, about) in OF_A_PROCESS {
-            let about = if process == "emulator" || what != "wakeup" {
+            let about = if process == Process::Emulator || what != "wakeup" {
                 format!("{about} ({who})")
             } else {
                 format!("From the arrival of the sensors to waking ({who})")
             };
-            kinds.push(Kind { tag: format!("{process}-{what}"), source, about });
+            kinds.push(Kind { tag: format!("{}-{what}", process.name()), source, about });
         }
     }
     for axis in Axis::NAMES {
@@ -108,8 +109,9 @@ fn ping_pongs() -> impl Iterator<Item = Kind> {
 pub fn of(tag: &str) -> Kind {
     let known = all().into_iter().find(|kind| kind.tag == tag);
     known.unwrap_or_else(|| {
-        let prefix =
-            |(process, source, _): &(&str, Source, &str)| tag.starts_with(process).then_some(*source);
+        let prefix = |(process, source, _): &(Process, Source, &str)| {
+            tag.starts_with(process.name()).then_some(*source)
+        };
         let foreign = if tag.starts_with(PING_PONG) { Source::Reference } else { Source::Emulator };
         let source = PROCESSES.iter().find_map(prefix).unwrap_or(foreign);
         Kind { tag: tag.into(), source, about: tag.replace('-', " ") }

@@ -1,7 +1,7 @@
 //! The runs one by one: counts, arrivals, and where each came from.
 
 use super::distributions::percentiles;
-use super::files::RunFiles;
+use super::files::{EMULATOR, RunFiles};
 use super::findings;
 use super::model::{ArrivalRow, FrameFaults, PercentilesNs, RunPart};
 use realtime::ArrivalFigures;
@@ -38,11 +38,10 @@ fn counts(run: &RunFiles) -> BTreeMap<String, u64> {
     const NO_COUNTS: [&str; 3] = ["schema_version", "thresholds", "figures"];
     let mut counts = BTreeMap::new();
     for (process, reported) in run.reports_as_they_stand() {
-        let prefix = if process == "emulator" { String::new() } else { format!("{process}.") };
+        let prefix = if process == EMULATOR { String::new() } else { format!("{process}.") };
         for (key, value) in reported.as_object().into_iter().flatten() {
             // Percentiles are no counts, and what joining copied from the controllers' own files stands there.
-            let copied =
-                process == "emulator" && ["axes", "controller", "controllers"].contains(&key.as_str());
+            let copied = process == EMULATOR && ["axes", "controller", "controllers"].contains(&key.as_str());
             // A sum in ns, such as the time that a thread waited for its CPU, is a count of its own.
             let is_distribution = key.ends_with("_ns") && !value.is_number();
             if !is_distribution && !NO_COUNTS.contains(&key.as_str()) && !copied {

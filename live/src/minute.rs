@@ -3,7 +3,7 @@
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
 use protocol::periods::CYCLE_NS;
 use runlog::candump::{self, FrameRecord};
-use runlog::run_folder::LineFile;
+use runlog::run_folder::{BUS_LOG, LineFile, MEASUREMENT_CSV};
 use runlog::telemetry::SetUp;
 use std::collections::VecDeque;
 use std::io::{self, Write};
@@ -105,7 +105,7 @@ impl Saved {
         }
         let reported = format!("saved in {}{}", self.folder.display(), self.cut);
         std::fs::create_dir_all(&self.folder)?;
-        let mut log = LineFile::create(&self.folder.join("bus.log"))?;
+        let mut log = LineFile::create(&self.folder.join(BUS_LOG))?;
         for record in &self.frames {
             candump::write_line(log.lines(), &self.interface, 0, record)?;
             log.write_when_full()?;
@@ -115,7 +115,7 @@ impl Saved {
             // Only telemetry tells which valve opening acted in which cycle.
             return Ok(reported);
         }
-        let mut table = LineFile::create(&self.folder.join("measurement.csv"))?;
+        let mut table = LineFile::create(&self.folder.join(MEASUREMENT_CSV))?;
         write!(table.lines(), "# linked={} added_mass_kg={}\ntime_s", self.linked, self.added_mass_kg)?;
         for axis in AXES {
             MEASURED.iter().try_for_each(|column| write!(table.lines(), ",{axis}_{column}"))?;

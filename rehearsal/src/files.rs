@@ -4,7 +4,7 @@ use crate::{Rehearsal, RehearsalParts};
 use axis_control::setup::{InputError, Inputs, Mode};
 use plant::tables::{self, CycleRecord};
 use plant::{Axis, Scene, SetupError};
-use runlog::run_folder::LineFile;
+use runlog::run_folder::{LineFile, MEASUREMENT_CSV, TRUTH_CSV};
 use std::io;
 use std::path::Path;
 
@@ -56,8 +56,8 @@ pub struct PlantTables {
 
 impl PlantTables {
     pub fn create(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<Self> {
-        let mut measurement = LineFile::create(&folder.join("measurement.csv"))?;
-        let mut truth = LineFile::create(&folder.join("truth.csv"))?;
+        let mut measurement = LineFile::create(&folder.join(MEASUREMENT_CSV))?;
+        let mut truth = LineFile::create(&folder.join(TRUTH_CSV))?;
         tables::write_measurement_head(measurement.lines(), scene.linked, scene.added_mass_kg)?;
         tables::write_truth_head(truth.lines(), &rehearsal.plant().term_names())?;
         Ok(Self { measurement, truth })

@@ -8,7 +8,7 @@
 //! ```
 
 use crate::candump::{self, FrameRecord};
-use crate::run_folder::{SCHEMA_VERSION, named, write_json};
+use crate::run_folder::{BUS_LOG, SCHEMA_VERSION, named, write_json};
 use crate::timing::{CycleTiming, write_head, write_row};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -82,7 +82,7 @@ pub fn write<'a>(
         write_head(out)?;
         rows.into_iter().try_for_each(|row| write_row(out, row))
     })?;
-    write_file(&folder.join("bus.log"), |out| {
+    write_file(&folder.join(BUS_LOG), |out| {
         frames
             .into_iter()
             .try_for_each(|record| candump::write_line(out, &log.interface, log.epoch_offset_ns, record))

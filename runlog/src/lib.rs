@@ -11,6 +11,7 @@ pub mod event;
 pub mod flight_dump;
 pub mod golden;
 pub mod ping_pong;
+pub mod process;
 pub mod run_folder;
 pub mod summary;
 pub mod telemetry;

@@ -3,6 +3,8 @@
 //! Tables grow by whole lines; JSON appears at once by being renamed. A process that is killed leaves files that read
 //! to their last line.
 
+use crate::axis::Axis;
+use crate::process::Process;
 use std::fs::File;
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -21,31 +23,55 @@ pub fn new_folder() -> PathBuf {
     PathBuf::from(format!("runs/{}-{}", now.as_secs(), std::process::id()))
 }
 
+/// What made a run.
+pub const RUN_JSON: &str = "run.json";
+/// What the emulator counted and, after `bench summary`, what the run adds up to.
+pub const SUMMARY_JSON: &str = "summary.json";
+/// Sensors and valves, a row for each cycle.
+pub const MEASUREMENT_CSV: &str = "measurement.csv";
+/// What only a simulation knows, a row for each cycle.
+pub const TRUTH_CSV: &str = "truth.csv";
+/// Every frame of the bus.
+pub const BUS_LOG: &str = "bus.log";
+/// Table of the faults that were put into a run; only runs in which there can be some have it.
+pub const FAULTS_CSV: &str = "faults.csv";
+/// Pair, group and load of a run that is measured.
+pub const CONDITIONS_JSON: &str = "conditions.json";
+/// Latencies of cyclictest beside a run.
+pub const CYCLICTEST_JSON: &str = "cyclictest.json";
+/// Ping-pongs beside a run.
+pub const PING_PONG_JSON: &str = "ping-pong.json";
+/// Gaps that `bench probe` saw beside a run.
+pub const PROBE_CSV: &str = "probe.csv";
+/// Curves of a run.
+pub const PICTURE_SVG: &str = "picture.svg";
+/// Curves around a step.
+pub const STEP_SVG: &str = "step.svg";
+/// Curves around an emergency stop.
+pub const STOP_SVG: &str = "stop.svg";
+
+/// Table of what the controller of an axis computed, whichever process that is in.
+#[must_use]
+pub fn controller_csv(axis: Axis) -> String {
+    format!("{}.csv", Process::ControllerOf(axis).name())
+}
+
 /// Files that programs write at the end of a run, or at its start in one go, and the emulator's own that it does not make in
 /// every run: what is left of an earlier run is none of this one's. What grows during a run is not among them, tables,
 /// `*.hlog` and dumps of the flight recorder ([`crate::flight_dump::clear`]): its writer makes it anew at its own start, and a
 /// controller may start before the rig. A controller's file whose axis no report of the run names is therefore of an earlier run.
-pub const RESULTS: &[&str] = &[
-    "run.json",
-    "summary.json",
-    "controller.json",
-    "controller-drive.json",
-    "controller-load.json",
-    "picture.svg",
-    "step.svg",
-    "stop.svg",
-    "emulator.hlog",
-    "emulator-timing.csv",
-    FAULTS_CSV,
-];
-
-/// Table of the faults that were put into a run; only runs in which there can be some have it.
-pub const FAULTS_CSV: &str = "faults.csv";
-
-/// Files of a controller, `name` being that of its report, that it does not make in every run: it removes them at its start.
 #[must_use]
-pub fn controller_results(name: &str) -> [String; 2] {
-    [format!("{name}.hlog"), format!("{name}-timing.csv")]
+pub fn results() -> Vec<String> {
+    let mut names = Vec::from([RUN_JSON, PICTURE_SVG, STEP_SVG, STOP_SVG, FAULTS_CSV].map(str::to_owned));
+    names.extend(Process::ALL.map(Process::report));
+    names.extend([Process::Emulator.hlog(), Process::Emulator.timing()]);
+    names
+}
+
+/// Files of a controller that it does not make in every run: it removes them at its start.
+#[must_use]
+pub fn controller_results(controller: Process) -> [String; 2] {
+    [controller.hlog(), controller.timing()]
 }
 
 /// Removes these files of an earlier run from `folder`.
@@ -62,12 +88,12 @@ pub fn clear(folder: &Path, names: &[impl AsRef<str>]) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes what an earlier run left of [`RESULTS`] in `folder`, so that two runs are never taken for one.
+/// Removes what an earlier run left of [`results`] in `folder`, so that two runs are never taken for one.
 ///
 /// # Errors
 /// What the system says, with the file's name.
 pub fn clear_results(folder: &Path) -> io::Result<()> {
-    clear(folder, RESULTS)
+    clear(folder, &results())
 }
 
 /// A file that grows by whole lines.
@@ -218,7 +244,7 @@ mod tests {
     fn results_of_an_earlier_run_go_and_everything_else_stays() {
         let folder = tempfile::tempdir().unwrap();
         let others = ["bus.log", "notes.txt"];
-        for name in RESULTS.iter().chain(&others) {
+        for name in results().iter().map(String::as_str).chain(others) {
             std::fs::write(folder.path().join(name), "of an earlier run").unwrap();
         }
         // Twice, because a folder without results is as good.

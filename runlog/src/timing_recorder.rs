@@ -11,6 +11,7 @@
 
 use crate::candump::FrameRecord;
 use crate::flight_dump::{self, Event, Log};
+use crate::process::{hlog_of, timing_of};
 use crate::run_folder::LineFile;
 use crate::timing::{self, CycleTiming};
 use protocol::frames::{Frame, MessageSpec};
@@ -155,11 +156,11 @@ impl TimingRecorder {
     pub fn create(setup: TimingSetup) -> io::Result<Self> {
         let TimingSetup { folder, process, due, log, .. } = setup;
         let mut account = StageAccount::new(&process, CYCLE);
-        let hlog = folder.join(format!("{process}.hlog"));
+        let hlog = folder.join(hlog_of(&process));
         let hlog = IntervalLog::create(&hlog, setup.started_unix_s, setup.started)?;
         account.log_to(if setup.copies_lines { hlog.with_copy() } else { hlog });
         let table = setup.full_timing.then(|| {
-            let mut table = LineFile::create(&folder.join(format!("{process}-timing.csv")))?;
+            let mut table = LineFile::create(&folder.join(timing_of(&process)))?;
             timing::write_head(table.lines())?;
             Ok::<_, io::Error>(table)
         });

@@ -19,21 +19,26 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapResult, WriteOptions, Writer};
 use protocol::can::{ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
 use protocol::frames::SignalKind;
-use runlog::run_folder::{FAULTS_CSV, FileError};
+use runlog::Axis;
+use runlog::run_folder::{FAULTS_CSV, FileError, MEASUREMENT_CSV, TRUTH_CSV, controller_csv};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Tables of a run's folder and their channels.
-const TABLES: [(&str, &str); 5] = [
-    ("measurement.csv", "/measurement"),
-    ("truth.csv", "/truth"),
-    ("controller-drive.csv", "/controller/drive"),
-    ("controller-load.csv", "/controller/load"),
-    (FAULTS_CSV, "/faults"),
-];
+/// Tables of a run's folder and their channels, a controller's with its axis.
+fn tables() -> [(String, String, Option<Axis>); 5] {
+    let of_rig = |name: &str, topic: &str| (name.to_owned(), topic.to_owned(), None);
+    let of_axis = |axis: Axis| (controller_csv(axis), format!("/controller/{}", axis.name()), Some(axis));
+    [
+        of_rig(MEASUREMENT_CSV, "/measurement"),
+        of_rig(TRUTH_CSV, "/truth"),
+        of_axis(Axis::Drive),
+        of_axis(Axis::Load),
+        of_rig(FAULTS_CSV, "/faults"),
+    ]
+}
 
 /// What was written.
 pub(super) struct Written {
@@ -88,14 +93,14 @@ pub(super) fn write(
         file.write_metadata(&metadata).map_err(unwritten)?;
     }
     let mut sources = Vec::new();
-    for (name, topic) in TABLES {
-        if let (Some(folder), Some(axis)) = (folder, topic.strip_prefix("/controller/"))
+    for (name, topic, axis) in tables() {
+        if let (Some(folder), Some(axis)) = (folder, axis)
             && !controllers::has_axis(folder, axis)?
         {
             continue;
         }
         if let Some(table) = folder.map(|folder| RunTable::open(&folder.join(name))).transpose()?.flatten() {
-            sources.push((topic.to_owned(), Source::Table { table, origin_ns: log.origin_ns() }));
+            sources.push((topic, Source::Table { table, origin_ns: log.origin_ns() }));
         }
     }
     for message in &signals.messages {

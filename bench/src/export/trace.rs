@@ -20,6 +20,7 @@ use crate::warn;
 use protocol::frames::MESSAGES;
 use protocol::periods::CYCLE_NS;
 use runlog::candump::FrameRecord;
+use runlog::process::Process;
 use runlog::run_folder::{FAULTS_CSV, FileError, read_text};
 use runlog::timing::{self, CycleTiming};
 use serde::Serialize;
@@ -28,10 +29,6 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-
-const RIG_TABLE: &str = "emulator-timing.csv";
-const CONTROLLER_TABLES: [&str; 3] =
-    ["controller-timing.csv", "controller-drive-timing.csv", "controller-load-timing.csv"];
 
 /// Processes of the trace; controllers follow the rig.
 const BUS: u32 = 1;
@@ -75,9 +72,8 @@ struct Trace {
     is_first: bool,
 }
 
-/// Cycles of a process.
-struct Process {
-    name: String,
+struct ProcessCycles {
+    name: &'static str,
     pid: u32,
     /// Whether it sends before it receives and computes, as the rig does.
     sends_first: bool,
@@ -123,21 +119,21 @@ pub(super) fn write(part: &Path, log: &RecordedLog, folder: Option<&Path>) -> Re
 }
 
 /// The processes whose cycles are known; those of controllers only beside the rig's, which says when cycle 0 was.
-fn processes(folder: &Path) -> Result<Vec<Process>, FileError> {
+fn processes(folder: &Path) -> Result<Vec<ProcessCycles>, FileError> {
     let mut processes = Vec::new();
-    for table in [RIG_TABLE].iter().chain(&CONTROLLER_TABLES) {
-        let path = folder.join(table);
-        let is_rig = *table == RIG_TABLE;
-        let name = if is_rig { "rig" } else { table.trim_end_matches("-timing.csv") };
-        if !path.exists() || !is_rig && !controllers::has_process(folder, name) {
+    for process in Process::ALL {
+        let path = folder.join(process.timing());
+        let is_rig = process == Process::Emulator;
+        let name = if is_rig { "rig" } else { process.name() };
+        if !path.exists() || !is_rig && !controllers::has_process(folder, process) {
             continue;
         }
         let rows = timing::read(&read_text(&path)?).map_err(|error| FileError::read(&path, error))?;
         let pid = if is_rig { RIG } else { RIG + 1 + processes.len() as u32 };
-        processes.push(Process { name: name.to_owned(), pid, sends_first: is_rig, rows });
+        processes.push(ProcessCycles { name, pid, sends_first: is_rig, rows });
     }
     if processes.first().is_some_and(|process| process.pid != RIG) {
-        let path = folder.join(RIG_TABLE);
+        let path = folder.join(Process::Emulator.timing());
         warn(&format!("{}: is missing, and with it the time of the controllers' cycles", path.display()));
         processes.clear();
     }
@@ -198,9 +194,9 @@ impl Trace {
 
     /// A slice for each cycle with its stages, and one for the wait before it; `offset_ns` turns the monotonic clock into the
     /// trace's.
-    fn cycles(&mut self, process: &Process, offset_ns: i128) -> io::Result<()> {
+    fn cycles(&mut self, process: &ProcessCycles, offset_ns: i128) -> io::Result<()> {
         let pid = process.pid;
-        self.name("process_name", pid, 0, &process.name)?;
+        self.name("process_name", pid, 0, process.name)?;
         self.name("thread_name", pid, CYCLES, "cycles")?;
         self.name("thread_name", pid, WAKE_UPS, "wake-up: due to woke")?;
         let mut previous_woke_ns = i128::MIN;

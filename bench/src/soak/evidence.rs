@@ -1,12 +1,16 @@
 //! What a segment left in its folder, read: reports of its programs, the frame log, and who was who on the bus.
 
+use super::EMULATOR;
 use super::account::{self, Account, Counts, Gaps, Party, Seen, Wire};
 use super::frame_log::{self, FrameLog, known_name};
 use super::model::Figures;
 use super::plan::Spec;
 use super::segment::Outcome;
 use protocol::bus::host::HostReport;
+use runlog::Axis;
 use runlog::controller_report::{AxisReport, ControllerReport};
+use runlog::process::Process;
+use runlog::run_folder::{BUS_LOG, RUN_JSON, SUMMARY_JSON};
 use runlog::summary::{ProcessReport, RunDescription, Summary};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -53,12 +57,11 @@ pub(super) fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts
 
 impl SegmentFiles {
     pub(super) fn read(spec: &Spec, folder: &Path) -> Self {
-        let names: &[&str] =
-            if spec.two_processes { &["controller-drive", "controller-load"] } else { &["controller"] };
-        let controllers = names.iter().map(|name| (*name, folder.join(format!("{name}.json"))));
-        let (summary, run) = (folder.join("summary.json"), folder.join("run.json"));
-        let reports = controllers.clone().chain([("emulator", summary.clone())]);
-        let log = folder.join("bus.log");
+        let controllers = Process::controllers(spec.two_processes).iter();
+        let controllers = controllers.map(|process| (process.name(), folder.join(process.report())));
+        let (summary, run) = (folder.join(SUMMARY_JSON), folder.join(RUN_JSON));
+        let reports = controllers.clone().chain([(EMULATOR, summary.clone())]);
+        let log = folder.join(BUS_LOG);
         let mut damaged = Vec::new();
         Self {
             summary: read_json(&summary, &mut damaged),
@@ -109,7 +112,7 @@ impl SegmentFiles {
             let pauses = commands.expired + commands.refused_stale + commands.breaks;
             Some(((*id).to_owned(), Gaps::Commands { lost: commands.lost, first, last, pauses }))
         });
-        Party { gaps: gaps.collect(), ..self.party("emulator") }
+        Party { gaps: gaps.collect(), ..self.party(EMULATOR) }
     }
 
     /// Each peer of the host goes to its process.
@@ -151,7 +154,7 @@ impl SegmentFiles {
         let axes = self.controllers.values().flat_map(|reported| reported.axes.values());
         let drive = self.drive();
         let summary = &self.summary;
-        let is_told = self.reports.get("emulator").is_some_and(|report| report.bus.is_some());
+        let is_told = self.reports.get(EMULATOR).is_some_and(|report| report.bus.is_some());
         Figures {
             cycles: summary.cycles,
             skipped: summary.skipped,
@@ -181,10 +184,11 @@ impl SegmentFiles {
     }
 
     fn controller(&self, name: &str, reported: &ControllerReport) -> Party {
-        let gaps = [("drive", "120"), ("load", "121")].iter().filter_map(|(axis, id)| {
-            let axis = reported.axes.get(*axis)?;
+        let sensors = [(Axis::Drive, "120"), (Axis::Load, "121")].into_iter();
+        let gaps = sensors.filter_map(|(axis, id)| {
+            let axis = reported.axes.get(axis.name())?;
             let (lost, before) = (axis.sensors_lost?, axis.sensors_missed_before_first_tick?);
-            Some(((*id).to_owned(), Gaps::Sensors { lost, before }))
+            Some((id.to_owned(), Gaps::Sensors { lost, before }))
         });
         Party { gaps: gaps.collect(), ..self.party(name) }
     }

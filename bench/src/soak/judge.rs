@@ -1,5 +1,6 @@
 //! What a finished segment is worth: its files read, its account closed, every check with its result.
 
+use super::EMULATOR;
 use super::account::{self, Account};
 use super::evidence::{SegmentFiles, counts};
 use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
@@ -66,7 +67,7 @@ fn processes(outcome: &Outcome) -> Check {
     // Asked to end by a signal, the rig says 130, with everything saved.
     let asked = matches!(outcome.end, End::Interrupted | End::DiskFull(_));
     let as_expected =
-        |name: &str, code: Option<i32>| code == Some(0) || (asked && name == "emulator" && code == Some(130));
+        |name: &str, code: Option<i32>| code == Some(0) || (asked && name == EMULATOR && code == Some(130));
     let mut broken: Vec<_> = outcome
         .exits
         .iter()

@@ -8,15 +8,13 @@ use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 use hdrhistogram::serialization::{Deserializer, Serializer, V2DeflateSerializer};
 use latency::hlog::decode;
 use realtime::{Recorder, write_hlog};
+use runlog::process::Process;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 use std::time::Duration;
-
-/// Files of a segment that hold distributions.
-const LOGS: &[&str] = &["emulator.hlog", "controller.hlog", "controller-drive.hlog", "controller-load.hlog"];
 
 #[derive(Clone, Default)]
 pub(super) struct Merged(BTreeMap<String, Histogram<u64>>);
@@ -40,7 +38,8 @@ impl Merged {
     /// Adds what a segment left in its folder. Tells what cannot be read.
     pub(super) fn add_segment(&mut self, folder: &Path) -> Vec<String> {
         let mut unread = Vec::new();
-        for path in LOGS.iter().map(|name| folder.join(name)).filter(|path| path.exists()) {
+        let logs = Process::ALL.map(|process| folder.join(process.hlog()));
+        for path in logs.into_iter().filter(|path| path.exists()) {
             if let Err(error) = self.add_log(&path) {
                 unread.push(format!("{}: {error}", path.display()));
             }

@@ -1,15 +1,11 @@
 //! Big files of older segments go, so that a soak of any length needs a known room: the newest and the failed ones keep theirs.
 
 use super::model::Segment;
-use runlog::flight_dump;
+use runlog::process::{HLOG_END, TIMING_END};
+use runlog::run_folder::{BUS_LOG, MEASUREMENT_CSV, PROBE_CSV, TRUTH_CSV, controller_csv};
+use runlog::{Axis, flight_dump};
 use std::io;
 use std::path::Path;
-
-/// Tables and logs that grow with a segment's length. What they add up to stands in `soak.json` and `soak.hlog`.
-const BIG: &[&str] =
-    &["bus.log", "measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv", "probe.csv"];
-/// Ends of names of further ones.
-const BIG_ENDS: &[&str] = &["-timing.csv", ".hlog"];
 
 /// Removes the big files of segments that keep theirs no longer; marks them.
 pub(super) fn rotate(out: &Path, segments: &mut [Segment], keep: u64, keep_failed: u64) -> io::Result<()> {
@@ -42,11 +38,18 @@ fn remove_big(folder: &Path) -> io::Result<()> {
         let path = folder.join(&*name);
         if name == flight_dump::FOLDER {
             gone(std::fs::remove_dir_all(&path))?;
-        } else if BIG.contains(&&*name) || BIG_ENDS.iter().any(|end| name.ends_with(end)) {
+        } else if is_big(&name) {
             gone(std::fs::remove_file(&path))?;
         }
     }
     Ok(())
+}
+
+/// Whether a file grows with a segment's length. What such tables and logs add up to stands in `soak.json` and `soak.hlog`.
+fn is_big(name: &str) -> bool {
+    [BUS_LOG, MEASUREMENT_CSV, TRUTH_CSV, PROBE_CSV].contains(&name)
+        || Axis::ALL.into_iter().any(|axis| controller_csv(axis) == name)
+        || [TIMING_END, HLOG_END].iter().any(|end| name.ends_with(end))
 }
 
 #[cfg(test)]

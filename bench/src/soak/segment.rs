@@ -4,14 +4,15 @@
 //! and its farewell ends the controllers. When one of them goes before its time, the others are ended too: what they
 //! have recorded stays, and the next segment is another one.
 
-use super::SoakError;
 use super::cli::SoakArguments;
 use super::memory::Sample;
 use super::plan::Spec;
 use super::processes::{Running, end_in_words};
 use super::procfs;
+use super::{EMULATOR, SoakError};
 use protocol::bus::BusUrl;
 use realtime::Interrupt;
+use runlog::process::Process;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -151,19 +152,18 @@ impl Start<'_> {
     fn emulator(&self, rig_s: f64) -> Result<Running, SoakError> {
         let mut more: Vec<OsString> = vec!["--seconds".into(), rig_s.to_string().into()];
         more.extend(self.common.arguments.emulator_options.split_whitespace().map(Into::into));
-        self.program("emulator", "emulator", more)
+        self.program(EMULATOR, "emulator", more)
     }
 
     fn controllers(&self) -> Result<Vec<Running>, SoakError> {
-        let axes: &[&str] = if self.spec.two_processes { &["drive", "load"] } else { &["both"] };
         let interface = interface(&self.common.arguments.bus);
         let before = interface.and_then(procfs::listeners);
         let mut controllers = Vec::new();
-        for axis in axes {
-            let name = if *axis == "both" { "controller".into() } else { format!("controller-{axis}") };
+        for process in Process::controllers(self.spec.two_processes) {
+            let axis = if let Process::ControllerOf(axis) = process { axis.name() } else { "both" };
             let mut more: Vec<OsString> = vec!["--axis".into(), axis.into(), "--repeat".into()];
             more.extend(self.common.arguments.controller_options.split_whitespace().map(Into::into));
-            controllers.push(self.program(&name, "controller", more)?);
+            controllers.push(self.program(process.name(), "controller", more)?);
         }
         if let Some((interface, before)) = interface.zip(before) {
             let until = Instant::now() + LISTEN;
@@ -215,7 +215,7 @@ impl Watch {
             let gone: Vec<_> =
                 running.iter_mut().filter_map(|one| (!one.is_running()).then(|| one.name.clone())).collect();
             let in_time = self.began.elapsed().as_secs_f64() >= rig_s;
-            if gone.iter().any(|name| name == "emulator") && in_time {
+            if gone.iter().any(|name| name == EMULATOR) && in_time {
                 return End::TimeUp;
             }
             // The farewell is heard a little before the rig's own end.

@@ -53,7 +53,7 @@ pub(crate) fn begin(
     };
     let recorder = TimingRecorder::create(TimingSetup {
         folder: arguments.files.out.clone(),
-        process: report::name(arguments.axis.list()),
+        process: report::process(arguments.axis.list()).name().into(),
         due: Due::OnArrival,
         full_timing: arguments.full_timing,
         flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),

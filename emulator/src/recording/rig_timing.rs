@@ -9,13 +9,14 @@ use protocol::frames::{MessageSpec, RIG_STATUS};
 use realtime::stages::Further;
 use realtime::{Percentiles, WallClockStep, WallClockWatch};
 use runlog::candump::FrameRecord;
+use runlog::process::Process;
 use runlog::timing::CycleTiming;
 use runlog::timing_recorder::{CommandAges, TimingFigures, TimingRecorder, TimingSetup};
 use std::collections::VecDeque;
 use std::io;
 
 /// Name of this process in tags and folders.
-pub(crate) const PROCESS: &str = "emulator";
+pub(crate) const PROCESS: &str = Process::Emulator.name();
 /// Steps of the wall clock that are kept.
 const MOST_STEPS: usize = 100;
 

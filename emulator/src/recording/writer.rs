@@ -13,7 +13,7 @@ use crate::telemetry::Telemetry;
 use plant::tables;
 use realtime::{Clock, MonotonicClock};
 use runlog::candump::{self, FrameRecord};
-use runlog::run_folder::{FAULTS_CSV, LineFile};
+use runlog::run_folder::{BUS_LOG, FAULTS_CSV, LineFile, MEASUREMENT_CSV, TRUTH_CSV};
 use runlog::telemetry::DroppedEvents;
 use runlog::timing_recorder::TimingSetup;
 use std::collections::HashMap;
@@ -91,7 +91,7 @@ impl Writer {
     pub(crate) fn create(mut setup: WriterSetup) -> io::Result<Self> {
         let open = |name: &str| LineFile::create(&setup.folder.join(name));
         let (bus_log, mut measurement, mut truth) =
-            (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
+            (open(BUS_LOG)?, open(MEASUREMENT_CSV)?, open(TRUTH_CSV)?);
         tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
         tables::write_truth_head(truth.lines(), &setup.terms)?;
         let mut faults = setup.faults.then(|| open(FAULTS_CSV)).transpose()?;

@@ -3,6 +3,7 @@
 use crate::children::{Children, Event};
 use crate::pair::{Pair, PairError};
 use crate::{Front, FrontError, last_lines};
+use runlog::run_folder::{CYCLICTEST_JSON, PING_PONG_JSON, PROBE_CSV};
 use rustix::process::Pid;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -134,7 +135,7 @@ impl SliceRunner {
         let said: Vec<_> = said.lines().filter(|line| !is_bin(line)).collect();
         fs::write(&log, said.join("\n") + "\n").map_err(|error| FrontError::output(&log, &error))?;
         if code == 0 && part.metadata().is_ok_and(|part| part.len() > 0) {
-            let whole = folder.join("cyclictest.json");
+            let whole = folder.join(CYCLICTEST_JSON);
             return fs::rename(&part, &whole).map_err(|error| FrontError::output(&whole, &error));
         }
         let first = said.into_iter().find(|line| !line.is_empty()).unwrap_or("it said nothing");
@@ -167,7 +168,7 @@ impl SliceRunner {
         let ended = pair.run(&mut self.children);
         if let Some(watching) = watching {
             self.end(watching);
-            let _ = fs::rename(run.with_extension("probe.csv"), run.join("probe.csv"));
+            let _ = fs::rename(run.with_extension(PROBE_CSV), run.join(PROBE_CSV));
         }
         match ended {
             Ok(_) => Ok(()),
@@ -188,7 +189,7 @@ impl SliceRunner {
         let log = run.with_extension("probe.log");
         let (out, error) = logs(File::create(&log), &log)?;
         let mut probe = Command::new(&self.bench);
-        probe.args(["probe", "--out"]).arg(run.with_extension("probe.csv")).stdout(out).stderr(error);
+        probe.args(["probe", "--out"]).arg(run.with_extension(PROBE_CSV)).stdout(out).stderr(error);
         self.children.start(&mut probe)
     }
 
@@ -215,7 +216,7 @@ impl SliceRunner {
         command.args(["--name", name, "--priority", &priority, "--cpu", &cpu, "--peer-cpu", &peer_cpu]);
         command
             .args(["--interval-us", "1000", "--seconds", &seconds, "--json"])
-            .arg(folder.join("ping-pong.json"));
+            .arg(folder.join(PING_PONG_JSON));
         command.arg("--out").arg(folder.join(format!("ping-pong-{name}.hlog")));
         let (out, error) = logs(File::create(file("log")), &file("log"))?;
         let code = self.children.call(command.stdout(out).stderr(error))?;

@@ -3,6 +3,7 @@
 use crate::files::RunFiles;
 use crate::model::Event;
 use runlog::flight_dump;
+use runlog::run_folder::BUS_LOG;
 use runlog::summary::{NotedEvent, Summary};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -17,7 +18,7 @@ const RIG_WITHIN_CYCLES: u64 = 10;
 pub(crate) fn add(event: &mut Event, run: &RunFiles) {
     let last = event.cycle + event.skipped;
     if let Some(dump) = dump(&run.folder, &event.process, event.cycle, last) {
-        event.frames = frames(&run.folder.join(&dump).join("bus.log"));
+        event.frames = frames(&run.folder.join(&dump).join(BUS_LOG));
         event.dump = Some(dump);
     }
     event.rig_events =

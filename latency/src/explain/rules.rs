@@ -18,6 +18,7 @@
 //! ahead of it. On a virtual machine that is how its host's doings look from inside. What another CPU wakes is ready at
 //! once: there a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
 
+use crate::files::EMULATOR;
 use crate::model::Cause;
 use crate::probe::ProbeCoverage;
 use realtime::VitalCounts;
@@ -84,7 +85,7 @@ fn first_that_holds(seen: &LatenessEvidence) -> Cause {
     let waited = seen.waited_half();
     let slow = seen.slow_ns > seen.late_ns;
     if seen.continued > 0 {
-        return if seen.process == "emulator" { Cause::EmulatorStopped } else { Cause::ControllerStopped };
+        return if seen.process == EMULATOR { Cause::EmulatorStopped } else { Cause::ControllerStopped };
     }
     if seen.still_ns.saturating_mul(2) >= bad_ns {
         return Cause::MachineStoodStill;
@@ -124,7 +125,7 @@ impl LatenessEvidence {
     pub(crate) fn machine_ran(&self) -> bool {
         self.another_ns.saturating_mul(2) >= self.bad_ns()
             || self.ran_elsewhere
-            || (self.process == "emulator" && self.waited_half())
+            || (self.process == EMULATOR && self.waited_half())
     }
 
     fn faults(&self) -> u64 {

@@ -6,6 +6,7 @@ use crate::model::{AroundRow, Cause, Event, Finding, Report};
 use pagekit::markup::{Cell, Table, folded, list, none, number, words as text};
 use pagekit::number;
 use pagekit::page::escaped;
+use runlog::process::TIMING_END;
 
 /// Rows of a card's table; more would make the page heavy, and the flight recorder's dump has them all.
 const MOST_ROWS: usize = 400;
@@ -30,7 +31,7 @@ fn nothing(report: &Report) -> String {
         return "None was recorded, which does not mean that none was: see what disturbed the runs.".into();
     }
     let over = number::length(EVENT_OVER_NS);
-    if report.runs.iter().any(|run| run.lacks.iter().any(|lack| lack.contains("-timing.csv"))) {
+    if report.runs.iter().any(|run| run.lacks.iter().any(|lack| lack.contains(TIMING_END))) {
         return format!(
             "None was recorded: no cycle was missed and no wake-up over {over} counted; slower work shows only beyond the \
              flight recorder's limit, because not every run wrote its timing tables."

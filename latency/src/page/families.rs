@@ -3,6 +3,7 @@
 //! Ours are recognised by the end of their tag (`emulator-wakeup`, `drive-round-trip`), a reference by the program that measured
 //! it: cyclictest waits for a time as our loops do, a ping-pong sends there and back as a round trip does.
 
+use crate::files::EMULATOR;
 use crate::model::{Distribution, Source};
 use pagekit::svg::Look;
 
@@ -85,7 +86,7 @@ pub(super) fn families(distributions: &[Distribution]) -> Vec<Family<'_>> {
         processes.sort_unstable();
         processes.dedup();
         // The rig first.
-        processes.sort_by_key(|process| *process != "emulator");
+        processes.sort_by_key(|process| *process != EMULATOR);
         for name in processes {
             let own = members.iter().copied().filter(|one| process(&one.name) == name).collect();
             found.push((format!("{title}: {name}"), about, own));

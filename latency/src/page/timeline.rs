@@ -9,6 +9,7 @@
 //! ```
 
 use super::histograms::scrolling;
+use crate::files::EMULATOR;
 use crate::model::{AroundRow, Event, ProbeGap};
 use pagekit::markup::none;
 use pagekit::number;
@@ -75,7 +76,7 @@ fn missed(event: &Event) -> Vec<(f64, f64)> {
 pub(super) fn by_process(event: &Event) -> Vec<(&str, &[AroundRow])> {
     let mut processes: Vec<_> =
         event.around.iter().map(|(process, rows)| (process.as_str(), rows.as_slice())).collect();
-    processes.sort_by_key(|(process, _)| *process != "emulator");
+    processes.sort_by_key(|(process, _)| *process != EMULATOR);
     processes
 }
 
