@@ -197,8 +197,8 @@ impl Windows<'_> {
         windows
     }
 
-    /// The same windows in another record of the same run, which differs by noise alone: its start states are estimated with these
-    /// `sensitivities`, of the windows of this record. `None` where a window is left out of one of the two.
+    /// The same windows in another record of the same run, which differs by noise alone: its start states are estimated with
+    /// these `sensitivities`, of the windows of this record. `None` where a window is left out of one of the two.
     pub(crate) fn replicated<'r>(
         &self,
         record: &'r GriddedRecord,

@@ -90,8 +90,8 @@ impl Significance {
         );
         if let Some(DrawnRecords { draws, reached, largest, p_value, .. }) = &self.chance {
             text += &format!(
-                " Of {draws} simulated records with parameters alone {reached} reach {gain_without_best:.0}, and the best gains {largest:.0} \
-                 (p {}).",
+                " Of {draws} simulated records with parameters alone {reached} reach {gain_without_best:.0}, and the best gains \
+                 {largest:.0} (p {}).",
                 p_words(*p_value)
             );
         }

@@ -6,10 +6,11 @@
 //!   all draws spent                                             ──► p = (draws that reach it + 1) / (draws + 1)
 //! ```
 //!
-//! *Far above*, where the tail is light: of n draws from a shifted exponential distribution, a further one exceeds the smallest by r times their range
-//! with probability n / (n + 1) prod_(i < n) i / (i + r), since what exceeds the smallest is exponential again. The
-//! largest of many chi2-like gains has a tail like that; one window in which the piston breaks away at another moment gives a
-//! heavier one, so that the rule needs gains without the best windows. With r = 1 it is 1 / (n + 1), the p-value of plain Monte Carlo.
+//! *Far above*, where the tail is light: of n draws from a shifted exponential distribution, a further one exceeds the smallest
+//! by r times their range with probability n / (n + 1) prod_(i < n) i / (i + r), since what exceeds the smallest is exponential
+//! again. The largest of many chi2-like gains has a tail like that; one window in which the piston breaks away at another moment
+//! gives a heavier one, so that the rule needs gains without the best windows. With r = 1 it is 1 / (n + 1), the p-value of plain
+//! Monte Carlo.
 //!
 //! Source: Besag, Clifford 1991, Biometrika 78(2): sequential Monte Carlo p-values.
 
