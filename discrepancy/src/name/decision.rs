@@ -155,10 +155,9 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
     let too_little = !is_likely
         && lacks_fit
         && (is_outside || !is_named.contains(&true) || share_left(engine, &selection) > MOST_LOSS_LEFT);
-    if too_little && let Some(first) = all_rounds.first().and_then(|round| round.first()) {
-        // It comes nearest to what is outside the catalogue.
-        selection.rounds = vec![vec![first.clone()]];
-        selection.model = first.clone();
+    if too_little && let Some(nearest) = nearest(&all_rounds, explanations) {
+        selection.rounds = vec![vec![nearest.clone()]];
+        selection.model = nearest.clone();
         shares = selection.shares(engine);
         is_named = vec![false; selection.model.placed.len()];
     }
@@ -174,6 +173,22 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
         }
     };
     Decision { selection, lacks_fit, shares, is_named, explained }
+}
+
+/// The single effect that comes nearest to what is outside the catalogue: of the most probable set of effects the one that removes
+/// most alone; where none of that set was fitted alone, the one of all effects.
+///
+/// The loss alone would choose an effect of the axis that fits worst, beside a background often another one than that of the
+/// missing law.
+fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Option<&'a Refit> {
+    let singles = all_rounds.first()?;
+    let effects = explanations.iter().filter(|one| one.kind == ExplanationKind::Effects);
+    let probable = effects.max_by(|left, right| left.probability.total_cmp(&right.probability));
+    let is_in = |single: &&Refit, set: &[EffectEstimate]| {
+        single.placed.iter().all(|placed| set.iter().any(|other| same(placed, other)))
+    };
+    let of_set = probable.and_then(|one| one.sets.first());
+    of_set.and_then(|set| singles.iter().find(|single| is_in(single, set))).or_else(|| singles.first())
 }
 
 /// Number of parameters that a model has significantly off.
@@ -218,40 +233,61 @@ mod tests {
     use crate::parameters::COUNT;
     use plant::RigParameters;
 
-    #[test]
-    fn what_is_less_probable_than_nothing_or_hardly_probable_has_no_name() {
+    fn placed(name: &str, amplitude: f64) -> EffectEstimate {
         let all = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]);
-        let placed = |name: &str, amplitude: f64| {
-            let candidate = *all.iter().find(|candidate| candidate.sheet.name == name).unwrap();
-            let mut coordinates = candidate.origin();
-            coordinates[0] = amplitude;
-            EffectEstimate { candidate, coordinates }
-        };
-        let model = Refit {
-            placed: vec![placed("inclination", 1.0), placed("valve-offset", 1e-3)],
+        let candidate = *all.iter().find(|candidate| candidate.sheet.name == name).unwrap();
+        let mut coordinates = candidate.origin();
+        coordinates[0] = amplitude;
+        EffectEstimate { candidate, coordinates }
+    }
+
+    fn model_of(placed: Vec<EffectEstimate>) -> Refit {
+        Refit {
+            placed,
             factors: [1.0; COUNT],
             loss: 0.0,
             squares: Vec::new(),
             errors: Vec::new(),
             design_effect: 1.0,
             convergence: Default::default(),
+        }
+    }
+
+    fn explanation(kind: ExplanationKind, sets: Vec<Vec<EffectEstimate>>, probability: f64) -> Explanation {
+        Explanation { kind, sets, features: None, fit: None, probability, marginal: None }
+    }
+
+    #[test]
+    fn what_is_outside_resembles_the_most_probable_effect_and_without_one_that_of_the_best_fit() {
+        let single = |name| model_of(vec![placed(name, 1.0)]);
+        let rounds =
+            [vec![single("valve-offset"), single("inclination"), single("piston-leakage")], Vec::new()];
+        let none = explanation(ExplanationKind::NoneOfThese, Vec::new(), 0.6);
+        let set = |names: &[&str], probability| {
+            let set = names.iter().map(|name| placed(name, 0.5)).collect();
+            explanation(ExplanationKind::Effects, vec![set], probability)
         };
-        let one = |kind, sets, probability| Explanation {
-            kind,
-            sets,
-            features: None,
-            fit: None,
-            probability,
-            marginal: None,
+        let named = |explanations: &[Explanation]| {
+            nearest(&rounds, explanations).unwrap().placed[0].candidate.sheet.name
         };
+        let likely = set(&["piston-leakage", "inclination"], 0.3);
+        assert_eq!(named(&[set(&["valve-offset"], 0.1), likely, none.clone()]), "inclination");
+        assert_eq!(named(&[set(&["dead-volume"], 0.3), none.clone()]), "valve-offset");
+        assert_eq!(named(&[none]), "valve-offset");
+        assert!(nearest(&[], &[]).is_none());
+    }
+
+    #[test]
+    fn what_is_less_probable_than_nothing_or_hardly_probable_has_no_name() {
+        let model = model_of(vec![placed("inclination", 1.0), placed("valve-offset", 1e-3)]);
         let improbable = |null: f64, set: f64| {
             let sets = vec![vec![placed("piston-leakage", 1.0)], vec![placed("inclination", 0.9)]];
             is_improbable(
                 &model,
                 &[
-                    one(ExplanationKind::Null, Vec::new(), null),
-                    one(ExplanationKind::Effects, sets, set),
-                    one(ExplanationKind::NoneOfThese, Vec::new(), 1.0 - null - set),
+                    explanation(ExplanationKind::Null, Vec::new(), null),
+                    explanation(ExplanationKind::Effects, sets, set),
+                    explanation(ExplanationKind::NoneOfThese, Vec::new(), 1.0 - null - set),
                 ],
             )
         };
