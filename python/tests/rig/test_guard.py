@@ -49,6 +49,14 @@ def processes_with(mark):
     return found
 
 
+def of_process(pid, file):
+    """A file of a process in /proc; empty where the process has ended."""
+    try:
+        return Path(f"/proc/{pid}/{file}").read_bytes()
+    except OSError:
+        return b""
+
+
 def gone(mark, private, timeout_s=60.0):
     """Waits until there is no process and no private folder; whether that came to pass."""
     until = time.monotonic() + timeout_s
@@ -96,7 +104,7 @@ def test_a_kill_at_random_moments_leaves_no_process_no_socket_no_lock_and_readab
 def test_grandchildren_of_a_foreign_program_end_too(tmp_path, number):
     victim, mark, private = start(tmp_path, "real", 0, shell=True)
     until = time.monotonic() + 60
-    while not any(Path(f"/proc/{pid}/comm").read_text() == "sleep\n" for pid in processes_with(mark) if Path(f"/proc/{pid}").exists()):
+    while not any(of_process(pid, "comm") == b"sleep\n" for pid in processes_with(mark)):
         assert time.monotonic() < until and victim.poll() is None, "it starts"
         time.sleep(0.01)
     victim.send_signal(number)
@@ -109,7 +117,7 @@ def test_a_guard_that_is_killed_takes_its_programs_along(tmp_path):
     victim.stdout.readline()
     until = time.monotonic() + 60
     while True:
-        guards = [pid for pid in processes_with(mark) if b"guard.py" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        guards = [pid for pid in processes_with(mark) if b"guard.py" in of_process(pid, "cmdline")]
         if guards and len(processes_with(mark)) >= 4:
             break
         assert time.monotonic() < until
