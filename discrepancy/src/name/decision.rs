@@ -175,8 +175,8 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
     Decision { selection, lacks_fit, shares, is_named, explained }
 }
 
-/// The single effect that comes nearest to what is outside the catalogue: of the most probable set of effects the one that removes
-/// most alone; where none of that set was fitted alone, the one of all effects.
+/// The single effect that comes nearest to what is outside the catalogue: of the most probable set of effects the one that
+/// removes most alone; where none of that set was fitted alone, the one of all effects.
 ///
 /// The loss alone would choose an effect of the axis that fits worst, beside a background often another one than that of the
 /// missing law.
