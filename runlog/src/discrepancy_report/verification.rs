@@ -28,7 +28,7 @@ pub struct Verification {
     #[serde(default)]
     pub record: String,
     /// Windowed chi2 per degree of freedom of the baseline.
-    #[serde(skip_deserializing)]
+    #[serde(default = "unknown", deserialize_with = "null_is_nan")]
     pub chi2_before: f64,
     /// Windowed chi2 per degree of freedom of the extended model.
     #[serde(deserialize_with = "null_is_nan")]

@@ -60,6 +60,8 @@ pub struct Case {
     pub judgement: Judgement,
     /// How probable it said what was so, and what was not.
     pub explanations: Vec<Said>,
+    /// Chi2 per degree of freedom that the rig file leaves on the held-out record, as reported.
+    pub rig_file_chi2: Option<f64>,
     /// Reported parameters of the baseline that the rig file has right: by which share of its value each is off.
     pub parameter_errors: Vec<f64>,
     /// What it came to when the hidden effect was left out of the program's catalogue.
@@ -259,6 +261,9 @@ fn case(
         coloured_noise: recipe.coloured_noise,
         explanations: good
             .map_or_else(Vec::new, |own| probability::judge(draw, &members, left_out.is_some(), own)),
+        rig_file_chi2: good
+            .and_then(|own| Some(own.verification.as_ref()?.chi2_before))
+            .filter(|chi2| chi2.is_finite()),
         parameter_errors: good.map_or_else(Vec::new, |own| parameters_off(draw, own)),
         judgement,
         left_out,
