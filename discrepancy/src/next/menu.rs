@@ -42,18 +42,14 @@ macro_rules! menu {
 }
 
 menu! {
-    "shut-and-hold": "leakage and an offset of the valve",
+    "shut-and-hold": "leakage, and dead zone, hysteresis and offset of the valve",
     "chirps": "delays and lags",
     "ends": "volume, position offset and what the gas does with its heat",
-    "two-pressures": "friction that grows with the speed and friction that grows with the pressure",
-    "valve-null": "dead zone, hysteresis, offset and leakage of the valve",
     "valve-steps": "rate limit, second order and delay of the spool",
     "full-exhaust": "silencer, restrictions and exhaust edges",
-    "rests": "break-away that grows at rest",
-    "slow-reversals": "bristles, Stribeck's curve and what turns with the direction",
-    "weights": "inertia and gains of sensors",
+    "slow-reversals": "bristles, Stribeck's curve, break-away and what turns with the direction",
+    "weights": "inertia, gains of sensors and what of the friction grows with the pressure",
     "load-steps": "gap and stiffness of the linkage, droop of the supply",
-    "pressed-hold": "leakage across the piston and at the valve's null",
 }
 
 /// Text of a shipped program that the menu uses.

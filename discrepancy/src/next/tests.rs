@@ -175,7 +175,7 @@ fn explanations_that_are_one_are_never_told_apart() {
     let noise = ReadingNoise::specified(&rig);
     let explanations = [one.clone(), one];
     let setting = setting(&rig, &explanations, &noise);
-    let entry = MENU.iter().find(|entry| entry.name == "valve-null").expect("an entry");
+    let entry = MENU.iter().find(|entry| entry.name == "chirps").expect("an entry");
     let rehearsed = rehearse(&setting, &[entry], &mut |_| {});
     let trials = &rehearsed[0].trials;
     assert_eq!(trials.len(), 20, "{trials:?}");

@@ -69,7 +69,7 @@ fn what_is_left_open_counts_only_with_the_truth_among_it() {
 #[test]
 fn a_draw_is_measured_under_the_menus_experiments_with_noise_of_its_own() {
     let free = MENU.iter().find(|entry| entry.name == "shut-and-hold").unwrap();
-    let linked = MENU.iter().find(|entry| entry.name == "pressed-hold").unwrap();
+    let linked = MENU.iter().find(|entry| entry.name == "load-steps").unwrap();
     let single = draw(Kind::Single, &["inclination"]);
     assert_ne!(recipe(&single).seed, single.recipe.seed);
     assert!(recipe(&single).seed < 1 << 53);
