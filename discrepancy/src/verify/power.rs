@@ -117,7 +117,7 @@ pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
         .collect()
 }
 
-/// Windows that remain after trimming.
+/// Windows that remain after trimming; of two models, by the smaller of both: a fault of the record is one to both.
 pub(super) fn kept(squares: &[Squares]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..squares.len()).filter(|at| squares[*at].expected > 0.0).collect();
     // A stable sort: equal windows stay in their order.

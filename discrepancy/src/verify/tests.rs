@@ -103,6 +103,20 @@ fn the_true_model_closes_the_gap_and_a_wrong_sign_does_not() {
 }
 
 #[test]
+fn windows_that_one_model_alone_gets_wrong_count_and_faults_of_the_record_do_not() {
+    let sums = |at: usize, sum: f64| {
+        Power::new(&(0..60).map(|k| if k == at { sum } else { 100.0 }).collect::<Vec<_>>(), &[100.0; 60], 1)
+    };
+    let ratio = |models: [Power; 2]| {
+        let misfit = signal_misfit(&models, 0, 1.0, 0.01);
+        misfit.after / misfit.before
+    };
+    assert_eq!(ratio([sums(7, 1e5), sums(7, 2e5)]), 1.0, "a spike of the sensor");
+    assert!(ratio([sums(7, 100.0), sums(7, 1e5)]) > 4.0, "the extended model alone");
+    assert!(ratio([sums(7, 1e5), sums(7, 100.0)]) < 0.25, "the rig file alone");
+}
+
+#[test]
 fn a_hidden_leak_is_closed_by_itself() {
     let rig = RigParameters::baseline();
     let truth = rig.with_effect("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)]).unwrap();
