@@ -3,24 +3,15 @@
 //! The end of a column's name is its unit (`drive_position_m`); a column of words is known by its name.
 
 use crate::warn;
+use figures::record::CHAINS;
 use runlog::run_folder::FileError;
 use settings::unit_of;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-/// Columns of `controller-*.csv` and `faults.csv` that hold words.
-const WORDS: [&str; 9] = [
-    "main_chain",
-    "force_chain",
-    "matching_chain",
-    "emergency_stop_chain",
-    "what",
-    "fault",
-    "at",
-    "numbers",
-    "cause",
-];
+/// Columns of `faults.csv` that hold words; of `controller-*.csv` it is [`CHAINS`].
+const OF_FAULTS: [&str; 5] = ["what", "fault", "at", "numbers", "cause"];
 
 pub(super) struct RunTable {
     file: PathBuf,
@@ -118,7 +109,7 @@ impl RunTable {
 }
 
 pub(super) fn holds_words(column: &str) -> bool {
-    WORDS.contains(&column)
+    CHAINS.contains(&column) || OF_FAULTS.contains(&column)
 }
 
 /// Unit of a column by the end of its name; empty for a plain number and for words.
