@@ -4,9 +4,9 @@ use crate::rehearsed::{self, Run};
 use crate::{Trial, TrialError};
 use axis_control::axis::AxisRecord;
 use axis_control::setup::{FileArguments, Inputs};
-use figures::record::Record;
-use figures::series::{Series, Span};
-use figures::tables_read::{StateSpan, Table};
+use figures::record::{MEASURED, Record};
+use figures::series::Series;
+use figures::tables_read::{Table, enter};
 use figures::{self, Figures, position};
 use plant::{Axis, Scene};
 use rehearsal::Rehearsed;
@@ -80,49 +80,27 @@ fn time_s(row: &Rehearsed) -> f64 {
 }
 
 fn measured(run: &Run) -> Table {
+    let mut columns = vec![Series::default(); MEASURED.len()];
+    for row in &run.rows {
+        for (column, value) in columns.iter_mut().zip(row.cycle.measured()) {
+            column.push(time_s(row), value);
+        }
+    }
     let mut table = Table::default();
-    let mut put = |name, of: fn(&Rehearsed) -> f64| {
-        table.set_numbers(name, run.rows.iter().map(|row| (time_s(row), of(row))).collect());
-    };
-    put("drive_valve", |row| row.cycle.valve[0]);
-    put("drive_position_m", |row| row.cycle.readings[0].position.value);
-    put("drive_force_N", |row| row.cycle.readings[0].force.value);
-    put("load_valve", |row| row.cycle.valve[1]);
-    put("load_position_m", |row| row.cycle.readings[1].position.value);
-    put("load_force_N", |row| row.cycle.readings[1].force.value);
+    MEASURED.iter().zip(columns).for_each(|(name, column)| table.set_numbers(name, column));
     table
 }
 
 fn controller<'a>(rows: impl Iterator<Item = (f64, &'a AxisRecord)> + Clone) -> Table {
     let mut table = Table::default();
-    let mut put = |name, of: fn(&AxisRecord) -> Option<f64>| {
-        let column: Series = rows.clone().filter_map(|(time_s, row)| Some((time_s, of(row)?))).collect();
-        table.set_numbers(name, column);
-    };
-    put("set_position_m", |row| Some(row.set_position?.position_m));
-    put("set_velocity_m_per_s", |row| Some(row.set_position?.velocity_m_per_s));
-    put("set_force_N", |row| Some(row.set_force?.force_n));
-    put("position_m", |row| Some(row.position_m));
-    put("velocity_m_per_s", |row| Some(row.velocity_m_per_s));
-    put("force_N", |row| Some(row.force_n));
-    put("opening", |row| Some(row.opening));
-    put("moving", |row| Some(f64::from(u8::from(row.moving()))));
-    table.set_states("main_chain", states(rows.clone().map(|(time_s, row)| (time_s, row.main.name()))));
-    table.set_states("force_chain", states(rows.map(|(time_s, row)| (time_s, row.force_chain.name()))));
-    table
-}
-
-/// A state lasts until the row of the next one; the last one until its last row.
-fn states(rows: impl Iterator<Item = (f64, &'static str)>) -> Vec<StateSpan> {
-    let mut spans: Vec<StateSpan> = Vec::new();
-    for (time_s, state) in rows {
-        if let Some(last) = spans.last_mut() {
-            last.span.to_s = time_s;
-            if last.state == state {
-                continue;
-            }
-        }
-        spans.push(StateSpan { state: state.into(), span: Span { from_s: time_s, to_s: time_s } });
+    for column in AxisRecord::NUMBERS {
+        let samples = rows.clone().filter_map(|(time_s, row)| Some((time_s, (column.value)(row)?)));
+        table.set_numbers(column.name, samples.collect());
     }
-    spans
+    for column in AxisRecord::CHAINS {
+        let mut spans = Vec::new();
+        rows.clone().for_each(|(time_s, row)| enter(&mut spans, (column.state)(row), time_s));
+        table.set_states(column.name, spans);
+    }
+    table
 }
