@@ -5,6 +5,7 @@
 //! without a distinction of cases are judged alike.
 
 use super::force::NOISE_S;
+use super::relieving::AT_WORK;
 use super::{Family, Figures};
 use crate::record::{Record, common};
 use crate::series::{Series, Span};
@@ -19,8 +20,6 @@ const AWAY_M: f64 = 0.001;
 const BESIDE_M: f64 = 0.005;
 /// What is looked at in the end.
 const END_S: f64 = 0.3;
-/// States of the force chain in which a hand may move the axis.
-const BY_HAND: &[&str] = &["limited", "standstill", "moving"];
 
 pub(super) const FAMILY: Family = Family {
     title: "hand (manual mode in the experiment; load sensor smoothed over 5 ms)",
@@ -39,7 +38,7 @@ pub(super) const FAMILY: Family = Family {
 };
 
 fn compute(record: &Record, figures: &mut Figures) {
-    let by_hand = common(&record.load.in_state("force_chain", BY_HAND), &record.experiments());
+    let by_hand = common(&record.load.in_state("force_chain", AT_WORK), &record.experiments());
     let Some(first) = by_hand.first() else { return };
     let position = record.measured.numbers("load_position_m");
     let force = record.measured.numbers("load_force_N").smoothed(NOISE_S).map(f64::abs);

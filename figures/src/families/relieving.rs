@@ -14,8 +14,9 @@ const AFTER_S: f64 = 0.05;
 /// Relieved: below this share of the force before, or below this force, whichever is larger.
 const RELIEVED_SHARE: f64 = 0.1;
 const RELIEVED_N: f64 = 10.0;
-/// States of the force chain while it relieves, and of the main chain in which it does.
-const AT_WORK: &[&str] = &["limited", "standstill", "moving"];
+/// States of the force chain at work: it relieves, or lets a hand move the axis.
+pub(super) const AT_WORK: &[&str] = &["limited", "standstill", "moving"];
+/// States of the main chain in which it relieves.
 const BEFORE_EXPERIMENT: &[&str] = &["initial-positioning", "preparing"];
 
 pub(super) const FAMILY: Family = Family {
