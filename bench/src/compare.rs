@@ -7,12 +7,12 @@ pub(crate) mod differences;
 pub(crate) mod overlay;
 
 use crate::drawing::Picture;
+use crate::picture::programs;
 use crate::runs::{Run, rows};
 use figures::SummaryError;
 use pagekit::grid::Grid;
 use pagekit::number::{in_use, without_unit};
 use pagekit::page::{document, escaped};
-use runlog::Axis;
 use runlog::run_folder::FileError;
 use std::path::{Path, PathBuf};
 
@@ -71,11 +71,7 @@ pub(crate) fn page(runs: &[Run], grid: &Grid, pictures: &[Picture]) -> Result<St
 
 /// A run by name, with the programs that its experiment names.
 fn entry(run: &Run) -> String {
-    let program = |axis: &str| {
-        let program = run.record.experiment.get(axis)?.get("program")?.as_str()?;
-        Some(format!("{axis}: {program}"))
-    };
-    let programs: Vec<_> = Axis::NAMES.into_iter().filter_map(program).collect();
+    let programs = programs(&run.record);
     let programs = if programs.is_empty() { String::new() } else { format!(" ({})", programs.join(", ")) };
     let folder = run.folder.display().to_string();
     format!("<li><b>{}</b>{} in {}</li>\n", escaped(&run.name), escaped(&programs), escaped(&folder))

@@ -89,11 +89,16 @@ fn text(record: &Record, path: &[&str]) -> Option<String> {
     table.get(*last)?.as_str().map(str::to_owned)
 }
 
+/// The programs that the experiment names, each behind its axis.
+pub(crate) fn programs(record: &Record) -> Vec<String> {
+    let program = |axis: &str| text(record, &[axis, "program"]).map(|program| format!("{axis}: {program}"));
+    Axis::NAMES.into_iter().filter_map(program).collect()
+}
+
 /// What the experiment says of itself, and the programs of both axes.
 fn caption(record: &Record) -> String {
     let about = text(record, &["about"]);
-    let program = |axis: &str| text(record, &[axis, "program"]).map(|program| format!("{axis}: {program}"));
-    let programs: Vec<_> = Axis::NAMES.into_iter().filter_map(program).collect();
+    let programs = programs(record);
     let programs = (!programs.is_empty()).then(|| programs.join("   "));
     about.into_iter().chain(programs).collect::<Vec<_>>().join("\n")
 }
