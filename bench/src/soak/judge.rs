@@ -8,6 +8,7 @@ use super::model::{Check, CheckResult, Figures};
 use super::plan::Spec;
 use super::segment::{End, Outcome};
 use figures::thresholds::{self, ByRepetition, Found};
+use figures::top::POSITIONS;
 use runlog::summary::{JudgedBound, ProcessReport};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -181,13 +182,12 @@ fn excuse(evidence: &SegmentFiles, judge: bool) -> Option<String> {
 /// The position errors against the experiment's bounds on them; what did not come about in the segment's time is not judged.
 fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
     let drive = evidence.drive();
-    let measured: BTreeMap<_, _> = [
-        ("position_error_dynamic_m", drive.and_then(|drive| drive.position_error_dynamic_m)),
-        ("position_error_static_m", drive.and_then(|drive| drive.position_error_static_m)),
-    ]
-    .into_iter()
-    .filter_map(|(key, error_m)| Some((key, error_m?)))
-    .collect();
+    let errors_m = [
+        drive.and_then(|drive| drive.position_error_dynamic_m),
+        drive.and_then(|drive| drive.position_error_static_m),
+    ];
+    let reported = POSITIONS.into_iter().zip(errors_m);
+    let measured: BTreeMap<_, _> = reported.filter_map(|(key, error_m)| Some((key, error_m?))).collect();
     let experiment = evidence.run.experiment_toml.as_deref().unwrap_or_default().parse::<toml::Table>();
     let passed =
         experiment.ok().and_then(|table| table.get("passed")?.as_table().cloned()).unwrap_or_default();
