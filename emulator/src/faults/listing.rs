@@ -1,8 +1,9 @@
 //! `emulator faults`: the table of faults for a person, for a program, and for the page; and a script checked.
 
-use super::script::{FaultScript, signals};
+use super::script::signals;
 use super::table::{FaultSpec, Places, all};
 use crate::cli::FaultsArguments;
+use crate::inputs::Script;
 use crate::run::RunError;
 use protocol::exit::Exit;
 use runlog::run_folder::SCHEMA_VERSION;
@@ -14,10 +15,7 @@ use std::io::Write as _;
 /// Prints the table, or checks a script.
 pub(crate) fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
     let text = if let Some(path) = &arguments.check {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| RunError::Input(format!("cannot read {}: {error}", path.display())))?;
-        let script = FaultScript::from_toml(&text, &path.display().to_string())
-            .map_err(|error| RunError::Input(error.to_string()))?;
+        let Script { script, .. } = Script::read(path)?;
         format!("{}: {} fault(s), each as the table allows", path.display(), script.faults.len())
     } else if arguments.json {
         serde_json::to_string_pretty(&as_json()).unwrap_or_default()
