@@ -3,7 +3,7 @@
 use super::files::RunFiles;
 use super::joined::{self, Series};
 use super::model::{Distribution, Maximum, PercentilesNs};
-use super::samples::Samples;
+use super::samples::{Samples, supported};
 use super::{kinds, reference};
 use std::collections::BTreeMap;
 
@@ -80,15 +80,7 @@ pub(crate) fn percentiles_of_run(
 
 /// Percentiles of the summaries; nothing without samples.
 pub(crate) fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
-    let count = reported.count;
-    let at = |value: Option<u64>, least: u64| value.filter(|_| count >= least);
-    (count > 0).then(|| PercentilesNs {
-        p90: at(reported.p90, 10),
-        p99: at(reported.p99, 100),
-        p999: at(reported.p999, 1000),
-        p9999: at(reported.p9999, 10_000),
-        ..*reported
-    })
+    (reported.count > 0).then(|| supported(*reported))
 }
 
 pub(crate) fn add_up(runs: &[BTreeMap<String, Series>]) -> BTreeMap<String, Samples> {

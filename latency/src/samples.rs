@@ -79,18 +79,7 @@ impl Samples {
 
     /// Percentiles; one that needs more samples than there are to differ from the maximum is null.
     pub fn percentiles_ns(&self) -> PercentilesNs {
-        let count = self.count();
-        let at =
-            |quantile: f64, least: u64| (count >= least).then(|| self.histogram.value_at_quantile(quantile));
-        PercentilesNs {
-            p50: at(0.5, 1),
-            p90: at(0.9, 10),
-            p99: at(0.99, 100),
-            p999: at(0.999, 1000),
-            p9999: at(0.9999, 10_000),
-            max: self.max_ns(),
-            count,
-        }
+        supported(PercentilesNs::of(&self.histogram))
     }
 
     /// Bins on a logarithmic axis, ten to a decade; what is 0 stands in one from 0 to 1 ns.
@@ -107,6 +96,18 @@ impl Samples {
             }
         }
         bins
+    }
+}
+
+/// The percentiles that the number of samples supports; a higher one would be the maximum again, and is null.
+pub(crate) fn supported(all: PercentilesNs) -> PercentilesNs {
+    let at = |value: Option<u64>, least: u64| value.filter(|_| all.count >= least);
+    PercentilesNs {
+        p90: at(all.p90, 10),
+        p99: at(all.p99, 100),
+        p999: at(all.p999, 1000),
+        p9999: at(all.p9999, 10_000),
+        ..all
     }
 }
 
