@@ -27,6 +27,7 @@ use crate::say;
 use cli::ProbeArguments;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use gaps::{Gap, GapWatch, Total};
+use latency::probe::COLUMNS;
 use protocol::exit::Exit;
 use realtime::privileges::parse_cpu_list;
 use realtime::signals::Continued;
@@ -42,7 +43,6 @@ use thread_priority::{
     thread_native_id,
 };
 
-const HEAD: &str = "cpu,from_ns,to_ns,another_ran";
 /// Gaps that wait for the writer: what all CPUs can see in several of its turns.
 const QUEUE: usize = 65_536;
 /// Turn of the writer.
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;
     let continued = Continued::watch().map_err(ProbeError::Signals)?;
     let mut file = LineFile::create(&arguments.out).map_err(ProbeError::Write)?;
-    file.lines().extend_from_slice(format!("{HEAD}\n").as_bytes());
+    file.lines().extend_from_slice(format!("{}\n", COLUMNS.join(",")).as_bytes());
     file.write_out().map_err(ProbeError::Write)?;
     // A page that is not there would be a gap of the probe's own making.
     realtime::acquire(&Request { lock_memory: true, ..Request::default() });

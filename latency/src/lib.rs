@@ -55,7 +55,7 @@ pub mod model;
 pub mod output;
 pub mod page;
 mod parts;
-mod probe;
+pub mod probe;
 mod ratios;
 mod reference;
 pub mod report_cause;

@@ -4,7 +4,8 @@
 //! host of a virtual machine took it away, or its firmware did. A row without length says that the probe watches that CPU
 //! from there on; older tables have none, and do not tell of a CPU without gaps whether it was watched.
 
-const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
+/// Columns of the table, in its order.
+pub const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
 
 /// A gap on one CPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
