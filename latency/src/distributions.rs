@@ -59,7 +59,7 @@ pub(crate) fn percentiles_of_run(
             (format!("{process}-wakeup"), &stages.wakeup_ns),
             (format!("{process}-execution"), &stages.execution_ns),
             (format!("{process}-period-error"), &stages.period_error_ns),
-            ("drive-round-trip".to_owned(), &report.round_trip_ns),
+            (kinds::ROUND_TRIPS[0].to_owned(), &report.round_trip_ns),
         ] {
             if let Some(percentiles) = percentiles(figures) {
                 reported.entry(tag).or_insert(percentiles);

@@ -3,7 +3,7 @@
 use super::hlog::{self, Passing};
 use super::joined::Series;
 use super::json_files::{ControllerFile, RunFile, SummaryFile};
-use super::kinds::{PING_PONG, PING_PONGS};
+use super::kinds::{PING_PONG, PING_PONGS, ROUND_TRIPS};
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
@@ -167,7 +167,7 @@ impl RunFiles {
     pub(crate) fn take_interval(&mut self, passing: Passing<'_>) {
         let Passing { tag, start_s, duration_s, histogram } = passing;
         // Logs from before the load axis had a round trip of its own name the drive's without its axis.
-        let tag = if tag == "round-trip" { "drive-round-trip" } else { tag };
+        let tag = if tag == "round-trip" { ROUND_TRIPS[0] } else { tag };
         if !self.logged.contains_key(tag) {
             self.logged.insert(tag.to_owned(), Series::default());
         }

@@ -7,6 +7,7 @@
 use super::explain::EVENT_OVER_NS;
 use super::explain::rules::in_words;
 use super::files::{EMULATOR, RunFiles};
+use super::kinds::WAKE_UP;
 use super::model::{Cause, Event, Finding};
 use protocol::periods::CYCLE_NS;
 use runlog::controller_report::ControllerReport;
@@ -124,7 +125,7 @@ fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
         let rows = run.rows.get(EMULATOR).map(Vec::as_slice).unwrap_or_default();
         let summary = run.counted();
         let counted = summary.and_then(|summary| summary.skipped);
-        let logged = run.logged.get("emulator-wakeup").and_then(|series| series.samples.max_ns());
+        let logged = run.logged.get(WAKE_UP).and_then(|series| series.samples.max_ns());
         let longest_ns = logged.or(summary.and_then(|summary| summary.wakeup_ns.max));
         let missing = counted.unwrap_or_default().saturating_sub(rows.iter().map(|row| row.skipped).sum());
         let late_ns = |row: &CycleTiming| (row.woke_ns + row.skipped * CYCLE_NS).saturating_sub(row.due_ns);

@@ -27,6 +27,11 @@ pub const PING_PONG: &str = "ping-pong-";
 /// What ends the tag of one that is measured to the answer's arrival, as the rig's round trip is.
 pub const TO_ARRIVAL: &str = "-to-arrival";
 
+/// Tag of the rig's wake-up latency.
+pub const WAKE_UP: &str = "emulator-wakeup";
+/// Tags of the round trips, the drive's and the load's.
+pub const ROUND_TRIPS: [&str; 2] = ["drive-round-trip", "load-round-trip"];
+
 /// What follows the axis in a tag: drive-, load-.
 const OF_AN_AXIS: [(&str, Source, &str); 4] = [
     ("round-trip", Source::Emulator, "Sensors sent to the command that answers them received"),
@@ -83,7 +88,7 @@ pub fn all() -> Vec<Kind> {
     // What is set beside each other stands beside each other.
     kinds.insert(1, reference);
     let after =
-        kinds.iter().position(|kind| kind.tag == "drive-round-trip").map_or(kinds.len(), |place| place + 1);
+        kinds.iter().position(|kind| kind.tag == ROUND_TRIPS[0]).map_or(kinds.len(), |place| place + 1);
     kinds.splice(after..after, ping_pongs());
     kinds
 }
@@ -134,6 +139,7 @@ mod tests {
         tags.sort();
         tags.dedup();
         assert_eq!(tags.len(), kinds.len());
+        assert!([WAKE_UP].iter().chain(&ROUND_TRIPS).all(|tag| place(tag) < kinds.len()));
         assert_eq!(of("controller-load-step").source, Source::Controller);
         assert_eq!(of("load-rig-to-controller").source, Source::Joined);
         assert_eq!(of("controller-of-somebody").source, Source::Controller);

@@ -1,6 +1,7 @@
 //! A report in words and tables: `report.md`, which a merge request takes as it stands, and the short table of a terminal.
 
 use super::explain::rules::in_words;
+use super::kinds::WAKE_UP;
 use super::model::{BoundResult, Comparison, Distribution, Event, PercentilesNs, Ratio, Report, Source};
 use super::report_cause::in_kebab;
 use super::resolution::{self, Verdict};
@@ -181,7 +182,7 @@ fn runs(report: &Report) -> String {
     const COUNTS: [&str; 5] = ["cycles", "skipped", "overruns", "frames_lost_by_gaps", "frames_malformed"];
     let row = |(place, run): (usize, &super::model::RunPart)| {
         let count = |key: &str| run.counts.get(key).map_or_else(|| "-".to_owned(), u64::to_string);
-        let wakeup = run.percentiles_ns.get("emulator-wakeup").copied().unwrap_or_default();
+        let wakeup = run.percentiles_ns.get(WAKE_UP).copied().unwrap_or_default();
         let mut cells =
             vec![format!("{place} {}", run.folder), run.group.clone(), format!("{:.1}", run.duration_s)];
         cells.extend(COUNTS.map(count));

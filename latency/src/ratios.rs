@@ -3,6 +3,7 @@
 //! A pair is a run with the reference measured right beside it, so that what the machine did in those minutes is in both. What is
 //! reported of the ratios is their [`median`].
 
+use super::kinds::{ROUND_TRIPS, WAKE_UP};
 use super::model::{Ratio, RunPart};
 use super::reference;
 use super::samples::Pick;
@@ -10,13 +11,13 @@ use figures::median::{Median, median};
 
 /// What is set against what: our distribution, percentile, the reference's distribution.
 const COMPARED: [(&str, &str, Pick, &str); 6] = [
-    ("emulator-wakeup", "p50", |reported| reported.p50, reference::TAG),
-    ("emulator-wakeup", "p99", |reported| reported.p99, reference::TAG),
-    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-bus"),
+    (WAKE_UP, "p50", |reported| reported.p50, reference::TAG),
+    (WAKE_UP, "p99", |reported| reported.p99, reference::TAG),
+    (ROUND_TRIPS[0], "p50", |reported| reported.p50, "ping-pong-bus"),
     // Like for like: both end when the answer has arrived.
-    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-bus-to-arrival"),
-    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-embedded"),
-    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-socketpair"),
+    (ROUND_TRIPS[0], "p50", |reported| reported.p50, "ping-pong-bus-to-arrival"),
+    (ROUND_TRIPS[0], "p50", |reported| reported.p50, "ping-pong-embedded"),
+    (ROUND_TRIPS[0], "p50", |reported| reported.p50, "ping-pong-socketpair"),
 ];
 
 /// Names of all ratios that there can be.

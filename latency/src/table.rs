@@ -10,6 +10,7 @@
 //! [`resolution`] says whether it is kept.
 
 use crate::bounds;
+use crate::kinds::WAKE_UP;
 use crate::model::{Ratio, Report, RunPart};
 use crate::ratios;
 use crate::resolution::{self, Verdict};
@@ -33,7 +34,6 @@ pub struct LatencyTableArguments {
     pub made_by: Option<String>,
 }
 
-const WAKE_UP: &str = "emulator-wakeup";
 /// What is claimed of plain runs and of those that spin: the files that `scripts/latency --claims` judges by.
 const CLAIMS: [&str; 2] = [include_str!("../bounds.toml"), include_str!("../bounds-spin.toml")];
 /// The figure of the runs that spin that is claimed, and the name of its row.

@@ -2,6 +2,7 @@
 
 use super::state::StagePercentiles;
 use latency::hlog;
+use latency::kinds::{ROUND_TRIPS, WAKE_UP};
 use latency::samples::Samples;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
@@ -9,8 +10,7 @@ use std::collections::{BTreeMap, VecDeque};
 /// Seconds that count as the last ones.
 const RECENT_S: usize = 10;
 /// What is shown, and the tags of the log that it is made of.
-const SHOWN: [(&str, &[&str]); 2] =
-    [("wake_up", &["emulator-wakeup"]), ("round_trip", &["drive-round-trip", "load-round-trip"])];
+const SHOWN: [(&str, &[&str]); 2] = [("wake_up", &[WAKE_UP]), ("round_trip", &ROUND_TRIPS)];
 
 #[derive(Debug, Default)]
 struct Distribution {
