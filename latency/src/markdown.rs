@@ -2,9 +2,10 @@
 
 use super::explain::rules::in_words;
 use super::kinds::WAKE_UP;
-use super::model::{BoundResult, Comparison, Distribution, Event, PercentilesNs, Ratio, Report, Source};
+use super::model::{BoundResult, Comparison, Distribution, Event, PercentilesNs, Ratio, Report};
 use super::report_cause::in_kebab;
 use super::resolution::{self, Verdict};
+use super::samples::PERCENTILES;
 use super::tallies;
 use pagekit::grid::Grid;
 use std::fmt::Write as _;
@@ -80,12 +81,10 @@ fn percentile_cells(reported: &PercentilesNs) -> Vec<String> {
 
 fn percentiles(distributions: &[Distribution]) -> Grid {
     let row = |distribution: &Distribution| {
-        let mark = if distribution.source == Source::Reference { " (reference)" } else { "" };
-        let name = format!("{}{mark}", distribution.name);
-        std::iter::once(name).chain(percentile_cells(&distribution.percentiles_ns)).collect()
+        let cells = percentile_cells(&distribution.percentiles_ns);
+        std::iter::once(distribution.shown_name()).chain(cells).collect()
     };
-    let head = ["us", "p50", "p90", "p99", "p99.9", "p99.99", "max", "count"];
-    Grid::new(head, distributions.iter().map(row))
+    Grid::new(["us"].into_iter().chain(PERCENTILES), distributions.iter().map(row))
 }
 
 fn ratios(ratios: &[Ratio]) -> String {

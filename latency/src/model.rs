@@ -119,6 +119,16 @@ pub struct Distribution {
     pub maxima: Vec<Maximum>,
 }
 
+impl Distribution {
+    /// Its tag; a reference says that it is one.
+    pub(crate) fn shown_name(&self) -> String {
+        match self.source {
+            Source::Reference => format!("{} (reference)", self.name),
+            _ => self.name.clone(),
+        }
+    }
+}
+
 /// Samples between two lengths of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bin {

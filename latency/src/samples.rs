@@ -7,6 +7,9 @@ use realtime::histogram::BOUND_NS;
 /// Bins to a decade of the logarithmic axis: each is 26 % wider than the one before.
 const BINS_PER_DECADE: i32 = 10;
 
+/// Names of what [`PercentilesNs`] holds, in its order.
+pub(crate) const PERCENTILES: [&str; 7] = ["p50", "p90", "p99", "p99.9", "p99.99", "max", "count"];
+
 pub(crate) type Pick = fn(&PercentilesNs) -> Option<u64>;
 
 /// Samples in ns, in a histogram of three significant digits up to [`BOUND_NS`]; what is longer stands in its last bin.

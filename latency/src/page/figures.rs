@@ -2,12 +2,11 @@
 
 use super::families::Family;
 use super::histograms::scrolling;
-use crate::model::{Distribution, PercentilesNs, Ratio, Source};
+use crate::model::{PercentilesNs, Ratio, Source};
+use crate::samples::PERCENTILES;
 use pagekit::markup::{Cell, Table, folded, none, number, paragraph, words as text};
 use pagekit::number::{self, NOT_MEASURED};
 use pagekit::svg::{Drawing, Look, Scale, stroke, text as label};
-
-pub(super) const PERCENTILES: [&str; 7] = ["p50", "p90", "p99", "p99.9", "p99.99", "max", "count"];
 
 pub(super) fn percentiles(of: &PercentilesNs) -> Vec<Cell> {
     let lengths = [of.p50, of.p90, of.p99, of.p999, of.p9999, of.max].map(|ns| number(number::maybe_us(ns)));
@@ -20,20 +19,12 @@ pub(super) fn key_figures(families: &[Family<'_>]) -> String {
         table.group(&family.title);
         for (_, distribution) in &family.members {
             let is_reference = distribution.source == Source::Reference;
-            let mut cells = vec![Cell::About(name(distribution), distribution.about.clone())];
+            let mut cells = vec![Cell::About(distribution.shown_name(), distribution.about.clone())];
             cells.extend(percentiles(&distribution.percentiles_ns));
             table.marked_row(if is_reference { "reference" } else { "" }, cells);
         }
     }
     table.html_or("No length of time was measured.")
-}
-
-/// Tag of a distribution; a reference says that it is one.
-pub(super) fn name(distribution: &Distribution) -> String {
-    match distribution.source {
-        Source::Reference => format!("{} (reference)", distribution.name),
-        _ => distribution.name.clone(),
-    }
 }
 
 /// The ratios: drawn, as a table, and each pair.

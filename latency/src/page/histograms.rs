@@ -4,7 +4,6 @@
 //! axis; an empty one brings the curve down to the axis, so that a gap before a late outlier is seen as one.
 
 use super::families::Family;
-use super::figures::name;
 use crate::model::{Bin, Distribution};
 use pagekit::markup::none;
 use pagekit::number;
@@ -96,7 +95,7 @@ fn chart(family: &Family<'_>, size: &Size) -> String {
         .iter()
         .map(|(look, one)| {
             let samples = number::count(one.percentiles_ns.count);
-            legend_entry(&curve_sample(*look), &format!("{}, {samples} samples", name(one)))
+            legend_entry(&curve_sample(*look), &format!("{}, {samples} samples", one.shown_name()))
         })
         .collect();
     let description = description(family);
@@ -181,7 +180,7 @@ fn description(family: &Family<'_>) -> String {
         let length = |ns: Option<u64>| ns.map_or_else(|| "not measured".to_owned(), number::length);
         format!(
             "{}: half below {}, 99 % below {}, longest {}.",
-            name(one),
+            one.shown_name(),
             length(of.p50),
             length(of.p99),
             length(of.max)

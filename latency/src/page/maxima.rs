@@ -4,7 +4,6 @@
 //! pixels the largest of them is drawn.
 
 use super::families::Family;
-use super::figures::name;
 use super::histograms::{FOOT, FULL, HALF, LEFT, RIGHT, Size, figure};
 use crate::model::{Distribution, Maximum, Report};
 use pagekit::markup::none;
@@ -96,7 +95,7 @@ fn chart(family: &Family<'_>, runs: &Runs, size: &Size) -> String {
 
 /// What stands above a strip: whose it is, and when the largest was.
 fn heading(distribution: &Distribution, runs: &Runs) -> String {
-    let name = name(distribution);
+    let name = distribution.shown_name();
     let Some(largest) = distribution.maxima.iter().max_by_key(|maximum| maximum.max_ns) else { return name };
     let run = if runs.are_several() { format!(" of run {}", largest.run) } else { String::new() };
     format!("{name}: longest {} in second {}{run}", number::length(largest.max_ns), largest.second)

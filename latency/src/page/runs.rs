@@ -1,7 +1,8 @@
 //! The runs one by one: how regularly frames came, what was counted, each run's percentiles.
 
-use super::figures::{PERCENTILES, percentiles};
+use super::figures::percentiles;
 use crate::model::{ArrivalRow, RunPart};
+use crate::samples::PERCENTILES;
 use crate::tallies;
 use pagekit::grid::Grid;
 use pagekit::markup::{Cell, Table, folded, list, number, words as text};
