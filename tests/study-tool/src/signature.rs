@@ -305,7 +305,7 @@ pub fn alike(left: &[f64], right: &[f64]) -> f64 {
     if lengths > 0.0 { (dot(left, right) / lengths).abs().min(1.0) } else { 0.0 }
 }
 
-fn dot(left: &[f64], right: &[f64]) -> f64 {
+pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(left, right)| left * right).sum()
 }
 

@@ -10,7 +10,7 @@
 use super::{Model, Part};
 use crate::classes::{nominal, with_parameter};
 use crate::nearest::Fit;
-use crate::signature::{Observer, length};
+use crate::signature::{Observer, dot, length};
 use crate::trajectory::WINDOW;
 use discrepancy::candidates::Candidate;
 use discrepancy::parameters::PARAMETERS as PRIORS;
@@ -213,8 +213,4 @@ fn is_drawn(candidate: &Candidate, coordinate: f64) -> bool {
     let least =
         if ends[0] * ends[1] < 0.0 { SMALLEST_ABOUT } else { SMALLEST * ends[0].abs().min(ends[1].abs()) };
     (least..=LARGEST * ends[0].abs().max(ends[1].abs())).contains(&coordinate.abs())
-}
-
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
 }
