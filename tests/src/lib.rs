@@ -6,6 +6,7 @@
 //!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
+//!   exit ──── exit codes as they are promised
 //!   broken ── a run with faults on purpose, and what it leaves
 //!   xcp ───── a client of the controllers' XCP, packet by packet, and the foreign one in Python
 //!   foreign_python  scripts with the packages that the product is held against
@@ -38,6 +39,7 @@ pub mod discrepancy;
 pub mod disturb;
 pub mod door;
 pub mod events;
+pub mod exit;
 pub mod firmware;
 pub mod foreign_python;
 pub mod guest;

@@ -6,14 +6,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
+use system_tests::exit::{BAD_INPUT, BOUND_BROKEN, GOOD, INTERRUPTED};
 use system_tests::small_disk::SmallDisk;
 use system_tests::{Build, Ended, PATIENCE, Program, Running, executable, install, json, skip, workspace};
 use tempfile::TempDir;
-
-const GOOD: i32 = 0;
-const BOUND_BROKEN: i32 = 1;
-const BAD_INPUT: i32 = 2;
-const INTERRUPTED: i32 = 130;
 
 /// Twelve short rehearsals in six parts.
 const SMALL: &str = "title = \"small\"\nexperiment = \"step\"\nseconds = 2.5\ndraws = 3\nruns_per_part = 2\n\

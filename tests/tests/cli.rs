@@ -2,10 +2,8 @@
 
 use std::path::Path;
 use std::process::Command;
+use system_tests::exit::{BAD_INPUT, BUS_FAILED};
 use system_tests::{Build, Ended, Launch, PROGRAM, Pace, Program, Running, SHORT, Scene, executable};
-
-const BAD_INPUT: i32 = 2;
-const BUS_FAILED: i32 = 3;
 
 /// A key of the rig file made wrong: text, its replacement, and what the message must hold besides file and line.
 const WRONG_RIGS: [(&str, &str, &[&str]); 7] = [

@@ -13,12 +13,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use system_tests::discrepancy::{discrepancy, rig};
+use system_tests::exit::{BAD_INPUT, GOOD, INTERRUPTED};
 use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, json};
 use tempfile::TempDir;
-
-const GOOD: i32 = 0;
-const BAD_INPUT: i32 = 2;
-const INTERRUPTED: i32 = 130;
 
 /// A constant force: some 14 degrees at 5 kg.
 const EFFECT: &str = "inclination";

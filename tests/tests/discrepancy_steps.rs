@@ -7,10 +7,9 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::discrepancy::{discrepancy, rig};
+use system_tests::exit::{BAD_INPUT, GOOD};
 use system_tests::json;
 
-const GOOD: i32 = 0;
-const BAD_INPUT: i32 = 2;
 const ROWS: usize = 8000;
 
 /// A record of an axis in which nothing is hidden.

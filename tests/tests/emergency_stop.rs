@@ -1,9 +1,9 @@
 //! Emergency stop over the bus: who stops must release, the record shows what acts, and the run ends by itself.
 
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
+use system_tests::exit::BOUND_BROKEN;
 use system_tests::{Pace, RESTLESS, Scene, Table, json};
 
-const BOUND_BROKEN: i32 = 1;
 /// The carriage moves by then.
 const TRIP: u32 = 900;
 const FOREIGN_RELEASE: u32 = 1400;

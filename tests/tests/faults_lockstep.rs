@@ -1,10 +1,8 @@
 //! Faults of the lockstep barrier: nobody hangs, the culprit is named, the exit code says which kind it was.
 
 use rustix::process::Signal;
+use system_tests::exit::{BUS_FAILED, LOCKSTEP_TIMEOUT};
 use system_tests::{Pace, RESTLESS, SHORT, Scene, Table, count, expect_whole_lines, json};
-
-const BUS_FAILED: i32 = 3;
-const LOCKSTEP_TIMEOUT: i32 = 4;
 
 fn expect_complete(scene: &Scene) {
     let measurement = Table::read(&scene.path("emulator/measurement.csv"));

@@ -1,13 +1,13 @@
 //! Faults of the output: a file that may not grow, a disk that is full, a process that is killed while it writes.
 
 use std::path::Path;
+use system_tests::exit::BAD_INPUT;
 use system_tests::small_disk::SmallDisk;
 use system_tests::{
     Ended, Pace, RESTLESS, Scene, Table, bus_log_to_last_whole_line, count, expect_whole_lines, json, skip,
     turn,
 };
 
-const BAD_INPUT: i32 = 2;
 /// No file grows beyond some hundred KiB; the signal that comes with it is ignored, so that writing fails instead.
 const SMALL_FILES: &str = "trap '' XFSZ && ulimit -f 300";
 

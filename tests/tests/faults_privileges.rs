@@ -1,6 +1,7 @@
 //! Without privileges for real time a run works all the same; what was refused is reported with its remedy.
 
 use std::os::unix::fs::{PermissionsExt, chown};
+use system_tests::exit::{BOUND_BROKEN, BUS_FAILED};
 use system_tests::{Pace, SHORT, Scene, count, json, turn};
 
 const NOBODY: u32 = 65534;
@@ -11,8 +12,6 @@ const NO_LIMITS_RAISED: &str = "ulimit -r 0 && ulimit -l 64";
 const LATENESS: [&str; 3] = ["missed its time", "fell silent", "did not come to rest"];
 /// What it says that answered too few cycles until the rig ended.
 const NOT_DONE: &str = "the rig ended before the experiment was done";
-const BOUND_BROKEN: i32 = 1;
-const BUS_FAILED: i32 = 3;
 
 #[test]
 fn a_user_without_privileges_is_told_the_remedy_and_the_run_succeeds() {

@@ -1,9 +1,9 @@
 //! Ctrl-C and SIGTERM, to each program and to both, in real time and in lockstep: exit 130, and every file complete.
 
 use rustix::process::Signal;
+use system_tests::exit::INTERRUPTED;
 use system_tests::{Pace, RESTLESS, Running, Scene, Table, bus_log, count, expect_whole_lines, json, turn};
 
-const INTERRUPTED: i32 = 130;
 const SIGNALS: [Signal; 2] = [Signal::INT, Signal::TERM];
 const PACES: [Pace; 2] = [Pace::Real, Pace::Lockstep];
 

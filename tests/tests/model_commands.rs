@@ -3,9 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 use system_tests::discrepancy::discrepancy;
-
-const GOOD: i32 = 0;
-const BAD_INPUT: i32 = 2;
+use system_tests::exit::{BAD_INPUT, GOOD};
 
 const MODEL: &str = "[inputs.u]\nunit = \"V\"\n[parameters]\nrate = { unit = \"1/s\", value = 2 }\n\
                      [states.x]\nunit = \"V\"\nstart = 0\nderivative = \"rate*(u - x)\"\n\

@@ -9,11 +9,11 @@ use protocol::frames::{
 use rustix::process::Signal;
 use std::path::PathBuf;
 use system_tests::bus_cycles::{Logged, read, read_to_last_whole_line};
+use system_tests::exit::BOUND_BROKEN;
 use system_tests::{
     AxisTable, Ended, LINKED, Pace, Running, SHORT, Scene, Table, count, events, json, run_both, turn,
 };
 
-const STOPPED: i32 = 1;
 /// Cycles from the partner's last frame to the emergency stop.
 const LOST_AT_LATEST: u64 = 100 + 10 + 1;
 /// Cycles from its last status.
@@ -110,7 +110,7 @@ fn log_of(scene: &Scene) -> PathBuf {
 
 fn expect_partner_lost(ended: Ended, axis: &str) -> Ended {
     let named = format!("stopped before the end: {axis}: partner-lost");
-    ended.expect_code(STOPPED).expect_said(&[named.as_str(), "fell silent for 100 ms"])
+    ended.expect_code(BOUND_BROKEN).expect_said(&[named.as_str(), "fell silent for 100 ms"])
 }
 
 #[test]
@@ -147,7 +147,7 @@ fn a_controller_that_stands_still_is_noticed_by_the_other_and_ends_too_when_it_g
         emulator.wait_for("emergency stop");
         failing.signal(Signal::CONT);
         let _ = expect_partner_lost(left.wait(), other);
-        let _ = failing.wait().expect_code(STOPPED).expect_said(&["stopped before the end"]);
+        let _ = failing.wait().expect_code(BOUND_BROKEN).expect_said(&["stopped before the end"]);
         let _ = emulator.interrupt();
         // In real time the last status may have been a cycle that was missed: one more period.
         expect_lost(&read(&log_of(&scene)), lost, other, 10);
@@ -160,7 +160,7 @@ fn a_controller_whose_partner_never_comes_gives_up_after_10_s_and_says_what_to_d
         let scene = Scene::new(LINKED);
         let emulator = scene.emulator(Pace::Lockstep).start();
         let controller = scene.axis_controller(Pace::Lockstep, axis).start();
-        let ended = controller.wait().expect_code(STOPPED);
+        let ended = controller.wait().expect_code(BOUND_BROKEN);
         let _ = ended.expect_said(&["partner-missing", "was not heard", "start it, or use --alone"]);
         let _ = emulator.wait();
         let table = AxisTable::read(&scene.path("controller").join(format!("controller-{axis}.csv")));
@@ -194,7 +194,7 @@ fn controllers_with_different_experiments_do_not_move_the_rig() {
     let drive = scene.axis_controller(Pace::Lockstep, "drive").start();
     let load = scene.axis_controller(Pace::Lockstep, "load").experiment(&other).start();
     for controller in [drive, load] {
-        let ended = controller.wait().expect_code(STOPPED);
+        let ended = controller.wait().expect_code(BOUND_BROKEN);
         let _ = ended.expect_said(&["stopped before the end"]);
     }
     let _ = emulator.wait();
@@ -249,7 +249,7 @@ fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
     let say = |cycle| if cycle == ABORT { run_control(RunControlCommand::Abort, 0) } else { None };
     let (scene, ended) = with_console(&long(), 20_000, say);
     for ended in ended {
-        let _ = ended.expect_code(STOPPED).expect_said(&["aborted: the console ended the run"]);
+        let _ = ended.expect_code(BOUND_BROKEN).expect_said(&["aborted: the console ended the run"]);
     }
     for axis in ["drive", "load"] {
         let table = table(&scene, axis);

@@ -5,12 +5,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
+use system_tests::exit::{BAD_INPUT, GOOD, INTERRUPTED};
 use system_tests::{Build, Ended, PATIENCE, Program, Running, executable, install, workspace};
 use tempfile::TempDir;
-
-const GOOD: i32 = 0;
-const BAD_INPUT: i32 = 2;
-const INTERRUPTED: i32 = 130;
 
 /// Two draws with nothing hidden, and a pair.
 const SHAPE: [&str; 10] =
