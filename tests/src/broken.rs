@@ -72,9 +72,14 @@ pub fn rows(path: &Path) -> Vec<Row> {
     lines.map(row).collect()
 }
 
+/// Cycles in which a [`fault`] begins and ends.
+pub const BEGINS: usize = 200;
+pub const ENDS: usize = 300;
+
 /// A fault from 0.2 to 0.3 s, as a script has it.
 pub fn fault(name: &str, at: &str, numbers: &str) -> String {
-    format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = 0.2\nto_s = 0.3\n{numbers}\n")
+    let [from_s, to_s] = [BEGINS, ENDS].map(|cycle| cycle as f64 / 1000.0);
+    format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = {from_s}\nto_s = {to_s}\n{numbers}\n")
 }
 
 impl Plan<'_> {

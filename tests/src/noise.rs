@@ -19,6 +19,7 @@ use protocol::can::{CanFrame, EXTENDED_FLAG, REMOTE_FLAG};
 use protocol::frames::{DecodeError, Frame};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
+use runlog::Axis;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,7 +40,8 @@ const STALE_CYCLES: usize = 20;
 const OPENING_STEPS: f64 = 2047.0;
 /// An opening is rounded to a step of the wire.
 const ROUNDING_STEPS: f64 = 0.51;
-const AXES: [&str; 2] = ["drive", "load"];
+/// Frames of noise in a second.
+pub const PER_SECOND: u32 = 10_000;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sent {
@@ -175,7 +177,7 @@ fn outcome(scene: &Scene, sent: Sent) -> Outcome {
     let reported = records::json(&scene.path("controller/controller.json"));
     let of = |pointer: &str| count(&summary, pointer);
     let mut obeyed = Obeyed::default();
-    AXES.iter().for_each(|axis| obeyed.add(scene, axis));
+    Axis::NAMES.iter().for_each(|axis| obeyed.add(scene, axis));
     Outcome {
         sent,
         missed: of("/skipped"),

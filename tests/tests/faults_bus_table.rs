@@ -9,11 +9,8 @@ use protocol::frames::{
     DRIVE_SENSORS, DRIVE_VALVE_COMMAND, Frame, LOAD_SENSORS, LOAD_VALVE_COMMAND, RIG_STATUS, TICK,
 };
 use serde_json::Value;
-use system_tests::broken::{Left, Plan, fault};
+use system_tests::broken::{BEGINS, ENDS, Left, Plan, fault};
 use system_tests::{count, count_of_id, events};
-
-const BEGINS: usize = 200;
-const ENDS: usize = 300;
 
 fn run_over(bus: &str, faults: &str) -> Left {
     Plan { faults, bus, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run_with_marks()

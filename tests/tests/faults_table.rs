@@ -5,10 +5,8 @@
 //! noise of 20 um, 0.5 N and 400 Pa, steps below that.
 
 use protocol::frames::RigStatus;
-use system_tests::broken::{Left, Plan, Row, fault};
+use system_tests::broken::{BEGINS, ENDS, Left, Plan, Row, fault};
 
-const BEGINS: usize = 200;
-const ENDS: usize = 300;
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
 /// What a kind of sensor measures: the unit that its keys end in, a size of error that is far above the noise and within the

@@ -2,10 +2,9 @@
 //!
 //! How much of the loop's time it costs is measured by `scripts/noise`.
 
-use system_tests::noise;
+use system_tests::noise::{self, PER_SECOND};
 
 const SECONDS: u32 = 4;
-const PER_SECOND: u32 = 10_000;
 
 #[test]
 fn no_opening_acts_that_no_controller_sent() {

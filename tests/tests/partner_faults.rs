@@ -4,7 +4,7 @@
 //! after its last status, which it sends each 10: at most 110 after it died, and one for the way of a frame.
 
 use protocol::frames::{
-    EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand, ValveCommand,
+    ECHO_RANGE, EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand, ValveCommand,
 };
 use rustix::process::Signal;
 use std::path::PathBuf;
@@ -15,10 +15,9 @@ use system_tests::{
 };
 
 /// Cycles from the partner's last frame to the emergency stop.
-const LOST_AT_LATEST: u64 = 100 + 10 + 1;
+const LOST_AT_LATEST: u64 = LOST_AFTER + 10 + 1;
 /// Cycles from its last status.
 const LOST_AFTER: u64 = 100;
-const ECHO_RANGE: u64 = 4096;
 
 /// The axis that fails, and the other.
 const PAIRS: [(&str, &str); 2] = [("load", "drive"), ("drive", "load")];

@@ -3,10 +3,8 @@
 //! `scripts/noise` calls it; the table goes to standard output, progress to standard error.
 
 use std::process::ExitCode;
-use system_tests::noise::{self, Outcome};
+use system_tests::noise::{self, Outcome, PER_SECOND};
 use system_tests::pairs::{self, Figure};
-
-const PER_SECOND: u32 = 10_000;
 
 const FIGURES: [Figure<Outcome>; 6] = [
     ("missed cycles", |run| run.missed as f64),
