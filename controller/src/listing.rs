@@ -11,7 +11,7 @@ use nominal::Axis;
 use protocol::exit::Exit;
 use settings::parameters::Parameter;
 use std::io::{self, Write};
-use xcp::a2l::{self, Described};
+use xcp::a2l::{self, AxisDescription};
 
 pub(crate) fn print() -> Exit {
     // A closed pipe is the reader's wish.
@@ -40,8 +40,11 @@ pub(crate) fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
         OneAxis::Load => Axis::Load,
     };
     let controller = controller(&inputs, axis)?;
-    let described =
-        Described { axis, title: &inputs.program_title(axis), variables: controller.program().variables() };
+    let described = AxisDescription {
+        axis,
+        title: &inputs.program_title(axis),
+        variables: controller.program().variables(),
+    };
     let text = a2l::text(&described).map_err(RunError::input)?;
     let _ = writeln!(io::stdout(), "{text}");
     Ok(Exit::Good)

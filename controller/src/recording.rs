@@ -107,7 +107,7 @@ impl Writer {
                 }
             }
             reloader.iter_mut().for_each(Reloader::look);
-            parameter_files.iter_mut().for_each(ParameterFileWorker::look);
+            parameter_files.iter_mut().for_each(ParameterFileWorker::poll);
             for item in news.try_iter() {
                 protocol::say!("controller: {}", sentence(item));
                 if let (NodeEvent::State { state: MainChainState::Fault, cycle, .. }, Some(timing)) =

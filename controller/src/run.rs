@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
 use std::time::Duration;
-use xcp::a2l::{self, Described};
+use xcp::a2l::{self, AxisDescription};
 use xcp::config::XcpConfig;
 use xcp::parameter_files::{AxisParameters, ParameterFileWorker};
 use xcp::port::{Port, Queues};
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         return Err(RunError::Input("--alone needs --axis drive or --axis load".into()));
     }
     let inputs = Inputs::read(&arguments.files)?;
-    let xcp = XcpConfig::asked(arguments.xcp.as_ref()).map_err(RunError::input)?;
+    let xcp = XcpConfig::from_option(arguments.xcp.as_ref()).map_err(RunError::input)?;
     let real_time = arguments.pace == Pace::Real;
     let mode = Mode { partner_needed: !arguments.alone, real_time, forever: arguments.files.repeat };
     let axes = arguments.axis.list();
@@ -152,7 +152,7 @@ fn open_xcp(
         let random = if arguments.pace == Pace::Real { random()? } else { [0; 16] };
         ports.push(Port::new(controller, &title, config, random, queues).map_err(RunError::input)?);
         let (variables, values) = (program.variables().to_vec(), program.values().to_vec());
-        let described = Described { axis, title: &title, variables: &variables };
+        let described = AxisDescription { axis, title: &title, variables: &variables };
         let path = out.join(a2l::file_name(axis));
         let text = a2l::text(&described).map_err(RunError::input)?;
         std::fs::write(&path, text)

@@ -1,4 +1,4 @@
-//! The A2L file of an axis, made of the tables that define its parameters, controls and signals: nothing is written in it twice.
+//! The A2L file of an axis, generated from the tables that define its parameters, controls and signals.
 //!
 //! What is the same for every program stands in `frame.a2l`: the protocol's numbers and their A2ML. Names are those of files
 //! with the axis in front, `drive.algorithm.gain_per_s`; what A2L allows in no name becomes `_`.
@@ -25,20 +25,23 @@ use nominal::Axis;
 use protocol::frames::BIT_RATE_PER_S;
 use settings::parameters::Parameter;
 
-pub struct Described<'a> {
+/// The controller that an A2L file describes.
+pub struct AxisDescription<'a> {
+    /// The axis that it controls.
     pub axis: Axis,
+    /// Title of its program; quotes and control characters become `'` in the file.
     pub title: &'a str,
-    /// Variables of the program, in their order.
+    /// Variables of its program, in the program's order.
     pub variables: &'a [Variable],
 }
 
-/// The texts that a slave hands out.
+/// Content of the description region of an XCP image.
 pub(crate) struct Description {
     pub bytes: Vec<u8>,
     pub texts: Texts,
 }
 
-/// A file that our own tables do not make: a bug, reported with what the library said.
+/// An A2L file that the library rejects. The tables are ours, so this is a bug; the message holds the library's reason.
 #[derive(Debug, thiserror::Error)]
 #[error("the A2L file of the {axis} axis cannot be made: {reason}")]
 pub struct A2lError {
@@ -46,8 +49,8 @@ pub struct A2lError {
     reason: String,
 }
 
-/// Which controller, program and tables this is: an A2L file with another one does not fit.
-pub fn epk(described: &Described<'_>) -> String {
+/// Identification of axis, program and tables (EPK): an A2L file with another EPK does not fit the controller.
+pub(crate) fn epk(described: &AxisDescription<'_>) -> String {
     let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
     let mut digest = crc.digest();
     let mut note = |name: &str, parameter: &Parameter| {
@@ -61,12 +64,13 @@ pub fn epk(described: &Described<'_>) -> String {
     format!("airbench {} {} {sum:08X}", env!("CARGO_PKG_VERSION"), described.axis.name())
 }
 
+/// Name of the A2L file in the run's folder.
 pub fn file_name(axis: Axis) -> String {
     format!("controller-{}.a2l", axis.name())
 }
 
-/// The texts that a slave hands out, the A2L file among them.
-pub(crate) fn description(described: &Described<'_>) -> Result<Description, A2lError> {
+/// A2L file, its name, EPK and event name in one block of bytes, and where each lies in it.
+pub(crate) fn description(described: &AxisDescription<'_>) -> Result<Description, A2lError> {
     let mut bytes = Vec::new();
     let mut place = |text: &str| {
         let at = bytes.len() as u32;
@@ -83,7 +87,10 @@ pub(crate) fn description(described: &Described<'_>) -> Result<Description, A2lE
 }
 
 /// The text of the A2L file of an axis.
-pub fn text(described: &Described<'_>) -> Result<String, A2lError> {
+///
+/// # Errors
+/// [`A2lError`] when the library rejects what the tables say: a bug.
+pub fn text(described: &AxisDescription<'_>) -> Result<String, A2lError> {
     let error = |reason: String| A2lError { axis: described.axis.name(), reason };
     let (mut file, warnings) =
         a2lfile::load_from_string(&frame(described), None, true).map_err(|what| error(what.to_string()))?;
@@ -104,7 +111,7 @@ fn checked(file: &A2lFile, mut problems: Vec<a2lfile::A2lError>) -> Result<(), S
     problems.first().map_or(Ok(()), |problem| Err(problem.to_string()))
 }
 
-fn frame(described: &Described<'_>) -> String {
+fn frame(described: &AxisDescription<'_>) -> String {
     let (master, slave) = identifiers(described.axis);
     let hex = |number: u32| format!("{number:#X}").replacen("0X", "0x", 1);
     // A text in quotes may hold anything but a quote and the end of its line.
@@ -353,7 +360,7 @@ impl Maker<'_> {
     }
 }
 
-/// Where a value lies and how.
+/// Address, format and conversion of a value.
 struct Place {
     address: u32,
     format: Format,

@@ -1,13 +1,13 @@
-//! A slave without bus and controller: for fuzzers, and for whoever tries packets by hand.
+//! A slave without bus and controller, for fuzzing and for packets by hand.
 
-use crate::a2l::{self, Described};
+use crate::a2l::{self, AxisDescription};
 use crate::image::{Image, ParameterActions};
 use crate::lock::Lock;
 use crate::slave::{Slave, SlaveParts};
 use axis_control::program::file::Source;
 use nominal::{Axis, RigParameters};
 
-/// Nobody acts on what is written.
+/// Accepts every write and has no effect.
 impl ParameterActions for () {
     fn set(&mut self, _place: usize, _value: f64) {}
 
@@ -20,7 +20,7 @@ impl ParameterActions for () {
     }
 }
 
-/// A slave over the program of an axis of which nothing is asked, behind this secret.
+/// A slave over the program that holds the drive's valve shut, locked with `secret`; without a secret it is never unlocked.
 ///
 /// # Panics
 /// When that program or its A2L file cannot be made: a bug.
@@ -29,7 +29,8 @@ pub fn slave(secret: Option<&[u8]>) -> Slave {
     let program = source
         .program(Axis::Drive, &RigParameters::baseline(), false)
         .unwrap_or_else(|error| panic!("the program that holds a valve shut: {error}"));
-    let described = Described { axis: Axis::Drive, title: &source.title, variables: program.variables() };
+    let described =
+        AxisDescription { axis: Axis::Drive, title: &source.title, variables: program.variables() };
     let description = a2l::description(&described).unwrap_or_else(|error| panic!("{error}"));
     Slave::new(SlaveParts {
         image: Image::new(description.bytes, program.variables().to_vec(), program.values()),

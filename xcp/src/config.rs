@@ -19,11 +19,12 @@ static DAQ_PACKETS: Parameter = Parameter::new(
 )
 .whole();
 
+/// Write protection and DAQ rate of all XCP ports of a controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct XcpConfig {
-    /// Secret of the write protection; `None`: nothing can be written.
+    /// Secret of the write protection, 16 to 64 bytes; `None`: nothing can be written.
     pub key: Option<Vec<u8>>,
-    /// DAQ packets that may leave in a cycle.
+    /// DAQ packets that a port may send in a cycle, 1 to 4.
     pub daq_packets_per_cycle: u32,
 }
 
@@ -34,28 +35,27 @@ impl Default for XcpConfig {
 }
 
 impl XcpConfig {
-    /// What the command line asks for: `None` without `--xcp`, the defaults without a file.
-    pub fn asked(asked: Option<&Option<PathBuf>>) -> Result<Option<Self>, SettingsError> {
-        match asked {
+    /// The configuration for the option `--xcp [FILE]`: `None` without the option, the defaults without a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no TOML of this form, or holds a value that is not allowed.
+    pub fn from_option(option: Option<&Option<PathBuf>>) -> Result<Option<Self>, SettingsError> {
+        match option {
             None => Ok(None),
             Some(None) => Ok(Some(Self::default())),
             Some(Some(path)) => Self::read(path).map(Some),
         }
     }
 
-    /// Reads the file.
-    ///
-    /// # Errors
-    /// It cannot be read, is no TOML of this form, or holds a value that is not allowed.
-    pub fn read(path: &Path) -> Result<Self, SettingsError> {
+    fn read(path: &Path) -> Result<Self, SettingsError> {
         let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
         Self::from_toml(&text, path)
     }
 
-    /// The configuration in a text; `file` is for messages.
+    /// The configuration in a text; `file` names it in messages.
     ///
     /// # Errors
-    /// What is wrong; never what the key is.
+    /// The text is no TOML of this form, or holds a value that is not allowed. The message never contains the key.
     pub fn from_toml(text: &str, file: &Path) -> Result<Self, SettingsError> {
         let source = Source::parse_with_secrets(text, file)?;
         let mut root = source.root();

@@ -1,4 +1,4 @@
-//! Lists of measurements that the slave sends by itself, each cycle or each so many.
+//! DAQ lists: measurements that the slave sends by itself, every cycle or every `prescaler` cycles.
 //!
 //! ```text
 //!   FREE_DAQ ─► ALLOC_DAQ ─► ALLOC_ODT ─► ALLOC_ODT_ENTRY ─► SET_DAQ_PTR, WRITE_DAQ ─► mode, start ─► packets
@@ -6,12 +6,11 @@
 //!   packet = number of the ODT | time stamp, 2 bytes, in the first ODT of a list if asked for | up to 7 bytes of entries
 //! ```
 //!
-//! All entries of a list are taken in the same cycle, after the answer to the sensors. Their packets leave at once, as far as
-//! so many may leave in a cycle; the others follow in the next ones. So the reserve of the bus is kept: lists that would need
-//! more than that in the long run are refused at their start ([`Refusal::DaqConfig`]). The time stamp is the rig's cycle, low
-//! 16 bits.
+//! All entries of a list are sampled in the same cycle, after the answer to the sensors. A limited number of packets is sent per
+//! cycle, to keep the reserve of the bus; the others follow in the next cycles. Lists whose mean rate exceeds that limit are
+//! refused at their start ([`Refusal::DaqConfig`]). The time stamp is the rig's cycle, low 16 bits.
 //!
-//! Everything has its place from the start: nothing here allocates.
+//! All memory is allocated at the start.
 
 use crate::image::Image;
 use crate::packet::{BYTES, LAST_PID, Packet, Refusal};
@@ -26,10 +25,10 @@ pub(crate) const ENTRIES: usize = 7;
 /// Longest entry, bytes.
 pub(crate) const LONGEST_ENTRY: u8 = 7;
 pub(crate) const STAMP_BYTES: usize = 2;
-/// Packets that may wait to leave.
+/// Capacity of the transmit queue, packets.
 const ROOM: usize = 2 * ODTS;
 
-/// Bit of a list's mode: with time stamps. The only one that can be asked for.
+/// Bit of a list's mode: with time stamps. A client can set no other one.
 const MODE_STAMP: u8 = 0x10;
 /// Bits of a list's mode in the response to the master: selected, running.
 const SELECTED: u8 = 0x01;
@@ -64,29 +63,29 @@ struct List {
     wait: u8,
 }
 
-/// How far the lists are made, since they are made in this order.
+/// Progress of the allocation, whose commands come in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-enum Made {
+enum AllocationStage {
     #[default]
-    Nothing,
+    Initial,
     Freed,
     Lists,
     Odts,
     Entries,
 }
 
-/// All lists, and the packets that wait to leave.
+/// All lists, and the queue of their packets.
 #[derive(Clone, Default)]
 pub(crate) struct Daq {
     pub(crate) per_cycle: u32,
-    made: Made,
+    stage: AllocationStage,
     lists: [List; LISTS],
     count: usize,
     odts: [Odt; ODTS],
     used: usize,
     pointer: Option<(usize, usize)>,
     waiting: VecDeque<Packet>,
-    /// Packets for which there was no room; the admission at the start keeps it 0.
+    /// Packets lost to a full queue; the admission at the start keeps it 0.
     pub(crate) dropped: u64,
 }
 
@@ -94,14 +93,14 @@ pub(crate) struct Daq {
 pub(crate) struct ListMode {
     /// Bits as they stand in the response.
     pub mode: u8,
-    /// A packet each so many cycles.
+    /// Cycles from sample to sample.
     pub prescaler: u8,
-    /// As it was set; all lists are served alike.
+    /// As the client set it; it has no effect.
     pub priority: u8,
 }
 
 impl Daq {
-    /// No lists; so many packets may leave in a cycle.
+    /// No lists; `per_cycle` packets may be sent in a cycle.
     pub(crate) fn new(per_cycle: u32) -> Self {
         Self { per_cycle, waiting: VecDeque::with_capacity(ROOM), ..Self::default() }
     }
@@ -114,20 +113,20 @@ impl Daq {
         if self.runs() { Err(Refusal::DaqActive) } else { Ok(()) }
     }
 
-    /// Gives all lists back; those that run stop.
+    /// Frees all lists; running ones stop.
     pub(crate) fn free(&mut self) {
         let mut waiting = std::mem::take(&mut self.waiting);
         waiting.clear();
         let Self { per_cycle, dropped, .. } = *self;
-        *self = Self { per_cycle, made: Made::Freed, waiting, dropped, ..Self::default() };
+        *self = Self { per_cycle, stage: AllocationStage::Freed, waiting, dropped, ..Self::default() };
     }
 
-    /// Makes so many lists.
+    /// Allocates `count` lists.
     ///
     /// # Errors
     /// [`Refusal::Sequence`] out of order, [`Refusal::MemoryOverflow`] beyond [`LISTS`].
     pub(crate) fn alloc_lists(&mut self, count: u16) -> Result<(), Refusal> {
-        self.in_order(Made::Freed, Made::Freed, Made::Lists)?;
+        self.in_order(AllocationStage::Freed, AllocationStage::Freed, AllocationStage::Lists)?;
         if usize::from(count) > LISTS {
             return Err(Refusal::MemoryOverflow);
         }
@@ -136,7 +135,7 @@ impl Daq {
         Ok(())
     }
 
-    /// Makes so many ODTs of a list.
+    /// Allocates `count` ODTs of a list.
     ///
     /// # Errors
     /// [`Refusal::Sequence`] out of order or again, [`Refusal::OutOfRange`] for no such list, [`Refusal::MemoryOverflow`] beyond
@@ -146,7 +145,7 @@ impl Daq {
         if self.lists[place].odts > 0 {
             return Err(Refusal::Sequence);
         }
-        self.in_order(Made::Lists, Made::Odts, Made::Odts)?;
+        self.in_order(AllocationStage::Lists, AllocationStage::Odts, AllocationStage::Odts)?;
         let count = usize::from(count);
         if self.used + count > ODTS {
             return Err(Refusal::MemoryOverflow);
@@ -156,14 +155,14 @@ impl Daq {
         Ok(())
     }
 
-    /// Makes so many entries of an ODT.
+    /// Allocates `count` entries of an ODT.
     ///
     /// # Errors
     /// As [`Daq::alloc_odts`]; [`Refusal::DaqActive`] while a list runs.
     pub(crate) fn alloc_entries(&mut self, list: u16, odt: u8, count: u8) -> Result<(), Refusal> {
         self.idle()?;
         let odt = self.odt(list, odt)?;
-        self.in_order(Made::Odts, Made::Entries, Made::Entries)?;
+        self.in_order(AllocationStage::Odts, AllocationStage::Entries, AllocationStage::Entries)?;
         if usize::from(count) > ENTRIES {
             return Err(Refusal::MemoryOverflow);
         }
@@ -171,11 +170,16 @@ impl Daq {
         Ok(())
     }
 
-    fn in_order(&mut self, least: Made, most: Made, then: Made) -> Result<(), Refusal> {
-        if !(least..=most).contains(&self.made) {
+    fn in_order(
+        &mut self,
+        least: AllocationStage,
+        most: AllocationStage,
+        then: AllocationStage,
+    ) -> Result<(), Refusal> {
+        if !(least..=most).contains(&self.stage) {
             return Err(Refusal::Sequence);
         }
-        self.made = then;
+        self.stage = then;
         Ok(())
     }
 
@@ -198,7 +202,7 @@ impl Daq {
         Ok(())
     }
 
-    /// Says which entry is written or read next.
+    /// Sets the entry that is written or read next.
     ///
     /// # Errors
     /// [`Refusal::OutOfRange`] for no such entry, [`Refusal::DaqActive`] while a list runs.
@@ -231,7 +235,7 @@ impl Daq {
             odt_entries.entries[place] = before;
             return Err(Refusal::OutOfRange);
         }
-        self.go_on(odt, place);
+        self.advance_pointer(odt, place);
         Ok(())
     }
 
@@ -241,11 +245,11 @@ impl Daq {
     /// [`Refusal::Sequence`] with none pointed at.
     pub(crate) fn read(&mut self) -> Result<Entry, Refusal> {
         let (odt, place) = self.pointer.ok_or(Refusal::Sequence)?;
-        self.go_on(odt, place);
+        self.advance_pointer(odt, place);
         Ok(self.odts[odt].entries[place])
     }
 
-    fn go_on(&mut self, odt: usize, place: usize) {
+    fn advance_pointer(&mut self, odt: usize, place: usize) {
         self.pointer = (place + 1 < self.odts[odt].count).then_some((odt, place + 1));
     }
 
@@ -273,11 +277,11 @@ impl Daq {
         Ok(ListMode { mode, prescaler, priority })
     }
 
-    /// Stops (0), starts (1) or selects (2) a list; tells the number of its first packet.
+    /// Stops (0), starts (1) or selects (2) a list; returns the number of its first packet.
     ///
     /// # Errors
-    /// [`Refusal::DaqConfig`] for a list that has nothing to send, whose packets do not hold it, or with which more packets would
-    /// come than may leave.
+    /// [`Refusal::DaqConfig`] for a list without ODTs, for one whose entries exceed a packet, and where the mean rate of all
+    /// running lists would exceed the limit.
     pub(crate) fn start_stop(&mut self, mode: u8, list: u16) -> Result<u8, Refusal> {
         let place = self.list(list)?;
         match mode {
@@ -335,7 +339,7 @@ impl Daq {
         (self.lists[place].running, self.lists[place].wait) = (true, 0);
     }
 
-    /// Whether a list's packets hold what it asks for.
+    /// Whether a list has ODTs and each fits its packet.
     fn check(&self, place: usize) -> Result<(), Refusal> {
         let List { first, odts, mode, .. } = self.lists[place];
         let mut head = 1 + if mode & MODE_STAMP != 0 { STAMP_BYTES } else { 0 };
@@ -348,14 +352,14 @@ impl Daq {
         if odts == 0 { Err(Refusal::DaqConfig) } else { Ok(()) }
     }
 
-    /// Whether all packets of these lists may leave: packets per cycle, times all prescalers' common multiple, in whole numbers.
+    /// Whether the mean rate of these lists, packets per cycle, is within the limit; in millionths, without floating point.
     fn admit(&self, of: impl Fn(usize, &List) -> bool) -> Result<(), Refusal> {
         let lists = self.lists[..self.count].iter().enumerate().filter(|(place, list)| of(*place, list));
-        // A sum of fractions with denominators of up to 255, in parts of a million, rounded up: never more than there is.
+        // Each term is rounded up, so that the sum is never too small.
         let parts: u64 = lists
             .map(|(_, list)| (list.odts as u64 * 1_000_000).div_ceil(u64::from(list.prescaler.max(1))))
             .sum();
-        // What rounding adds: less than one part for each list.
+        // Rounding adds less than one millionth for each list.
         if parts <= u64::from(self.per_cycle) * 1_000_000 + LISTS as u64 {
             Ok(())
         } else {
@@ -363,7 +367,7 @@ impl Daq {
         }
     }
 
-    /// Takes what is due in a cycle.
+    /// Samples the lists that are due in a cycle and queues their packets.
     pub(crate) fn cycle(&mut self, cycle: u64, image: &Image) {
         for place in 0..self.count {
             let list = &mut self.lists[place];
@@ -394,7 +398,7 @@ impl Daq {
         let Odt { entries, count } = &self.odts[number];
         for entry in &entries[..*count] {
             let size = usize::from(entry.size);
-            // Checked when the entry was written; what regions there are does not change.
+            // Checked when the entry was written; regions do not change.
             let _ = image.read(entry.address, &mut packet[at..at + size]);
             at += size;
         }

@@ -1,18 +1,18 @@
-//! The memory that an XCP client sees: nothing of the process, but values under addresses of our own, in regions.
+//! The memory that an XCP client sees: values under virtual addresses, in regions; no memory of the process.
 //!
 //! ```text
 //!   0x0001_0000  description: the A2L file, then the identification     bytes          read
 //!   0x1000_0000  parameters of the axis's program                       double each    read, write
 //!   0x2000_0000  controls: trigger buffer, parameter set                8 bytes each   read, write
 //!   0x3000_0000  signals of the newest cycle                            4 bytes each   read, DAQ
-//!   0x4000_0000  what the trigger buffer tells of itself                4 bytes each   read, DAQ
+//!   0x4000_0000  state of the trigger buffer                            4 bytes each   read, DAQ
 //!   0x5000_0000  trigger buffer: cycles of the samples                  4 bytes each   read
 //!   0x51…, 52…, 53…, 54…_0000  its channels                             double each    read
 //! ```
 //!
-//! A transfer stays within a region. A value is written whole or not at all: what comes of it in a packet that ends within it
-//! waits for the packet that goes on there, and any other write forgets it. All values of a block are checked before the first
-//! is taken. A change acts from the next cycle on. Reading and writing allocate nothing.
+//! A transfer stays within a region. A value is written whole or not at all: the bytes of a packet that ends within a value are
+//! kept until the next packet completes it, and any other write discards them. All values of a block are checked before the
+//! first is stored. A change acts from the next cycle on. Reading and writing allocate nothing.
 
 use crate::packet::Refusal;
 use crate::signals::{COUNT, Format, SIGNALS};
@@ -26,7 +26,7 @@ pub(crate) const CONTROL: u32 = 0x2000_0000;
 pub(crate) const SIGNAL: u32 = 0x3000_0000;
 pub(crate) const TRACE_STATUS: u32 = 0x4000_0000;
 pub(crate) const TRACE_CYCLES: u32 = 0x5000_0000;
-/// That of the first channel; from channel to channel it is [`CHANNEL_STEP`].
+/// First address of the first channel; the others follow [`CHANNEL_STEP`] apart.
 pub(crate) const TRACE_CHANNELS: u32 = 0x5100_0000;
 pub(crate) const CHANNEL_STEP: u32 = 0x0100_0000;
 
@@ -35,15 +35,15 @@ pub(crate) const WIDE: u32 = 8;
 /// Bytes from signal to signal.
 pub(crate) const NARROW: u32 = 4;
 
-/// What acts on what was written.
+/// Effects of a client's writes on the controller.
 pub trait ParameterActions {
-    /// A parameter has another value, in its range.
+    /// Sets the parameter at `place` in the list of variables to `value`, which is within its range.
     fn set(&mut self, place: usize, value: f64);
 
-    /// The parameter set is to be stored; false when that is not possible now.
+    /// Begins to store the parameter set, `values` in the order of the variables; false when that is not possible now.
     fn store(&mut self, values: &[f64]) -> bool;
 
-    /// The stored parameter set is to be loaded; false when that is not possible now.
+    /// Begins to load the stored parameter set; false when that is not possible now.
     fn load(&mut self) -> bool;
 }
 
@@ -58,14 +58,15 @@ enum Region {
     TraceChannel(usize),
 }
 
-/// The beginning of a value, of which the rest is still to come.
+/// The first bytes of a value that a later packet completes.
 #[derive(Clone, Copy)]
-struct Begun {
+struct PartialValue {
     next: u32,
     bytes: [u8; 8],
     count: usize,
 }
 
+/// Description, parameters, controls, signals and trigger buffer of an axis under their addresses.
 #[derive(Clone)]
 pub struct Image {
     description: Vec<u8>,
@@ -74,7 +75,7 @@ pub struct Image {
     controls: [f64; CONTROLS.len()],
     signals: [f64; COUNT],
     trace: Trace,
-    begun: Option<Begun>,
+    partial: Option<PartialValue>,
 }
 
 impl Image {
@@ -87,11 +88,11 @@ impl Image {
             controls: std::array::from_fn(|place| CONTROLS[place].default),
             signals: [0.0; COUNT],
             trace: Trace::default(),
-            begun: None,
+            partial: None,
         }
     }
 
-    /// Takes what a cycle left: signals, and parameters that others may have changed.
+    /// Takes the signals of a cycle, and the parameters, which other clients may have changed.
     pub(crate) fn refresh(&mut self, cycle: u64, signals: &[f64; COUNT], parameters: &[f64]) {
         self.signals = *signals;
         self.parameters.copy_from_slice(parameters);
@@ -102,6 +103,7 @@ impl Image {
         self.trace.restart();
     }
 
+    /// Values of the parameters, in the order of the variables.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
     }
@@ -111,15 +113,15 @@ impl Image {
         &self.description
     }
 
-    /// Forgets the beginning of a value.
+    /// Discards the first bytes of a value that is not complete.
     pub(crate) fn forget(&mut self) {
-        self.begun = None;
+        self.partial = None;
     }
 
     /// Reads the bytes from `address` on.
     ///
     /// # Errors
-    /// [`Refusal::AccessDenied`] where nothing is, or beyond the end of a region.
+    /// [`Refusal::AccessDenied`] outside the regions, or beyond the end of one.
     pub(crate) fn read(&self, address: u32, into: &mut [u8]) -> Result<(), Refusal> {
         let (region, mut offset) = self.reach(address, into.len() as u32)?;
         if region == Region::Description {
@@ -140,7 +142,7 @@ impl Image {
         Ok(())
     }
 
-    /// Whether so many bytes can be read from `address` on.
+    /// Whether `count` bytes can be read from `address` on.
     pub(crate) fn check_readable(&self, address: u32, count: u32) -> Result<(), Refusal> {
         self.reach(address, count).map(|_| ())
     }
@@ -153,7 +155,7 @@ impl Image {
         if end <= count * width { Ok((region, offset)) } else { Err(Refusal::AccessDenied) }
     }
 
-    /// How many values a region has, and bytes of each.
+    /// Number of values of a region, and bytes of each.
     fn extent(&self, region: Region) -> (u32, u32) {
         match region {
             Region::Description => (self.description.len() as u32, 1),
@@ -184,39 +186,40 @@ impl Image {
     /// Writes the bytes from `address` on; `actions` gets every value that changed.
     ///
     /// # Errors
-    /// [`Refusal::AccessDenied`] where nothing is; [`Refusal::WriteProtected`] for what is only read, or read at the start only;
-    /// [`Refusal::OutOfRange`] for a value that its parameter does not allow; [`Refusal::Sequence`] for the rest of a value that
-    /// nobody began, and for arming with a pre-trigger as long as the buffer. Nothing of the block is taken then.
+    /// [`Refusal::AccessDenied`] outside the regions; [`Refusal::WriteProtected`] for a region that is only read, and for a
+    /// parameter that is fixed at the start; [`Refusal::OutOfRange`] for a value outside its parameter's range;
+    /// [`Refusal::Sequence`] for the rest of a value without its first bytes, and for arming with a pre-trigger as long as the
+    /// buffer. No value of the block is stored then.
     pub(crate) fn write(
         &mut self,
         address: u32,
         bytes: &[u8],
         actions: &mut dyn ParameterActions,
     ) -> Result<(), Refusal> {
-        let begun = self.begun.take().filter(|begun| begun.next == address);
+        let partial = self.partial.take().filter(|partial| partial.next == address);
         let (region, offset) = self.reach(address, bytes.len() as u32)?;
         if !matches!(region, Region::Parameters | Region::Controls) {
             return Err(Refusal::WriteProtected);
         }
-        if !offset.is_multiple_of(WIDE) && begun.is_none() {
+        if !offset.is_multiple_of(WIDE) && partial.is_none() {
             return Err(Refusal::Sequence);
         }
         let mut controls = self.controls;
-        // First all are looked at, then all are taken.
+        // First pass: check all; second pass: store all.
         let mut rest = None;
         for take in [false, true] {
-            // A load may find its queue full, so that it goes before anything is taken.
+            // A load may find its queue full, so that it comes before anything is stored.
             if take && controls[LOAD_SET] != 0.0 && !actions.load() {
                 return Err(Refusal::Busy);
             }
-            let mut value = begun.unwrap_or(Begun { next: address, bytes: [0; 8], count: 0 });
+            let mut value = partial.unwrap_or(PartialValue { next: address, bytes: [0; 8], count: 0 });
             for (byte, at) in bytes.iter().zip(offset..) {
                 value.bytes[value.count] = *byte;
                 value.count += 1;
                 value.next += 1;
                 let place = (at / WIDE) as usize;
-                // A count has four bytes of its own; the other four of its place are nobody's.
-                if value.count == self.own_bytes(region, place) {
+                // A count has the first four bytes of its place; the other four are padding.
+                if value.count == self.value_bytes(region, place) {
                     if take {
                         self.take(region, place, value.bytes, actions)?;
                     } else {
@@ -224,17 +227,17 @@ impl Image {
                     }
                 }
                 if value.count == WIDE as usize {
-                    value = Begun { bytes: [0; 8], count: 0, ..value };
+                    value = PartialValue { bytes: [0; 8], count: 0, ..value };
                 }
             }
             rest = Some(value).filter(|value| value.count > 0);
         }
-        self.begun = rest;
+        self.partial = rest;
         Ok(())
     }
 
-    /// Bytes of a place that mean something.
-    fn own_bytes(&self, region: Region, place: usize) -> usize {
+    /// Bytes of a place without padding.
+    fn value_bytes(&self, region: Region, place: usize) -> usize {
         match region {
             Region::Controls => trace::control_format(place).bytes(),
             _ => WIDE as usize,
@@ -317,7 +320,7 @@ pub(super) mod tests {
     use super::*;
     use settings::parameters::{Parameter, declare};
 
-    /// A actions that records what it gets.
+    /// Actions that record their calls.
     #[derive(Default)]
     pub(crate) struct Notes {
         pub(crate) set: Vec<(usize, f64)>,

@@ -4,9 +4,9 @@
 //!   key = first 8 bytes of HMAC-SHA256(secret, seed)
 //! ```
 //!
-//! The secret stands in the configuration of the controller and in that of the client; on the bus there are only seed and key.
-//! Seeds are made of the same function over a random start and a count, so that none comes twice. A wrong key ends the session,
-//! and no seed is given out for [`PAUSE`] cycles. Without a secret nothing is ever unlocked.
+//! Controller and client know the secret from their configurations; the bus carries seed and key alone. Seeds are the same
+//! function over a random start and a count, so that none is repeated. A wrong key ends the session, and no seed is issued for
+//! [`PAUSE`] cycles. Without a secret the lock never opens.
 //!
 //! Source: RFC 2104 (HMAC), FIPS 180-4 (SHA-256), ASAM MCD-1 XCP 1.1, part 2, GET_SEED and UNLOCK.
 
@@ -18,10 +18,10 @@ use sha2::Sha256;
 pub(crate) const BYTES: usize = 8;
 /// Bytes of seed or key in a packet.
 pub(crate) const IN_PACKET: usize = 6;
-/// Cycles after a wrong key in which no seed is given out.
+/// Cycles after a wrong key in which no seed is issued.
 pub(crate) const PAUSE: u64 = 1000;
 
-/// The lock in front of all writing.
+/// Write protection of a slave.
 #[derive(Clone, Default)]
 pub(crate) struct Lock {
     secret: Option<Vec<u8>>,
@@ -29,26 +29,26 @@ pub(crate) struct Lock {
     seeds: u64,
     open: bool,
     seed: [u8; BYTES],
-    /// Bytes of the seed that were given out; `None` when there is none.
+    /// Bytes of the seed that were issued; `None` without a seed.
     given: Option<usize>,
     key: [u8; BYTES],
-    had: usize,
-    /// Cycles for which no seed is given out.
+    received: usize,
+    /// Cycles for which no seed will be issued.
     pause: u64,
 }
 
-/// What became of a part of a key.
+/// Result of a part of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Turned {
-    /// A part was taken; more of the key is to come.
-    Halfway,
+pub(crate) enum KeyCheck {
+    /// The key needs further parts.
+    Incomplete,
     Open,
-    /// It was a wrong one: the session ends.
+    /// The key is wrong; the session ends.
     Wrong,
 }
 
 impl Lock {
-    /// A shut lock. `start` is random; in simulated time it is not, and seeds come again in the next run.
+    /// A closed lock. `start` is random in real time; in simulated time it is constant, so that runs repeat.
     pub(crate) fn new(secret: Option<Vec<u8>>, start: [u8; 16]) -> Self {
         Self { secret, start, ..Self::default() }
     }
@@ -58,17 +58,18 @@ impl Lock {
     }
 
     pub(crate) fn shut(&mut self) {
-        (self.open, self.given, self.had) = (false, None, 0);
+        (self.open, self.given, self.received) = (false, None, 0);
     }
 
     pub(crate) fn cycle(&mut self) {
         self.pause = self.pause.saturating_sub(1);
     }
 
-    /// The seed, or what is left of it: how many bytes are, and up to [`IN_PACKET`] of them. None are when it is open.
+    /// Number of seed bytes that remain, and the next of them, [`IN_PACKET`] at most; 0 when the lock is open. `rest` continues a
+    /// seed.
     ///
     /// # Errors
-    /// [`Refusal::AccessDenied`] without a secret and in the pause; [`Refusal::Sequence`] for a rest without a beginning.
+    /// [`Refusal::AccessDenied`] without a secret and in the pause; [`Refusal::Sequence`] for a rest without its first bytes.
     pub(crate) fn seed(&mut self, rest: bool) -> Result<(u8, [u8; IN_PACKET]), Refusal> {
         let Some(secret) = self.secret.as_ref().filter(|_| self.pause == 0) else {
             return Err(Refusal::AccessDenied);
@@ -81,7 +82,7 @@ impl Lock {
                 self.seeds += 1;
                 let made = mac(secret).chain_update(self.start).chain_update(self.seeds.to_le_bytes());
                 self.seed.copy_from_slice(&made.finalize().into_bytes()[..BYTES]);
-                self.had = 0;
+                self.received = 0;
                 0
             }
             (true, Some(given)) if given < BYTES => given,
@@ -94,36 +95,36 @@ impl Lock {
         Ok(((BYTES - from) as u8, part))
     }
 
-    /// Takes a key, or a part of it; `left` is how many of its bytes are still to come, these included.
+    /// Takes a key, or a part of it; `left` is the number of its bytes not yet received before this part.
     ///
     /// # Errors
-    /// [`Refusal::Sequence`] without a seed that was given out whole, and for a `left` that is not what is left.
-    pub(crate) fn turn(&mut self, left: u8, part: &[u8]) -> Result<Turned, Refusal> {
+    /// [`Refusal::Sequence`] before the whole seed was issued, and for a wrong `left`.
+    pub(crate) fn check_key(&mut self, left: u8, part: &[u8]) -> Result<KeyCheck, Refusal> {
         let Some(secret) = self.secret.as_ref().filter(|_| self.given == Some(BYTES)) else {
             return Err(Refusal::Sequence);
         };
-        if usize::from(left) != BYTES - self.had {
-            self.had = 0;
+        if usize::from(left) != BYTES - self.received {
+            self.received = 0;
             return Err(Refusal::Sequence);
         }
         let count = part.len().min(usize::from(left));
-        self.key[self.had..self.had + count].copy_from_slice(&part[..count]);
-        self.had += count;
-        if self.had < BYTES {
-            return Ok(Turned::Halfway);
+        self.key[self.received..self.received + count].copy_from_slice(&part[..count]);
+        self.received += count;
+        if self.received < BYTES {
+            return Ok(KeyCheck::Incomplete);
         }
-        // Compared in a time that does not tell how much of it was right.
+        // Compared in constant time.
         self.open = mac(secret).chain_update(self.seed).verify_truncated_left(&self.key).is_ok();
-        (self.given, self.had) = (None, 0);
+        (self.given, self.received) = (None, 0);
         if self.open {
-            return Ok(Turned::Open);
+            return Ok(KeyCheck::Open);
         }
         self.pause = PAUSE;
-        Ok(Turned::Wrong)
+        Ok(KeyCheck::Wrong)
     }
 }
 
-/// The key to a seed: the first bytes of its HMAC with the secret.
+/// The key for a seed: the first 8 bytes of HMAC-SHA256 of `seed` under `secret`.
 pub fn key(secret: &[u8], seed: [u8; BYTES]) -> [u8; BYTES] {
     let whole = mac(secret).chain_update(seed).finalize().into_bytes();
     std::array::from_fn(|byte| whole[byte])
@@ -157,9 +158,9 @@ mod tests {
         super::key(SECRET, seed)
     }
 
-    fn turn(lock: &mut Lock, key: [u8; BYTES]) -> Turned {
-        assert_eq!(lock.turn(8, &key[..6]), Ok(Turned::Halfway));
-        lock.turn(2, &key[6..]).unwrap()
+    fn check_key(lock: &mut Lock, key: [u8; BYTES]) -> KeyCheck {
+        assert_eq!(lock.check_key(8, &key[..6]), Ok(KeyCheck::Incomplete));
+        lock.check_key(2, &key[6..]).unwrap()
     }
 
     /// RFC 4231, test case 2.
@@ -173,7 +174,7 @@ mod tests {
     fn the_right_key_opens_until_it_is_shut() {
         let mut lock = lock();
         let seed = seed(&mut lock);
-        assert_eq!(turn(&mut lock, key(seed)), Turned::Open);
+        assert_eq!(check_key(&mut lock, key(seed)), KeyCheck::Open);
         assert!(lock.is_open());
         assert_eq!(lock.seed(false).unwrap().0, 0, "no key is needed any more");
         lock.shut();
@@ -186,7 +187,7 @@ mod tests {
             let mut lock = lock();
             let mut wrong = key(seed(&mut lock));
             wrong[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(turn(&mut lock, wrong), Turned::Wrong, "bit {bit}");
+            assert_eq!(check_key(&mut lock, wrong), KeyCheck::Wrong, "bit {bit}");
             assert!(!lock.is_open());
             (1..PAUSE).for_each(|_| lock.cycle());
             assert_eq!(lock.seed(false), Err(Refusal::AccessDenied));
@@ -199,22 +200,22 @@ mod tests {
     fn a_key_serves_once() {
         let mut lock = lock();
         let first = seed(&mut lock);
-        assert_eq!(turn(&mut lock, key(first)), Turned::Open);
+        assert_eq!(check_key(&mut lock, key(first)), KeyCheck::Open);
         lock.shut();
-        assert_eq!(lock.turn(8, &key(first)[..6]), Err(Refusal::Sequence), "no seed, no key");
+        assert_eq!(lock.check_key(8, &key(first)[..6]), Err(Refusal::Sequence), "no seed, no key");
         assert_ne!(seed(&mut lock), first);
-        assert_eq!(turn(&mut lock, key(first)), Turned::Wrong);
+        assert_eq!(check_key(&mut lock, key(first)), KeyCheck::Wrong);
     }
 
     #[test]
     fn what_is_out_of_order_is_refused() {
         let mut lock = lock();
         assert_eq!(lock.seed(true), Err(Refusal::Sequence));
-        assert_eq!(lock.turn(8, &[0; 6]), Err(Refusal::Sequence));
+        assert_eq!(lock.check_key(8, &[0; 6]), Err(Refusal::Sequence));
         let _ = lock.seed(false).unwrap();
-        assert_eq!(lock.turn(8, &[0; 6]), Err(Refusal::Sequence), "half a seed");
+        assert_eq!(lock.check_key(8, &[0; 6]), Err(Refusal::Sequence), "half a seed");
         let _ = lock.seed(true).unwrap();
-        assert_eq!(lock.turn(2, &[0; 2]), Err(Refusal::Sequence), "the end before the beginning");
+        assert_eq!(lock.check_key(2, &[0; 2]), Err(Refusal::Sequence), "the end before the beginning");
         assert_eq!(Lock::new(None, [0; 16]).seed(false), Err(Refusal::AccessDenied));
     }
 }

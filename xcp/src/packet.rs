@@ -8,9 +8,9 @@
 pub(crate) const BYTES: usize = 8;
 pub(crate) type Packet = [u8; BYTES];
 
-/// First byte of a good answer.
+/// First byte of a positive response.
 pub(crate) const RESPONSE: u8 = 0xFF;
-/// First byte of a refusal.
+/// First byte of an error packet.
 pub(crate) const ERROR: u8 = 0xFE;
 /// First byte of an event.
 pub(crate) const EVENT: u8 = 0xFD;
@@ -58,22 +58,22 @@ pub(crate) mod command {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Refusal {
-    /// The answer to SYNCH: the command processor begins anew.
+    /// The answer to SYNCH: the command processor is reset.
     Synch = 0x00,
-    /// What was asked for before is not done yet.
+    /// An earlier request is not finished.
     Busy = 0x10,
     DaqActive = 0x11,
     Unknown = 0x20,
-    /// Too short, or a field that means nothing.
+    /// Too short.
     Syntax = 0x21,
     OutOfRange = 0x22,
     /// Never written, or only at the start.
     WriteProtected = 0x23,
-    /// Nothing there, or not now.
+    /// No such memory, or not now.
     AccessDenied = 0x24,
     AccessLocked = 0x25,
     Sequence = 0x29,
-    /// Lists that cannot run so.
+    /// Lists that cannot run with these settings.
     DaqConfig = 0x2A,
     MemoryOverflow = 0x30,
 }
@@ -85,7 +85,7 @@ impl<'a> Fields<'a> {
     /// Byte `at`.
     ///
     /// # Errors
-    /// [`Refusal::Syntax`] when the packet is shorter; so for all fields.
+    /// [`Refusal::Syntax`] when the packet is shorter; the same for all fields.
     pub(crate) fn byte(self, at: usize) -> Result<u8, Refusal> {
         self.0.get(at).copied().ok_or(Refusal::Syntax)
     }
@@ -101,13 +101,13 @@ impl<'a> Fields<'a> {
         Ok(u32::from(low) | u32::from(high) << 16)
     }
 
-    /// So many bytes from `at` on.
+    /// `count` bytes from `at` on.
     pub(crate) fn bytes(self, at: usize, count: usize) -> Result<&'a [u8], Refusal> {
         self.0.get(at..at + count).ok_or(Refusal::Syntax)
     }
 }
 
-/// A good answer with these bytes behind its first.
+/// A positive response with these bytes after its first.
 ///
 /// # Panics
 /// With more than 7 bytes, which no command here has.

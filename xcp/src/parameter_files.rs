@@ -1,4 +1,4 @@
-//! What a slave cannot do in the 1 ms path: files of parameter sets, and words for a person. It runs in the recorder's thread.
+//! Work of the slaves outside the 1 ms path: files of parameter sets, and messages. It runs in the recorder's thread.
 //!
 //! A set is stored to `controller-drive-parameters.toml` or `controller-load-parameters.toml` of the run's folder, and loaded
 //! from there; no other file is read or written on a client's behalf.
@@ -10,51 +10,67 @@ use crossbeam_channel::{Receiver, Sender};
 use nominal::Axis;
 use std::path::{Path, PathBuf};
 
-/// What a port tells of its axis, with the rig's cycle that was answered last.
+/// A port's request or report to the worker; `cycle` is the rig's cycle that was answered last.
 #[derive(Debug)]
 pub enum Note {
-    /// The parameter at a place in the list of variables has another value.
+    /// A client changed a parameter.
     Changed {
+        /// Axis of the port.
         axis: Axis,
+        /// The rig's cycle.
         cycle: u64,
+        /// Place in the list of variables.
         place: usize,
+        /// New value, in the unit of the variable.
         value: f64,
     },
+    /// A client unlocked writing.
     Unlocked {
+        /// Axis of the port.
         axis: Axis,
+        /// The rig's cycle.
         cycle: u64,
     },
+    /// A client sent a wrong key.
     WrongKey {
+        /// Axis of the port.
         axis: Axis,
+        /// The rig's cycle.
         cycle: u64,
     },
-    /// These values are to be stored, in the order of the variables.
+    /// A client asks to store the parameters.
     Store {
+        /// Axis of the port.
         axis: Axis,
+        /// Their values, in the order of the variables.
         values: Vec<f64>,
     },
-    /// The stored values are to be loaded.
+    /// A client asks to load the stored parameters.
     Load {
+        /// Axis of the port.
         axis: Axis,
     },
 }
 
-/// A copy of the parameters that comes back.
+/// A copy of the parameters that the worker returns to its port.
 #[derive(Debug)]
-pub struct Returned {
-    /// The copy, whose room serves again.
+pub struct ParameterCopy {
+    /// The values; the port reuses the allocation.
     pub values: Vec<f64>,
+    /// Whether the file was written.
     pub stored: bool,
 }
 
-/// An axis with an XCP port.
+/// An axis with an XCP port, as the worker needs it.
 pub struct AxisParameters {
+    /// Axis of the port.
     pub axis: Axis,
+    /// Variables of its program, in the program's order.
     pub variables: Vec<Variable>,
     /// Their values at the start.
     pub values: Vec<f64>,
-    /// Where a copy of the parameters goes back to the port.
-    pub returned: Sender<Returned>,
+    /// Queue that returns copies of the parameters to the port.
+    pub returned: Sender<ParameterCopy>,
 }
 
 /// Stores and loads parameter sets for the ports, and reports their notes; it runs outside the 1 ms path.
@@ -65,13 +81,13 @@ pub struct ParameterFileWorker {
     folder: PathBuf,
 }
 
-/// Name of the file that a set is stored in.
-pub fn file_name(axis: Axis) -> String {
+/// Name of the file in the run's folder that stores a set.
+fn file_name(axis: Axis) -> String {
     format!("controller-{}-parameters.toml", axis.name())
 }
 
 impl ParameterFileWorker {
-    /// A worker for these axes, with the run's folder.
+    /// A worker for these axes. `folder` is the run's folder; loaded values go to `changes`.
     pub fn new(
         notes: Receiver<Note>,
         axes: Vec<AxisParameters>,
@@ -81,7 +97,8 @@ impl ParameterFileWorker {
         Self { notes, axes, changes, folder: folder.into() }
     }
 
-    pub fn look(&mut self) {
+    /// Processes the notes that wait; the recorder's thread calls it in each of its rounds.
+    pub fn poll(&mut self) {
         let notes = self.notes.clone();
         for note in notes.try_iter() {
             match note {
@@ -131,7 +148,7 @@ impl ParameterFileWorker {
         let Some(axis_parameters) = self.parameters_of(axis) else { return };
         let path = self.path(axis);
         let text = parameter_set::text(axis, &axis_parameters.variables, &values);
-        // Written beside it and moved over it: nobody reads half a set.
+        // Written to a temporary file and renamed, so that no reader sees half a set.
         let part = path.with_extension("toml.part");
         let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path));
         match &written {
@@ -144,11 +161,11 @@ impl ParameterFileWorker {
             }
             Err(error) => protocol::say!("controller: cannot write {}: {error}", path.display()),
         }
-        // A port that has gone needs nothing back.
-        let _ = axis_parameters.returned.send(Returned { values, stored: written.is_ok() });
+        // A port that has ended needs no copy.
+        let _ = axis_parameters.returned.send(ParameterCopy { values, stored: written.is_ok() });
     }
 
-    /// Hands all values of the set on, or none and why not.
+    /// Queues all values of the stored set and returns their number; on an error it queues none, except where the queue is full.
     fn load(&self, axis: Axis) -> Result<usize, String> {
         let Some(axis_parameters) = self.parameters_of(axis) else { return Ok(0) };
         let settings = parameter_set::read(&self.path(axis)).map_err(|error| error.to_string())?;

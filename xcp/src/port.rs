@@ -1,17 +1,16 @@
-//! The place of a slave on the bus: commands wait here for the end of the controller's work in a cycle, answers and DAQ packets
-//! leave.
+//! A slave on the bus: commands wait until the controller's work in a cycle is done, then responses and DAQ packets are sent.
 //!
 //! In real time a command is answered in the wake-up that it causes, in lockstep in its cycle. At most [`COMMANDS`] are
-//! answered at a time and [`INBOX`] wait; what a flood brings beyond that is dropped and counted. Nothing here allocates,
-//! locks, prints or blocks: what needs a file goes to the worker of [`crate::parameter_files`] by a queue.
+//! answered at a time and [`INBOX`] wait; further ones are dropped and counted. Nothing here allocates, locks, prints or blocks:
+//! requests for files go to the worker of [`crate::parameter_files`] by a queue.
 
-use crate::a2l::{self, A2lError, Described};
+use crate::a2l::{self, A2lError, AxisDescription};
 use crate::config::XcpConfig;
 use crate::identifiers;
 use crate::image::{Image, ParameterActions};
 use crate::lock::Lock;
 use crate::packet::{BYTES, Packet};
-use crate::parameter_files::{Note, Returned};
+use crate::parameter_files::{Note, ParameterCopy};
 use crate::signals::{self, View};
 use crate::slave::{Slave, SlaveCounters, SlaveParts};
 use axis_control::axis::AxisController;
@@ -24,32 +23,36 @@ use protocol::can::CanFrame;
 use protocol::frames::{Sensors, ValveCommand};
 use std::collections::VecDeque;
 
-/// Commands that wait at most: more than the longest block has packets.
+/// Most commands that wait; more than the packets of the longest block.
 pub(crate) const INBOX: usize = 64;
-/// Commands that are answered at a time.
+/// Most commands that are answered at a time.
 pub(crate) const COMMANDS: usize = 8;
 
+/// Counters of a port and its slave, as the controller's report holds them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PortCounters {
     #[serde(flatten)]
-    pub slave: SlaveCounters,
-    /// Commands for which there was no room.
-    pub commands_dropped: u64,
-    /// DAQ packets that the bus did not take, or for which there was no room.
-    pub daq_dropped: u64,
-    /// Answers that the bus did not take.
-    pub answers_dropped: u64,
-    pub changed: u64,
+    pub(crate) slave: SlaveCounters,
+    /// Commands lost to a full queue.
+    pub(crate) commands_dropped: u64,
+    /// DAQ packets lost to a full queue, or that the bus did not accept.
+    pub(crate) daq_dropped: u64,
+    /// Responses that the bus did not accept.
+    pub(crate) answers_dropped: u64,
+    /// Parameter values that clients changed.
+    pub(crate) changed: u64,
 }
 
 /// The queues between a port and the worker for files.
 pub struct Queues {
+    /// Requests and reports to the worker.
     pub notes: Sender<Note>,
-    pub returned: Receiver<Returned>,
+    /// Copies of the parameters that the worker returns.
+    pub returned: Receiver<ParameterCopy>,
 }
 
-/// What acts on what was written.
-struct Act<'a> {
+/// Applies a client's writes to the program of the axis, in the 1 ms path.
+struct ProgramActions<'a> {
     axis: Axis,
     cycle: u64,
     program: &'a mut Program,
@@ -58,13 +61,13 @@ struct Act<'a> {
     changed: &'a mut u64,
 }
 
-impl ParameterActions for Act<'_> {
+impl ParameterActions for ProgramActions<'_> {
     fn set(&mut self, place: usize, value: f64) {
         let Self { axis, cycle, .. } = *self;
         // Checked against its table by the image.
         if self.program.set(place, value).is_ok() {
             *self.changed += 1;
-            // What a full queue loses is a line for a person; the count stays.
+            // A full queue loses a message alone; the counter stays right.
             let _ = self.notes.try_send(Note::Changed { axis, cycle, place, value });
         }
     }
@@ -100,17 +103,20 @@ pub struct Port {
     response_id: u16,
     slave: Slave,
     queues: Queues,
-    /// Room for a copy of the parameters; gone while the worker for files has it.
+    /// Buffer for a copy of the parameters; `None` while the worker has it.
     spare: Option<Vec<f64>>,
     inbox: VecDeque<CanFrame>,
     cycle: u64,
-    /// DAQ packets that may still leave in this cycle.
-    may_leave: u32,
+    /// DAQ packets that may still be sent in this cycle.
+    daq_budget: u32,
     counters: PortCounters,
 }
 
 impl Port {
-    /// A port for this controller; `random` begins its seeds.
+    /// A port for this controller. `title` is that of its program, `random` the start of the lock's seeds.
+    ///
+    /// # Errors
+    /// [`A2lError`] when the A2L file cannot be made: a bug.
     pub fn new(
         controller: &AxisController,
         title: &str,
@@ -120,7 +126,8 @@ impl Port {
     ) -> Result<Self, A2lError> {
         let (axis, program) = (controller.axis(), controller.program());
         let variables = program.variables();
-        let a2l::Description { bytes, texts } = a2l::description(&Described { axis, title, variables })?;
+        let a2l::Description { bytes, texts } =
+            a2l::description(&AxisDescription { axis, title, variables })?;
         let (command_id, response_id) = identifiers(axis);
         let slave = Slave::new(SlaveParts {
             image: Image::new(bytes, variables.to_vec(), program.values()),
@@ -137,22 +144,24 @@ impl Port {
             spare: Some(Vec::with_capacity(variables.len())),
             inbox: VecDeque::with_capacity(INBOX),
             cycle: 0,
-            may_leave: 0,
+            daq_budget: 0,
             counters: PortCounters::default(),
         })
     }
 
+    /// The axis of its controller.
     pub fn axis(&self) -> Axis {
         self.axis
     }
 
+    /// What it counted since the start.
     pub fn counters(&self) -> PortCounters {
         let daq_dropped = self.counters.daq_dropped + self.slave.daq.dropped;
         PortCounters { slave: *self.slave.counters(), daq_dropped, ..self.counters }
     }
 
-    /// Tells a person of keys.
-    fn tell(&mut self, before: &SlaveCounters) {
+    /// Reports right and wrong keys since `before`.
+    fn report_keys(&mut self, before: &SlaveCounters) {
         let (axis, cycle) = (self.axis, self.cycle);
         let after = self.slave.counters();
         if after.unlocked > before.unlocked {
@@ -204,11 +213,11 @@ impl CalibrationPort for Port {
         let signals = signals::sample(&View { ready: controller.program().ready(), sensors, record });
         self.slave.cycle(cycle, &signals, controller.program().values());
         self.cycle = cycle;
-        self.may_leave = self.slave.daq.per_cycle;
+        self.daq_budget = self.slave.daq.per_cycle;
     }
 
     fn serve(&mut self, program: &mut Program, bus: &mut dyn Bus) {
-        while let Ok(Returned { values, stored }) = self.queues.returned.try_recv() {
+        while let Ok(ParameterCopy { values, stored }) = self.queues.returned.try_recv() {
             self.spare = Some(values);
             let event = self.slave.stored().filter(|_| stored);
             self.answer(event, bus);
@@ -216,7 +225,7 @@ impl CalibrationPort for Port {
         for _ in 0..COMMANDS {
             let Some(frame) = self.inbox.pop_front() else { break };
             let before = *self.slave.counters();
-            let mut act = Act {
+            let mut act = ProgramActions {
                 axis: self.axis,
                 cycle: self.cycle,
                 program: &mut *program,
@@ -225,12 +234,12 @@ impl CalibrationPort for Port {
                 changed: &mut self.counters.changed,
             };
             let answer = self.slave.command(frame.data(), self.cycle, &mut act);
-            self.tell(&before);
+            self.report_keys(&before);
             self.answer(answer, bus);
         }
-        while self.may_leave > 0 {
+        while self.daq_budget > 0 {
             let Some(packet) = self.slave.next_daq() else { break };
-            self.may_leave -= 1;
+            self.daq_budget -= 1;
             if !self.send(packet, bus) {
                 self.counters.daq_dropped += 1;
             }

@@ -1,7 +1,7 @@
-//! What can be measured in a controller: one table, of which A2L, DAQ lists and the trigger buffer are made.
+//! The measurable signals of a controller: one table behind A2L file, DAQ lists and trigger buffer.
 //!
-//! A signal is a number of the cycle that was just answered, in SI. On the wire of XCP it is a float of four bytes or a count,
-//! so that it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
+//! A signal is a number of the cycle that was just answered, in SI. XCP carries it as a float of four bytes or a count, so that
+//! it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
 
 use algorithms::algorithm::Ready;
 use axis_control::axis::AxisRecord;
@@ -50,9 +50,9 @@ impl Format {
     }
 }
 
-/// A cycle as the signals see it.
+/// The data of a cycle that signals are taken from.
 pub(crate) struct View<'a> {
-    /// What its program was given.
+    /// Inputs of its program.
     pub(crate) ready: &'a Ready,
     pub(crate) sensors: &'a Sensors,
     /// The row of its record.
@@ -97,6 +97,7 @@ const fn names(chain: usize) -> &'static [&'static str] {
 
 const NO_YES: &[&str] = &["no", "yes"];
 
+/// Number of signals.
 pub const COUNT: usize = SIGNALS.len();
 
 /// All signals; a place in this table is what the trigger buffer calls a source or a channel.

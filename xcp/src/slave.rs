@@ -1,4 +1,4 @@
-//! The XCP slave: packets in, packets out, over a memory and nothing else.
+//! The XCP slave: a function from packets to packets over an [`Image`].
 //!
 //! ```text
 //!   command(packet, cycle, actions) ─► answer or none     any bytes, at any time
@@ -6,20 +6,19 @@
 //!   next_daq() ─► packet or none                          what DAQ lists have to send
 //! ```
 //!
-//! It knows no bus, no clock, no controller: what it changes it tells its [`ParameterActions`]. Whatever the bytes are, it
-//! answers, refuses or keeps silent, and a session that is not open answers CONNECT alone. Nothing here allocates, locks,
-//! prints or blocks.
+//! It knows no bus, no clock, no controller: it changes parameters through [`ParameterActions`]. Any bytes lead to a response, an
+//! error packet or silence; without a session CONNECT alone is answered. Nothing here allocates, locks, prints or blocks.
 //!
 //! Source: ASAM MCD-1 XCP 1.1, part 2.
 
 use crate::daq::{Daq, Entry, LISTS, LONGEST_ENTRY, ListMode, STAMP_BYTES};
 use crate::image::{DESCRIPTION, Image, ParameterActions};
-use crate::lock::{Lock, Turned};
+use crate::lock::{KeyCheck, Lock};
 use crate::packet::{BYTES, EVENT, EVENT_STORED, Fields, Packet, Refusal, command, refusal, response};
 use crate::signals::COUNT;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-/// What can be written: calibration. What can be read by itself: DAQ.
+/// Resources: calibration (writing), DAQ (measuring).
 const CALIBRATION: u8 = 0x01;
 const DAQ: u8 = 0x04;
 /// Bits of the session's state.
@@ -35,27 +34,26 @@ const WRITE_BYTES: usize = BYTES - 2;
 pub(crate) const BLOCK_PACKETS: u8 = BLOCK.div_ceil(WRITE_BYTES) as u8;
 /// Type of the checksum: CRC-32 of IEEE 802.3.
 const CHECKSUM_CRC_32: u8 = 0x09;
-/// Most bytes of a checksum; more would be felt in the cycle.
+/// Most bytes of a checksum, to bound its time within the cycle.
 const CHECKSUM_BYTES: u32 = 4096;
 /// Dynamic lists, prescaler, time stamps.
 const DAQ_PROPERTIES: u8 = 0x13;
 /// Unit of time stamps and of the event: 1 ms.
 const UNIT_1_MS: u8 = 6;
-/// Cycles without a command after which writing wants a key again: a minute.
+/// Cycles without a command after which writing is locked again: a minute.
 const IDLE_CYCLES: u64 = 60_000;
 /// Version of the protocol layer and of the layer below it.
 const VERSION: u8 = 1;
 
 static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Where the texts of the description lie, within it.
+/// Offset and length of each text in the description region, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Texts {
-    /// The A2L file: offset and bytes.
     pub a2l: (u32, u32),
-    /// Its name, without the path.
+    /// Name of the A2L file, without the path.
     pub file: (u32, u32),
-    /// Which controller, program and tables this is.
+    /// See [`crate::a2l::epk`].
     pub epk: (u32, u32),
     pub event: (u32, u32),
 }
@@ -64,30 +62,33 @@ pub(crate) struct SlaveParts {
     pub image: Image,
     pub texts: Texts,
     pub lock: Lock,
-    /// DAQ packets that may leave in a cycle.
+    /// DAQ packets that may end_session in a cycle.
     pub daq_per_cycle: u32,
 }
 
+/// What a slave counted since the start of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct SlaveCounters {
-    pub sessions: u64,
-    /// Commands that were answered well.
-    pub answered: u64,
-    pub refused: u64,
-    pub unlocked: u64,
-    pub wrong_keys: u64,
+pub(crate) struct SlaveCounters {
+    pub(crate) sessions: u64,
+    /// Commands with a positive response.
+    pub(crate) answered: u64,
+    /// Commands with an error packet, SYNCH excepted.
+    pub(crate) refused: u64,
+    pub(crate) unlocked: u64,
+    pub(crate) wrong_keys: u64,
     /// DAQ packets handed out.
-    pub daq_packets: u64,
+    pub(crate) daq_packets: u64,
 }
 
 /// A block that is being written.
 #[derive(Clone)]
 struct Block {
     bytes: [u8; BLOCK],
-    had: usize,
+    received: usize,
     whole: usize,
 }
 
+/// A slave: session, lock, DAQ lists and image.
 #[derive(Clone)]
 pub struct Slave {
     image: Image,
@@ -116,15 +117,17 @@ impl Slave {
             storing: false,
             idle: 0,
             address: None,
-            block: Block { bytes: [0; BLOCK], had: 0, whole: 0 },
+            block: Block { bytes: [0; BLOCK], received: 0, whole: 0 },
             counters: SlaveCounters::default(),
         }
     }
 
+    /// The memory that clients see.
     pub fn image(&self) -> &Image {
         &self.image
     }
 
+    /// Whether the session may write.
     pub fn is_unlocked(&self) -> bool {
         self.lock.is_open()
     }
@@ -133,7 +136,8 @@ impl Slave {
         &self.counters
     }
 
-    /// A cycle was answered: takes its signals and the parameters as they are now.
+    /// Ends a cycle of the rig: takes its signals, in the order of their table, and the current parameters, in the order of the
+    /// variables; samples the DAQ lists that are due.
     pub fn cycle(&mut self, cycle: u64, signals: &[f64; COUNT], parameters: &[f64]) {
         self.image.refresh(cycle, signals, parameters);
         self.lock.cycle();
@@ -148,19 +152,20 @@ impl Slave {
         self.image.restart();
     }
 
+    /// The next DAQ packet to send; `None` when none waits.
     pub fn next_daq(&mut self) -> Option<Packet> {
         let packet = self.daq.next_packet()?;
         self.counters.daq_packets += 1;
         Some(packet)
     }
 
-    /// The parameter set was stored: the event that tells so.
+    /// Ends a request to store; the event to send, if a session is open.
     pub(crate) fn stored(&mut self) -> Option<Packet> {
         self.storing = false;
         self.connected.then_some([EVENT, EVENT_STORED, 0, 0, 0, 0, 0, 0])
     }
 
-    /// The answer to a packet of any bytes, received in `cycle`; `None` where none is due.
+    /// Processes a packet of any bytes, received in the rig's `cycle`, and returns the response, if the packet has one.
     pub fn command(
         &mut self,
         packet: &[u8],
@@ -191,8 +196,8 @@ impl Slave {
     }
 
     fn connect(&mut self) -> Packet {
-        // Whoever comes finds a session without a past: shut, no lists that run.
-        self.leave();
+        // A new session is locked and has no lists.
+        self.end_session();
         self.daq.free();
         (self.connected, self.idle) = (true, 0);
         self.counters.sessions += 1;
@@ -201,11 +206,11 @@ impl Slave {
         response(&[CALIBRATION | DAQ, basic, BYTES as u8, BYTES as u8, 0, VERSION, VERSION])
     }
 
-    fn leave(&mut self) {
+    fn end_session(&mut self) {
         self.connected = false;
         self.lock.shut();
         self.daq.stop();
-        // What waits is for nobody.
+        // Discard the packets of the session.
         while self.daq.next_packet().is_some() {}
         self.address = None;
         self.block.whole = 0;
@@ -225,7 +230,7 @@ impl Slave {
         self.block.whole = 0;
         let answer = match code {
             command::DISCONNECT => {
-                self.leave();
+                self.end_session();
                 response(&[])
             }
             command::GET_STATUS => self.status(),
@@ -264,7 +269,7 @@ impl Slave {
         response(&[state, self.protected(), 0, 0, 0])
     }
 
-    /// Resources that want a key.
+    /// Resources that need a key.
     fn protected(&self) -> u8 {
         if self.lock.is_open() { 0 } else { CALIBRATION }
     }
@@ -303,7 +308,7 @@ impl Slave {
             return Err(Refusal::OutOfRange);
         }
         if mode == 0 && resource == DAQ {
-            // Measuring is open to everybody.
+            // Measuring needs no key.
             return Ok(response(&[0]));
         }
         let (left, [a, b, c, d, e, f]) = self.lock.seed(mode == 1)?;
@@ -313,12 +318,12 @@ impl Slave {
     fn unlock(&mut self, fields: Fields<'_>) -> Result<Packet, Refusal> {
         let left = fields.byte(1)?;
         let part = fields.bytes(2, usize::from(left).min(WRITE_BYTES))?;
-        match self.lock.turn(left, part)? {
-            Turned::Halfway => {}
-            Turned::Open => self.counters.unlocked += 1,
-            Turned::Wrong => {
+        match self.lock.check_key(left, part)? {
+            KeyCheck::Incomplete => {}
+            KeyCheck::Open => self.counters.unlocked += 1,
+            KeyCheck::Wrong => {
                 self.counters.wrong_keys += 1;
-                self.leave();
+                self.end_session();
                 return Err(Refusal::AccessLocked);
             }
         }
@@ -354,20 +359,20 @@ impl Slave {
         Ok(response(&[CHECKSUM_CRC_32, 0, 0, a, b, c, d]))
     }
 
-    /// A packet that writes; a block is answered at its end, or where it goes wrong.
+    /// DOWNLOAD and DOWNLOAD_NEXT; a block is answered at its end, or at its first error.
     fn write(
         &mut self,
-        goes_on: bool,
+        is_continuation: bool,
         fields: Fields<'_>,
         actions: &mut dyn ParameterActions,
     ) -> Result<Option<Packet>, Refusal> {
         let count = usize::from(fields.byte(1)?);
-        let left = self.block.whole.saturating_sub(self.block.had);
+        let left = self.block.whole.saturating_sub(self.block.received);
         let wanted = std::mem::take(&mut self.block.whole);
         self.check_unlocked()?;
         let address = self.address.ok_or(Refusal::Sequence)?;
-        // Neither a rest that is not the one awaited, nor another block in the midst of one: half of it would be lost unnoticed.
-        let in_order = if goes_on { left > 0 && count == left } else { wanted == 0 };
+        // A block out of order would lose half of another one without an error.
+        let in_order = if is_continuation { left > 0 && count == left } else { wanted == 0 };
         if !in_order {
             return Err(Refusal::Sequence);
         }
@@ -375,14 +380,14 @@ impl Slave {
             return Err(Refusal::OutOfRange);
         }
         let part = fields.bytes(2, count.min(WRITE_BYTES))?;
-        let Block { bytes, had, whole } = &mut self.block;
-        if !goes_on {
-            *had = 0;
+        let Block { bytes, received, whole } = &mut self.block;
+        if !is_continuation {
+            *received = 0;
         }
-        bytes[*had..*had + part.len()].copy_from_slice(part);
-        *had += part.len();
-        let all = if goes_on { wanted } else { count };
-        if *had < all {
+        bytes[*received..*received + part.len()].copy_from_slice(part);
+        *received += part.len();
+        let all = if is_continuation { wanted } else { count };
+        if *received < all {
             *whole = all;
             return Ok(None);
         }
@@ -454,7 +459,7 @@ impl Slave {
     }
 }
 
-/// An address at `at`, behind its extension, which is 0 here.
+/// The address after its extension at `at`, which must be 0.
 fn address(fields: Fields<'_>, at: usize) -> Result<u32, Refusal> {
     let (extension, address) = (fields.byte(at)?, fields.long(at + 1)?);
     if extension == 0 { Ok(address) } else { Err(Refusal::AccessDenied) }

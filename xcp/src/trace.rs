@@ -4,13 +4,12 @@
 //! ```text
 //!   idle ── arm ──► filling ── pre-trigger samples are there ──► armed ── source crosses the threshold ──► triggered
 //!    ▲                                                                                                        │
-//!    └───────────── arm = 0, or the rig began anew ──────────── ready ◄────────── length samples are there ───┘
+//!    └───────────── arm = 0, or the rig restarted ───────────── ready ◄────────── length samples are there ───┘
 //! ```
 //!
-//! A sample is taken every so many cycles; in each of them the source is compared with what it was in the one before. The
-//! sample in which it has crossed is number `pre_trigger_samples`, counted from 0. Cycles that never came leave no sample: each
-//! says its own cycle. What is set counts from the next arming on. The buffer is made at the start; taking a sample allocates
-//! nothing.
+//! A sample is taken every `sample_time_cycles`; each compares the source with its value in the sample before. The first sample
+//! beyond the threshold is number `pre_trigger_samples`, counted from 0. Skipped cycles leave no sample; each sample holds its
+//! cycle. Settings apply from the next arming on. The buffer is allocated at the start.
 
 use crate::signals::{COUNT, Format};
 use settings::parameters::Parameter;
@@ -35,8 +34,7 @@ pub(crate) const LOAD_SET: usize = ARM + 1;
 /// Last place of the table of signals.
 const LAST: f64 = (COUNT - 1) as f64;
 
-/// What can be written besides the parameters of the program. Whole numbers lie in memory as counts of four bytes, others as
-/// floats of eight.
+/// Writable values besides the parameters of the program. Whole numbers are counts of four bytes, others floats of eight.
 pub(crate) static CONTROLS: [Parameter; LOAD_SET + 1] = [
     signal("trace.source", 17.0, "signal that is compared with the threshold, by its place"),
     Parameter::new(("trace.threshold", ""), [-1e9, 1e9], 0.0, "threshold, in the unit of the source"),
@@ -78,16 +76,16 @@ pub(crate) fn control_format(place: usize) -> Format {
 /// Names of the states.
 pub(crate) const STATES: &[&str] = &["idle", "filling", "armed", "triggered", "ready"];
 
-/// What the buffer does.
+/// State of the trigger buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum State {
-    /// Nothing; what it holds stays.
+    /// Not recording; samples stay readable.
     Idle = 0,
-    /// It takes the samples before the trigger.
+    /// Recording the samples before the trigger.
     Filling = 1,
     Armed = 2,
-    /// It takes the samples after it.
+    /// Recording the samples after the trigger.
     Triggered = 3,
     Ready = 4,
 }
@@ -123,7 +121,7 @@ pub(crate) struct Trace {
     held: usize,
     /// Samples that are still to come after the trigger.
     to_come: usize,
-    /// What the source was in the last sample.
+    /// Value of the source in the last sample.
     before: Option<f64>,
     due: u64,
     trigger_cycle: u32,
@@ -165,24 +163,24 @@ impl Settings {
 }
 
 impl Trace {
-    /// Whether it can be armed so: the pre-trigger leaves room for the trigger.
+    /// Whether the pre-trigger is shorter than the buffer.
     pub(crate) fn can_arm(controls: &[f64; CONTROLS.len()]) -> bool {
         controls[PRE_TRIGGER] < controls[LENGTH]
     }
 
-    /// Begins anew with these settings, whose ranges were checked; what it held is gone.
+    /// Discards all samples and starts with these settings, whose ranges were checked.
     pub(crate) fn arm(&mut self, controls: &[f64; CONTROLS.len()]) {
         self.settings = Settings::of(controls);
         self.state = State::Filling;
         (self.next, self.held, self.before, self.due, self.trigger_cycle) = (0, 0, None, 0, 0);
     }
 
-    /// Stops, and keeps what it has.
+    /// Stops, and keeps the samples.
     pub(crate) fn disarm(&mut self) {
         self.state = State::Idle;
     }
 
-    /// The rig's time began again: what was being recorded is of another time.
+    /// Stops a recording that a restart of the rig has cut.
     pub(crate) fn restart(&mut self) {
         if self.runs() {
             self.disarm();

@@ -29,7 +29,7 @@ fn the_file_of_every_shipped_program_says_what_the_tables_say() {
             let program = program(axis, kind.name);
             let variables = program.variables();
             let title = "with \"quotes\" and\na second line";
-            let module = read(&text(&Described { axis, title, variables }).unwrap());
+            let module = read(&text(&AxisDescription { axis, title, variables }).unwrap());
             let image = Image::new(Vec::new(), variables.to_vec(), program.values());
             for (variable, value) in variables.iter().zip(program.values()) {
                 let name = format!("{}.{}", axis.name(), variable.name.replace('-', "_"));
@@ -54,7 +54,7 @@ fn the_file_of_every_shipped_program_says_what_the_tables_say() {
 #[test]
 fn the_identification_is_another_when_a_table_is() {
     let program = program(Axis::Drive, "position-p");
-    let of = |axis, variables: &[Variable]| epk(&Described { axis, title: "t", variables });
+    let of = |axis, variables: &[Variable]| epk(&AxisDescription { axis, title: "t", variables });
     let same = of(Axis::Drive, program.variables());
     assert_eq!(of(Axis::Drive, program.variables()), same);
     assert_ne!(of(Axis::Load, program.variables()), same);
