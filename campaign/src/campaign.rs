@@ -1,4 +1,4 @@
-//! A campaign, ready to be run: its file, the files that this names, its runs, and how they are shared out.
+//! A campaign ready to run: its file, the files that this names, its runs, and their partition into parts.
 
 use crate::child::Limit;
 use crate::command::{self, CommandError, Invocation};
@@ -7,9 +7,9 @@ use crate::factor::Value;
 use crate::file;
 use crate::file::{CampaignFile, ExperimentKind, Kind, Pace, RESERVED};
 use crate::inputs::{CampaignInputs, InputsError};
-use crate::outcome::{Ended, Outcome};
-use crate::parts::{Parts, hash, usual_runs_per_part};
-use crate::points::{Point, Points, TooMany};
+use crate::outcome::{EndState, Outcome};
+use crate::parts::{Parts, default_runs_per_part, hash};
+use crate::points::{Point, Points, TooManyRuns};
 use crate::processes::{self, ProcessesError, Programs};
 use crate::rehearsed;
 use figures::top::POSITIONS;
@@ -24,14 +24,14 @@ use std::sync::atomic::AtomicBool;
 pub(crate) struct Campaign {
     pub file: CampaignFile,
     pub points: Points,
-    /// How they are shared out.
+    /// Partition of the runs.
     pub parts: Parts,
     /// The files that it names; none for a command.
     inputs: Option<CampaignInputs>,
     programs: Programs,
 }
 
-/// Where a campaign finds what it needs.
+/// Folders that a campaign looks files up in.
 #[derive(Clone, Debug)]
 pub(crate) struct Places {
     /// Folder with the shipped `experiments` and `programs`.
@@ -48,7 +48,7 @@ pub(crate) enum CampaignError {
     #[error(transparent)]
     Inputs(#[from] InputsError),
     #[error("{0}: {1}")]
-    TooMany(String, TooMany),
+    TooManyRuns(String, TooManyRuns),
     #[error("{0}: {1}")]
     Condition(String, ConditionError),
     #[error("{0}: {1}")]
@@ -60,7 +60,7 @@ pub(crate) enum CampaignError {
 }
 
 impl Campaign {
-    /// Reads a campaign's file and all that it names, and tries the values at the ends of its lists.
+    /// Reads a campaign's file and all files that it names, and checks the first and last values of its lists.
     pub(crate) fn read(path: &Path, places: &Places) -> Result<Self, CampaignError> {
         let mut file = CampaignFile::read(path)?;
         let folder = file.folder()?;
@@ -73,14 +73,14 @@ impl Campaign {
         };
         let name = || path.display().to_string();
         let points = Points::new(&file.factors, file.draws, file.seed)
-            .map_err(|error| CampaignError::TooMany(name(), error))?;
+            .map_err(|error| CampaignError::TooManyRuns(name(), error))?;
         let runs = points.runs();
         let parts = Parts {
-            campaign: which_campaign(&file, inputs.as_ref()),
-            program: which_program(&file, places)?,
+            campaign: campaign_hash(&file, inputs.as_ref()),
+            program: program_hash(&file, places)?,
             columns: columns(&file),
             runs,
-            runs_per_part: file.runs_per_part.unwrap_or_else(|| usual_runs_per_part(runs)),
+            runs_per_part: file.runs_per_part.unwrap_or_else(|| default_runs_per_part(runs)),
         };
         let programs = Programs { folder: places.programs.clone() };
         let campaign = Self { file, points, parts, inputs, programs };
@@ -110,15 +110,15 @@ impl Campaign {
         CampaignError::Condition(self.file.path.display().to_string(), error)
     }
 
-    /// A run; `None` when it was asked to stop.
+    /// Makes a run; `None` when `stop` was set.
     ///
     /// # Errors
-    /// [`CampaignError`] for what is no result: values that go into no file, programs that cannot be started.
+    /// [`CampaignError`] where there is no result: values that the files reject, programs that cannot be started.
     pub(crate) fn run(&self, point: &Point, stop: &AtomicBool) -> Result<Option<Outcome>, CampaignError> {
         let limit = Limit::of(file::LONGEST_WALL_S, stop);
         let kind = match &self.file.kind {
             Kind::Experiment(kind) => kind,
-            Kind::Command(command) => return self.ask(command, point, false, limit),
+            Kind::Command(command) => return self.run_command(command, point, false, limit),
         };
         match kind.pace {
             Pace::Rehearsal => {
@@ -127,15 +127,17 @@ impl Campaign {
                 let outcome = rehearsed::rehearse(&condition, inputs, point.run, kind.longest_s);
                 outcome.map(Some).map_err(|error| self.refused(error))
             }
-            Pace::Lockstep => match self.run_somewhere(point, limit)? {
-                // A barrier that a busy machine is too late for is none of the run's doing: what fails twice is.
-                Some(outcome) if outcome.ended == Ended::Failed => self.run_somewhere(point, limit),
+            Pace::Lockstep => match self.run_in_temporary_folder(point, limit)? {
+                // A busy machine may miss the barrier's time-out; a second failure is the run's.
+                Some(outcome) if outcome.ended == EndState::Failed => {
+                    self.run_in_temporary_folder(point, limit)
+                }
                 outcome => Ok(outcome),
             },
         }
     }
 
-    /// The same once more, for somebody to see: an experiment as processes that leave their files in `folder`.
+    /// Repeats a run for inspection: an experiment as processes that leave their files in `folder`.
     pub(crate) fn repeat(
         &self,
         point: &Point,
@@ -144,11 +146,11 @@ impl Campaign {
     ) -> Result<Option<Outcome>, CampaignError> {
         match &self.file.kind {
             Kind::Experiment(_) => self.run_in(point, folder, limit),
-            Kind::Command(command) => self.ask(command, point, true, limit),
+            Kind::Command(command) => self.run_command(command, point, true, limit),
         }
     }
 
-    fn ask(
+    fn run_command(
         &self,
         command: &[String],
         point: &Point,
@@ -160,13 +162,17 @@ impl Campaign {
             .map_err(|error| CampaignError::Command(command[0].clone(), point.run, error))
     }
 
-    fn run_somewhere(&self, point: &Point, limit: Limit<'_>) -> Result<Option<Outcome>, CampaignError> {
+    fn run_in_temporary_folder(
+        &self,
+        point: &Point,
+        limit: Limit<'_>,
+    ) -> Result<Option<Outcome>, CampaignError> {
         let folder = tempfile::Builder::new().prefix("airbench-run-").tempdir();
         let folder = folder.map_err(|error| CampaignError::Program("a folder for the run".into(), error))?;
         self.run_in(point, folder.path(), limit)
     }
 
-    /// A run of an experiment as processes, which leave their files in `folder`; `None` when it was asked to stop.
+    /// A run of an experiment as processes, which leave their files in `folder`; `None` when it was stopped.
     fn run_in(
         &self,
         point: &Point,
@@ -203,7 +209,7 @@ impl Campaign {
     }
 }
 
-/// Adds a cell, quoted where it has to be.
+/// Appends a CSV cell, quoted if necessary.
 fn push_cell(row: &mut String, text: &str) {
     row.push(',');
     if text.contains([',', '"', '\n', '\r']) {
@@ -230,7 +236,7 @@ fn columns(file: &CampaignFile) -> Vec<String> {
     own(before).into_iter().chain(factors).chain(own(after)).chain(collected(file)).collect()
 }
 
-/// A command's program: a path is from the campaign's file, a name is looked for as a shell does.
+/// A command's program: a path is relative to the campaign's file, a name is looked up in PATH.
 fn program(word: &str, folder: &Path) -> Result<String, CampaignError> {
     if word.contains('/') {
         return Ok(folder.join(word).display().to_string());
@@ -242,8 +248,8 @@ fn program(word: &str, folder: &Path) -> Result<String, CampaignError> {
     Ok(found.display().to_string())
 }
 
-/// Tells one campaign from another by all that its results follow from.
-fn which_campaign(file: &CampaignFile, inputs: Option<&CampaignInputs>) -> String {
+/// Hash of everything that determines the results, besides the programs.
+fn campaign_hash(file: &CampaignFile, inputs: Option<&CampaignInputs>) -> String {
     let mut all = String::new();
     let mut add = |name: &str, hash: &str| {
         let _ = writeln!(all, "{name} {hash}");
@@ -253,8 +259,8 @@ fn which_campaign(file: &CampaignFile, inputs: Option<&CampaignInputs>) -> Strin
     hash(all.as_bytes())[..16].to_owned()
 }
 
-/// Tells one version from another by the programs themselves: this one, and those that it starts.
-fn which_program(file: &CampaignFile, places: &Places) -> Result<String, CampaignError> {
+/// Hash of the executables: this program, and those that it starts.
+fn program_hash(file: &CampaignFile, places: &Places) -> Result<String, CampaignError> {
     let own =
         std::env::current_exe().map_err(|error| CampaignError::Program("this program".into(), error))?;
     let mut programs = vec![own];
@@ -262,7 +268,7 @@ fn which_program(file: &CampaignFile, places: &Places) -> Result<String, Campaig
         programs.extend(["emulator", "controller"].map(|name| places.programs.join(name)));
     }
     if let Kind::Command(words) = &file.kind {
-        // As far as its words are files: scripts and programs.
+        // Those of its words that name files: scripts and programs.
         let folder = file.folder()?;
         programs.extend(words.iter().map(|word| folder.join(word)).filter(|path| path.is_file()));
         for word in &file.programs {

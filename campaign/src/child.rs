@@ -1,4 +1,4 @@
-//! A process that a run is made of: waited for, and ended when the campaign is or when it takes too long.
+//! A process of a run: waited for, and terminated when the campaign ends or the process exceeds its time limit.
 
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use std::io;
@@ -7,20 +7,20 @@ use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time between two looks at whether a process has ended.
-const LOOK: Duration = Duration::from_millis(2);
-/// How long a process that was asked to end may take to save what it has.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Period of the polls for the end of a process.
+const POLL_PERIOD: Duration = Duration::from_millis(2);
+/// Time between SIGTERM and SIGKILL, in which a process saves its files.
+const TERMINATION_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A process that ends with its owner, and with it all that it started.
+/// A child process in a process group of its own; dropping it terminates the group.
 #[derive(Debug)]
-pub(crate) struct Own {
+pub(crate) struct ChildProcess {
     child: Child,
 }
 
-/// Why a process did not come to its own end.
+/// Why a wait ended without an exit status.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum Cut {
+pub(crate) enum WaitError {
     #[error("stopped")]
     Stopped,
     #[error("took longer than {0} s, and was ended")]
@@ -29,9 +29,8 @@ pub(crate) enum Cut {
     System(#[from] io::Error),
 }
 
-impl Own {
-    /// Starts it as a group of its own, which a Ctrl-C at the terminal does not reach: what that does to a run is for its owner
-    /// to say.
+impl ChildProcess {
+    /// Starts a process in a group of its own, which a Ctrl-C at the terminal does not reach.
     pub(crate) fn start(command: &mut Command) -> io::Result<Self> {
         command.process_group(0).spawn().map(|child| Self { child })
     }
@@ -40,36 +39,36 @@ impl Own {
         &mut self.child
     }
 
-    /// Waits for its end, until `deadline` at most.
+    /// Waits for the exit status.
     ///
     /// # Errors
-    /// [`Cut`] when it was ended instead.
-    pub(crate) fn wait(&mut self, limit: Limit<'_>) -> Result<ExitStatus, Cut> {
+    /// [`WaitError`] at the time limit, or when the campaign stops; the process still runs then.
+    pub(crate) fn wait(&mut self, limit: Limit<'_>) -> Result<ExitStatus, WaitError> {
         loop {
             if let Some(status) = self.child.try_wait()? {
                 return Ok(status);
             }
             if limit.stop.load(Ordering::Relaxed) {
-                return Err(Cut::Stopped);
+                return Err(WaitError::Stopped);
             }
             if limit.began.elapsed().as_secs_f64() > limit.longest_s {
-                return Err(Cut::TooLong(limit.longest_s));
+                return Err(WaitError::TooLong(limit.longest_s));
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_PERIOD);
         }
     }
 }
 
-impl Drop for Own {
-    /// Asks it to end first: it may have started others that it has to end itself.
+impl Drop for ChildProcess {
+    /// Sends SIGTERM first: the process may have to end others that it started.
     fn drop(&mut self) {
         let process = Pid::from_child(&self.child);
         if matches!(self.child.try_wait(), Ok(None)) {
-            // What has ended meanwhile needs no signal.
+            // Fails where the process has ended meanwhile.
             let _ = kill_process(process, Signal::TERM);
             let asked = Instant::now();
-            while matches!(self.child.try_wait(), Ok(None)) && asked.elapsed() < PATIENCE {
-                std::thread::sleep(LOOK);
+            while matches!(self.child.try_wait(), Ok(None)) && asked.elapsed() < TERMINATION_TIMEOUT {
+                std::thread::sleep(POLL_PERIOD);
             }
             let _ = self.child.kill();
             let _ = self.child.wait();

@@ -1,19 +1,19 @@
-//! A run as a program of somebody else's: it is given the run as a line of JSON, and answers with one.
+//! A run by an external program: it reads a request as a line of JSON and prints its answer as one.
 //!
 //! ```text
 //! stdin    {"run": 17, "draw": 2, "seed": 93, "values": {"hidden": "valve-offset", "noise": 0.5}, "again": false}
 //! stdout   anything, and as the last line a JSON object; its keys that the campaign collects become columns
 //! ```
 //!
-//! An exit code other than 0, a hang and an answer that is none are results: `failed`, with what the program said last. A crash
-//! in one of ten thousand runs costs one run. A program that ends with 75 says that nothing was tried, for want of a disk or of
-//! anything else that is not the run's affair: the start ends, and the run stays missing.
+//! An exit code other than 0, a time-out and an invalid answer are results: `failed`, with the last line of the program. A crash
+//! in one of ten thousand runs costs one run. Exit code 75 reports that nothing was tried, because of a full disk or another
+//! cause outside the run: the start ends, and the run stays missing.
 //!
-//! Programs run in the folder of the campaign's file, so that paths beside it are right wherever the start was made.
+//! Programs run in the folder of the campaign's file, so that relative paths do not depend on the folder of the start.
 
-use crate::child::{Cut, Limit, Own};
+use crate::child::{ChildProcess, Limit, WaitError};
 use crate::factor::{Factor, Value};
-use crate::outcome::{Ended, Outcome};
+use crate::outcome::{EndState, Outcome};
 use crate::points::Point;
 use serde_json::{Map, Value as Json, json};
 use std::io::{self, Read, Write};
@@ -21,21 +21,22 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
 
-/// At least so many of the last bytes of a program's output are kept.
+/// Least number of bytes kept from the end of a program's output.
 const KEPT_OUTPUT_BYTES: usize = 1 << 20;
 /// Most characters of a program's last line that a result keeps as the reason of a failure.
 const MAX_REASON_CHARS: usize = 400;
-/// Exit code of a program that tried nothing: `EX_TEMPFAIL` of sysexits.h.
+/// Exit code by which a command reports that it could not try the run and that the run must stay missing: `EX_TEMPFAIL` of
+/// sysexits.h.
 pub const NOT_TRIED: i32 = 75;
 
-/// A program, where it runs, and what for.
+/// How a program is started.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Invocation<'a> {
     /// The program and its arguments.
     pub(crate) command: &'a [String],
     /// The folder that it runs in.
     pub(crate) folder: &'a Path,
-    /// Whether somebody wants to see the run once more: what the program keeps of it does not do.
+    /// Whether this is a repetition for inspection, so that the program must not answer from its cache.
     pub(crate) again: bool,
 }
 
@@ -52,14 +53,14 @@ pub(crate) enum CommandError {
 /// Runs the program; `None` when the campaign was asked to stop.
 ///
 /// # Errors
-/// [`CommandError`] for what is no result.
+/// [`CommandError`] when the program could not be run or tried nothing.
 pub(crate) fn run(
     Invocation { command, folder, again }: Invocation<'_>,
     factors: &[Factor],
     point: &Point,
     limit: Limit<'_>,
 ) -> Result<Option<Outcome>, CommandError> {
-    let mut own = Own::start(
+    let mut process = ChildProcess::start(
         Command::new(&command[0])
             .args(&command[1..])
             .current_dir(folder)
@@ -67,38 +68,36 @@ pub(crate) fn run(
             .stdout(Stdio::piped())
             .stderr(Stdio::piped()),
     )?;
-    let child = own.child();
+    let child = process.child();
     if let Some(mut stdin) = child.stdin.take() {
-        // A program that does not ask for its values has them not.
-        let _ = writeln!(stdin, "{}", question(factors, point, again));
+        // Fails where the program does not read its input.
+        let _ = writeln!(stdin, "{}", request(factors, point, again));
     }
-    let (out, err) = (child.stdout.take().map(listen), child.stderr.take().map(listen));
-    let status = match own.wait(limit) {
+    let (out, err) = (child.stdout.take().map(collect_output), child.stderr.take().map(collect_output));
+    let status = match process.wait(limit) {
         Ok(status) => status,
-        Err(Cut::Stopped) => return Ok(None),
-        Err(Cut::System(error)) => return Err(error.into()),
-        Err(cut @ Cut::TooLong(_)) => return Ok(Some(Outcome::failed(format!("the program {cut}")))),
+        Err(WaitError::Stopped) => return Ok(None),
+        Err(WaitError::System(error)) => return Err(error.into()),
+        Err(cut @ WaitError::TooLong(_)) => return Ok(Some(Outcome::failed(format!("the program {cut}")))),
     };
     let output = |listener: Option<thread::JoinHandle<String>>| {
         listener.and_then(|listener| listener.join().ok()).unwrap_or_default()
     };
     let (out, err) = (output(out), output(err));
     if status.code() == Some(NOT_TRIED) {
-        return Err(CommandError::NotTried(last_words(&err)));
+        return Err(CommandError::NotTried(last_line(&err)));
     }
     if !status.success() {
-        return Ok(Some(Outcome::failed(format!("{status}: {}", last_words(&err)))));
+        return Ok(Some(Outcome::failed(format!("{status}: {}", last_line(&err)))));
     }
     let line = out.trim_end().lines().next_back().unwrap_or_default();
     Ok(Some(match serde_json::from_str::<Map<String, Json>>(line) {
-        Ok(answer) => answered(&answer),
-        Err(error) => {
-            Outcome::failed(format!("its answer is no JSON object ({error}): {}", last_words(&out)))
-        }
+        Ok(answer) => outcome_of(&answer),
+        Err(error) => Outcome::failed(format!("its answer is no JSON object ({error}): {}", last_line(&out))),
     }))
 }
 
-fn question(factors: &[Factor], point: &Point, again: bool) -> Json {
+fn request(factors: &[Factor], point: &Point, again: bool) -> Json {
     let reported = |value: &Value| match value {
         Value::Number(number) => json!(number),
         Value::Text(text) => json!(text),
@@ -111,7 +110,7 @@ fn question(factors: &[Factor], point: &Point, again: bool) -> Json {
     json!({ "run": point.run, "draw": point.draw, "seed": point.seed, "values": values, "again": again })
 }
 
-fn answered(answer: &Map<String, Json>) -> Outcome {
+fn outcome_of(answer: &Map<String, Json>) -> Outcome {
     let value = |value: &Json| match value {
         Json::Number(number) => number.as_f64().map(Value::Number),
         Json::String(text) => Some(Value::Text(text.clone())),
@@ -120,7 +119,7 @@ fn answered(answer: &Map<String, Json>) -> Outcome {
     };
     let figures = answer.iter().filter_map(|(name, reported)| Some((name.clone(), value(reported)?)));
     Outcome {
-        ended: Ended::Done,
+        ended: EndState::Done,
         because: String::new(),
         simulated_s: answer.get("simulated_s").and_then(Json::as_f64).unwrap_or(0.0),
         passed: answer.get("passed").and_then(Json::as_bool),
@@ -128,17 +127,17 @@ fn answered(answer: &Map<String, Json>) -> Outcome {
     }
 }
 
-/// The last line, cut where it is long.
-fn last_words(text: &str) -> String {
+/// The last line, at most [`MAX_REASON_CHARS`] of it.
+fn last_line(text: &str) -> String {
     text.trim_end().lines().next_back().unwrap_or_default().chars().take(MAX_REASON_CHARS).collect()
 }
 
-/// Reads to the end, so that a program never waits for its listener, and keeps the end.
-fn listen(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
+/// Reads a pipe in a thread, so that the program never blocks on it, and returns the end of the output.
+fn collect_output(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
     thread::spawn(move || {
         let mut output = Vec::new();
         let mut piece = [0; 1 << 16];
-        // What cannot be read any more is over.
+        // A read error ends the output.
         while let Ok(length @ 1..) = pipe.read(&mut piece) {
             output.extend_from_slice(&piece[..length]);
             if output.len() > 2 * KEPT_OUTPUT_BYTES {
@@ -158,7 +157,7 @@ mod tests {
     fn ask(script: &str, longest_s: f64) -> Result<Option<Outcome>, CommandError> {
         let factor = Factor {
             name: "hidden".into(),
-            changes: Changes::Passed,
+            changes: Changes::CommandValue,
             values: Values::List(vec![Value::Text("x".into())]),
         };
         let point = Point { run: 3, draw: 1, seed: 7, hidden_seed: 0, values: vec![Value::Text("x".into())] };
@@ -176,7 +175,7 @@ mod tests {
     fn the_program_is_told_its_run_and_its_last_line_counts() {
         let script = "read line; echo hello; echo \"{\\\"told\\\": \\\"$(echo $line | tr -d '\\\"')\\\", \\\"n\\\": 2}\"";
         let outcome = answer(script, 60.0);
-        assert_eq!(outcome.ended, Ended::Done, "{outcome:?}");
+        assert_eq!(outcome.ended, EndState::Done, "{outcome:?}");
         assert_eq!(outcome.figures["n"], Value::Number(2.0));
         let Value::Text(reported) = &outcome.figures["told"] else { panic!("a text") };
         assert_eq!(reported, "{again:false,draw:1,run:3,seed:7,values:{hidden:x}}");
@@ -198,7 +197,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let reported = folder.path().join("told");
         let script = format!("trap 'echo asked >{}; exit' TERM; sleep 60 & wait", reported.display());
-        assert_eq!(answer(&script, 0.3).ended, Ended::Failed);
+        assert_eq!(answer(&script, 0.3).ended, EndState::Failed);
         assert_eq!(std::fs::read_to_string(reported).unwrap(), "asked\n");
     }
 
@@ -212,7 +211,7 @@ mod tests {
             ("kill -SEGV $$", 60.0, "signal"),
         ] {
             let outcome = answer(script, longest_s);
-            assert_eq!(outcome.ended, Ended::Failed, "{script}");
+            assert_eq!(outcome.ended, EndState::Failed, "{script}");
             assert!(outcome.because.contains(words), "{script}: {}", outcome.because);
         }
     }
@@ -220,6 +219,6 @@ mod tests {
     #[test]
     fn a_program_that_says_much_does_not_wait_for_its_listener() {
         let outcome = answer("yes | head -c 5000000; echo; echo '{\"a\": 1}'", 60.0);
-        assert_eq!(outcome.ended, Ended::Done, "{outcome:?}");
+        assert_eq!(outcome.ended, EndState::Done, "{outcome:?}");
     }
 }

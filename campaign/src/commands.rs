@@ -1,12 +1,12 @@
-//! What the commands do.
+//! The subcommands of the program.
 
 use crate::campaign::{Campaign, CampaignError, Places};
 use crate::child::Limit;
 use crate::cli::{Cli, Command, CommonArguments, PlanArguments, RepeatArguments, RunArguments};
-use crate::engine::{Done, EngineError, Start, in_words};
+use crate::engine::{EngineError, Start, StartReport, duration_text};
 use crate::file::LONGEST_WALL_S;
 use crate::merge::{MergeError, merge};
-use crate::outcome::Ended;
+use crate::outcome::EndState;
 use crate::page::page;
 use crate::parts::write_whole;
 use crate::shard::{Shard, ShardError};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Why a command did not do what it was asked for.
+/// Why a subcommand failed.
 #[derive(Debug, thiserror::Error)]
 enum CommandError {
     #[error(transparent)]
@@ -38,6 +38,7 @@ enum CommandError {
     NoSuchRun { run: u64, last: u64 },
 }
 
+/// Runs the program `campaign` with the arguments of the process.
 pub fn main() -> ExitCode {
     let exit = run(&Cli::parse()).unwrap_or_else(|error| {
         say(&error.to_string());
@@ -49,7 +50,7 @@ pub fn main() -> ExitCode {
 fn run(cli: &Cli) -> Result<Exit, CommandError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // A second one ends the process at once; parts are whole or absent in any case.
+        // A second signal ends the process at once; parts are whole or absent in any case.
         let code = Exit::Interrupted as i32;
         signal_hook::flag::register_conditional_shutdown(signal, code, Arc::clone(&stop))
             .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
@@ -60,7 +61,7 @@ fn run(cli: &Cli) -> Result<Exit, CommandError> {
         Command::Run(arguments) => start(arguments, &stop),
         Command::Merge(arguments) => {
             let campaign = read(&arguments.common)?;
-            let usual = vec![usual_out(&arguments.common.file)];
+            let usual = vec![default_out(&arguments.common.file)];
             let folders = if arguments.folders.is_empty() { &usual } else { &arguments.folders };
             let to = arguments.to.as_ref().unwrap_or(&folders[0]);
             results(&campaign, folders, to, arguments.expect_passed)
@@ -84,7 +85,7 @@ fn stem(file: &Path) -> String {
     file.file_stem().map_or_else(|| "campaign".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
-fn usual_out(file: &Path) -> PathBuf {
+fn default_out(file: &Path) -> PathBuf {
     Path::new("runs/campaigns").join(stem(file))
 }
 
@@ -130,7 +131,7 @@ fn start(arguments: &RunArguments, stop: &AtomicBool) -> Result<Exit, CommandErr
         Some(asked) => asked.shard(|name| std::env::var(name).ok())?,
         None => Shard::WHOLE,
     };
-    let out = arguments.out.clone().unwrap_or_else(|| usual_out(&arguments.common.file));
+    let out = arguments.out.clone().unwrap_or_else(|| default_out(&arguments.common.file));
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or_else(cores, |jobs| jobs as usize);
     let start = Start { campaign: &campaign, out: &out, shard, jobs, stop, say: &say };
@@ -147,9 +148,9 @@ fn start(arguments: &RunArguments, stop: &AtomicBool) -> Result<Exit, CommandErr
     Ok(Exit::Good)
 }
 
-fn reported(done: &Done, jobs: usize) -> String {
-    let Done { runs, simulated_s, wall_s, .. } = *done;
-    let mut reported = format!("{runs} runs in {}", in_words(wall_s));
+fn reported(done: &StartReport, jobs: usize) -> String {
+    let StartReport { runs, simulated_s, wall_s, .. } = *done;
+    let mut reported = format!("{runs} runs in {}", duration_text(wall_s));
     if simulated_s > 0.0 && wall_s > 0.0 {
         let rate = simulated_s / wall_s;
         reported += &format!(
@@ -169,7 +170,7 @@ fn results(
 ) -> Result<Exit, CommandError> {
     let began = Instant::now();
     let results = merge(campaign, folders, to)?;
-    // From wherever it is typed, and the same whoever merges.
+    // Absolute, so that the command does not depend on the folder of the merge.
     let file = std::fs::canonicalize(&campaign.file.path).unwrap_or_else(|_| campaign.file.path.clone());
     let file = quoted(&file.display().to_string());
     let command = |run: u64| format!("scripts/campaign repeat {file} {run}");
@@ -190,7 +191,7 @@ fn results(
     Ok(Exit::Good)
 }
 
-/// A word as a shell takes it.
+/// A word quoted for a shell.
 fn quoted(word: &str) -> String {
     let plain = |letter: char| letter.is_alphanumeric() || "/._-+:@%".contains(letter);
     if word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
@@ -206,7 +207,7 @@ fn repeat(arguments: &RepeatArguments, stop: &AtomicBool) -> Result<Exit, Comman
     let usual = || PathBuf::from(format!("runs/{}-run-{run}", stem(&arguments.common.file)));
     let out = arguments.out.clone().unwrap_or_else(usual);
     let mut files = String::new();
-    // What a program leaves is its own affair.
+    // Only an experiment leaves its files in the folder.
     if campaign.experiment().is_some() {
         std::fs::create_dir_all(&out)
             .map_err(|error| CommandError::File(out.display().to_string(), error))?;
@@ -217,5 +218,5 @@ fn repeat(arguments: &RepeatArguments, stop: &AtomicBool) -> Result<Exit, Comman
     let because = if outcome.because.is_empty() { String::new() } else { format!(": {}", outcome.because) };
     say(&format!("run {run} {}{because}{files}", outcome.ended.name()));
     say(campaign.row(&point, &outcome).trim_end());
-    Ok(if outcome.ended == Ended::Failed { Exit::BusFailed } else { Exit::Good })
+    Ok(if outcome.ended == EndState::Failed { Exit::BusFailed } else { Exit::Good })
 }

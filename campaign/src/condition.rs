@@ -1,7 +1,7 @@
-//! What a run is made with: the campaign's files, with the values of the run put in.
+//! Inputs of a run: the campaign's files with the values of the run.
 //!
-//! Rig and experiment become texts, as files would hold them, so that a run of two processes and a rehearsal read the same. The
-//! simulated rig has the values of the run; the controllers know the rig file as it stands, as they know a real rig.
+//! Rig and experiment are texts in the form of their files, so that processes and rehearsal read the same input. The simulated
+//! rig has the values of the run; the controllers know the unchanged rig file, as they know a real rig.
 
 use crate::edits::{self, EditError};
 use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
@@ -35,12 +35,12 @@ pub(crate) struct Condition<'s> {
     pub seed: u64,
 }
 
-/// Values that do not go into the campaign's files.
+/// Values of a run that a file's reader rejects.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("run {run}: {message}")]
 pub(crate) struct ConditionError {
     pub run: u64,
-    /// What the file's reader says.
+    /// Message of the reader.
     pub message: String,
 }
 
@@ -50,7 +50,7 @@ pub(crate) fn condition<'s>(
     point: &Point,
 ) -> Result<Condition<'s>, ConditionError> {
     let refused = |message: String| ConditionError { run: point.run, message };
-    let mut sorted = Sorted::default();
+    let mut sorted = ValuesByTarget::default();
     for (factor, value) in points.factors().iter().zip(&point.values) {
         sorted.take(&factor.changes, value, point);
     }
@@ -96,9 +96,9 @@ impl Condition<'_> {
     }
 }
 
-/// A run's values by what they change.
+/// Values of a run, grouped by the file or program that they change.
 #[derive(Default)]
-struct Sorted<'p> {
+struct ValuesByTarget<'p> {
     rig: Vec<(String, f64)>,
     experiment: Vec<(String, f64)>,
     set: Vec<String>,
@@ -106,7 +106,7 @@ struct Sorted<'p> {
     files: Vec<(FileChoice, &'p str)>,
 }
 
-impl<'p> Sorted<'p> {
+impl<'p> ValuesByTarget<'p> {
     fn take(&mut self, changes: &'p Changes, value: &'p Value, point: &Point) {
         match (changes, value) {
             (Changes::Rig(path), Value::Number(number)) => self.rig.push((path.clone(), *number)),
@@ -119,7 +119,7 @@ impl<'p> Sorted<'p> {
             (Changes::Hidden(among), Value::Text(name)) => {
                 self.rig.extend(hidden(name, *among, point.hidden_seed));
             }
-            // Numbers for what has numbers, names for what has names: `factor.rs` holds the file to that.
+            // `factor.rs` checks that each kind of change has values of its type.
             _ => {}
         }
     }
@@ -128,7 +128,7 @@ impl<'p> Sorted<'p> {
         self.files.iter().find(|(own, _)| *own == choice).map(|(_, name)| *name)
     }
 
-    /// Numbers of one fault at one place stand together.
+    /// The fault script; numbers of one fault at one place form one entry.
     fn faults_toml(&self) -> String {
         let mut text = String::new();
         for (place, (fault, _)) in self.faults.iter().enumerate() {
@@ -155,11 +155,11 @@ impl<'p> Sorted<'p> {
     }
 }
 
-/// Paths and numbers of a hidden effect in a rig file; none for no effect.
+/// Paths and numbers of a hidden effect in a rig file; empty without an effect.
 fn hidden(name: &str, among: Among, seed: u64) -> Vec<(String, f64)> {
     let Some(sheet) = sheet(name).filter(|_| name != NONE_HIDDEN) else { return Vec::new() };
     let mut sampler = EffectSampler::new(seed);
-    // The file's reader has seen to it that it has a place there.
+    // The reader of the campaign file checked that the effect exists at such a place.
     let Some(place) = sampler.place(sheet, among) else { return Vec::new() };
     let numbers = sampler.numbers(sheet);
     let path = |key: &str| format!("effects.{name}.{place}.{key}");

@@ -1,22 +1,22 @@
-//! Numbers put into the text of a TOML file by their paths: a run gets its rig and its experiment as files would say them.
+//! Sets numbers in the text of a TOML file by their paths, for the rig and the experiment of a run.
 //!
 //! ```text
 //! friction.sliding_force_n            key of a table
 //! valve.kv_supply_m3_per_h.3          place in a list of numbers, from 0
 //! drive.set-point.1.to_m              key of a table in a list of tables, from 0
-//! effects.valve-offset.drive.offset_percent   tables that are not there yet are made
+//! effects.valve-offset.drive.offset_percent   absent tables are added
 //! ```
 //!
-//! Whether the file may hold the key, and such a number there, is for its reader to say.
+//! Keys and ranges are checked by the reader of the file.
 //!
-//! Files that a text names, tables of set-points and libraries, are found by their being there: a text that is moved names them
-//! by their whole paths.
+//! A string value that names an existing file (a table of set-points, a library) is a file reference; in a text for another
+//! folder it becomes an absolute path.
 
 use std::path::{Path, PathBuf};
 use toml_edit::visit_mut::{VisitMut, visit_value_mut};
 use toml_edit::{DocumentMut, Item, Table, Value};
 
-/// Why a path leads nowhere.
+/// Why a number cannot be set.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum EditError {
     #[error("is no TOML: {0}")]
@@ -25,7 +25,7 @@ pub(crate) enum EditError {
     Path {
         path: String,
         part: String,
-        /// What stands there instead.
+        /// What the text has there instead of a table, list or number.
         what: &'static str,
     },
 }
@@ -49,17 +49,17 @@ pub(crate) fn with<'a>(
     Ok(document.to_string())
 }
 
-/// The files that are there and that the text at `path` names, as it names them.
+/// The existing files that the text of the file `path` names, as it spells them.
 pub(crate) fn files_beside(text: &str, path: &Path) -> Result<Vec<String>, EditError> {
-    let mut found = Found { path, names: Vec::new() };
+    let mut found = FileNames { path, names: Vec::new() };
     found.visit_document_mut(&mut document(text)?);
     Ok(found.names)
 }
 
-/// The text at `path` as it may stand elsewhere.
+/// The text of the file `path` with absolute paths, for use in another folder.
 pub(crate) fn moved(text: &str, path: &Path) -> Result<String, EditError> {
     let mut document = document(text)?;
-    Found { path, names: Vec::new() }.visit_document_mut(&mut document);
+    FileNames { path, names: Vec::new() }.visit_document_mut(&mut document);
     Ok(document.to_string())
 }
 
@@ -69,13 +69,13 @@ pub(crate) fn beside(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name)
 }
 
-/// Files that a text names, replaced by their whole paths.
-struct Found<'a> {
+/// Collects the files that a text names and replaces them by their absolute paths.
+struct FileNames<'a> {
     path: &'a Path,
     names: Vec<String>,
 }
 
-impl VisitMut for Found<'_> {
+impl VisitMut for FileNames<'_> {
     fn visit_value_mut(&mut self, value: &mut Value) {
         let name = value.as_str().filter(|name| beside(self.path, name).is_file());
         let whole = name.and_then(|name| std::path::absolute(beside(self.path, name)).ok());

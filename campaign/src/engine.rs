@@ -1,7 +1,7 @@
-//! Does the parts that are missing, on as many cores as it may use, and tells how it goes.
+//! Makes the missing parts on several cores and reports progress.
 //!
-//! The order in which parts are done changes nothing: each follows from the campaign and its number. What is done is on the disk
-//! at once, so that a start that is killed loses the parts that it was at and nothing else.
+//! Each part depends on the campaign and its number alone, so that their order does not matter. A part is written as soon as it
+//! is done: a start that is killed loses the parts in progress and nothing else.
 
 use crate::campaign::{Campaign, CampaignError};
 use crate::outcome::Outcome;
@@ -13,12 +13,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Between two lines of progress.
-const TELL_EACH: Duration = Duration::from_secs(2);
+/// Least time between two lines of progress.
+const PROGRESS_PERIOD: Duration = Duration::from_secs(2);
 
-/// How a start went on.
+/// Statistics of a start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Done {
+pub(crate) struct StartReport {
     /// Runs that this start did.
     pub runs: u64,
     /// Simulated time of these runs, s.
@@ -29,13 +29,13 @@ pub(crate) struct Done {
     pub missing: u64,
 }
 
-/// Why a start cannot go on; what is done stays.
+/// Why a start ended early; parts that were written stay.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum EngineError {
     /// A run that cannot be made.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
-    /// A part that is there and is none of ours.
+    /// An existing part of another campaign or program.
     #[error(transparent)]
     Part(#[from] PartError),
     /// A part that cannot be written.
@@ -45,10 +45,11 @@ pub(crate) enum EngineError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
+/// One start of a campaign, or of one of its shards.
 pub(crate) struct Start<'a> {
     pub campaign: &'a Campaign,
     pub out: &'a Path,
-    /// Which parts are this start's.
+    /// The share of this start.
     pub shard: Shard,
     pub jobs: usize,
     /// Set from outside to end the start.
@@ -58,23 +59,23 @@ pub(crate) struct Start<'a> {
 }
 
 impl Start<'_> {
-    /// Does what is missing of its shard.
+    /// Makes the missing parts of its shard.
     ///
     /// # Errors
-    /// [`EngineError`] with the first that went wrong; the parts that others were at stay missing.
-    pub(crate) fn run(&self) -> Result<Done, EngineError> {
+    /// The first [`EngineError`]; parts in progress stay missing.
+    pub(crate) fn run(&self) -> Result<StartReport, EngineError> {
         let parts = &self.campaign.parts;
-        let own: Vec<u64> = (0..parts.count()).filter(|part| self.shard.holds(*part)).collect();
-        let missing = self.missing(&own)?;
+        let of_shard: Vec<u64> = (0..parts.count()).filter(|part| self.shard.holds(*part)).collect();
+        let missing = self.missing(&of_shard)?;
         let runs_of = |list: &[u64]| list.iter().map(|part| parts.runs_of(*part).count() as u64).sum::<u64>();
         let todo = runs_of(&missing);
-        (self.say)(&self.announcement(runs_of(&own), missing.len(), todo));
+        (self.say)(&self.announcement(runs_of(&of_shard), missing.len(), todo));
         let tried = self.try_first(&missing, todo)?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.jobs.max(1)).build()?;
         let progress = Progress::new(todo, self.say);
         let failed = Mutex::new(None);
         pool.install(|| {
-            // One part at a time: no core goes idle while another has several before it.
+            // One part at a time, so that no core idles while another has a queue.
             missing.par_iter().with_max_len(1).for_each(|part| {
                 if self.is_over(&failed) {
                     return;
@@ -87,16 +88,19 @@ impl Start<'_> {
         match failed.into_inner().expect("no holder panics") {
             Some(error) => Err(error),
             None => {
-                let missing = self.missing(&own)?.len() as u64;
-                Ok(Done { missing, ..progress.done() })
+                let missing = self.missing(&of_shard)?.len() as u64;
+                Ok(StartReport { missing, ..progress.done() })
             }
         }
     }
 
-    /// Parts that are not there. One that cannot be read is made again; one of somebody else's is not touched.
-    fn missing(&self, own: &[u64]) -> Result<Vec<u64>, PartError> {
+    /// The parts among `parts` that are absent or unreadable.
+    ///
+    /// # Errors
+    /// [`PartError`] for a part of another campaign or program, which is not overwritten.
+    fn missing(&self, parts: &[u64]) -> Result<Vec<u64>, PartError> {
         let mut missing = Vec::new();
-        for part in own {
+        for part in parts {
             match self.campaign.parts.read(self.out, *part) {
                 Ok(Some(_)) => {}
                 Ok(None) => missing.push(*part),
@@ -110,11 +114,11 @@ impl Start<'_> {
         Ok(missing)
     }
 
-    fn announcement(&self, own_runs: u64, parts: usize, todo: u64) -> String {
+    fn announcement(&self, shard_runs: u64, parts: usize, todo: u64) -> String {
         let of_shard = if self.shard == Shard::WHOLE {
             String::new()
         } else {
-            format!(", {own_runs} of them in shard {}", self.shard)
+            format!(", {shard_runs} of them in shard {}", self.shard)
         };
         format!(
             "{} runs ({} combinations, {} draws){of_shard}; {todo} to do in {parts} parts, {} at once",
@@ -125,8 +129,8 @@ impl Start<'_> {
         )
     }
 
-    /// Does the first run that is missing, and tells how long all will take. Of a program of somebody else's nobody knows how
-    /// long one takes: there the first that is done tells it.
+    /// Makes the first missing run of an experiment, to estimate the total time. How long a command takes is unknown; there the
+    /// first completed run gives the estimate.
     fn try_first(&self, missing: &[u64], todo: u64) -> Result<Option<(u64, Outcome)>, EngineError> {
         let (Some(first), Some(_)) = (missing.first(), self.campaign.experiment()) else { return Ok(None) };
         let run = self.campaign.parts.runs_of(*first).start;
@@ -134,7 +138,7 @@ impl Start<'_> {
         let outcome = self.campaign.run(&self.campaign.points.point(run), self.stop)?;
         let at_once = self.jobs.clamp(1, missing.len()) as f64;
         let expected_s = began.elapsed().as_secs_f64() * todo as f64 / at_once;
-        (self.say)(&format!("expected: {}", in_words(expected_s)));
+        (self.say)(&format!("expected: {}", duration_text(expected_s)));
         Ok(outcome.map(|outcome| (run, outcome)))
     }
 
@@ -151,7 +155,7 @@ impl Start<'_> {
     ) -> Result<(), EngineError> {
         let mut rows = String::new();
         for run in self.campaign.parts.runs_of(part) {
-            // A part that is not whole is none: nothing is gained by its other runs.
+            // An incomplete part is not written, so that its other runs are not needed.
             if self.is_over(failed) {
                 return Ok(());
             }
@@ -160,7 +164,7 @@ impl Start<'_> {
                 Some((tried, outcome)) if *tried == run => Some(outcome.clone()),
                 _ => self.campaign.run(&point, self.stop)?,
             };
-            // A signal that ends this one may have ended the run's programs, too: what they came to is no result then.
+            // The signal that stops this process may have ended the run's programs too; their outcome is no result then.
             let Some(outcome) = outcome.filter(|_| !self.stop.load(Ordering::Relaxed)) else { return Ok(()) };
             rows += &self.campaign.row(&point, &outcome);
             progress.ran(outcome.simulated_s);
@@ -170,7 +174,7 @@ impl Start<'_> {
     }
 }
 
-/// What is reported while it goes on.
+/// Counters behind the lines of progress.
 struct Progress<'a> {
     todo: u64,
     began: Instant,
@@ -197,16 +201,16 @@ impl<'a> Progress<'a> {
         self.simulated_ms.fetch_add((simulated_s * 1e3).round() as u64, Ordering::Relaxed);
         let runs = self.runs.fetch_add(1, Ordering::Relaxed) + 1;
         let mut reported = self.reported.lock().expect("no holder panics");
-        if runs == 1 || reported.elapsed() >= TELL_EACH {
+        if runs == 1 || reported.elapsed() >= PROGRESS_PERIOD {
             *reported = Instant::now();
             let wall_s = self.began.elapsed().as_secs_f64();
             let left_s = wall_s / runs as f64 * (self.todo - runs) as f64;
-            (self.say)(&format!("{runs}/{} runs, {} left", self.todo, in_words(left_s)));
+            (self.say)(&format!("{runs}/{} runs, {} left", self.todo, duration_text(left_s)));
         }
     }
 
-    fn done(&self) -> Done {
-        Done {
+    fn done(&self) -> StartReport {
+        StartReport {
             runs: self.runs.load(Ordering::Relaxed),
             simulated_s: self.simulated_ms.load(Ordering::Relaxed) as f64 * 1e-3,
             wall_s: self.began.elapsed().as_secs_f64(),
@@ -215,9 +219,9 @@ impl<'a> Progress<'a> {
     }
 }
 
-/// A time for people.
+/// A duration in s, min, h or days.
 #[must_use]
-pub(crate) fn in_words(seconds: f64) -> String {
+pub(crate) fn duration_text(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {
         0..60 => format!("{seconds:.0} s"),
@@ -233,7 +237,7 @@ mod tests {
 
     #[test]
     fn times_are_told_in_the_units_that_people_use() {
-        let reported = [0.4, 59.0, 60.0, 3599.0, 3600.0, 90_000.0, 864_000.0].map(in_words);
+        let reported = [0.4, 59.0, 60.0, 3599.0, 3600.0, 90_000.0, 864_000.0].map(duration_text);
         assert_eq!(
             reported,
             ["0 s", "59 s", "1 min 00 s", "59 min 59 s", "1 h 00 min", "25 h 00 min", "10.0 days"]

@@ -1,4 +1,4 @@
-//! What a campaign varies: one `[[vary]]` of its file each.
+//! Factors of a campaign: one for each `[[vary]]` of its file.
 //!
 //! ```text
 //! [[vary]]                                    changes
@@ -11,10 +11,10 @@
 //! choose = "hidden"                           one effect, or "none"; its place and numbers are drawn as for sealed rigs
 //! ```
 //!
-//! In a campaign of a program (`command = […]`) a `[[vary]]` has a `name` alone, by which the program is given its value.
+//! In a campaign of a program (`command = […]`) a `[[vary]]` has a `name` alone, the key of its value in the program's request.
 //!
-//! `list = […]` is gone through, each of its values beside each of every other list; from `range = [least, most]` a value is
-//! drawn for each run, evenly, or evenly in its order of magnitude with `log = true`.
+//! Lists (`list = […]`) form a full factorial design; from `range = [least, most]` a value is drawn for each run, uniformly, or
+//! log-uniformly with `log = true`.
 
 use plant::effects::draw::Among;
 use plant::effects::{SHEETS, sheet};
@@ -22,7 +22,7 @@ use settings::{Section, SettingsError};
 use std::fmt;
 use toml::de::DeValue;
 
-/// What is varied, and through which values.
+/// A factor and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Factor {
     /// Name of its column.
@@ -41,23 +41,23 @@ pub(crate) enum Changes {
     Fault(FaultNumber),
     /// A file as a whole.
     File(FileChoice),
-    /// The effect that the rig has and the controllers do not know, at a place among these.
+    /// An effect of the rig that the controllers do not know, at one of these places.
     Hidden(Among),
-    /// Nothing here: it is given to the program that is run.
-    Passed,
+    /// A value of a command, which receives it in its request.
+    CommandValue,
 }
 
 /// A number of a fault, and when it acts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FaultNumber {
     pub fault: String,
-    /// Where; none for a fault that has one place.
+    /// Place of the fault; `None` for a fault with one place.
     pub at: Option<String>,
     /// Key of the number that is varied.
     pub key: String,
-    /// From when, s of the rig's time.
+    /// Start, s of the rig's time.
     pub from_s: f64,
-    /// Until when; to the end without.
+    /// End, s of the rig's time; `None`: the end of the run.
     pub to_s: Option<f64>,
 }
 
@@ -77,16 +77,16 @@ pub(crate) enum Values {
     Range(Range),
 }
 
-/// What a value is drawn from.
+/// Distribution that values are drawn from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
     pub(crate) ends: [f64; 2],
-    /// Evenly in the order of magnitude, not in the value; then both ends are above 0.
+    /// Log-uniform instead of uniform; both ends are above 0 then.
     pub log: bool,
 }
 
 impl Range {
-    /// The value at a share of it, 0 to 1.
+    /// Quantile of the distribution at `share`, 0 to 1.
     #[must_use]
     pub(crate) fn at(&self, share: f64) -> f64 {
         let Range { ends: [least, most], log } = *self;
@@ -130,7 +130,7 @@ impl Value {
 }
 
 impl Values {
-    /// How many are gone through; 1 for those that are drawn.
+    /// Number of levels of a list; 1 for a range.
     #[must_use]
     pub(crate) fn listed(&self) -> usize {
         match self {
@@ -140,12 +140,12 @@ impl Values {
     }
 }
 
-/// Keys that say what is changed.
+/// Keys that name the target of a factor.
 const SUBJECTS: [&str; 5] = ["rig", "experiment", "set", "fault", "choose"];
-/// Keys that only a fault has.
+/// Keys of faults alone.
 const OF_A_FAULT: [&str; 4] = ["at", "key", "from_s", "to_s"];
 
-/// What `choose` may name; `None`: a hidden effect.
+/// Values of `choose`; `None`: a hidden effect.
 const CHOICES: [(&str, Option<FileChoice>); 5] = [
     ("experiment", Some(FileChoice::Experiment)),
     ("rig", Some(FileChoice::Rig)),
@@ -198,11 +198,11 @@ fn values(section: &mut Section<'_>) -> Result<Values, SettingsError> {
     }
 }
 
-/// What is changed, and the name of its column when it has no other.
+/// The target of a factor, and the default name of its column.
 fn changes(section: &mut Section<'_>, name: Option<&String>) -> Result<(String, Changes), SettingsError> {
     let subjects: Vec<_> = SUBJECTS.into_iter().filter(|key| section.has(key)).collect();
     let subject = match (&subjects[..], name) {
-        ([], Some(name)) => return Ok((name.clone(), Changes::Passed)),
+        ([], Some(name)) => return Ok((name.clone(), Changes::CommandValue)),
         ([subject], _) => *subject,
         _ => return Err(section.wrong(&format!("rig: needs exactly one of {}", SUBJECTS.join(", ")))),
     };
@@ -239,7 +239,7 @@ fn fault_number(section: &mut Section<'_>, fault: String) -> Result<(String, Cha
 
 /// Files and effects have names, everything else has numbers.
 fn check_kind(section: &Section<'_>, changes: &Changes, values: &Values) -> Result<(), SettingsError> {
-    if *changes == Changes::Passed {
+    if *changes == Changes::CommandValue {
         return Ok(());
     }
     let names = matches!(changes, Changes::File(_) | Changes::Hidden(_));
@@ -266,7 +266,7 @@ fn check_kind(section: &Section<'_>, changes: &Changes, values: &Values) -> Resu
     Ok(())
 }
 
-/// Name of no hidden effect.
+/// Value of a factor for a run without a hidden effect.
 pub(crate) const NONE_HIDDEN: &str = "none";
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! A campaign file: what is run, what is varied, what is collected.
+//! The campaign file: the run, its factors, the columns to collect.
 //!
 //! ```toml
 //! title = "Gain of the position loop over friction"
@@ -20,8 +20,8 @@
 //! ```
 //!
 //! In place of an experiment, `command = ["PROGRAM", "ARGUMENT", …]` runs anything that answers with a line of JSON
-//! (`command.rs`); `figures` are the keys of its answer that are collected, and `programs = ["NAME", …]` those that it starts
-//! in its turn: results of another version of one of them are none of this campaign's.
+//! (`command.rs`); `figures` are the keys of its answer that are collected, and `programs = ["NAME", …]` the programs that it
+//! starts: results of another version of one of them do not belong to this campaign.
 
 use crate::factor::{self, Changes, Factor, FileChoice};
 use figures::top::POSITIONS;
@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::DeValue;
 
-/// A campaign as its file asks for it; paths are from the file's folder.
+/// Content of a campaign file; paths are relative to its folder.
 #[derive(Clone, Debug)]
 pub(crate) struct CampaignFile {
     pub path: PathBuf,
@@ -42,14 +42,14 @@ pub(crate) struct CampaignFile {
     pub draws: u64,
     /// Seed of everything that is drawn.
     pub seed: u64,
-    /// Runs that are written together; by the number of runs where it is left out.
+    /// Runs of a part; `None`: by the number of runs.
     pub runs_per_part: Option<u64>,
     pub factors: Vec<Factor>,
-    /// Columns that are collected; of an experiment all figures when there are none.
+    /// Columns to collect; empty means all figures of an experiment.
     pub figures: Vec<String>,
     /// Columns of which the page shows the largest values, each with its run.
     pub worst: Vec<String>,
-    /// Columns of truth and answer, of which the page shows a confusion matrix.
+    /// Pairs of columns, truth and answer, whose confusion matrices the page shows.
     pub confusion: Vec<[String; 2]>,
 }
 
@@ -63,9 +63,9 @@ pub(crate) enum Kind {
 /// An experiment on the simulated rig.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ExperimentKind {
-    /// Name or path, unless it is varied.
+    /// Name or path; `None` where it is varied.
     pub experiment: Option<String>,
-    /// Path of the rig file, unless it is varied or the shipped one.
+    /// Path of the rig file; `None` where it is varied, and for the shipped one.
     pub rig: Option<String>,
     /// Longest run, s of the rig's time.
     pub longest_s: f64,
@@ -84,7 +84,7 @@ pub(crate) enum Pace {
 
 const PACES: [(&str, Pace); 2] = [("rehearsal", Pace::Rehearsal), ("lockstep", Pace::Lockstep)];
 
-/// Keys of an experiment, which a command has not.
+/// Keys of campaigns of an experiment alone.
 const OF_AN_EXPERIMENT: [&str; 4] = ["experiment", "rig", "seconds", "pace"];
 const OTHERS: [&str; 8] =
     ["title", "command", "programs", "draws", "seed", "runs_per_part", "collect", "vary"];
@@ -106,7 +106,7 @@ impl CampaignFile {
         Self::from_toml(&text, path)
     }
 
-    /// The same of a text; `path` is for messages and as the place that paths are from.
+    /// Parses a text; `path` names the file in messages, and paths are relative to its folder.
     pub(crate) fn from_toml(text: &str, path: &Path) -> Result<Self, SettingsError> {
         let source = Source::parse(text, path)?;
         let mut root = source.root();
@@ -149,16 +149,16 @@ impl CampaignFile {
         Ok(file)
     }
 
-    /// The folder that its paths are from, absolute.
+    /// The absolute folder that its paths are relative to.
     ///
     /// # Errors
-    /// [`SettingsError`] where the system does not tell where this process is.
+    /// [`SettingsError`] when the current folder cannot be found.
     pub(crate) fn folder(&self) -> Result<PathBuf, SettingsError> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
         std::path::absolute(folder).map_err(|error| SettingsError::unreadable(&self.path, &error))
     }
 
-    /// What is collected has names of its own.
+    /// Checks that collected columns have distinct names.
     fn check_figures(&self, collect: &Section<'_>) -> Result<(), SettingsError> {
         let experiment = matches!(self.kind, Kind::Experiment(_));
         if self.figures.is_empty() && !experiment {
@@ -177,7 +177,7 @@ impl CampaignFile {
         Ok(())
     }
 
-    /// What the page shows is among what is varied or collected.
+    /// Checks that the columns of the page are factors or collected.
     fn check_shown(&self, collect: &Section<'_>) -> Result<(), SettingsError> {
         let own = |name: &String| {
             self.figures.contains(name)
@@ -201,7 +201,7 @@ pub(crate) fn is_figure(name: &str) -> bool {
     POSITIONS.contains(&name) || figures::definition(name).is_some()
 }
 
-/// Pairs of columns of truth and answer.
+/// Reads the pairs of columns, truth and answer.
 fn confusion(collect: &mut Section<'_>) -> Result<Vec<[String; 2]>, SettingsError> {
     let list = collect.list("confusion")?.unwrap_or_default();
     let pair = |item: &Spanned<DeValue<'_>>| -> Option<[String; 2]> {
@@ -240,12 +240,12 @@ fn kind(root: &mut Section<'_>) -> Result<Kind, SettingsError> {
     }))
 }
 
-/// Whether a factor fits the campaign and those before it.
+/// Checks a factor against the kind of campaign and the factors before it.
 fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), String> {
     let Factor { name, changes, .. } = factor;
     if before
         .iter()
-        .any(|other| other.name == *name || (other.changes == *changes && *changes != Changes::Passed))
+        .any(|other| other.name == *name || (other.changes == *changes && *changes != Changes::CommandValue))
     {
         return Err(format!("name: {name} is varied twice; give one of them another name, or leave one out"));
     }
@@ -254,11 +254,11 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
         return Err(format!("name = \"{name}\": a figure has this name, choose another"));
     }
     match (kind, changes) {
-        (Kind::Command(_), Changes::Passed) => Ok(()),
+        (Kind::Command(_), Changes::CommandValue) => Ok(()),
         (Kind::Command(_), _) => {
             Err("name: a command receives name and value: leave out what is changed, give a name".into())
         }
-        (Kind::Experiment(_), Changes::Passed) => {
+        (Kind::Experiment(_), Changes::CommandValue) => {
             Err("rig: needs exactly one of rig, experiment, set, fault, choose".into())
         }
         (Kind::Experiment(ExperimentKind { pace: Pace::Rehearsal, .. }), Changes::Fault(_)) => {
@@ -274,7 +274,7 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
     }
 }
 
-/// Whether a column of the result may have this name beside those that are `taken`.
+/// Checks that a column may have this name beside those that are `taken`.
 fn check_column(name: &str, taken: &[&str]) -> Result<(), String> {
     if taken.contains(&name) {
         return Err(format!("\"{name}\": another column of the result has this name, choose another"));
@@ -287,7 +287,7 @@ fn check_column(name: &str, taken: &[&str]) -> Result<(), String> {
     Ok(())
 }
 
-/// Columns that every result has.
+/// Columns that every table of runs has.
 pub(crate) const RESERVED: &[&str] = &["run", "draw", "seed", "ended", "because", "simulated_s", "passed"];
 
 #[cfg(test)]
@@ -346,7 +346,7 @@ mod tests {
         let text = "title = \"t\"\ncommand = [\"judge\"]\n[collect]\nfigures = [\"named\"]\n\
                     confusion = [[\"hidden\", \"named\"]]\n[[vary]]\nname = \"hidden\"\nlist = [\"a\", \"b\"]\n";
         let file = read(text).unwrap();
-        assert_eq!(file.factors[0].changes, Changes::Passed);
+        assert_eq!(file.factors[0].changes, Changes::CommandValue);
         assert_eq!(file.confusion, [["hidden".to_owned(), "named".to_owned()]]);
     }
 }

@@ -1,4 +1,4 @@
-//! The files that a campaign names, read once before anything runs, and what tells this campaign from every other.
+//! The files that a campaign names, read once before the first run, and their hashes.
 
 use crate::edits::{self, EditError, beside};
 use crate::factor::{Changes, Factor, FileChoice, Value, Values};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// The shipped rig's name in results.
 const SHIPPED: &str = "shipped";
 
-/// What a campaign of experiments reads.
+/// Files of a campaign of experiments.
 #[derive(Debug)]
 pub(crate) struct CampaignInputs {
     /// Experiments by the name that the file gives them.
@@ -21,27 +21,27 @@ pub(crate) struct CampaignInputs {
     /// Rigs by the name that the file gives them.
     rigs: BTreeMap<String, RigFile>,
     programs: BTreeMap<PathBuf, Source>,
-    /// Hashes of what experiments and programs name in their turn, tables of set-points and libraries, by their names there.
+    /// Names and hashes of the files that experiments and programs name: tables of set-points, libraries.
     further: BTreeSet<(String, String)>,
     folders: Folders,
-    /// The experiment and the rig where they are not varied.
-    usual: [String; 2],
+    /// Names of the experiment and the rig for runs that do not vary them.
+    defaults: [String; 2],
 }
 
 /// Folders in which the names of files are looked up.
 #[derive(Debug)]
 struct Folders {
-    /// The one of the campaign's file.
+    /// Folder of the campaign's file.
     campaign: PathBuf,
-    /// The one with the shipped `experiments` and `programs`.
+    /// Folder with the shipped `experiments` and `programs`.
     shipped: PathBuf,
 }
 
 impl Folders {
-    /// The file of this name: a path from `own`, or a name in a shipped folder.
-    fn file(&self, name: &str, folder: &str, own: &Path) -> PathBuf {
+    /// The file of this name: a path relative to `base`, or a name in a shipped folder.
+    fn file(&self, name: &str, folder: &str, base: &Path) -> PathBuf {
         if name.ends_with(".toml") {
-            own.join(name)
+            base.join(name)
         } else {
             self.shipped.join(folder).join(format!("{name}.toml"))
         }
@@ -71,11 +71,11 @@ pub(crate) struct Text {
 #[derive(Debug)]
 pub(crate) struct RigFile {
     pub file: Text,
-    /// Its numbers: those that controllers know.
+    /// Its parameters, which the controllers know.
     pub nominal: RigParameters,
 }
 
-/// A file that a campaign names and that cannot be used.
+/// A file that a campaign names and that is missing or invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{campaign}: {message}")]
 pub(crate) struct InputsError {
@@ -112,7 +112,7 @@ impl CampaignInputs {
             experiments.insert(name.clone(), read(folders.experiment(&name))?);
         }
         let first = |keys: Option<&String>| keys.cloned().unwrap_or_default();
-        let usual = [first(experiments.keys().next()), first(rigs.keys().next())];
+        let defaults = [first(experiments.keys().next()), first(rigs.keys().next())];
         let mut programs = BTreeMap::new();
         let mut add = |path: PathBuf| match Source::read(&path) {
             Ok(source) => {
@@ -121,7 +121,7 @@ impl CampaignInputs {
             }
             Err(reported) => Err(error(reported.to_string())),
         };
-        let stroke_m = rigs[&usual[1]].nominal.cylinder().stroke_m;
+        let stroke_m = rigs[&defaults[1]].nominal.cylinder().stroke_m;
         for Text { path, text } in experiments.values() {
             let experiment = Experiment::from_toml(text, path, stroke_m)
                 .map_err(|reported| error(reported.to_string()))?;
@@ -143,7 +143,7 @@ impl CampaignInputs {
                 further.insert((name, hash(&bytes)));
             }
         }
-        Ok(Self { experiments, rigs, programs, further, folders, usual })
+        Ok(Self { experiments, rigs, programs, further, folders, defaults })
     }
 
     /// The experiment of this name, or the only one.
@@ -152,7 +152,7 @@ impl CampaignInputs {
     /// If the campaign names no such file.
     #[must_use]
     pub(crate) fn experiment(&self, name: Option<&str>) -> &Text {
-        &self.experiments[name.unwrap_or(&self.usual[0])]
+        &self.experiments[name.unwrap_or(&self.defaults[0])]
     }
 
     /// The rig of this name, or the only one.
@@ -161,7 +161,7 @@ impl CampaignInputs {
     /// If the campaign names no such file.
     #[must_use]
     pub(crate) fn rig(&self, name: Option<&str>) -> &RigFile {
-        &self.rigs[name.unwrap_or(&self.usual[1])]
+        &self.rigs[name.unwrap_or(&self.defaults[1])]
     }
 
     /// A program that an experiment names.
@@ -179,7 +179,7 @@ impl CampaignInputs {
         &self.programs[&self.folders.chosen_program(name)]
     }
 
-    /// The hashes of all files, each behind the name of its file, in an order that does not depend on where they are.
+    /// Name and hash of each file; names do not depend on the folder of the campaign.
     #[must_use]
     pub(crate) fn hashes(&self) -> BTreeSet<(String, String)> {
         let experiments = self.experiments.iter().map(|(name, file)| (name.as_str(), &file.text));
@@ -193,7 +193,7 @@ impl CampaignInputs {
     }
 }
 
-/// The files among which the factors choose.
+/// The files that factors with this choice name.
 fn names(factors: &[Factor], choice: FileChoice) -> Vec<String> {
     let lists = factors.iter().filter(|factor| factor.changes == Changes::File(choice));
     lists

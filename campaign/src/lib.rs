@@ -3,31 +3,33 @@
 //! ```text
 //!   campaign.toml ──► points.rs: run number ──► values ──► condition.rs: rig, experiment, programs of the run
 //!                                                              │
-//!        rehearsed.rs (plant and controllers here), processes.rs (lockstep), command.rs (anybody's program)
+//!        rehearsed.rs (plant and controllers here), processes.rs (lockstep), command.rs (an external program)
 //!                                                              │ outcome.rs: how it ended, figures
 //!                                                              ▼
 //!   engine.rs: parts that are missing, on all cores ──► parts.rs: OUT/parts/000012.csv ──► merge.rs: runs.csv
 //!                                                                                      └─► page.rs: report.html
 //! ```
 //!
-//! A run follows from the campaign and its number, a part from the campaign and its own: shards, machines and their order change
-//! nothing. Time is simulated throughout; runs that measure latencies share no cores and are none of a campaign's.
+//! A run depends on the campaign and its number alone, and so does a part: shards, machines and their order do not matter. Time
+//! is simulated throughout; runs that measure latencies must not share cores and do not belong in a campaign.
 //!
 //! | file | holds |
 //! |---|---|
 //! | [`mod@file`] | the campaign file |
-//! | [`factor`] | what is varied |
-//! | [`points`] | which runs there are |
+//! | [`factor`] | factors: what is varied |
+//! | [`points`] | the list of runs |
 //! | [`inputs`] | the files that a campaign names |
-//! | [`edits`] | numbers put into the texts of files |
-//! | [`condition`] | what a run is made with |
-//! | [`rehearsed`], [`processes`], [`command`] | the three ways in which a run is made |
-//! | [`child`] | processes that end when they have to |
-//! | [`outcome`] | what a run comes to |
-//! | [`campaign`] | all of it together |
-//! | [`shard`], [`parts`], [`engine`] | who does what, on disk, on all cores |
-//! | [`merge`], [`page`] | results |
+//! | [`edits`] | numbers set in the texts of files |
+//! | [`condition`] | inputs of a run |
+//! | [`rehearsed`], [`processes`], [`command`] | the three ways to make a run |
+//! | [`child`] | child processes with a time limit |
+//! | [`outcome`] | result of a run |
+//! | [`campaign`] | the campaign with all its inputs |
+//! | [`shard`], [`parts`], [`engine`] | share of a start, results on disk, execution on all cores |
+//! | [`merge`], [`page`] | table and page of the results |
 //! | [`cli`], [`commands`] | the program |
+
+#![warn(missing_docs)] // an interface of other crates
 
 mod campaign;
 mod child;

@@ -1,6 +1,6 @@
-//! The parts of a campaign, from one folder or from several, made into one table: `runs.csv`.
+//! Merges the parts of a campaign, from one folder or several, into one table: `runs.csv`.
 //!
-//! Nothing is merged unless all of it is there, once, and of one version.
+//! It merges only a complete set of parts of one version, without duplicates.
 
 use crate::campaign::Campaign;
 use crate::factor::Values;
@@ -21,15 +21,15 @@ pub(crate) enum MergeError {
     #[error(
         "part {part} is in {one} and in {other}: one run would count twice; name one folder once, or delete one of them"
     )]
-    Doubled { part: u64, one: String, other: String },
-    /// A part is none of ours, or not whole.
+    Duplicate { part: u64, one: String, other: String },
+    /// A part of another campaign or program, or an incomplete one.
     #[error(transparent)]
     Part(#[from] PartError),
     #[error("{path}: {error}")]
     Write { path: String, error: io::Error },
 }
 
-/// The table of all runs, column by column, as far as the page needs it.
+/// The columns of the table of runs that the page needs.
 #[derive(Debug, Default)]
 pub(crate) struct Results {
     pub runs: u64,
@@ -39,11 +39,11 @@ pub(crate) struct Results {
     numbers: BTreeMap<String, Vec<f64>>,
     /// Categorical columns by their name.
     words: BTreeMap<String, CategoricalColumn>,
-    /// The first of the runs that did not come to their end.
+    /// The first [`MAX_REPORTED`] runs that were not completed.
     pub unfinished: Vec<Unfinished>,
 }
 
-/// A run that did not come to its end.
+/// A run that was not completed.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Unfinished {
     pub run: u64,
@@ -55,12 +55,12 @@ pub(crate) struct Unfinished {
 /// Most unfinished runs that are reported one by one.
 const MAX_REPORTED: usize = 100;
 
-/// A column of words, each kept once.
+/// A categorical column: its distinct values, and an index for each run.
 #[derive(Debug, Default)]
 pub(crate) struct CategoricalColumn {
-    /// The different words, in the order of their first run.
+    /// The distinct values, in the order of their first run.
     pub known: Vec<String>,
-    /// For each run the place of its word in `known`.
+    /// For each run the index of its value in `known`.
     pub places: Vec<u32>,
 }
 
@@ -74,10 +74,10 @@ impl CategoricalColumn {
     }
 }
 
-/// Merges the parts in `folders`, which all have a place, into `to`/runs.csv.
+/// Merges the parts in `folders` into `to`/runs.csv.
 ///
 /// # Errors
-/// [`MergeError`]; `runs.csv` is as it was then.
+/// [`MergeError`]; `runs.csv` is unchanged then.
 pub(crate) fn merge(campaign: &Campaign, folders: &[PathBuf], to: &Path) -> Result<Results, MergeError> {
     let parts = &campaign.parts;
     let places = places(parts, folders)?;
@@ -109,7 +109,7 @@ fn places<'f>(parts: &Parts, folders: &'f [PathBuf]) -> Result<Vec<&'f Path>, Me
         match (holders.next(), holders.next()) {
             (Some(one), Some(other)) => {
                 let (one, other) = (one.display().to_string(), other.display().to_string());
-                return Err(MergeError::Doubled { part, one, other });
+                return Err(MergeError::Duplicate { part, one, other });
             }
             (Some(one), None) => places.push(one.as_path()),
             (None, _) => absent.push(part),
@@ -153,7 +153,7 @@ impl Results {
         {
             results.words.entry(name).or_default();
         }
-        // Of a command nobody knows beforehand what is a number; of an experiment all figures are.
+        // The figures of an experiment are numbers; those of a command may be words.
         for name in &campaign.parts.columns {
             let is_collected = campaign.file.figures.contains(name) && !results.words.contains_key(name);
             if is_figure(name) || is_collected {
@@ -193,7 +193,7 @@ impl Results {
         self.numbers.get(name).map(Vec::as_slice)
     }
 
-    /// Whether every run is done and none broke its experiment's bounds.
+    /// Whether every run was completed and kept the bounds of its experiment.
     #[must_use]
     pub(crate) fn all_passed(&self) -> bool {
         self.unfinished.is_empty() && !self.numbers("passed").unwrap_or_default().contains(&0.0)

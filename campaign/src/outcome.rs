@@ -1,41 +1,41 @@
-//! What a run comes to: how it ended, and its figures; a row of the result.
+//! Result of a run: how it ended, and its figures; a row of the table of runs.
 
 use crate::factor::Value;
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Outcome {
-    pub ended: Ended,
+    pub ended: EndState,
     /// Why, in words; empty for a run that is done.
     pub because: String,
-    /// How much of the rig's time passed, s.
+    /// Simulated time, s.
     pub simulated_s: f64,
-    /// Whether the experiment's own bounds were kept; none for a command, and without bounds.
+    /// Whether the bounds of the experiment were kept; `None` without bounds, and where a command does not say.
     pub passed: Option<bool>,
-    /// Figures that there was something to measure on.
+    /// Figures by name, without those that the run does not define.
     pub figures: BTreeMap<String, Value>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Ended {
-    /// It came to its end.
+pub(crate) enum EndState {
+    /// The experiment or the command was completed.
     Done,
     TimeOver,
-    /// A fault or an abort ended it: a result like any other.
+    /// A fault or an abort ended it; this is a valid result.
     Stopped,
-    /// A program crashed, hung, or answered with nonsense.
+    /// A program crashed, hung, or gave an invalid answer.
     Failed,
 }
 
-impl Ended {
-    /// As results call it.
+impl EndState {
+    /// Its name in the column `ended`.
     #[must_use]
     pub(crate) fn name(self) -> &'static str {
         match self {
-            Ended::Done => "done",
-            Ended::TimeOver => "time-over",
-            Ended::Stopped => "stopped",
-            Ended::Failed => "failed",
+            EndState::Done => "done",
+            EndState::TimeOver => "time-over",
+            EndState::Stopped => "stopped",
+            EndState::Failed => "failed",
         }
     }
 }
@@ -43,6 +43,6 @@ impl Ended {
 impl Outcome {
     #[must_use]
     pub(crate) fn failed(because: String) -> Self {
-        Outcome { ended: Ended::Failed, because, simulated_s: 0.0, passed: None, figures: BTreeMap::new() }
+        Outcome { ended: EndState::Failed, because, simulated_s: 0.0, passed: None, figures: BTreeMap::new() }
     }
 }

@@ -1,6 +1,6 @@
-//! The page of a campaign: how its runs ended, how its figures lie, over what they change, and its worst cases.
+//! The page of a campaign: end states, distributions of figures, their dependence on factors, worst cases.
 //!
-//! One file without anything from elsewhere, in the look of all pages.
+//! One self-contained file with the stylesheet of all pages.
 
 mod confusion;
 mod distribution;
@@ -17,8 +17,8 @@ use pagekit::number::{in_use, short, without_unit};
 use pagekit::page::{document, escaped};
 use std::fmt::Write as _;
 
-/// Figures that the page shows when the campaign's file names none to be worst.
-const USUAL: usize = 4;
+/// Number of figures on the page when the campaign's file has no `worst`.
+const DEFAULT_FIGURES: usize = 4;
 
 /// The page; `repeat` makes the command that repeats a run.
 #[must_use]
@@ -36,7 +36,7 @@ pub(crate) fn page(campaign: &Campaign, results: &Results, repeat: &dyn Fn(u64) 
     document(&campaign.file.title, &body)
 }
 
-/// Figures of which the page shows more than a line.
+/// Figures with a histogram, heat maps and worst cases.
 fn shown(campaign: &Campaign, results: &Results) -> Vec<String> {
     if !campaign.file.worst.is_empty() {
         return campaign.file.worst.clone();
@@ -47,7 +47,7 @@ fn shown(campaign: &Campaign, results: &Results) -> Vec<String> {
             && (is_figure(name) || campaign.file.figures.contains(name))
             && column.iter().any(|value| value.is_finite())
     };
-    campaign.parts.columns.iter().filter(measured).take(USUAL).cloned().collect()
+    campaign.parts.columns.iter().filter(measured).take(DEFAULT_FIGURES).cloned().collect()
 }
 
 fn lead(campaign: &Campaign, results: &Results) -> String {
@@ -99,12 +99,12 @@ fn file_section(campaign: &Campaign) -> String {
     )
 }
 
-/// A figure's name for people.
+/// Heading for a figure.
 fn name(figure: &str) -> String {
     without_unit(figure)
 }
 
-/// A value in the unit that people use.
+/// A value with its display unit.
 fn value(figure: &str, number: f64) -> String {
     let unit = match definition(figure) {
         Some(definition) => definition.unit,
@@ -114,14 +114,14 @@ fn value(figure: &str, number: f64) -> String {
     in_use(number, unit)
 }
 
-/// The finite values of a column, growing.
+/// The finite values of a column, ascending.
 fn sorted(column: &[f64]) -> Vec<f64> {
     let mut values: Vec<_> = column.iter().copied().filter(|value| value.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     values
 }
 
-/// The value below which this share lies; values grow and are not none.
+/// Empirical quantile at `share`; `values` ascend and are not empty.
 fn quantile(values: &[f64], share: f64) -> f64 {
     values[((values.len() - 1) as f64 * share).round() as usize]
 }

@@ -1,4 +1,4 @@
-//! Results on disk: parts of some runs each, whole or absent.
+//! Results on disk: files of some runs each, complete or absent.
 //!
 //! ```text
 //! OUT/parts/000012.csv
@@ -8,10 +8,10 @@
 //!   # whole: sha256 77ab…
 //! ```
 //!
-//! A part is written beside its place, brought to the disk and renamed, so that a power cut leaves it whole or not at all. Its
-//! first line tells which campaign it is of and which program made it, its last that nothing of it is missing. Which runs a part
-//! holds follows from the campaign alone: shards in any number may fill one folder, one after the other or at once, and a part
-//! that is there is never made again.
+//! A part is written to a temporary file, synchronised and renamed, so that a power failure leaves it complete or absent. Its
+//! first line identifies the campaign and the program, its last certifies that it is complete. The runs of a part depend on the
+//! campaign alone: any number of shards may fill one folder, one after the other or at once, and an existing part is not made
+//! again.
 
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
@@ -22,20 +22,20 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// How a campaign's runs are shared out.
+/// Partition of a campaign's runs into files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Parts {
-    /// Which campaign: the hash of its file and of all that this names.
+    /// Hash of the campaign's file and of the files that this names.
     pub(crate) campaign: String,
-    /// Which program: the hash of its executables.
+    /// Hash of the executables.
     pub(crate) program: String,
     pub(crate) columns: Vec<String>,
     pub(crate) runs: u64,
-    /// How many a part has, but for the last.
+    /// Runs of each part but the last.
     pub(crate) runs_per_part: u64,
 }
 
-/// What is wrong with a part that is there.
+/// What is wrong with an existing part.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum PartError {
     #[error(
@@ -58,14 +58,14 @@ pub(crate) struct WriteError {
     error: io::Error,
 }
 
-/// Parts that a campaign is cut into when its file does not say: enough for a thousand machines.
-const USUAL_PARTS: u64 = 1024;
-/// Runs of a part when the file does not say.
-const USUAL_RUNS: Range<u64> = 8..1001;
+/// Default number of parts: enough for a thousand machines.
+const DEFAULT_PARTS: u64 = 1024;
+/// Bounds of the default number of runs of a part.
+const DEFAULT_RUNS: Range<u64> = 8..1001;
 
 #[must_use]
-pub(crate) fn usual_runs_per_part(runs: u64) -> u64 {
-    (runs / USUAL_PARTS).clamp(USUAL_RUNS.start, USUAL_RUNS.end - 1)
+pub(crate) fn default_runs_per_part(runs: u64) -> u64 {
+    (runs / DEFAULT_PARTS).clamp(DEFAULT_RUNS.start, DEFAULT_RUNS.end - 1)
 }
 
 impl Parts {
@@ -96,7 +96,7 @@ impl Parts {
     /// Writes a part; `rows` are its lines.
     ///
     /// # Errors
-    /// [`WriteError`], and nothing is left of it.
+    /// [`WriteError`]; the part is absent then.
     pub(crate) fn write(&self, out: &Path, part: u64, rows: &str) -> Result<(), WriteError> {
         let path = self.path(out, part);
         let mut text = self.head(part) + rows;
@@ -107,10 +107,10 @@ impl Parts {
             .map_err(|error| WriteError { path: path.display().to_string(), error })
     }
 
-    /// The lines of a part; `None` when it is not there.
+    /// The lines of a part; `None` when it is absent.
     ///
     /// # Errors
-    /// [`PartError`] for one that is there and is not this campaign's, or not whole.
+    /// [`PartError`] for a part of another campaign or program, and for an incomplete one.
     pub(crate) fn read(&self, out: &Path, part: u64) -> Result<Option<String>, PartError> {
         let path = self.path(out, part);
         let unreadable =
@@ -123,7 +123,7 @@ impl Parts {
         let head = self.head(part);
         if !text.starts_with(&head) {
             return Err(self
-                .stranger(&text, &path)
+                .foreign(&text, &path)
                 .unwrap_or_else(|| unreadable("does not begin as a part does")));
         }
         let cut = text.rfind("# whole: sha256 ").ok_or_else(|| unreadable("its end is missing"))?;
@@ -134,8 +134,8 @@ impl Parts {
         Ok(Some(whole[head.len()..].to_owned()))
     }
 
-    /// Why a part with another head is none of ours.
-    fn stranger(&self, text: &str, path: &Path) -> Option<PartError> {
+    /// The error for a part with the first line of another campaign or program.
+    fn foreign(&self, text: &str, path: &Path) -> Option<PartError> {
         let reported = text.lines().next()?.strip_prefix("# airbench campaign ")?;
         let (campaign, reported) = reported.split_once(", made by ")?;
         let (program, _) = reported.split_once(", part ")?;
@@ -150,23 +150,24 @@ impl Parts {
     }
 }
 
-/// A file that is there as a whole, or not.
+/// Writes a file atomically: to a temporary file in the same folder, which is synchronised and renamed. Readers see all of
+/// `bytes`, or the file as it was before.
 ///
 /// # Errors
-/// What the system says; then it is not there.
+/// The error of the system; `path` is unchanged then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)?;
-    // Another process that does the same part has another name; whichever is renamed last has the same bytes.
+    // Processes that make the same part use different temporary files with the same bytes.
     let mut beside = beside(folder)?;
     beside.write_all(bytes)?;
     beside.as_file().sync_all()?;
     beside.persist(path).map_err(|error| error.error)?;
-    // The rename is on the disk when its folder is.
+    // Synchronising the folder makes the rename durable.
     File::open(folder)?.sync_all()
 }
 
-/// A file that is to get its name when it is whole; whoever may read its folder's other files may read it.
+/// A temporary file in `folder` with the usual permissions, to be renamed when it is complete.
 pub(crate) fn beside(folder: &Path) -> io::Result<NamedTempFile> {
     let readable = Permissions::from_mode(0o666); // less what the umask takes
     tempfile::Builder::new().prefix(".part-").suffix(".tmp").permissions(readable).tempfile_in(folder)
@@ -197,7 +198,7 @@ mod tests {
 
     #[test]
     fn parts_are_enough_for_many_machines_and_not_too_many_files() {
-        assert_eq!([30, 2000, 1_000_000, 1_000_000_000].map(usual_runs_per_part), [8, 8, 976, 1000]);
+        assert_eq!([30, 2000, 1_000_000, 1_000_000_000].map(default_runs_per_part), [8, 8, 976, 1000]);
     }
 
     #[test]

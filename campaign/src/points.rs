@@ -1,4 +1,4 @@
-//! Which runs a campaign has: from its file and a number follows the run, and nothing else.
+//! The runs of a campaign: each depends on the campaign's file and its number alone.
 //!
 //! ```text
 //! run = combination * draws + draw
@@ -6,9 +6,9 @@
 //! draw          what is drawn: the seed of the sensors' noise, a hidden effect's place and numbers, a value from each range
 //! ```
 //!
-//! A draw depends on the campaign's seed and its own number, not on the combination: every combination meets the same conditions,
-//! so that two of them are compared in pairs. PCG-64 begins from the SHA-256 of both numbers, since its streams from neighbouring
-//! states would be alike at first.
+//! A draw depends on the campaign's seed and the number of the draw, not on the combination: all combinations have the same
+//! draws (common random numbers), so that they are compared in pairs. PCG-64 is seeded with the SHA-256 of both numbers, since
+//! streams of neighbouring seeds are correlated at first.
 
 use crate::factor::{Factor, Value, Values};
 use rand_core::{Rng, SeedableRng};
@@ -36,10 +36,10 @@ pub(crate) struct Point {
     pub values: Vec<Value>,
 }
 
-/// A campaign that has more runs than can be counted.
+/// A campaign with more than [`MOST_RUNS`] runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the lists and draws make more than {MOST_RUNS} runs; shorten a list, or draw from a range instead")]
-pub(crate) struct TooMany;
+pub(crate) struct TooManyRuns;
 
 pub(crate) const MOST_RUNS: u64 = 1_000_000_000;
 
@@ -47,13 +47,13 @@ impl Points {
     /// The runs of these factors.
     ///
     /// # Errors
-    /// [`TooMany`] beyond [`MOST_RUNS`].
-    pub(crate) fn new(factors: &[Factor], draws: u64, seed: u64) -> Result<Self, TooMany> {
+    /// [`TooManyRuns`] beyond [`MOST_RUNS`].
+    pub(crate) fn new(factors: &[Factor], draws: u64, seed: u64) -> Result<Self, TooManyRuns> {
         let combinations = factors
             .iter()
             .try_fold(1_u64, |product, factor| product.checked_mul(factor.values.listed() as u64))
             .filter(|product| product.checked_mul(draws).is_some_and(|runs| runs <= MOST_RUNS))
-            .ok_or(TooMany)?;
+            .ok_or(TooManyRuns)?;
         Ok(Self { factors: factors.to_vec(), seed, draws, combinations })
     }
 
@@ -62,7 +62,7 @@ impl Points {
         self.combinations * self.draws
     }
 
-    /// How many combinations of the lists.
+    /// Number of combinations of the lists.
     #[must_use]
     pub(crate) fn combinations(&self) -> u64 {
         self.combinations
@@ -76,7 +76,7 @@ impl Points {
     /// The run of this number.
     ///
     /// # Panics
-    /// If there is none.
+    /// If `run` is not below [`Points::runs`].
     #[must_use]
     pub(crate) fn point(&self, run: u64) -> Point {
         assert!(run < self.runs(), "run {run} of {}", self.runs());
@@ -84,12 +84,12 @@ impl Points {
         let mut random = self.random(draw);
         let seed = random.next_u64() >> 32;
         let hidden_seed = random.next_u64() >> 32;
-        // Drawn in the order of the file, counted through from its end.
+        // Values are drawn in the order of the file; combinations count from its end.
         let mut values: Vec<Value> = self
             .factors
             .iter()
             .map(|factor| match &factor.values {
-                Values::Range(range) => Value::Number(range.at(unit(&mut random))),
+                Values::Range(range) => Value::Number(range.at(uniform(&mut random))),
                 Values::List(list) => list[0].clone(),
             })
             .collect();
@@ -112,7 +112,7 @@ impl Points {
 }
 
 /// Uniform in [0, 1) with 53 bits.
-fn unit(random: &mut Pcg64) -> f64 {
+fn uniform(random: &mut Pcg64) -> f64 {
     (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
@@ -181,7 +181,7 @@ mod tests {
         let long = Values::List((0..1000).map(f64::from).map(Value::Number).collect());
         let factors: Vec<_> = ["a", "b", "c"].iter().map(|name| factor(name, long.clone())).collect();
         assert_eq!(Points::new(&factors, 1, 1).unwrap().runs(), MOST_RUNS);
-        assert_eq!(Points::new(&factors, 2, 1).unwrap_err(), TooMany);
-        assert_eq!(Points::new(&factors, u64::MAX, 1).unwrap_err(), TooMany);
+        assert_eq!(Points::new(&factors, 2, 1).unwrap_err(), TooManyRuns);
+        assert_eq!(Points::new(&factors, u64::MAX, 1).unwrap_err(), TooManyRuns);
     }
 }

@@ -1,13 +1,13 @@
-//! A run as two processes in lockstep on an embedded bus of their own, with all the files of a run.
+//! A run as two processes in lockstep on a private embedded bus, with all the files of a run.
 //!
-//! It is slower than a rehearsal, and the only way for what needs a rig process: faults, frames that are lost.
+//! It is slower than a rehearsal, and needed for faults and lost frames, which the emulator simulates.
 
-use crate::child::{Cut, Limit, Own};
+use crate::child::{ChildProcess, Limit, WaitError};
 use crate::condition::{Condition, ConditionError};
 use crate::edits;
 use crate::factor::Value;
 use crate::inputs::CampaignInputs;
-use crate::outcome::{Ended, Outcome};
+use crate::outcome::{EndState, Outcome};
 use axis_control::experiment::Experiment;
 use figures::top::POSITIONS;
 use figures::{SummaryError, join};
@@ -20,29 +20,29 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Programs that a run is made of.
+/// Location of the programs of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Programs {
     /// Folder of `emulator` and `controller`.
     pub folder: PathBuf,
 }
 
-/// How a run of processes went wrong for a reason that is not the run's.
+/// Why a run of processes has no result.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ProcessesError {
     #[error("stopped")]
     Stopped,
-    /// Values and files do not go together.
+    /// Values that a file's reader rejects.
     #[error(transparent)]
     Condition(#[from] ConditionError),
     #[error("run {run}: {what}: {error}")]
     System { run: u64, what: String, error: io::Error },
 }
 
-/// A run in a folder, of at most `seconds` of the rig's time.
+/// Makes a run, of at most `seconds` of the rig's time, with its files in `folder`.
 ///
 /// # Errors
-/// [`ProcessesError`]; a rig or controllers that fail are a result.
+/// [`ProcessesError`]; a failure of emulator or controller is a result.
 pub(crate) fn run(
     condition: &Condition<'_>,
     inputs: &CampaignInputs,
@@ -53,7 +53,7 @@ pub(crate) fn run(
 ) -> Result<Outcome, ProcessesError> {
     let system = |what: &str| system(run, what);
     let files = Files::write(condition, inputs, run, folder)?;
-    // The socket's path may not be long, and a folder's may.
+    // In a temporary folder: the path of a socket is limited to 107 bytes.
     let private =
         tempfile::Builder::new().prefix("airbench-").tempdir().map_err(system("a folder for the bus"))?;
     let bus = format!("unix://{}/bus", private.path().display());
@@ -64,7 +64,7 @@ pub(crate) fn run(
         add(&mut command);
         let log = fs::File::create(folder.join(format!("{name}.txt"))).map_err(system(name))?;
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
-        Own::start(&mut command).map_err(system(name))
+        ChildProcess::start(&mut command).map_err(system(name))
     };
     let mut emulator = start("emulator", &|command| {
         command.arg("--rig").arg(&files.rig);
@@ -88,9 +88,9 @@ pub(crate) fn run(
     for (name, process) in [("emulator", &mut emulator), ("controller", &mut controller)] {
         match process.wait(limit) {
             Ok(status) => codes.push((name, status.code())),
-            Err(Cut::Stopped) => return Err(ProcessesError::Stopped),
-            Err(Cut::System(error)) => return Err(system(name)(error)),
-            Err(cut @ Cut::TooLong(_)) => return Ok(Outcome::failed(format!("{name}: {cut}"))),
+            Err(WaitError::Stopped) => return Err(ProcessesError::Stopped),
+            Err(WaitError::System(error)) => return Err(system(name)(error)),
+            Err(cut @ WaitError::TooLong(_)) => return Ok(Outcome::failed(format!("{name}: {cut}"))),
         }
     }
     if let Some((name, _)) = codes.iter().find(|(_, code)| *code == Some(Exit::BadInput as i32)) {
@@ -100,10 +100,10 @@ pub(crate) fn run(
     outcome(folder, &codes).map_err(|error| system("its folder")(io::Error::other(error)))
 }
 
-/// What the run's folder tells.
+/// The outcome from the files of a run's folder and the exit codes.
 ///
 /// # Errors
-/// [`SummaryError`] for a folder that cannot be written, which is none of the run's doing.
+/// [`SummaryError`] for a folder that cannot be read or written.
 fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, SummaryError> {
     let joined = match join::join(folder) {
         Ok(joined) => joined,
@@ -121,14 +121,17 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
     let why = || controller.and_then(|controller| controller.ended_because.clone()).unwrap_or_default();
     let code = |name: &str| codes.iter().find(|(own, _)| *own == name).and_then(|(_, code)| *code);
     let (ended, because) = match (code("emulator"), code("controller")) {
-        (Some(0), Some(0)) => (Ended::Done, String::new()),
-        (Some(0), Some(3)) => (Ended::TimeOver, why()),
-        (Some(0 | 1), Some(0 | 1)) => (Ended::Stopped, why()),
+        (Some(0), Some(0)) => (EndState::Done, String::new()),
+        (Some(0), Some(3)) => (EndState::TimeOver, why()),
+        (Some(0 | 1), Some(0 | 1)) => (EndState::Stopped, why()),
         (emulator, controller) => {
             let reported =
                 |code: Option<i32>| code.map_or("a signal".to_owned(), |code| format!("code {code}"));
             let (emulator, controller) = (reported(emulator), reported(controller));
-            (Ended::Failed, format!("the emulator ended with {emulator}, the controller with {controller}"))
+            (
+                EndState::Failed,
+                format!("the emulator ended with {emulator}, the controller with {controller}"),
+            )
         }
     };
     let passed = (!summary.thresholds.is_empty()).then(|| joined.passed());
@@ -193,7 +196,7 @@ impl Files {
     }
 }
 
-/// The last words of a program that refused its input.
+/// The last line of a program's output: why it refused its input.
 fn last_line(path: &Path) -> String {
     let text = fs::read_to_string(path).unwrap_or_default();
     text.trim_end().lines().next_back().unwrap_or("a program refused its input").to_owned()

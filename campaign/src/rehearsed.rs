@@ -1,12 +1,12 @@
-//! A run as a rehearsal: plant and controllers in this process, nothing written.
+//! A run as a rehearsal: plant and controllers in this process, without files.
 //!
-//! The columns are collected as they would be written, so that the figures are those of a run's folder to the bit; a test
-//! holds them against one.
+//! Values of columns are rounded as in the files, so that the figures equal those of a run's folder to the bit; a test compares
+//! them.
 
 use crate::condition::{Condition, ConditionError};
 use crate::factor::Value;
 use crate::inputs::CampaignInputs;
-use crate::outcome::{Ended, Outcome};
+use crate::outcome::{EndState, Outcome};
 use axis_control::axis::{AxisController, AxisRecord};
 use axis_control::setup::{Inputs, Mode};
 use figures::record::{MEASURED, Record, TRUE};
@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 /// Rehearses a run of at most `seconds` of the rig's time.
 ///
 /// # Errors
-/// [`ConditionError`] when experiment, programs and variables do not go together: not a result but a mistake in the campaign.
+/// [`ConditionError`] when experiment, programs and variables are inconsistent: an error in the campaign, not a result.
 pub(crate) fn rehearse(
     condition: &Condition<'_>,
     campaign_inputs: &CampaignInputs,
@@ -67,10 +67,10 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
         controllers().filter(is_stopped).max_by_key(|controller| controller.state() == MainChainState::Fault);
     let broken = rehearsal.off_the_wire().map(|error| format!("the simulated rig broke: {error}"));
     let (ended, because) = match stopped {
-        _ if broken.is_some() => (Ended::Failed, broken.unwrap_or_default()),
-        Some(axis) => (Ended::Stopped, format!("{}: {}", axis.axis().name(), axis.cause())),
-        None if rehearsal.node().done() => (Ended::Done, String::new()),
-        None => (Ended::TimeOver, "the longest time was over before the experiment was done".to_owned()),
+        _ if broken.is_some() => (EndState::Failed, broken.unwrap_or_default()),
+        Some(axis) => (EndState::Stopped, format!("{}: {}", axis.axis().name(), axis.cause())),
+        None if rehearsal.node().done() => (EndState::Done, String::new()),
+        None => (EndState::TimeOver, "the longest time was over before the experiment was done".to_owned()),
     };
     let drive =
         controllers().find(|controller| controller.axis() == Axis::Drive).map(AxisController::figures);
@@ -88,12 +88,12 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
     Ok(Outcome { ended, because, simulated_s, passed, figures })
 }
 
-/// Whether the experiment's bounds are kept; a rehearsal loses no frames, is never late, and has no latency to bound.
+/// Whether the experiment's bounds are kept. A rehearsal has no lost frames, no missed cycles and no latencies.
 fn passed(
     inputs: &Inputs,
     figures: &BTreeMap<String, Value>,
     by_repetition: &ByRepetition,
-    ended: Ended,
+    ended: EndState,
 ) -> Result<Option<bool>, String> {
     let bounds = &inputs.experiment.passed;
     if bounds.is_empty() {
@@ -105,7 +105,7 @@ fn passed(
         measured.or_else(|| is_fault().then_some(0.0)).map(Found::Number)
     };
     let judged = thresholds::judge(bounds, found, by_repetition).map_err(|error| error.to_string())?;
-    Ok(Some(ended == Ended::Done && judged.values().all(|bound| bound.kept)))
+    Ok(Some(ended == EndState::Done && judged.values().all(|bound| bound.kept)))
 }
 
 struct Columns {
@@ -156,7 +156,7 @@ impl Columns {
         MEASURED.iter().zip(self.measured).for_each(|(name, column)| measured.set_numbers(name, column));
         let mut truth = Table::default();
         self.truth.into_iter().for_each(|(_, name, column)| truth.set_numbers(name, column));
-        // Read once already, by the experiment's own reader.
+        // Cannot fail: the experiment's reader has parsed it.
         let experiment = inputs.experiment_toml.parse().unwrap_or_default();
         Record { drive, load, measured, truth, experiment }
     }

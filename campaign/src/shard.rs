@@ -1,4 +1,4 @@
-//! Which part of a campaign one start does: `--shard i/n`, or the index that a batch system gives.
+//! The share of a campaign that one start makes: `--shard i/n`, or the index that a batch system provides.
 
 use std::fmt;
 use std::str::FromStr;
@@ -21,7 +21,7 @@ pub(crate) enum ShardError {
     )]
     NoIndex {
         count: u32,
-        /// Where the index is looked for.
+        /// Environment variables that may hold the index.
         names: String,
     },
     #[error(
@@ -30,10 +30,10 @@ pub(crate) enum ShardError {
     Index { name: &'static str, value: String, count: u32, most: u32 },
 }
 
-/// Where batch systems tell the index: arrays of Slurm, indexed jobs of Kubernetes.
+/// Environment variables with the index: arrays of Slurm, indexed jobs of Kubernetes.
 pub(crate) const INDEX_VARIABLES: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"];
 
-/// `--shard` as it is written: the index may be left to the batch system.
+/// Value of `--shard`; without an index that of the batch system is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ShardArgument {
     index: Option<u32>,
@@ -43,7 +43,7 @@ pub(crate) struct ShardArgument {
 impl Shard {
     pub(crate) const WHOLE: Shard = Shard { index: 0, count: 1 };
 
-    /// Whether the part of this number is of this shard.
+    /// Whether the part of this number belongs to this shard.
     #[must_use]
     pub(crate) fn holds(self, part: u64) -> bool {
         part % u64::from(self.count) == u64::from(self.index)
@@ -51,10 +51,10 @@ impl Shard {
 }
 
 impl ShardArgument {
-    /// The shard, with the index of the batch system where none was written; `variable` tells the environment's.
+    /// The shard, with the index of the batch system where none was given; `variable` reads an environment variable.
     ///
     /// # Errors
-    /// [`ShardError`] when nobody tells an index, or one that is none.
+    /// [`ShardError`] without an index, and for an invalid one.
     pub(crate) fn shard(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, ShardError> {
         let count = self.count;
         if let Some(index) = self.index {

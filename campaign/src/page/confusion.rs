@@ -1,4 +1,4 @@
-//! Confusion matrices: what was true, and what was answered.
+//! Confusion matrices of truth and answer.
 
 use crate::campaign::Campaign;
 use crate::merge::Results;
@@ -41,7 +41,7 @@ pub(super) fn section(campaign: &Campaign, results: &Results) -> String {
     text
 }
 
-/// The different values of a column, sorted, and the place of each run's.
+/// The distinct values of a column, sorted, and the index of each run's value.
 struct Labels {
     known: Vec<String>,
     places: Vec<usize>,

@@ -1,4 +1,4 @@
-//! How a figure lies: its quantiles in a table, and a histogram.
+//! Distribution of each figure: a table of quantiles, and histograms.
 
 use super::{name, quantile, sorted, value};
 use crate::merge::Results;
@@ -6,9 +6,9 @@ use pagekit::grid::Grid;
 use pagekit::page::escaped;
 use std::fmt::Write as _;
 
-/// Bars of a histogram.
+/// Number of bars of a histogram.
 const BARS: usize = 40;
-/// Size of a histogram, in its own units.
+/// Size of a histogram in units of its SVG viewBox.
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 120.0;
 

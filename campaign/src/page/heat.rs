@@ -1,4 +1,4 @@
-//! Heat maps: a figure over two things that are varied, or over one.
+//! Heat maps: a figure over two factors, or over one.
 
 use super::{name, quantile, sorted, value};
 use crate::campaign::Campaign;
@@ -8,11 +8,11 @@ use pagekit::number::short;
 use pagekit::page::escaped;
 use std::fmt::Write as _;
 
-/// Classes that a range is cut into.
+/// Number of classes of a range.
 const CLASSES: usize = 6;
 /// Most maps of a figure: each pair of the first four factors.
 const MOST_MAPS: usize = 6;
-/// Most values of a list that are shown.
+/// Most levels of a list that is shown.
 const MOST_VALUES: usize = 40;
 
 /// The maps of all figures that are shown.
@@ -40,7 +40,7 @@ pub(super) fn section(campaign: &Campaign, results: &Results, shown: &[String]) 
     text
 }
 
-/// What is varied, in classes.
+/// A factor in classes.
 struct Axis {
     name: String,
     classes: Vec<String>,
@@ -48,7 +48,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// `None` for a list of one, and one that is too long to be shown.
+    /// `None` for a list of one value, and for one of more than [`MOST_VALUES`].
     fn of(factor: &Factor, results: &Results) -> Option<Self> {
         let name = factor.name.clone();
         match &factor.values {

@@ -29,7 +29,7 @@ pub(super) fn section(
     for figure in shown {
         let Some(column) = results.numbers(figure) else { continue };
         let mut runs: Vec<_> = (0..column.len()).filter(|run| column[*run].is_finite()).collect();
-        // Of equals the first.
+        // Ties: the first run.
         runs.sort_by(|one, other| column[*other].total_cmp(&column[*one]));
         let head = [&*name(figure), "run", "with", "repeated by"];
         let rows = runs.iter().take(RUNS_SHOWN).map(|run| {
@@ -41,7 +41,7 @@ pub(super) fn section(
     text
 }
 
-/// What the run was made with.
+/// Values of the factors in this run.
 fn values(campaign: &Campaign, run: u64) -> String {
     let point = campaign.points.point(run);
     let reported =
