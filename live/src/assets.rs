@@ -1,13 +1,13 @@
-//! The files of the live page, inside the binary: nothing is read from a disk or from the network while it runs.
+//! The files of the live page, embedded in the binary, so that a run of the page reads neither disk nor network.
 //!
-//! `page/` is served as it stands, without a build step; the stylesheet of all pages is the reports' own. What is vendored, with
-//! licence and checksums, is in `page/vendor/`.
+//! `page/` is served unchanged, without a build step; the stylesheet is that of the reports. Vendored files, with licence and
+//! checksums, are in `page/vendor/`.
 
 use pagekit::page;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Asset {
-    /// Its type, as HTTP tells it.
+    /// Value of its `Content-Type`.
     pub content_type: &'static str,
     pub body: &'static [u8],
 }
@@ -15,7 +15,7 @@ pub(crate) struct Asset {
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
-/// A file of `page/`, found at `/assets/` and its path there.
+/// A file of `page/`, served at `/assets/` and its path there.
 macro_rules! file {
     ($path:literal, $content_type:expr) => {
         (

@@ -1,8 +1,8 @@
 //! The chains of the axis controllers as diagrams: their states, which `rig.dbc` names, and the edges between them.
 //!
-//! The edges are those of the drawings at the heads of `axis/src/chains/*.rs`; a test holds every name against `rig.dbc`.
-//! What may happen in any state (a fault, an emergency stop, another phase of the main chain) is drawn from the state in which
-//! it is reported at most places, where the drawing says "any": a page cannot show arrows from everywhere.
+//! The edges are those of the diagrams at the heads of `axis/src/chains/*.rs`; a test compares every name with `rig.dbc`. A
+//! transition from any state (a fault, an emergency stop, another phase of the main chain) is drawn from its most frequent
+//! source state alone, to keep the diagram legible.
 
 use super::state::ChainStates;
 use protocol::frames::{ChainStatus, DRIVE_CHAIN_STATUS, Frame};
@@ -95,7 +95,7 @@ pub(crate) fn diagrams() -> Value {
 /// The states of an axis by chain.
 pub(crate) fn active(status: ChainStatus) -> ChainStates {
     let mut by_chain = ChainStates::new();
-    // Both axes' statuses have one layout.
+    // The signals of both axes have the same layout.
     Frame::DriveChainStatus(status).for_each_signal(|signal, value| {
         if let Some(chain) = CHAINS.iter().find(|chain| chain.signal == signal.name) {
             by_chain.insert(chain.name, signal.values.get(value as usize).copied());

@@ -1,7 +1,7 @@
 //! One connection to the live page: its socket, its request, and its bounded queue.
 //!
-//! A client that is behind misses whole events, counted; one that takes nothing for long, or does not get to the point of its
-//! request, is parted with. Neither costs anybody else anything.
+//! A slow client misses whole events, which are counted. A client that reads nothing for long, or does not complete its
+//! request, is disconnected. Neither affects other clients.
 
 use super::http::{self, Progress, Request, Status};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -11,35 +11,36 @@ use std::net::{Shutdown, TcpListener, TcpStream};
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 
-/// Bytes of events that wait for a client: some ten seconds of them.
+/// Capacity of the event queue of a client, bytes: some ten seconds.
 const QUEUE: usize = 1 << 20;
-/// What the kernel may hold for a client, bytes; it takes twice of it.
+/// Send buffer of a client's socket, bytes; the kernel doubles it.
 const SEND_BUFFER: usize = 64 << 10;
-/// A request comes within so long.
+/// Longest time until a request is complete.
 const REQUEST_MS: u64 = 10_000;
-/// Something was queued for so long, and the client took nothing.
-const STUCK_MS: u64 = 30_000;
-/// How long a client that has its answer may take to go.
+/// Longest time with a queue of which the client reads nothing.
+const STALLED_MS: u64 = 30_000;
+/// Longest time between the response and the end of the connection.
 const CLOSING_MS: u64 = 2_000;
-/// What is done elsewhere, by the emulator or on the disk, is answered within so long.
+/// Longest time for an answer from the emulator or the disk.
 const ANSWER_MS: u64 = 5_000;
-/// Bytes taken from a client in one turn.
+/// Most bytes read from a client in one turn.
 const READ_A_TURN: usize = 16 << 10;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    Asking,
-    /// Its request is being obeyed elsewhere.
-    Waiting,
+    ReadingRequest,
+    /// Its request is in progress elsewhere.
+    AwaitingAnswer,
     Streaming,
-    /// It gets its answer, and then its end.
-    Ending,
-    /// It has its answer; what it still sends is read, since a socket closed on unread bytes may take the answer back.
+    /// Its response is being sent.
+    SendingAnswer,
+    /// The response is sent. Further input is read and discarded, since closing a socket with unread bytes may discard the
+    /// response.
     Closing,
 }
 
 pub(super) struct Client {
-    /// Tells it from all that came before.
+    /// Unique number of the connection.
     pub(super) number: u64,
     stream: TcpStream,
     stage: Stage,
@@ -48,9 +49,9 @@ pub(super) struct Client {
     /// Bytes of the first piece that were written.
     written: usize,
     queued: usize,
-    came_ms: u64,
+    connected_ms: u64,
     last_progress_ms: u64,
-    /// Events that its queue had no room for.
+    /// Events lost to a full queue.
     pub(super) missed: u64,
     gone: bool,
 }
@@ -63,12 +64,12 @@ impl Client {
         Ok(Self {
             number,
             stream,
-            stage: Stage::Asking,
+            stage: Stage::ReadingRequest,
             incoming: Vec::new(),
             outgoing: VecDeque::new(),
             written: 0,
             queued: 0,
-            came_ms: now_ms,
+            connected_ms: now_ms,
             last_progress_ms: now_ms,
             missed: 0,
             gone: false,
@@ -91,19 +92,19 @@ impl Client {
         self.gone
     }
 
-    /// Takes what has come; a request, when it is whole.
+    /// Reads from the socket; returns the request when it is complete.
     pub(super) fn read(&mut self, now_ms: u64) -> Option<Request> {
         let mut bytes = [0; READ_A_TURN];
         let read = match self.stream.read(&mut bytes) {
             Ok(read) if read > 0 => read,
-            Err(error) if is_for_later(&error) => return None,
+            Err(error) if is_not_ready(&error) => return None,
             Ok(_) | Err(_) => {
                 self.gone = true;
                 return None;
             }
         };
-        if self.stage != Stage::Asking {
-            // It had its say.
+        if self.stage != Stage::ReadingRequest {
+            // One request a connection: further input is discarded.
             return None;
         }
         self.incoming.extend(&bytes[..read]);
@@ -111,7 +112,7 @@ impl Client {
             Progress::Partial => None,
             Progress::Whole(request) => {
                 self.incoming = Vec::new();
-                (self.stage, self.last_progress_ms) = (Stage::Waiting, now_ms);
+                (self.stage, self.last_progress_ms) = (Stage::AwaitingAnswer, now_ms);
                 Some(request)
             }
             Progress::Refused(status) => {
@@ -122,10 +123,10 @@ impl Client {
         }
     }
 
-    /// Gives it its answer, after which it goes; one that comes too late is none.
+    /// Queues the response, after which the connection ends; ignored if the connection has had a response.
     pub(super) fn answer(&mut self, response: Vec<u8>, now_ms: u64) {
-        if matches!(self.stage, Stage::Asking | Stage::Waiting) {
-            self.stage = Stage::Ending;
+        if matches!(self.stage, Stage::ReadingRequest | Stage::AwaitingAnswer) {
+            self.stage = Stage::SendingAnswer;
             self.queue(response.into(), now_ms);
         }
     }
@@ -135,7 +136,7 @@ impl Client {
         self.queue(http::stream_head().into(), now_ms);
     }
 
-    /// Queues an event for a listener, or counts it as missed.
+    /// Queues an event for a subscriber, or counts it as missed.
     pub(super) fn offer(&mut self, event: &Arc<[u8]>, now_ms: u64) {
         if self.queued + event.len() > QUEUE {
             self.missed += 1;
@@ -152,7 +153,7 @@ impl Client {
         self.outgoing.push_back(piece);
     }
 
-    /// Writes what the socket takes, and parts with a client that is done or stands still.
+    /// Writes what the socket accepts, and marks the client as gone when it is done or has timed out.
     pub(super) fn write(&mut self, now_ms: u64) {
         while let Some(front) = self.outgoing.front() {
             match self.stream.write(&front[self.written..]) {
@@ -166,29 +167,33 @@ impl Client {
                         self.outgoing.pop_front();
                     }
                 }
-                Err(error) if is_for_later(&error) => break,
+                Err(error) if is_not_ready(&error) => break,
                 Err(_) => return self.gone = true,
             }
         }
-        if self.stage == Stage::Waiting && now_ms.saturating_sub(self.last_progress_ms) >= ANSWER_MS {
+        if self.stage == Stage::AwaitingAnswer && now_ms.saturating_sub(self.last_progress_ms) >= ANSWER_MS {
             self.answer(http::message_response(Status::NoAnswer, "there was no answer in time"), now_ms);
         }
-        if self.stage == Stage::Ending && self.outgoing.is_empty() {
-            // One that is gone already is as good as shut down.
+        if self.stage == Stage::SendingAnswer && self.outgoing.is_empty() {
+            // Fails where the client has disconnected.
             let _ = self.stream.shutdown(Shutdown::Write);
             self.stage = Stage::Closing;
         }
         let since_ms = |then_ms: u64| now_ms.saturating_sub(then_ms);
         self.gone |= match self.stage {
-            Stage::Asking => since_ms(self.came_ms) >= REQUEST_MS,
+            Stage::ReadingRequest => since_ms(self.connected_ms) >= REQUEST_MS,
             Stage::Closing => since_ms(self.last_progress_ms) >= CLOSING_MS,
-            _ => !self.outgoing.is_empty() && since_ms(self.last_progress_ms) >= STUCK_MS,
+            _ => !self.outgoing.is_empty() && since_ms(self.last_progress_ms) >= STALLED_MS,
         };
     }
 }
 
-/// Waits at the door and for clients, each with whether it has something to write; `other` wakes too. Tells which clients have
-/// sent something, and whether somebody waits at the door.
+/// Waits until the listener or a client is readable, a client with output is writable, or `other` is readable; at most
+/// `milliseconds`. `clients` are sockets, each with whether output waits for it. Returns the indices of the readable clients,
+/// and whether a connection waits at the listener.
+///
+/// # Errors
+/// The error of `poll`; a signal only ends the wait.
 pub fn wait<'a>(
     door: &TcpListener,
     clients: impl Iterator<Item = (&'a TcpStream, bool)>,
@@ -213,12 +218,12 @@ pub fn wait<'a>(
     ))
 }
 
-/// Whether a socket that does not block has nothing to say yet.
-pub fn is_for_later(error: &io::Error) -> bool {
+/// Whether an error of a non-blocking socket only says that it is not ready.
+pub fn is_not_ready(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }
 
-/// What to say to whom there is no room for.
+/// Response to a client beyond the limit of clients.
 pub(super) fn refusal() -> Vec<u8> {
     http::message_response(Status::Busy, "too many clients; --clients N allows more")
 }
@@ -265,7 +270,7 @@ mod tests {
         let (mut client, mut far) = pair();
         ask(&mut client, &mut far, 1000);
         client.write(1000 + ANSWER_MS - 1);
-        assert_eq!(client.stage, Stage::Waiting);
+        assert_eq!(client.stage, Stage::AwaitingAnswer);
         // In this turn it is answered, in the next one that is written.
         (0..2).for_each(|_| client.write(1000 + ANSWER_MS));
         assert_eq!(client.stage, Stage::Closing);
@@ -289,19 +294,19 @@ mod tests {
             client.offer(&event, 0);
             client.write(0);
         }
-        assert!(!is_gone(&mut client, STUCK_MS - 1));
+        assert!(!is_gone(&mut client, STALLED_MS - 1));
         // It reads all that the kernel holds for it: room for more.
         let mut bytes = vec![0; QUEUE];
         while client.last_progress_ms == 0 {
             let _ = far.read(&mut bytes).unwrap();
-            client.write(STUCK_MS - 1);
+            client.write(STALLED_MS - 1);
         }
-        assert!(!is_gone(&mut client, STUCK_MS));
+        assert!(!is_gone(&mut client, STALLED_MS));
         // It reads no more; what it read before may have made some more room.
-        let mut now_ms = STUCK_MS;
+        let mut now_ms = STALLED_MS;
         while !is_gone(&mut client, now_ms) {
-            assert!(client.has_something_to_write() && now_ms < 10 * STUCK_MS, "{now_ms} ms");
-            now_ms += STUCK_MS;
+            assert!(client.has_something_to_write() && now_ms < 10 * STALLED_MS, "{now_ms} ms");
+            now_ms += STALLED_MS;
         }
     }
 }

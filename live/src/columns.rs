@@ -1,30 +1,30 @@
-//! The columns of the live page: name, unit, and where each value comes from. Nothing about them stands elsewhere.
+//! The columns of the live page: name, unit, and source of each value.
 //!
-//! A value comes from the cycles of the telemetry, by the name that the column has in `measurement.csv` or `truth.csv`; what
-//! the controllers say comes from their ChainValues on the bus. Without telemetry the measured ones come from the bus, and what
-//! only a simulation knows is none.
+//! A value comes from the cycles of the telemetry, by the name of its column in `measurement.csv` or `truth.csv`; set-points
+//! come from the controllers' ChainValues on the bus. Without telemetry measured values come from the bus, and columns of the
+//! truth are empty.
 
 use runlog::Axis;
 use runlog::telemetry::Table;
 use std::sync::LazyLock;
 
-/// Columns of `measurement.csv` for one axis, in its order: those that the bus tells too.
+/// Columns of `measurement.csv` for one axis, in its order, that the bus carries too.
 pub(crate) const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
 /// Number of measured columns of both axes.
 pub(crate) const MEASURED_COUNT: usize = 2 * MEASURED.len();
-/// Names of the axes, with which the names of their columns begin.
+/// Names of the axes, the prefixes of their columns.
 pub(crate) const AXES: [&str; 2] = Axis::NAMES;
 
-/// Where a value comes from.
+/// Source of a value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Source {
-    /// Column of `measurement.csv`, by its place.
+    /// Column of `measurement.csv`, by its index.
     Measured(usize),
-    /// Sum of columns of `truth.csv`, each with this factor.
+    /// Sum of columns of `truth.csv`, times this factor.
     Truth(Vec<String>, f64),
     /// A signal of the controller of this axis.
     Controller(usize, ControllerSignal),
-    /// The supply's pressure, which the bus tells too.
+    /// Supply pressure, which the bus carries too.
     Supply,
 }
 
@@ -63,7 +63,7 @@ pub(crate) static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
 });
 
 fn of_axis(axis: usize) -> Vec<Column> {
-    // The load's rod goes out in -x: what is reported along its own extension is turned round.
+    // The load's rod extends in -x: values in rod coordinates change their sign.
     let along_x = [1.0, -1.0][axis];
     let measured = |name: &str| {
         let place = MEASURED.iter().position(|known| *known == name);
@@ -97,17 +97,17 @@ fn of_axis(axis: usize) -> Vec<Column> {
     .into()
 }
 
-/// Where the columns' values stand in a cycle of the telemetry.
+/// Indices of the columns' values in a cycle of the telemetry.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Layout {
     measured: [Option<usize>; MEASURED_COUNT],
-    /// For each column that is a sum of true ones: their places; empty when one is missing.
+    /// For each column that is a sum of columns of the truth, their indices; empty when one is missing.
     truth: Vec<Vec<usize>>,
     supply: Option<usize>,
 }
 
 impl Layout {
-    /// From the description's columns: table and name of each.
+    /// Layout for the columns of a description: table and name of each.
     pub(crate) fn new<'a>(described: impl Iterator<Item = (Table, &'a str)>) -> Self {
         let described: Vec<_> = described.collect();
         let place = |table: Table, name: &str| described.iter().position(|known| *known == (table, name));
@@ -134,7 +134,7 @@ impl Layout {
         values.get(self.supply?).copied()
     }
 
-    /// The value of a column that is a sum of true ones, by the column's place.
+    /// The value of a column that is a sum of columns of the truth, by the index of the column.
     pub(crate) fn truth(&self, column: usize, factor: f64, values: &[f64]) -> Option<f64> {
         let places = self.truth.get(column).filter(|places| !places.is_empty())?;
         let sum: Option<f64> = places.iter().map(|place| values.get(*place)).sum();

@@ -1,6 +1,7 @@
-//! What the page may ask for, out of JSON; carried out by the bus, by the emulator's console, or here. Pure.
+//! The requests of the page, parsed from JSON; they are carried out by the bus, by the emulator's console, or here. No input or
+//! output.
 //!
-//! Ranges are not checked here: the console of the emulator knows them, and its answer is handed on.
+//! Ranges are not checked here: the console of the emulator checks them, and its answer is passed on.
 
 use super::minute::LONGEST_S;
 use protocol::frames::{Frame, HandSetPointAxis, RunControl, RunControlCommand};
@@ -53,23 +54,23 @@ enum RequestAxis {
     Load,
 }
 
-/// How it is carried out.
+/// How a request is carried out.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Order {
-    /// A stop by the console, repeated on the bus until it is released.
+    /// A stop by the console, sent again until the release.
     Stop,
     Release,
     Frame(Frame),
-    /// A set-point by hand on the bus, once: one of both, of which the other is not to change.
+    /// A set-point by hand on the bus, sent once: position or force.
     SetPoint {
         axis: HandSetPointAxis,
-        /// Where it is to go, m.
+        /// Target position, m.
         position_m: Option<f64>,
-        /// How hard it is to press, N.
+        /// Target force, N.
         force_n: Option<f64>,
     },
     Line(String),
-    /// The last so many seconds, saved.
+    /// Save a record of the last seconds, of this length.
     Save(f64),
 }
 
@@ -124,7 +125,7 @@ fn at(name: &str, place: Option<&str>) -> Result<String, String> {
     })
 }
 
-/// Text as a word of a command: nothing of it may look like another word, or another line.
+/// Checks that a text is a single word of a console line.
 fn word(text: &str) -> Result<&str, String> {
     let good = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
     if !text.is_empty() && text.chars().all(good) { Ok(text) } else { Err(format!("{text:?} is no name")) }

@@ -1,4 +1,4 @@
-//! The telemetry of an emulator as a viewer has it: connected whenever there is one, asked for nothing but commands.
+//! The client end of the emulator's telemetry: connects whenever there is an emulator, and sends console lines.
 
 use runlog::telemetry::{Decoder, Packet};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 /// Time between two attempts to connect.
 const RETRY_PERIOD: Duration = Duration::from_millis(100);
-/// Bytes taken in one turn: more than the emulator tells in 100 ms.
+/// Bytes taken in one turn: more than the emulator sends in 100 ms.
 const READ_A_TURN: usize = 256 << 10;
 
 pub(super) struct Feed {
@@ -34,11 +34,11 @@ impl Feed {
         }
     }
 
-    /// Hands out what has come, and connects if it is time to; whether the connection has gone, since the emulator ended or
-    /// started anew.
+    /// Passes on what was received, and connects when an attempt is due. Returns whether the connection has ended because the
+    /// emulator ended or restarted.
     pub(super) fn turn(&mut self, mut take: impl FnMut(Packet)) -> bool {
         if std::mem::take(&mut self.half_a_line) {
-            return self.part();
+            return self.disconnect();
         }
         let Some(stream) = &mut self.stream else {
             self.try_to_connect();
@@ -49,7 +49,7 @@ impl Feed {
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {
                 return false;
             }
-            Ok(_) | Err(_) => return self.part(),
+            Ok(_) | Err(_) => return self.disconnect(),
         };
         self.decoder.take(&self.bytes[..read]);
         loop {
@@ -58,28 +58,28 @@ impl Feed {
                 Ok(None) => return false,
                 Err(error) => {
                     eprintln!("bench watch: {}: {error}", self.path.display());
-                    return self.part();
+                    return self.disconnect();
                 }
             }
         }
     }
 
-    /// Sends a command of the console; whether it left.
+    /// Sends a console line; returns whether it was sent.
     pub(super) fn command(&mut self, line: &str) -> bool {
         let Some(stream) = &mut self.stream else { return false };
         match stream.write(format!("{line}\n").as_bytes()) {
             Ok(written) if written > line.len() => true,
-            // Half a line would be the beginning of the next one; a new connection begins with none.
+            // Part of a line would corrupt the next one, so the connection is closed; a new one begins without input.
             Ok(_) => {
                 self.half_a_line = true;
                 false
             }
-            // A socket that takes no line is that of an emulator that stands still.
+            // A full socket belongs to an emulator that does not run.
             Err(_) => false,
         }
     }
 
-    fn part(&mut self) -> bool {
+    fn disconnect(&mut self) -> bool {
         (self.stream, self.decoder) = (None, Decoder::default());
         self.next_attempt = Instant::now() + RETRY_PERIOD;
         true
@@ -89,7 +89,7 @@ impl Feed {
         let now = Instant::now();
         if now >= self.next_attempt {
             self.next_attempt = now + RETRY_PERIOD;
-            // Mostly nobody listens yet.
+            // Fails until an emulator listens.
             self.stream = connected(&self.path).ok();
         }
     }

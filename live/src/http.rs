@@ -1,7 +1,7 @@
-//! HTTP as far as the live page needs it: a request out of bytes, a response as bytes. Pure; the sockets are in `client`.
+//! The subset of HTTP that the live page needs: requests from bytes, responses to bytes. No input or output; the sockets are in
+//! `client`.
 //!
-//! Every response but a stream of events ends its connection: no client can leave one half used. Requests are bounded in all
-//! that a client decides.
+//! Every response but an event stream ends its connection. All lengths that a client chooses are bounded.
 
 use serde_json::{Value, json};
 use std::net::IpAddr;
@@ -12,34 +12,34 @@ pub(crate) const LONGEST_HEAD: usize = 16 << 10;
 pub(crate) const LONGEST_BODY: usize = 64 << 10;
 const MOST_FIELDS: usize = 64;
 
-/// Sent with everything: the page loads nothing from elsewhere, is in no frame of another, and tells nobody where it is.
+/// Security headers of every response: no foreign resources, no embedding in foreign frames, no referrer.
 const SECURITY: &str = "Content-Security-Policy: default-src 'self'; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; \
                         base-uri 'none'; form-action 'none'\r\nX-Content-Type-Options: nosniff\r\n\
                         Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n";
 
-/// A request that has come whole.
+/// A complete request.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Request {
     /// Its method, as `GET`.
     pub method: String,
-    /// Its path, without what follows a question mark.
+    /// Its path, without the query.
     pub path: String,
     pub query: String,
-    /// Whose it was, as `127.0.0.1:8080`.
+    /// Value of `Host`, as `127.0.0.1:8080`.
     pub host: Option<String>,
-    /// The page that it came from; none from a program.
+    /// Value of `Origin`; browsers send it, programs do not.
     pub origin: Option<String>,
-    /// The token, if one was shown.
+    /// Token of the request, if any.
     pub token: Option<String>,
     pub body: Vec<u8>,
 }
 
-/// How far a request has come.
+/// Result of parsing the bytes received so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Progress {
     Partial,
     Whole(Request),
-    /// It is none, or more than is taken: what to answer.
+    /// Invalid or too large: the status of the response.
     Refused(Status),
 }
 
@@ -74,7 +74,7 @@ impl Status {
     }
 }
 
-/// Reads what has come of a request so far.
+/// Parses the bytes received so far.
 pub(crate) fn parse(bytes: &[u8]) -> Progress {
     let mut fields = [httparse::EMPTY_HEADER; MOST_FIELDS];
     let mut head = httparse::Request::new(&mut fields);
@@ -94,7 +94,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Progress {
             return Progress::Refused(Status::BadRequest);
         };
         let is = |name: &str| field.name.eq_ignore_ascii_case(name);
-        // Of fields that come twice, the second would be read by some and the first by others.
+        // Duplicate fields are refused: parsers disagree on which one counts.
         let once = |place: &mut Option<String>| place.replace(value.trim().to_owned()).is_none();
         let good = if is("host") {
             once(&mut request.host)
@@ -105,7 +105,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Progress {
         } else if is("content-length") {
             value.trim().parse().map(|reported: usize| length = reported).is_ok()
         } else {
-            // Nobody who asks for so little needs to send in pieces.
+            // Chunked bodies are refused: requests are short.
             !is("transfer-encoding")
         };
         if !good {
@@ -120,8 +120,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Progress {
     Progress::Whole(request)
 }
 
-/// Whether a request was meant for the server at `port`, by a name that no foreign page can have: `localhost`, or an address in
-/// digits. A name of somebody's own that leads here (DNS rebinding) would make a foreign page's requests look like ours.
+/// Whether `Host` names this server at `port`, as `localhost` or by an address in digits. A foreign name that resolves to this
+/// address (DNS rebinding) would let a foreign page send requests.
 pub(crate) fn is_ours(host: &str, port: u16) -> bool {
     let (name, reported) = match host.rsplit_once(':') {
         Some((name, reported)) if !reported.ends_with(']') => (name, reported),
@@ -146,7 +146,7 @@ pub(crate) fn json_response(status: Status, value: &Value) -> Vec<u8> {
     response(status, "application/json", value.to_string().as_bytes())
 }
 
-/// What is said when something was refused or done.
+/// A response with a message as JSON.
 pub(crate) fn message_response(status: Status, message: &str) -> Vec<u8> {
     json_response(status, &json!({ "ok": status == Status::Good, "message": message }))
 }
@@ -160,11 +160,11 @@ pub(crate) fn stream_head() -> Vec<u8> {
 }
 
 pub(crate) fn event(name: &str, data: &Value) -> Vec<u8> {
-    // JSON without line breaks, as it is written here, is one line of data.
+    // JSON is written without line breaks, so that it is one line of data.
     format!("event: {name}\ndata: {data}\n\n").into_bytes()
 }
 
-/// A comment that keeps a stream alive.
+/// A comment that keeps an event stream alive.
 pub(crate) const HEARTBEAT: &[u8] = b": still here\n\n";
 
 #[cfg(test)]

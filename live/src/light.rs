@@ -1,9 +1,9 @@
-//! The light: whether the run that goes on supports a latency claim, by the rules of the report and by what is known so far.
+//! The light: whether the run so far supports a latency claim, by the rules of the report.
 //!
-//! `no`: something speaks against it that the rest of the run will hardly mend. `doubtful`: nothing does, but something is still
-//! missing; without a reference in turns with the runs that stays so to the end, as it does in the report. `yes`: the report
-//! would say so. Missed cycles count as in the report, by their share of the run so far: a light that went out for them may come
-//! back once the share is small again, and the count stands beside it in any case.
+//! `no`: a rule is violated that the rest of the run can hardly satisfy. `doubtful`: no rule is violated, but something is
+//! missing; without a reference interleaved with the runs this remains to the end, as in the report. `yes`: the report would
+//! support the claim. Missed cycles count by their share of the run so far, as in the report: the light may return to `yes`
+//! when the share falls, and the count is shown beside it.
 
 use latency::claim::{self, CycleCount};
 use latency::conditions::conditions;
@@ -11,14 +11,14 @@ use latency::files::RunFiles;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// The run as the rules see it.
+/// The files of the run that the rules need.
 #[derive(Debug, Default)]
 pub(crate) struct Light {
     folder: Option<PathBuf>,
     run: RunFiles,
 }
 
-/// What the light shows.
+/// State of the light.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct Judgement {
     pub supported: Support,
@@ -35,14 +35,14 @@ pub(crate) enum Support {
 }
 
 impl Light {
-    /// Of the run in this folder.
+    /// For the run in this folder.
     pub(crate) fn new(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(Path::to_path_buf), run: RunFiles::default() }
     }
 
-    /// Judges anew, after so many cycles of which so many were skipped.
+    /// Judges the run after `cycles` cycles, of which `skipped` were skipped.
     pub(crate) fn judge(&mut self, cycles: u64, skipped: u64) -> Judgement {
-        // The emulator writes run.json when it has asked for its privileges, which is after it let viewers in.
+        // The emulator writes run.json after acquiring its privileges, which is after it accepts viewers.
         let is_known = self.folder.as_deref().is_some_and(|folder| self.run.read_description(folder));
         if !is_known {
             let reason = "What the emulator was granted is not known: its run.json was not found.";

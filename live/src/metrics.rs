@@ -1,4 +1,4 @@
-//! The state as Prometheus reads it: text, version 0.0.4. Made of the page's own state, so that both say the same.
+//! The state in the text format of Prometheus, version 0.0.4, made from the state of the page.
 
 use super::columns::COLUMNS;
 use super::light::Support;
@@ -11,7 +11,7 @@ pub(crate) fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
     let state = view.state(audience);
     let mut text = String::new();
     let mut one = |name: &str, kind: &str, help: &str, value: Option<f64>| {
-        // What is not known has no line.
+        // Unknown values have no line.
         if let Some(value) = value.filter(|value| value.is_finite()) {
             head(&mut text, name, kind, help);
             let _ = writeln!(text, "airbench_{name} {value}");
@@ -65,7 +65,7 @@ pub(crate) fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
         for (quantile, ns) in
             [(0.5, reported.p50), (0.9, reported.p90), (0.99, reported.p99), (0.999, reported.p999)]
         {
-            // One that there are too few samples for has no line, as it is null in the state.
+            // A percentile with too few samples has no line; it is null in the state.
             if let Some(ns) = ns {
                 let seconds = ns as f64 * 1e-9;
                 let _ = writeln!(text, "airbench_{name}_seconds{{quantile=\"{quantile}\"}} {seconds}");

@@ -1,4 +1,4 @@
-//! The last minute as a record: `measurement.csv` and `bus.log` in the forms of a run, which `discrepancy check` reads.
+//! A record of the last minute: `measurement.csv` and `bus.log` in the formats of a run, which `discrepancy check` reads.
 
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
 use protocol::periods::CYCLE_NS;
@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 /// Longest record, s.
 pub(crate) const LONGEST_S: f64 = 60.0;
 const CYCLES_KEPT: usize = 60_000;
-/// Frames that are kept: those of a minute, with room for noise.
+/// Frames that are kept: those of a minute, with a reserve.
 const FRAMES_KEPT: usize = 600_000;
 
-/// What sensors and valves showed in a cycle.
+/// Measured values of a cycle.
 #[derive(Clone, Copy, Debug)]
 struct Measured {
     cycle: u64,
@@ -23,7 +23,7 @@ struct Measured {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Minute {
+pub(crate) struct RecentRecord {
     cycles: VecDeque<Measured>,
     /// Stamped with the time of day.
     frames: VecDeque<FrameRecord>,
@@ -31,20 +31,20 @@ pub(crate) struct Minute {
     changed: u64,
 }
 
-/// A record that is to be written; it owns what it needs, so that another thread can.
-pub(crate) struct Saved {
+/// A record to be written; it owns its data, so that another thread can write it.
+pub(crate) struct SavedRecord {
     folder: PathBuf,
     interface: String,
     linked: bool,
     added_mass_kg: f64,
     cycles: Vec<Measured>,
     frames: Vec<FrameRecord>,
-    /// What it has less than was asked for, in words.
+    /// Why it is shorter than requested, for the message.
     cut: String,
 }
 
-impl Minute {
-    /// Takes a cycle whose measured values are all there.
+impl RecentRecord {
+    /// Adds a cycle; ignored if a measured value is missing.
     pub(crate) fn cycle(&mut self, cycle: u64, values: [Option<f64>; MEASURED_COUNT]) {
         let reported: Vec<f64> = values.into_iter().flatten().collect();
         if let Ok(values) = reported.try_into() {
@@ -55,7 +55,7 @@ impl Minute {
         }
     }
 
-    /// Takes a frame of the bus, sent or heard.
+    /// Adds a frame of the bus, sent or received.
     pub(crate) fn frame(&mut self, record: FrameRecord) {
         self.frames.push_back(record);
         if self.frames.len() > FRAMES_KEPT {
@@ -63,14 +63,14 @@ impl Minute {
         }
     }
 
-    /// Notes that linkage or weights changed in this cycle.
+    /// Records that linkage or weights changed in this cycle.
     pub(crate) fn change(&mut self, cycle: u64) {
         self.changed = cycle;
     }
 
-    /// The last so many seconds, to be written to a folder of their own in `folder`. A record tells one set-up for all of it,
-    /// which is that of its end: it begins no earlier than the last change.
-    pub(crate) fn last(&self, seconds: f64, folder: &Path, interface: &str, set_up: SetUp) -> Saved {
+    /// The last `seconds`, to be written to a new folder in `folder`. A record has one set-up, so it begins no earlier than the
+    /// last change of it.
+    pub(crate) fn last(&self, seconds: f64, folder: &Path, interface: &str, set_up: SetUp) -> SavedRecord {
         let newest = self.cycles.back().map_or(0, |measured| measured.cycle);
         let oldest = self.cycles.front().map_or(0, |measured| measured.cycle);
         let (mut cycles, mut cut) = ((seconds * 1000.0) as u64, String::new());
@@ -82,7 +82,7 @@ impl Minute {
         let newest_ns = self.frames.back().map_or(0, |record| record.stamp_ns);
         let from_ns = newest_ns.saturating_sub(cycles * CYCLE_NS);
         let SetUp { linked, added_mass_kg } = set_up;
-        Saved {
+        SavedRecord {
             folder: folder.join(format!("saved-{}", newest_ns / 1_000_000)),
             interface: interface.to_owned(),
             linked,
@@ -94,11 +94,11 @@ impl Minute {
     }
 }
 
-impl Saved {
-    /// Writes it, and tells where.
+impl SavedRecord {
+    /// Writes the record and returns a message with its folder.
     ///
     /// # Errors
-    /// What the system says, with the file's name; an error too when there is nothing to write.
+    /// The error of the system with the name of the file; an error too for an empty record.
     pub(crate) fn write(self) -> io::Result<String> {
         if self.frames.is_empty() && self.cycles.is_empty() {
             return Err(io::Error::other("nothing was heard yet, or not since linkage or weights changed"));
@@ -112,7 +112,7 @@ impl Saved {
         }
         log.write_out()?;
         if self.cycles.is_empty() {
-            // Only telemetry tells which valve opening acted in which cycle.
+            // Telemetry alone says which valve opening acted in which cycle.
             return Ok(reported);
         }
         let mut table = LineFile::create(&self.folder.join(MEASUREMENT_CSV))?;
@@ -140,8 +140,8 @@ mod tests {
     const SET_UP: SetUp = SetUp { linked: true, added_mass_kg: 2.5 };
 
     /// Three seconds, and a cycle that lacks a value.
-    fn minute() -> Minute {
-        let mut minute = Minute::default();
+    fn minute() -> RecentRecord {
+        let mut minute = RecentRecord::default();
         for cycle in 0..3000 {
             minute.cycle(cycle, [Some(0.25); MEASURED_COUNT]);
             let frame = CanFrame::new(0x120, &[0; 8]);
@@ -154,7 +154,7 @@ mod tests {
     }
 
     /// Saves so many seconds: the message after the folder's name, and the lines of `measurement.csv` and `bus.log`.
-    fn saved(minute: &Minute, seconds: f64) -> (String, Vec<String>, usize) {
+    fn saved(minute: &RecentRecord, seconds: f64) -> (String, Vec<String>, usize) {
         let folder = tempfile::tempdir().unwrap();
         let reported = minute.last(seconds, folder.path(), "bus0", SET_UP).write().unwrap();
         let reported = reported.strip_prefix("saved in ").unwrap();
@@ -170,7 +170,7 @@ mod tests {
         assert_eq!((rest.as_str(), lines[0].as_str()), ("", "# linked=true added_mass_kg=2.5"));
         assert!(lines[1].starts_with("time_s,drive_valve,drive_position_m,drive_force_N"), "{}", lines[1]);
         assert_eq!((lines.len(), lines[2].split(',').next(), frames), (1002, Some("2.000"), 1000));
-        let nothing = Minute::default().last(1.0, Path::new("/nowhere"), "bus0", SET_UP);
+        let nothing = RecentRecord::default().last(1.0, Path::new("/nowhere"), "bus0", SET_UP);
         assert!(nothing.write().is_err());
     }
 

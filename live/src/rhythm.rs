@@ -1,4 +1,4 @@
-//! The loop's heartbeat out of the telemetry's histograms: wake-ups and round trips, of all that was heard and of the last 10 s.
+//! Latency histograms from the telemetry: wake-ups and round trips, of the whole run and of the last 10 s.
 
 use super::state::StagePercentiles;
 use latency::hlog;
@@ -7,26 +7,26 @@ use latency::samples::Samples;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 
-/// Seconds that count as the last ones.
+/// Length of the recent window, s.
 const RECENT_S: usize = 10;
-/// What is shown, and the tags of the log that it is made of.
+/// The stages shown, and their tags in the interval log.
 const SHOWN: [(&str, &[&str]); 2] = [("wake_up", &[WAKE_UP]), ("round_trip", &ROUND_TRIPS)];
 
 #[derive(Debug, Default)]
 struct Distribution {
     whole: Samples,
-    /// By the second in which they began.
+    /// By the second in which their interval began.
     recent: VecDeque<(u64, Samples)>,
 }
 
-/// The heartbeat of a run.
+/// Latency distributions of a run.
 #[derive(Debug, Default)]
-pub(crate) struct Rhythm {
+pub(crate) struct LatencyHistograms {
     distributions: [Distribution; SHOWN.len()],
 }
 
-impl Rhythm {
-    /// Takes a line of an interval log.
+impl LatencyHistograms {
+    /// Adds a line of an interval log.
     pub(crate) fn take(&mut self, line: &str) -> Result<(), hlog::LogError> {
         hlog::each(&format!("{line}\n"), |passing| {
             let known = SHOWN.iter().position(|(_, tags)| tags.contains(&passing.tag));
@@ -46,7 +46,7 @@ impl Rhythm {
         })
     }
 
-    /// Percentiles of all that was heard, us; null where there are too few samples for one.
+    /// Percentiles of the whole run, us; null with too few samples.
     pub(crate) fn percentiles(&self) -> BTreeMap<&'static str, StagePercentiles> {
         let us = |ns: Option<u64>| ns.map(|ns| ns as f64 / 1e3);
         self.each(|distribution| {
@@ -62,7 +62,7 @@ impl Rhythm {
         })
     }
 
-    /// Bins on a logarithmic axis: upper end in us, and samples.
+    /// Bins on a logarithmic axis: upper limit in us, and samples.
     pub(crate) fn histograms(&self) -> Value {
         let bins = |samples: &Samples| -> Value {
             samples.bins().iter().map(|bin| json!([bin.to_ns as f64 / 1e3, bin.count])).collect()
@@ -75,7 +75,7 @@ impl Rhythm {
         json!(reported)
     }
 
-    /// The samples of all that was heard, by name.
+    /// The samples of the whole run, by name.
     pub(crate) fn samples(&self) -> impl Iterator<Item = (&'static str, &Samples)> {
         SHOWN.iter().zip(&self.distributions).map(|((name, _), distribution)| (*name, &distribution.whole))
     }
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn what_is_old_counts_in_the_whole_alone() {
-        let mut rhythm = Rhythm::default();
+        let mut rhythm = LatencyHistograms::default();
         for second in 0..RECENT_S + 5 {
             for line in lines("emulator-wakeup", second as f64, if second < 5 { 50_000 } else { 10_000 }) {
                 rhythm.take(&line).unwrap();
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn both_axes_count_as_round_trips_and_others_as_nothing() {
-        let mut rhythm = Rhythm::default();
+        let mut rhythm = LatencyHistograms::default();
         for tag in ["drive-round-trip", "load-round-trip", "emulator-step"] {
             lines(tag, 0.0, 20_000).iter().for_each(|line| rhythm.take(line).unwrap());
         }

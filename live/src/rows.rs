@@ -1,8 +1,8 @@
-//! What the charts are made of: a row every 10 ms with the controllers' set-points at the same moment, and the last minute.
+//! Data of the charts: a row every 10 ms with the controllers' set-points of the same instant, and the last minute of rows.
 //!
-//! Cycles come by the telemetry and ChainValues by the bus, each by its own way and the latter every ten cycles at some cycle of
-//! their own. A row waits until the values after it are there, and takes what lies between them; where there is nothing on both
-//! sides, it has none: a set-point drawn beside a sensor of another cycle would be an error that nobody made.
+//! Cycles come by the telemetry, ChainValues by the bus every ten cycles, at different cycles. A row waits for the ChainValues
+//! after it and interpolates; without values on both sides the cell is empty, since a set-point beside a sensor of another
+//! cycle would show a false error.
 
 use super::columns::{COLUMNS, ControllerSignal, Source};
 use super::state::NewestRow;
@@ -14,13 +14,13 @@ use std::collections::VecDeque;
 pub(crate) const SPACING_CYCLES: u64 = 10;
 /// Rows that are kept: a minute.
 const KEPT: usize = 6000;
-/// Cycles that a row waits for the controllers.
-const PATIENCE_CYCLES: u64 = 30;
-/// Most cycles between two values of a controller that a straight line is drawn through: one of them may be lost.
+/// Longest time that a row waits for the controllers, cycles.
+const LONGEST_WAIT_CYCLES: u64 = 30;
+/// Longest gap between two values of a controller that is interpolated, cycles: one of them may be lost.
 const BRIDGED_CYCLES: u64 = 20;
 const VALUES_KEPT: usize = 32;
 
-/// A row of the charts; values as the page gets them, to seven digits.
+/// A row of the charts; values have seven digits, as the page gets them.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     cycle: u64,
@@ -29,17 +29,17 @@ struct Row {
 
 #[derive(Debug, Default)]
 pub(crate) struct Rows {
-    /// Those that wait for the controllers.
+    /// Rows that wait for the controllers.
     waiting: VecDeque<Row>,
     chain_values: [VecDeque<(u64, ChainValues)>; 2],
     kept: VecDeque<Row>,
-    /// Rows at the end of those kept that were not handed out yet.
+    /// Rows at the end of `kept` that were not sent.
     fresh: usize,
 }
 
 impl Rows {
-    /// Takes what the controller of an axis said after the sensors of `cycle`.
-    pub(crate) fn hear(&mut self, axis: usize, cycle: u64, values: ChainValues) {
+    /// Adds the values that the controller of an axis sent for `cycle`.
+    pub(crate) fn add_chain_values(&mut self, axis: usize, cycle: u64, values: ChainValues) {
         let chain_values = &mut self.chain_values[axis];
         chain_values.push_back((cycle, values));
         if chain_values.len() > VALUES_KEPT {
@@ -47,20 +47,20 @@ impl Rows {
         }
     }
 
-    /// Takes a row, without what controllers say.
+    /// Adds a row, without values of controllers.
     pub(crate) fn add(&mut self, cycle: u64, values: &[Option<f64>]) {
         let values = values.iter().map(|value| value.map(|value| value as f32)).collect();
         self.waiting.push_back(Row { cycle, values });
-        self.settle(cycle);
+        self.complete_rows(cycle);
     }
 
-    /// Completes the rows that need wait no longer, `newest` being the newest cycle.
-    fn settle(&mut self, newest: u64) {
+    /// Completes the rows that need not wait longer; `newest` is the newest cycle.
+    fn complete_rows(&mut self, newest: u64) {
         while let Some(row) = self.waiting.front() {
             let received = |chain_values: &VecDeque<(u64, ChainValues)>| {
                 chain_values.back().is_some_and(|(cycle, _)| *cycle >= row.cycle)
             };
-            if !self.chain_values.iter().all(received) && newest < row.cycle + PATIENCE_CYCLES {
+            if !self.chain_values.iter().all(received) && newest < row.cycle + LONGEST_WAIT_CYCLES {
                 return;
             }
             let Some(mut row) = self.waiting.pop_front() else { return };
@@ -77,13 +77,13 @@ impl Rows {
         }
     }
 
-    /// The rows that are new since this was asked the last time; `None` when there are none.
+    /// The rows since the last call; `None` without any.
     pub(crate) fn take_fresh(&mut self) -> Option<Value> {
         let fresh = std::mem::take(&mut self.fresh);
         (fresh > 0).then(|| table(self.kept.range(self.kept.len() - fresh..)))
     }
 
-    /// The rows of the last so many seconds.
+    /// The rows of the last `seconds`.
     pub(crate) fn last(&self, seconds: f64) -> Value {
         let rows = (seconds * 1000.0 / SPACING_CYCLES as f64) as usize;
         table(self.kept.range(self.kept.len().saturating_sub(rows)..))
@@ -97,7 +97,7 @@ impl Rows {
     }
 }
 
-/// What a controller said of a cycle, or between what it said before and after.
+/// Value of a controller at `cycle`, interpolated if necessary.
 fn between(chain_values: &VecDeque<(u64, ChainValues)>, cycle: u64, signal: ControllerSignal) -> Option<f64> {
     let value = |values: &ChainValues| match signal {
         ControllerSignal::Position => values.position_set_point_m,
@@ -116,7 +116,7 @@ fn between(chain_values: &VecDeque<(u64, ChainValues)>, cycle: u64, signal: Cont
     }
 }
 
-/// The shortest decimal number that is this one to its seven digits: JSON would spell out those that a wider type adds.
+/// The decimal number with the digits of the f32: a conversion to f64 would add digits to the JSON.
 fn short(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }
@@ -151,11 +151,11 @@ mod tests {
     fn a_set_point_is_that_of_the_rows_own_cycle() {
         let mut rows = Rows::default();
         let row = vec![Some(0.5); COLUMNS.len()];
-        (0..2).for_each(|axis| rows.hear(axis, 3, values(0.25)));
+        (0..2).for_each(|axis| rows.add_chain_values(axis, 3, values(0.25)));
         rows.add(0, &row);
         rows.add(10, &row);
         assert_eq!(set_points(&mut rows), [Value::Null], "of cycle 0 nothing is known, and 10 waits");
-        (0..2).for_each(|axis| rows.hear(axis, 13, values(0.5)));
+        (0..2).for_each(|axis| rows.add_chain_values(axis, 13, values(0.5)));
         rows.add(20, &row);
         // 7 of the 10 cycles between 3 and 13: 0.25 + 0.7 0.25.
         assert_eq!(set_points(&mut rows), [json!(0.425)]);
@@ -165,7 +165,7 @@ mod tests {
     fn a_controller_that_is_silent_holds_nobody_up_for_long() {
         let mut rows = Rows::default();
         let row = vec![None; COLUMNS.len()];
-        rows.hear(0, 0, values(0.25));
+        rows.add_chain_values(0, 0, values(0.25));
         (0..=60).step_by(10).for_each(|cycle| rows.add(cycle, &row));
         assert_eq!(set_points(&mut rows), [json!(0.25), Value::Null, Value::Null, Value::Null]);
     }
@@ -175,8 +175,8 @@ mod tests {
         for (after, expected) in [(20, json!(0.375)), (30, Value::Null)] {
             let mut rows = Rows::default();
             let row = vec![None; COLUMNS.len()];
-            (0..2).for_each(|axis| rows.hear(axis, 0, values(0.25)));
-            (0..2).for_each(|axis| rows.hear(axis, after, values(0.5)));
+            (0..2).for_each(|axis| rows.add_chain_values(axis, 0, values(0.25)));
+            (0..2).for_each(|axis| rows.add_chain_values(axis, after, values(0.5)));
             [0, 10].into_iter().for_each(|cycle| rows.add(cycle, &row));
             assert_eq!(set_points(&mut rows), [json!(0.25), expected]);
         }

@@ -1,4 +1,4 @@
-//! Who gets what: the loop over bus, telemetry and clients, the paths, and the orders.
+//! The loop over bus, telemetry and clients, the paths, and the requests to act.
 
 use super::LiveError;
 use super::assets;
@@ -25,26 +25,26 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time between two looks at bus and telemetry, ms.
+/// Period of the polls of bus and telemetry, ms.
 const TURN_MS: u64 = 10;
-/// Frames of the bus that are taken in one turn: more than a full bus carries in ten of them.
+/// Most frames of the bus that are taken in one turn: more than a full bus carries in ten turns.
 const FRAMES_A_TURN: usize = 4096;
 /// Times between events of each kind, ms.
 const ROWS_MS: u64 = 50;
 const STATE_MS: u64 = 200;
 const SECOND_MS: u64 = 1000;
 const HEARTBEAT_MS: u64 = 5000;
-/// Longest history that is handed out, s.
+/// Longest history of a response, s.
 const LONGEST_HISTORY_S: f64 = 60.0;
-/// Bytes of a token: too many to be guessed.
+/// Bytes of a token: enough against guessing.
 const TOKEN_BYTES: usize = 16;
-/// Interface name in saved logs of a bus without a name of its own.
+/// Interface name in saved logs of an unnamed bus.
 const NAMELESS: &str = "bus0";
 
-/// What became of a record that was saved for a client, or why it was not.
-type Saved = (u64, io::Result<String>);
+/// Number of the client that asked for a record, and the result.
+type SaveResult = (u64, io::Result<String>);
 
-/// The page and everything behind it.
+/// The server with all its inputs and clients.
 pub(super) struct Server {
     bus: Box<dyn Bus>,
     url: BusUrl,
@@ -56,14 +56,14 @@ pub(super) struct Server {
     clients: Vec<Client>,
     most_clients: usize,
     next_client: u64,
-    /// What a client shows that may act; `None` when nobody may.
+    /// Token of clients that may act; `None` without --control.
     token: Option<String>,
     save_to: Option<PathBuf>,
-    saved: (Sender<Saved>, Receiver<Saved>),
+    saved: (Sender<SaveResult>, Receiver<SaveResult>),
     saving: bool,
-    /// Clients whose commands the emulator has not answered yet, in their order.
+    /// Numbers of the clients whose commands the emulator has not answered, in order.
     asked: VecDeque<u64>,
-    /// When the console's stop is due on the bus again, while it is held.
+    /// When the console's stop is sent again, while it is held.
     stop_due_ms: Option<u64>,
     missed_by_gone: u64,
     began: Instant,
@@ -126,12 +126,12 @@ impl Server {
         }
     }
 
-    /// Waits for something to do, and does it.
+    /// Waits for input until the next turn is due, and processes it.
     pub(super) fn turn(&mut self) -> io::Result<()> {
         let (readable, someone_waits) = self.wait()?;
         let now_ms = self.now_ms();
         if someone_waits {
-            self.let_in(now_ms);
+            self.accept(now_ms);
         }
         for place in readable {
             if let Some(request) = self.clients[place].read(now_ms) {
@@ -140,9 +140,9 @@ impl Server {
         }
         if now_ms >= self.due.turn {
             self.due.turn = now_ms + TURN_MS;
-            self.hear(now_ms);
+            self.receive_input(now_ms);
             self.repeat_stop(now_ms);
-            self.tell(now_ms);
+            self.send_due_events(now_ms);
         }
         self.clients.iter_mut().for_each(|client| client.write(now_ms));
         let gone = self.clients.extract_if(.., |client| client.is_gone());
@@ -150,28 +150,28 @@ impl Server {
         Ok(())
     }
 
-    /// Which clients have sent something, and whether somebody waits at the door.
+    /// Indices of the readable clients, and whether a connection waits.
     fn wait(&self) -> io::Result<(Vec<usize>, bool)> {
         let left_ms = self.due.turn.saturating_sub(self.now_ms());
         let clients = self.clients.iter().map(|client| (client.stream(), client.has_something_to_write()));
         wait(&self.listener, clients, None, left_ms as i64)
     }
 
-    fn let_in(&mut self, now_ms: u64) {
+    fn accept(&mut self, now_ms: u64) {
         while let Ok((stream, _)) = self.listener.accept() {
             if self.clients.len() >= self.most_clients {
-                // Whether it reads this is its own affair; the socket's buffer takes it at once.
+                // The response fits the socket's buffer; whether the client reads it does not matter.
                 let _ = stream.set_nonblocking(true).and_then(|()| (&stream).write(&refusal()));
                 continue;
             }
             self.next_client += 1;
-            // A socket that takes no options is that of a client that has gone already.
+            // Fails for a client that has disconnected.
             self.clients.extend(Client::new(stream, self.next_client, now_ms));
         }
     }
 
-    /// Takes what came by bus and telemetry.
-    fn hear(&mut self, now_ms: u64) {
+    /// Processes the input from bus and telemetry.
+    fn receive_input(&mut self, now_ms: u64) {
         for _ in 0..FRAMES_A_TURN {
             match self.bus.receive() {
                 Received::Frame(frame, stamp_ns) => self.view.frame(FrameRecord { stamp_ns, frame }, now_ms),
@@ -181,7 +181,7 @@ impl Server {
         }
         let bus_is_up = self.bus.is_up();
         if std::mem::replace(&mut self.bus_was_up, bus_is_up) != bus_is_up {
-            self.tell_status(now_ms);
+            self.announce_status(now_ms);
         }
         let Some(feed) = &mut self.feed else { return };
         let (had_telemetry, mut described) = (self.view.telemetry, false);
@@ -193,21 +193,21 @@ impl Server {
                 view.packet(packet);
             }
         });
-        answers.iter().for_each(|text| self.hand_on(text, now_ms));
+        answers.iter().for_each(|text| self.pass_on_answer(text, now_ms));
         if gone {
             self.view.telemetry = false;
             for number in std::mem::take(&mut self.asked) {
                 self.answer(number, message_response(Status::Busy, "the emulator is gone"), now_ms);
             }
         }
-        // Connected is reported with the description, not before it: who hears of it asks for that at once.
+        // "connected" is announced with the description, since clients request the description at once.
         if described || had_telemetry && gone {
-            self.tell_status(now_ms);
+            self.announce_status(now_ms);
         }
     }
 
-    /// Gives the emulator's answer to the client that asked for it.
-    fn hand_on(&mut self, text: &str, now_ms: u64) {
+    /// Passes the emulator's answer on to the client that sent the command.
+    fn pass_on_answer(&mut self, text: &str, now_ms: u64) {
         let Some(number) = self.asked.pop_front() else { return };
         let reported = match serde_json::from_str(text) {
             Ok(Answer { ok: true, text }) if text.is_empty() => {
@@ -224,14 +224,14 @@ impl Server {
     }
 
     fn answer(&mut self, number: u64, response: Vec<u8>, now_ms: u64) {
-        // One that has gone meanwhile needs none.
+        // The client may have disconnected.
         if let Some(client) = self.clients.iter_mut().find(|client| client.number == number) {
             client.answer(response, now_ms);
         }
     }
 
-    /// Tells listeners what is due.
-    fn tell(&mut self, now_ms: u64) {
+    /// Sends the events that are due to subscribers.
+    fn send_due_events(&mut self, now_ms: u64) {
         for message in self.view.take_messages() {
             self.broadcast("message", &json!(message), now_ms);
         }
@@ -261,7 +261,7 @@ impl Server {
         }
     }
 
-    fn tell_status(&mut self, now_ms: u64) {
+    fn announce_status(&mut self, now_ms: u64) {
         let status = self.status();
         let of = |what: &str| status[what].as_str().unwrap_or_default();
         eprintln!("bench watch: bus {}, telemetry {}", of("bus"), of("telemetry"));
@@ -290,7 +290,7 @@ impl Server {
         Audience { viewers, missed: self.missed_by_gone + missed, now_ms }
     }
 
-    /// Answers a request, now or when it is done.
+    /// Answers a request, or leaves the answer for later.
     fn serve(&mut self, place: usize, request: &Request, now_ms: u64) {
         let is_for_us = request.host.as_deref().is_some_and(|host| is_ours(host, self.address.port()));
         if !is_for_us {
@@ -342,7 +342,7 @@ impl Server {
         }
     }
 
-    /// Obeys an order if it may be given; `None` when the answer comes later.
+    /// Checks the authority of a request and carries it out; `None` when the answer comes later.
     fn control(&mut self, number: u64, request: &Request, now_ms: u64) -> Option<Vec<u8>> {
         if request.method != "POST" {
             return Some(message_response(Status::MethodNotAllowed, "orders come by POST"));
@@ -353,7 +353,7 @@ impl Server {
                 "this page only looks on: it was started without --control",
             ));
         };
-        // Browsers tell which page a request comes from; programs tell nothing, and need the token all the same.
+        // Browsers send the origin of a request; programs send none and need the token too.
         let host = request.host.as_deref().unwrap_or_default();
         if request.origin.as_deref().is_some_and(|origin| origin != format!("http://{host}")) {
             return Some(message_response(Status::Forbidden, "this request comes from another page"));
@@ -366,12 +366,12 @@ impl Server {
             ));
         }
         match control::read(&request.body) {
-            Ok(order) => self.obey(number, order, now_ms),
+            Ok(order) => self.execute(number, order, now_ms),
             Err(why) => Some(message_response(Status::BadRequest, &why)),
         }
     }
 
-    fn obey(&mut self, number: u64, order: Order, now_ms: u64) -> Option<Vec<u8>> {
+    fn execute(&mut self, number: u64, order: Order, now_ms: u64) -> Option<Vec<u8>> {
         match order {
             Order::Stop => {
                 self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
@@ -404,7 +404,7 @@ impl Server {
         }
     }
 
-    /// Puts a frame on the bus, and tells whether it left.
+    /// Sends a frame on the bus; returns the response for the client.
     fn send(&mut self, frame: &Frame, now_ms: u64) -> Vec<u8> {
         let encoded = match frame.encode() {
             Ok(encoded) => encoded,
@@ -412,7 +412,7 @@ impl Server {
         };
         match self.bus.send(&encoded) {
             Ok(_) => {
-                // A peer does not hear itself.
+                // A peer does not receive its frames.
                 self.view.sent(encoded, wall_clock_ns(0));
                 if let Frame::ConsoleEmergencyStop(stop) = frame {
                     self.view.wire.note_stop(CONSOLE, *stop, now_ms);
@@ -423,7 +423,7 @@ impl Server {
         }
     }
 
-    /// Sends the console's stop again, as `rig.dbc` has it while its cause lasts; also to a rig that was not there before.
+    /// Sends the console's stop again, as `rig.dbc` requires while it is held; this reaches a rig that starts later too.
     fn repeat_stop(&mut self, now_ms: u64) {
         if self.stop_due_ms.is_some_and(|due_ms| now_ms >= due_ms) {
             self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
@@ -441,7 +441,7 @@ impl Server {
         let interface = self.url.name().unwrap_or_else(|| NAMELESS.into());
         let record = self.view.minute.last(seconds, &folder, &interface, self.view.set_up());
         let done = self.saved.0.clone();
-        // The disk may take its time; the page does not wait for it.
+        // In a thread, since the disk may be slow.
         std::thread::spawn(move || done.send((number, record.write())));
         None
     }
@@ -451,7 +451,7 @@ impl Server {
     }
 }
 
-/// Whether it is time, and then when it is again.
+/// Whether an event is due; if so, sets the time of the next.
 fn is_due(due_ms: &mut u64, now_ms: u64, every_ms: u64) -> bool {
     let is_time = now_ms >= *due_ms;
     if is_time {
@@ -460,14 +460,14 @@ fn is_due(due_ms: &mut u64, now_ms: u64, every_ms: u64) -> bool {
     is_time
 }
 
-/// A token that nobody can guess.
+/// A random token.
 fn draw_token() -> io::Result<String> {
     let mut bytes = [0; TOKEN_BYTES];
     std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// Whether two texts are the same, in a time that does not tell where they differ.
+/// Compares two texts in constant time.
 fn is_same(one: &[u8], other: &[u8]) -> bool {
     let differ = one.iter().zip(other).fold(0, |differ, (a, b)| differ | (a ^ b));
     one.len() == other.len() && differ == 0

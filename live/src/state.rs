@@ -1,6 +1,6 @@
-//! The state of the page as programs, the page and Prometheus get it: written as JSON by one type, and read by its fields.
+//! The state of the page for programs, the page and Prometheus: one type, serialised to JSON.
 //!
-//! Keys are those of `bench/docs/watch.md`; null is what is not known.
+//! Keys are those of `bench/docs/watch.md`; null means unknown.
 
 use super::light::Judgement;
 use runlog::event::FaultMark;
@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 /// Values by column, each in the unit of its column.
 pub(crate) type NewestRow = BTreeMap<String, Option<f64>>;
 
-/// The state of each chain of an axis by its name; `None` of a number that `rig.dbc` does not name.
+/// The state of each chain of an axis by its name; `None` for a number without a name in `rig.dbc`.
 pub(crate) type ChainStates = BTreeMap<&'static str, Option<&'static str>>;
 
-/// The state of the run that goes on.
+/// The state of the run in progress.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct State {
     pub cycle: Option<u64>,
@@ -24,19 +24,19 @@ pub(crate) struct State {
     pub linked: bool,
     pub check_valves_shut: Option<bool>,
     pub weights_kg: f64,
-    /// By axis; `None` of a controller that is silent.
+    /// By axis; `None` for a silent controller.
     pub chains: BTreeMap<&'static str, Option<ChainStates>>,
     pub faults_active: Vec<ActiveFault>,
     pub bus: BusLoad,
     pub timing: Timing,
     /// `None` before the first judgement.
     pub claim: Option<Judgement>,
-    /// Listeners to events.
+    /// Number of subscribers to events.
     pub viewers: usize,
-    /// Events that listeners were too slow for.
+    /// Events that slow subscribers missed.
     pub dropped: u64,
     pub telemetry_records_lost: u64,
-    /// The last messages, where they are asked for.
+    /// The last messages, where they were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub messages: Option<Vec<Message>>,
 }
@@ -49,7 +49,7 @@ pub(crate) struct EmergencyStopState {
     pub senders: Vec<&'static str>,
 }
 
-/// A fault that is put into the run.
+/// An injected fault that is active.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct ActiveFault {
     pub name: String,
@@ -63,11 +63,11 @@ pub(crate) struct ActiveFault {
 pub(crate) struct BusLoad {
     /// In the last second, with worst-case stuffing; `None` before the first is over.
     pub load_percent: Option<f64>,
-    /// By name of the frame, those that came.
+    /// Received frames by name.
     pub frames_per_s: BTreeMap<&'static str, f64>,
-    /// Sensor frames of this run that did not come here.
+    /// Sensor frames of this run that were not received.
     pub lost: u64,
-    /// Frames that are not as `rig.dbc` says.
+    /// Frames that violate `rig.dbc`.
     pub malformed: u64,
 }
 
@@ -77,7 +77,7 @@ pub(crate) struct Timing {
     #[serde(flatten)]
     pub percentiles: BTreeMap<&'static str, StagePercentiles>,
     pub overruns: u64,
-    /// In each of the last seconds, the one that goes on last.
+    /// In each of the last seconds, the current one last.
     pub overruns_by_second: Vec<u64>,
     /// Cycles that overruns skipped.
     pub skipped: u64,
@@ -106,7 +106,7 @@ pub(crate) struct Message {
     pub text: String,
 }
 
-/// How much a message concerns a person.
+/// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Level {

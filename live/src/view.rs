@@ -1,13 +1,13 @@
-//! What the page shows: everything that was heard of the run that goes on, from its telemetry and from the bus.
+//! The data of the run in progress, from its telemetry and from the bus.
 
 use super::chains;
 use super::columns::{COLUMNS, Layout, Source};
 use super::light::{Judgement, Light};
-use super::minute::Minute;
-use super::rhythm::Rhythm;
+use super::minute::RecentRecord;
+use super::rhythm::LatencyHistograms;
 use super::rows::{Rows, SPACING_CYCLES};
 use super::state::{ActiveFault, Level, Message, State, Timing};
-use super::wire::{News, Wire};
+use super::wire::{Wire, WireEvent};
 use protocol::can::CanFrame;
 use runlog::candump::FrameRecord;
 use runlog::event::{EventKind, FaultChange};
@@ -16,11 +16,11 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 
-/// Messages that are kept for who comes later.
+/// Messages kept for later clients.
 const MESSAGES_KEPT: usize = 200;
-/// Of overruns fewer, so that a bad machine's thousands hide nothing else.
+/// Overruns among them; the limit keeps other messages visible on a bad machine.
 const OVERRUNS_KEPT: u64 = 20;
-/// Seconds for which overruns are counted one by one.
+/// Seconds for which overruns are counted per second.
 const OVERRUN_SECONDS: usize = 60;
 const SECOND_CYCLES: u64 = 1000;
 
@@ -31,20 +31,20 @@ pub(crate) struct View {
     /// `None` before the telemetry sends one.
     description: Option<Description>,
     layout: Layout,
-    /// Whether cycles come by telemetry, and not by the bus alone.
+    /// Whether cycles come by telemetry rather than by the bus alone.
     pub telemetry: bool,
     cycle: Option<u64>,
     pub wire: Wire,
     pub rows: Rows,
-    pub rhythm: Rhythm,
-    pub minute: Minute,
+    pub rhythm: LatencyHistograms,
+    pub minute: RecentRecord,
     light: Light,
     claim: Option<Judgement>,
     overruns: u64,
     recent_overruns: VecDeque<u64>,
     skipped: u64,
     records_lost: u64,
-    /// Those that are put into the run, by number.
+    /// Active faults by number.
     faults: BTreeMap<u16, ActiveFault>,
     /// Set-up of the rig, from the telemetry.
     set_up: SetUp,
@@ -52,10 +52,10 @@ pub(crate) struct View {
     fresh: Vec<Message>,
 }
 
-/// What only the server knows of the state.
+/// Server-side numbers of the state.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Audience {
-    /// Listeners to events.
+    /// Number of subscribers to events.
     pub viewers: usize,
     pub missed: u64,
     /// Milliseconds since the start of the program.
@@ -68,7 +68,7 @@ impl View {
         Self { folder: folder.map(Path::to_path_buf), light: Light::new(folder), ..Self::default() }
     }
 
-    /// Takes a packet of the telemetry, save an answer, which is the server's.
+    /// Processes a packet of the telemetry; answers go to the server instead.
     pub(crate) fn packet(&mut self, packet: Packet) {
         match packet {
             Packet::Description(text) => self.describe(&text),
@@ -76,12 +76,15 @@ impl View {
             Packet::Event(text) => match serde_json::from_str(&text) {
                 Ok(event) => self.event(event),
                 Err(error) => {
-                    self.tell(Level::Warning, &format!("an event of the telemetry cannot be read: {error}"));
+                    self.report(
+                        Level::Warning,
+                        &format!("an event of the telemetry cannot be read: {error}"),
+                    );
                 }
             },
             Packet::Histogram(line) => {
                 if let Err(error) = self.rhythm.take(&line) {
-                    self.tell(
+                    self.report(
                         Level::Warning,
                         &format!("a histogram of the telemetry cannot be read: {error}"),
                     );
@@ -90,7 +93,7 @@ impl View {
             Packet::Loss(records) => {
                 self.records_lost = records;
                 let text = format!("{records} records of the telemetry did not come here");
-                self.tell(
+                self.report(
                     Level::Warning,
                     &format!("{text}: what is broken and how much was skipped may be out of date"),
                 );
@@ -99,8 +102,7 @@ impl View {
         }
     }
 
-    /// A run begins, or is joined. The emulator tells what happened in it before; what was of another run would be taken for this
-    /// one's.
+    /// A run begins, or is joined. Data of another run is discarded; the emulator sends what happened earlier in this one.
     fn describe(&mut self, text: &str) {
         let (description, error) = match serde_json::from_str::<Description>(text) {
             Ok(description) => (Some(description), None),
@@ -109,7 +111,7 @@ impl View {
         let known = description.clone().unwrap_or_default();
         let folder = self.folder.clone().or_else(|| folder_of(&known));
         let mut wire = std::mem::take(&mut self.wire);
-        wire.begin_anew();
+        wire.reset();
         let named = known.columns.iter().map(|column| (column.table, column.name.as_str()));
         *self = Self {
             layout: Layout::new(named),
@@ -123,7 +125,7 @@ impl View {
             ..Self::new(self.folder.as_deref())
         };
         if let Some(error) = error {
-            self.tell(Level::Warning, &format!("the description of the telemetry cannot be read: {error}"));
+            self.report(Level::Warning, &format!("the description of the telemetry cannot be read: {error}"));
         }
     }
 
@@ -151,13 +153,15 @@ impl View {
     pub(crate) fn frame(&mut self, record: FrameRecord, now_ms: u64) {
         self.minute.frame(record);
         match self.wire.take(&record.frame, now_ms) {
-            Some(News::ChainValues(axis, cycle, values)) => self.rows.hear(axis, cycle, values),
-            Some(News::Cycle(cycle, anew)) if !self.telemetry => self.row_of_bus(cycle, anew),
+            Some(WireEvent::ChainValues(axis, cycle, values)) => {
+                self.rows.add_chain_values(axis, cycle, values)
+            }
+            Some(WireEvent::Cycle(cycle, anew)) if !self.telemetry => self.row_of_bus(cycle, anew),
             _ => {}
         }
     }
 
-    /// A row without telemetry: what the bus tells.
+    /// Adds a row from the bus, without telemetry.
     fn row_of_bus(&mut self, cycle: u64, anew: bool) {
         if anew {
             self.rows = Rows::default();
@@ -209,8 +213,8 @@ impl View {
         }
     }
 
-    /// A message of the page's own, at the run's newest moment.
-    pub(crate) fn tell(&mut self, level: Level, text: &str) {
+    /// A message of the page itself, at the newest cycle.
+    pub(crate) fn report(&mut self, level: Level, text: &str) {
         self.say(self.cycle.unwrap_or_default(), level, text, true);
     }
 
@@ -225,12 +229,12 @@ impl View {
         self.fresh.push(message);
     }
 
-    /// Messages that are new since this was asked the last time.
+    /// The messages since the last call.
     pub(crate) fn take_messages(&mut self) -> Vec<Message> {
         std::mem::take(&mut self.fresh)
     }
 
-    /// What is due once a second.
+    /// Updates that are due once a second.
     pub(crate) fn second(&mut self) {
         let newest = self.cycle.unwrap_or_default();
         self.recent_overruns
@@ -242,18 +246,18 @@ impl View {
         self.folder.clone().or_else(|| self.description.as_ref().and_then(folder_of))
     }
 
-    /// How the rig is set up in the newest cycles.
+    /// Set-up of the rig in the newest cycle.
     pub(crate) fn set_up(&self) -> SetUp {
         self.set_up
     }
 
-    /// Overruns in each of the last seconds, the one that goes on last.
+    /// Overruns in each of the last seconds, the current one last.
     fn overruns_by_second(&self) -> Vec<u64> {
         let second = |cycle: u64| cycle / SECOND_CYCLES;
         let now = second(self.cycle.unwrap_or_default());
         let mut counts = vec![0; OVERRUN_SECONDS];
         for cycle in &self.recent_overruns {
-            // One that is reported ahead of its cycle is of the second that goes on.
+            // An event reported ahead of its cycle belongs to the current second.
             let ago = now.saturating_sub(second(*cycle)) as usize;
             if let Some(count) = counts.iter_mut().rev().nth(ago) {
                 *count += 1;
@@ -262,7 +266,7 @@ impl View {
         counts
     }
 
-    /// What does not change while a run goes on.
+    /// The properties of the run that do not change.
     pub(crate) fn description(&self, control: bool) -> Value {
         let described = self.description.as_ref();
         let column = |column: &super::columns::Column| json!({ "name": column.name, "unit": column.unit });
@@ -310,23 +314,23 @@ impl View {
         }
     }
 
-    /// The same, and the last messages, for who comes later.
+    /// The state with the last messages, for a new client.
     pub(crate) fn state_with_messages(&self, audience: Audience) -> State {
         State { messages: Some(self.messages.iter().cloned().collect()), ..self.state(audience) }
     }
 
-    /// A frame that was sent from here.
+    /// Records a frame that this program sent.
     pub(crate) fn sent(&mut self, frame: CanFrame, stamp_ns: u64) {
         self.minute.frame(FrameRecord { stamp_ns, frame });
     }
 }
 
-/// The run's folder, if the description names one.
+/// Folder of the run, if the description names one.
 fn folder_of(description: &Description) -> Option<PathBuf> {
     Some(&description.out).filter(|out| !out.is_empty()).map(PathBuf::from)
 }
 
-/// Warnings are events that a person has to look at, errors those that end or stop something.
+/// Events that need attention are warnings; those that end or stop something are errors.
 fn level(kind: &EventKind) -> Level {
     match kind {
         EventKind::EmergencyStop
@@ -353,7 +357,7 @@ fn level(kind: &EventKind) -> Level {
     }
 }
 
-/// A fault of the table in the words of the page, which makes a form of it.
+/// A fault of the table with the texts from which the page makes a form.
 fn fault_form(fault: &FaultEntry) -> Value {
     let parameters = fault.keys.iter().map(|key| {
         json!({

@@ -1,4 +1,4 @@
-//! The bus as the live page sees it: the rig's cycles, what the controllers say, who holds a stop, how full the wire is.
+//! The bus as the live page sees it: cycle of the rig, values of the controllers, holders of a stop, bus load.
 
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
 use super::state::{BusLoad, ChainStates, EmergencyStopState};
@@ -11,39 +11,39 @@ use protocol::frames::{
 use runlog::Axis;
 use std::collections::BTreeMap;
 
-/// Who stopped or failed to is known by a frame every 100 ms; one that is silent for so long holds nothing any more.
+/// A node that holds a stop repeats it every 100 ms; after this silence it no longer holds it.
 const STOP_HOLDS_MS: u64 = 500;
-/// A controller's chains are reported every 10 ms; after so long they are none.
+/// Controllers send their chain states every 10 ms; after this silence they are unknown.
 const STATUS_HOLDS_MS: u64 = 1000;
-/// Values of the tick's count of skipped cycles.
+/// Range of the tick's counter of skipped cycles.
 const SKIPPED_RANGE: u64 = 1 << 16;
-/// Senders of emergency stops.
+/// Nodes that can hold an emergency stop.
 pub(crate) const STOPPERS: [&str; 4] = ["console", "rig", Axis::Drive.name(), Axis::Load.name()];
-/// Place of the console among them, whose frames are sent from here too.
+/// Index of the console among them; this program sends its frames too.
 pub(crate) const CONSOLE: usize = 0;
 
-/// What a frame tells the rest of the page.
+/// Effect of a frame on the rest of the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum News {
-    /// The rig is at this cycle, and started anew if that is reported.
+pub(crate) enum WireEvent {
+    /// Newest cycle of the rig, and whether the rig restarted.
     Cycle(u64, bool),
-    /// What the controller of an axis sends of itself, in its answer to the sensors of this cycle.
+    /// Axis, cycle answered and values of a controller.
     ChainValues(usize, u64, ChainValues),
 }
 
-/// Frames of the bus, taken in.
+/// State from the frames of the bus.
 #[derive(Debug, Default)]
 pub(crate) struct Wire {
-    /// The newest that is known of, once a tick has reported one.
+    /// The newest cycle; `None` before the first tick.
     cycle: Option<u64>,
-    /// Low bits of the cycle that each controller answered last, as its command to the valve tells.
+    /// Low bits of the cycle that each controller answered last, from its valve command.
     echo: [Option<u16>; 2],
     chain_values: [Option<ChainValues>; 2],
-    /// Sensors of each axis, since the first tick.
-    sensors: [Came; 2],
-    /// Cycles that the rig skipped since then, and what its own count was when it reported it last.
+    /// Sensors of each axis since the first tick.
+    sensors: [Reception; 2],
+    /// Cycles that the rig skipped since the first tick, and its counter in the last tick.
     skipped: u64,
-    skipped_told: Option<u16>,
+    skipped_reported: Option<u16>,
     status: Option<RigStatus>,
     chains: [Option<(u64, ChainStatus)>; 2],
     stops: [Option<u64>; 4],
@@ -53,18 +53,18 @@ pub(crate) struct Wire {
     frames: Counts,
 }
 
-/// Which sensors of an axis came.
+/// Reception of the sensors of an axis.
 #[derive(Clone, Copy, Debug, Default)]
-struct Came {
-    /// The newest cycle that was looked for.
+struct Reception {
+    /// The newest cycle expected.
     newest: u64,
-    /// Whether its sensors came, whether those of the cycle before did, and so on: from the lowest bit up.
+    /// Bit i: whether the sensors of cycle `newest - i` were received.
     bits: u64,
-    /// Cycles up to it whose sensors did not come.
+    /// Expected cycles up to `newest` without sensors.
     missing: u64,
 }
 
-/// Frames by message, this second and the last.
+/// Frames by message, in the current second and in the last.
 #[derive(Debug, Default)]
 struct Counts {
     since_ms: u64,
@@ -75,10 +75,10 @@ struct Counts {
 }
 
 impl Wire {
-    pub(crate) fn take(&mut self, frame: &CanFrame, now_ms: u64) -> Option<News> {
+    pub(crate) fn take(&mut self, frame: &CanFrame, now_ms: u64) -> Option<WireEvent> {
         self.frames.count(frame);
         match Frame::decode(frame) {
-            Ok(frame) => self.obey(frame, now_ms),
+            Ok(frame) => self.process(frame, now_ms),
             Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => None,
             Err(_) => {
                 self.malformed += 1;
@@ -87,7 +87,7 @@ impl Wire {
         }
     }
 
-    fn obey(&mut self, frame: Frame, now_ms: u64) -> Option<News> {
+    fn process(&mut self, frame: Frame, now_ms: u64) -> Option<WireEvent> {
         match frame {
             Frame::DriveSensors(sensors) => self.measure(0, &sensors),
             Frame::LoadSensors(sensors) => self.measure(1, &sensors),
@@ -103,8 +103,8 @@ impl Wire {
             Frame::RigStatus(status) => self.status = Some(status),
             Frame::DriveChainStatus(status) => self.chains[0] = Some((now_ms, status)),
             Frame::LoadChainStatus(status) => self.chains[1] = Some((now_ms, status)),
-            Frame::DriveChainValues(values) => return self.hear(0, values),
-            Frame::LoadChainValues(values) => return self.hear(1, values),
+            Frame::DriveChainValues(values) => return self.add_chain_values(0, values),
+            Frame::LoadChainValues(values) => return self.add_chain_values(1, values),
             Frame::ConsoleEmergencyStop(stop) => self.note_stop(CONSOLE, stop, now_ms),
             Frame::RigEmergencyStop(stop) => self.note_stop(1, stop, now_ms),
             Frame::DriveEmergencyStop(stop) => self.note_stop(2, stop, now_ms),
@@ -114,21 +114,21 @@ impl Wire {
         None
     }
 
-    fn hear(&mut self, axis: usize, values: ChainValues) -> Option<News> {
+    fn add_chain_values(&mut self, axis: usize, values: ChainValues) -> Option<WireEvent> {
         self.chain_values[axis] = Some(values);
-        Some(News::ChainValues(axis, self.answered(axis)?, values))
+        Some(WireEvent::ChainValues(axis, self.answered_cycle(axis)?, values))
     }
 
-    /// The cycle that a controller answered last. Newer sensors may have passed since: a late answer is of its own cycle.
-    fn answered(&self, axis: usize) -> Option<u64> {
+    /// The cycle that a controller answered last; it may be older than the newest one.
+    fn answered_cycle(&self, axis: usize) -> Option<u64> {
         let (cycle, echo) = (self.cycle?, self.echo[axis]?);
         let age = cycle.wrapping_sub(u64::from(echo)) % ECHO_RANGE;
         cycle.checked_sub(age)
     }
 
-    /// Takes sensors; what they show stands until newer ones come, whatever comes late.
+    /// Takes sensor values; late ones do not replace newer ones.
     fn measure(&mut self, axis: usize, sensors: &Sensors) {
-        if !self.follow(axis, sensors.alive) {
+        if !self.record_sensors(axis, sensors.alive) {
             return;
         }
         let Sensors { position_m, force_n, pressure_a_pa, pressure_b_pa, .. } = *sensors;
@@ -138,9 +138,9 @@ impl Wire {
         }
     }
 
-    /// Notes that sensors of an axis came, and tells whether they are its newest. Their counter has the low bits of their cycle,
-    /// which is the one nearest to the newest cycle that is known: a step of more than half of the counter's range goes back.
-    fn follow(&mut self, axis: usize, alive: u8) -> bool {
+    /// Records the reception of sensors and returns whether they are the newest. Their counter has the low bits of the cycle;
+    /// the cycle is the one nearest to the newest known cycle, at most half of the counter's range away.
+    fn record_sensors(&mut self, axis: usize, alive: u8) -> bool {
         let Some(known) = self.cycle else { return true };
         let ahead = (ALIVE_RANGE + u64::from(alive) - known % ALIVE_RANGE) % ALIVE_RANGE;
         let behind = ALIVE_RANGE - ahead;
@@ -149,33 +149,33 @@ impl Wire {
         self.sensors[axis].take(cycle)
     }
 
-    fn tick(&mut self, tick: &Tick) -> Option<News> {
+    fn tick(&mut self, tick: &Tick) -> Option<WireEvent> {
         let reported = u64::from(tick.cycle);
         let anew = self.cycle.is_some_and(|cycle| reported + ALIVE_RANGE < cycle);
         if anew {
-            self.begin_anew();
+            self.reset();
         }
-        let before = self.skipped_told.replace(tick.skipped).unwrap_or(tick.skipped);
+        let before = self.skipped_reported.replace(tick.skipped).unwrap_or(tick.skipped);
         self.skipped += (SKIPPED_RANGE + u64::from(tick.skipped) - u64::from(before)) % SKIPPED_RANGE;
         match self.cycle {
-            None => self.sensors = [Came::since(reported); 2],
-            // A tick after a miss comes ahead of the sensors of its cycle, but of no earlier ones.
-            Some(_) => self.sensors.iter_mut().for_each(|came| came.look_for(reported.saturating_sub(1))),
+            None => self.sensors = [Reception::since(reported); 2],
+            // A tick after a miss precedes the sensors of its cycle, but no earlier ones.
+            Some(_) => self.sensors.iter_mut().for_each(|came| came.expect(reported.saturating_sub(1))),
         }
         self.cycle = self.cycle.max(Some(reported));
         let lost = self.sensors.iter().map(|came| came.missing.saturating_sub(self.skipped)).sum();
         self.lost = self.lost.max(lost);
-        Some(News::Cycle(reported, anew))
+        Some(WireEvent::Cycle(reported, anew))
     }
 
-    /// Another run: of the one before nothing but the counts of frames holds.
-    pub(crate) fn begin_anew(&mut self) {
+    /// Resets everything for a new run, except the counters of frames.
+    pub(crate) fn reset(&mut self) {
         let frames = std::mem::take(&mut self.frames);
         *self = Self { frames, malformed: self.malformed, ..Self::default() };
     }
 
-    /// A set-point by hand. The frame has room for a position and a force, and the axis follows the one that it controls: what
-    /// was not given is what its controller reported last, and leads nowhere. `None` as long as no controller of it was heard.
+    /// A set-point by hand. The frame holds a position and a force, and the axis follows the one that it controls; the one not
+    /// given repeats the controller's last set-point. `None` before the first values of the controller.
     pub(crate) fn hand_set_point(
         &self,
         axis: HandSetPointAxis,
@@ -199,12 +199,12 @@ impl Wire {
         self.status.as_ref()
     }
 
-    /// What sensors and valves show.
+    /// Newest values of sensors and valves.
     pub(crate) fn measured(&self) -> &[Option<f64>; MEASURED_COUNT] {
         &self.measured
     }
 
-    /// The emergency stop: whether it is tripped, and who holds it.
+    /// The emergency stop: whether it is tripped, and which nodes hold it.
     pub(crate) fn emergency_stop(&self, now_ms: u64) -> EmergencyStopState {
         let holds = |at: &Option<u64>| at.is_some_and(|at_ms| now_ms.saturating_sub(at_ms) < STOP_HOLDS_MS);
         let senders = STOPPERS.iter().zip(&self.stops).filter(|(_, at)| holds(at));
@@ -214,7 +214,7 @@ impl Wire {
         }
     }
 
-    /// The states of the chains of both axes; null of a controller that is silent.
+    /// Chain states of both axes; null for a silent controller.
     pub(crate) fn chains(&self, now_ms: u64) -> BTreeMap<&'static str, Option<ChainStates>> {
         let fresh = self.chains.map(|received| {
             received
@@ -224,12 +224,12 @@ impl Wire {
         AXES.into_iter().zip(fresh.map(|status| status.map(super::chains::active))).collect()
     }
 
-    /// A second is over, perhaps.
+    /// Closes the current second of the counters, if it is over.
     pub(crate) fn turn(&mut self, now_ms: u64) {
         self.frames.turn(now_ms);
     }
 
-    /// How full the bus is, by frame, and what was lost here.
+    /// Bus load by frame, and lost frames.
     pub(crate) fn load(&self) -> BusLoad {
         let counts = &self.frames;
         let seconds = counts.last_ms as f64 / 1000.0;
@@ -247,40 +247,40 @@ impl Wire {
         }
     }
 
-    /// Frames so far by name.
+    /// Frames since the start, by name.
     pub(crate) fn totals(&self) -> impl Iterator<Item = (&'static str, u64)> {
         self.frames.total.iter().enumerate().map(|(place, count)| (name(place), *count))
     }
 }
 
-/// Name of a message by its place; the last place is that of all others.
+/// Name of a message by its index; the last index stands for all others.
 fn name(place: usize) -> &'static str {
     MESSAGES.get(place).map_or("others", |message| message.name)
 }
 
-/// Bits of a message on the wire at most; of others those of the longest.
+/// Worst-case bits of a message on the wire; for other messages those of the longest.
 fn bits(place: usize) -> u32 {
     worst_case_bits(MESSAGES.get(place).map_or(8, |message| message.length))
 }
 
-impl Came {
-    /// From the cycle after this one on: what came before is not known, and nobody's loss.
+impl Reception {
+    /// Expects sensors after `cycle`; earlier ones are unknown.
     fn since(cycle: u64) -> Self {
         Self { newest: cycle, bits: u64::MAX, missing: 0 }
     }
 
-    /// Looks for the sensors of all cycles up to this one: each is missing until it comes.
-    fn look_for(&mut self, cycle: u64) {
+    /// Expects the sensors of all cycles up to `cycle`; each is missing until it is received.
+    fn expect(&mut self, cycle: u64) {
         let more = cycle.saturating_sub(self.newest);
         self.bits = self.bits.checked_shl(more.min(u64::from(u64::BITS)) as u32).unwrap_or(0);
         self.newest += more;
         self.missing += more;
     }
 
-    /// Takes the sensors of a cycle in time, late or again, and tells whether they are the newest.
+    /// Takes the sensors of a cycle, on time, late or duplicate; returns whether they are the newest.
     fn take(&mut self, cycle: u64) -> bool {
-        self.look_for(cycle);
-        // Half of the counter's range at most, since no cycle is looked for that is not known of.
+        self.expect(cycle);
+        // At most half of the counter's range, since no later cycle is expected than is known.
         let bit = 1 << (self.newest - cycle);
         if self.bits & bit == 0 {
             self.bits |= bit;
@@ -364,7 +364,7 @@ mod tests {
         assert_eq!(wire.cycle, Some(127));
         assert_eq!(wire.measured()[1].map(|m| (m * 1e3).round()), Some(127.0), "the newest stand");
         go_on(&mut wire, 128..=130);
-        assert_eq!(wire.take(&tick(130, 0), 0), Some(News::Cycle(130, false)));
+        assert_eq!(wire.take(&tick(130, 0), 0), Some(WireEvent::Cycle(130, false)));
         assert_eq!(wire.load().lost, 0);
         // Told as lost by the tick between, and no reason to overlook the next one.
         go_on(&mut wire, (131..140).filter(|cycle| *cycle != 138));
@@ -403,8 +403,8 @@ mod tests {
     #[test]
     fn a_rig_that_starts_anew_is_told() {
         let mut wire = wire(58, &[], 0);
-        assert_eq!(wire.take(&tick(160, 0), 0), Some(News::Cycle(160, false)));
-        assert_eq!(wire.take(&tick(0, 0), 0), Some(News::Cycle(0, true)));
+        assert_eq!(wire.take(&tick(160, 0), 0), Some(WireEvent::Cycle(160, false)));
+        assert_eq!(wire.take(&tick(0, 0), 0), Some(WireEvent::Cycle(0, true)));
         go_on(&mut wire, 0..=0);
         assert_eq!(wire.cycle, Some(0));
         let total: u64 = wire.totals().map(|(_, count)| count).sum();
@@ -440,7 +440,7 @@ mod tests {
         wire.take(&Frame::DriveValveCommand(command).encode().unwrap(), 0);
         let reported = wire.take(&chain_values, 0);
         assert!(
-            matches!(reported, Some(News::ChainValues(0, 154, _))),
+            matches!(reported, Some(WireEvent::ChainValues(0, 154, _))),
             "the newest sensors are of 157: {reported:?}"
         );
     }

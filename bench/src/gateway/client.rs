@@ -4,7 +4,7 @@
 //! counted. A reply that does not fit ends the connection: the client asks and does not read.
 
 use super::session::{Action, GREETING, Parting, Session};
-use live::client::is_for_later;
+use live::client::is_not_ready;
 use protocol::can::CanFrame;
 use rustix::net::sockopt;
 use serde::Serialize;
@@ -146,7 +146,7 @@ impl Client {
         let read = match self.stream.read(&mut bytes) {
             Ok(0) => return self.end(Ended::ByClient),
             Ok(read) => read,
-            Err(error) if is_for_later(&error) => return,
+            Err(error) if is_not_ready(&error) => return,
             Err(_) => return self.end(Ended::ByClient),
         };
         let mut actions = Vec::new();
@@ -180,7 +180,7 @@ impl Client {
                     self.at_once = self.at_once.saturating_sub(written);
                     self.last_progress_ms = now_ms;
                 }
-                Err(error) if is_for_later(&error) => break,
+                Err(error) if is_not_ready(&error) => break,
                 Err(_) => return self.end(Ended::ByClient),
             }
         }
