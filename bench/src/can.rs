@@ -1,7 +1,7 @@
 //! `bench can`: runs any SocketCAN program on embedded buses, on a machine whose kernel may have no CAN.
 //!
-//! How its system calls are answered is the crate `socketcan-guest`; here are the command line, the bus of a pair of programs
-//! that have no rig, and the exit code, which is the program's own.
+//! The crate `socketcan-guest` answers the system calls; this module has the command line, the bus of a pair of programs
+//! without a rig, and the exit code, which is that of the program.
 
 pub(crate) mod cli;
 
@@ -21,20 +21,20 @@ use std::time::Duration;
 
 /// The interface of `--bus`.
 const FIRST_INTERFACE: &str = "vcan0";
-/// Priority of the thread that answers: above all programs without real-time priority, for which one that has it would wait in a
-/// call; below the rig, its host and its controllers.
+/// Priority of the thread that answers: above programs without real-time priority, since one with real-time priority blocks in
+/// its calls; below the rig, its host and its controllers.
 const FIFO_PRIORITY: u8 = 1;
-/// How often the end is looked for while a bus is hosted.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Period of the polls for the end while a bus is hosted.
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CanError {
-    /// A bus that the kernel has itself.
+    /// A bus of the kernel.
     #[error("{0}: 'bench can' opens embedded buses, unix:///PATH; a program reaches {0} without it")]
-    Kernels(BusUrl),
+    KernelBus(BusUrl),
     /// Two interfaces of one name.
     #[error("interface {0} is given twice")]
-    Twice(String),
+    Duplicate(String),
     /// Neither a program nor a bus to open.
     #[error("no command: bench can -- COMMAND ARGUMENT…, or bench can --pair to open a bus alone")]
     NoCommand,
@@ -49,7 +49,7 @@ pub(crate) enum CanError {
 }
 
 impl CanError {
-    /// The code of the table that all programs share.
+    /// Exit code of the program.
     #[must_use]
     pub(crate) fn exit(&self) -> Exit {
         match self {
@@ -59,7 +59,7 @@ impl CanError {
     }
 }
 
-/// Runs what the arguments say; the exit code is the program's.
+/// Runs the program; returns its exit code.
 #[must_use]
 pub(crate) fn run(arguments: &CanArguments) -> ExitCode {
     match try_to_run(arguments) {
@@ -80,7 +80,7 @@ fn try_to_run(arguments: &CanArguments) -> Result<i32, CanError> {
         return run_program(arguments, &named);
     }
     let BusUrl::Unix { path, wire } = &arguments.bus else {
-        return Err(CanError::Kernels(arguments.bus.clone()));
+        return Err(CanError::KernelBus(arguments.bus.clone()));
     };
     let host = Host::bind(path, *wire, None)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -115,7 +115,7 @@ fn run_program(arguments: &CanArguments, named: &[Named]) -> Result<i32, CanErro
     Ok(code.unwrap_or(Exit::Interrupted as i32))
 }
 
-/// What the threads ask for that others wait for. An ordinary user is refused, and goes on without.
+/// Real-time request of the answering threads. An unprivileged user is refused, and the program runs without it.
 fn answering() -> Request {
     Request { fifo_priority: Some(FIFO_PRIORITY), timer_slack: true, ..Request::default() }
 }
@@ -124,12 +124,12 @@ fn wait_for_the_end(bus: &BusUrl) -> Result<i32, CanError> {
     let interrupt = Interrupt::watch()?;
     warn(&format!("hosting {bus}; Ctrl-C ends it"));
     while !interrupt.came() {
-        std::thread::sleep(LOOK_EVERY);
+        std::thread::sleep(POLL_PERIOD);
     }
     Ok(Exit::Interrupted as i32)
 }
 
-/// The interfaces in their order: those that are named, or the one of `--bus`.
+/// The interfaces in order: those that are named, or the one of `--bus`.
 fn interfaces(arguments: &CanArguments) -> Result<Vec<Named>, CanError> {
     let first = InterfaceArgument { name: FIRST_INTERFACE.into(), bus: arguments.bus.clone() };
     let asked =
@@ -138,10 +138,10 @@ fn interfaces(arguments: &CanArguments) -> Result<Vec<Named>, CanError> {
     for InterfaceArgument { name, bus } in asked {
         let path: PathBuf = match bus {
             BusUrl::Unix { path, .. } => path.clone(),
-            BusUrl::Can { .. } => return Err(CanError::Kernels(bus.clone())),
+            BusUrl::Can { .. } => return Err(CanError::KernelBus(bus.clone())),
         };
         if named.iter().any(|other| other.name == *name) {
-            return Err(CanError::Twice(name.clone()));
+            return Err(CanError::Duplicate(name.clone()));
         }
         named.push(Named { name: name.clone(), path });
     }

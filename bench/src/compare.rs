@@ -1,7 +1,7 @@
 //! Runs of one experiment side by side: a table of all figures, and their curves over each other.
 //!
-//! [`overlay`] draws the curves, [`differences`] how far the others lie from the first instead. Time begins with the experiment,
-//! so that runs whose waiting took longer lie on each other.
+//! [`overlay`] draws the curves, [`differences`] their distance from the first run instead. Time begins with the experiment, so
+//! that runs with different waits coincide.
 
 pub(crate) mod differences;
 pub(crate) mod overlay;
@@ -36,10 +36,10 @@ pub(crate) fn table(runs: &[Run]) -> Grid {
     Grid { head, rows: rows.collect() }
 }
 
-/// Changes beyond this, in per cent, say no more than that the first was next to nothing.
+/// Largest relative change shown, per cent: beyond it the first value was almost zero.
 const MOST_CHANGE: f64 = 1000.0;
 
-/// Relative change in per cent; nothing against zero, next to zero or the unknown.
+/// Relative change in per cent; empty where the first value is zero, almost zero or unknown.
 fn change(first: Option<f64>, other: Option<f64>) -> String {
     match (first, other) {
         (Some(first), Some(other)) if first == other => "0 %".into(),
@@ -69,7 +69,7 @@ pub(crate) fn page(runs: &[Run], grid: &Grid, pictures: &[Picture]) -> Result<St
     Ok(document(&title, &body))
 }
 
-/// A run by name, with the programs that its experiment names.
+/// Name of a run, with the programs that its experiment names.
 fn entry(run: &Run) -> String {
     let programs = programs(&run.record);
     let programs = if programs.is_empty() { String::new() } else { format!(" ({})", programs.join(", ")) };

@@ -1,4 +1,5 @@
-//! Whether a foreign controller keeps the contract of the bus: the check is the rig, and disturbs it on purpose.
+//! Checks whether a foreign controller keeps the contract of the bus: the check takes the place of the rig and injects
+//! disturbances.
 //!
 //! ```text
 //!   session 1   regular operation ── noise on the bus ── skipped cycles
@@ -6,14 +7,14 @@
 //!   session 3   … its valve opens ── its sensors fall silent, and come back
 //! ```
 //!
-//! Each session has a controller that was started anew, when the check is given its command line; else whoever runs the check
-//! resets it. A fault is made while the valve is open: on a valve that is shut nothing could be seen.
+//! Each session has a controller that was restarted, if the check has its command line; else the user resets it. Faults are
+//! injected while the valve is open, since nothing can be observed on a shut valve.
 //!
 //! | file | holds |
 //! |---|---|
-//! | `line` | the bus as the rig has it, cycle by cycle |
-//! | `stand_in` | what a rig says, and a carriage that follows |
-//! | `observer` | what was heard of the controller |
+//! | `line` | the bus from the side of the rig, cycle by cycle |
+//! | `stand_in` | the frames of a rig, and a carriage that follows |
+//! | `observer` | what the controller sent |
 //! | `judge` | the checks |
 //! | [`cli`] | the command line |
 
@@ -46,26 +47,26 @@ use std::time::{Duration, Instant};
 /// Cycles of each part of the first session after regular operation.
 const NOISE_CYCLES: u64 = 200;
 const AFTER_SKIP_CYCLES: u64 = 100;
-/// Cycles that are skipped: as many as a 4-bit counter can tell, and more than that.
+/// Skipped cycles: within the range of a 4-bit counter, and beyond it.
 const SKIPS: [u64; 2] = [7, 40];
-/// Cycles that pass before anything is judged: a controller may be starting.
+/// Cycles without judgement, in which a controller may start.
 const SETTLING_CYCLES: u64 = 100;
-/// An opening that is no accident, and for how many cycles.
+/// A deliberate opening, and the number of cycles that it must last.
 const OPEN: f64 = 0.02;
 const OPEN_CYCLES: u64 = 10;
-/// Cycles that an emergency stop, and a loss of sensors, lasts; and those for which it is watched once sensors are back.
+/// Cycles of an emergency stop, of a loss of sensors, and of the observation after it.
 const STOP_CYCLES: u64 = 500;
 const LOSS_CYCLES: u64 = 200;
 const BACK_CYCLES: u64 = 200;
-/// When no valve opens for so many cycles, the carriage is pushed, by so much, again and again.
+/// When no valve opens for so many cycles, the carriage is moved by [`PUSH_M`], repeatedly.
 const PUSH_EVERY_CYCLES: u64 = 5000;
 const PUSH_M: f64 = 0.02;
 /// FIFO priority of the check in real time; that of the emulator.
 const FIFO_PRIORITY: u8 = 80;
-/// How long a controller may take to end when it is asked to.
-const END_PATIENCE: Duration = Duration::from_secs(2);
+/// Time that a controller may take to end after SIGTERM.
+const TERMINATION_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// What keeps the check from being made.
+/// Why the check cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ConformanceError {
     #[error("{0}; the check is the rig itself: end the emulator on this bus first")]
@@ -91,18 +92,18 @@ impl ConformanceError {
     }
 }
 
-/// Checks a controller, tells what was found, and writes it as JUnit XML when asked.
+/// Checks a controller, prints the results, and writes them as JUnit XML if asked.
 ///
 /// # Errors
-/// [`ConformanceError`] when the check could not be made; what the controller does wrong is a result.
+/// [`ConformanceError`] when the check could not be made; violations of the controller are results.
 pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
     let interrupt = Interrupt::watch().map_err(ConformanceError::System)?;
     let began = Instant::now();
-    // The folder goes when the check is over.
+    // Dropping it at the end removes the folder.
     let (url, _own) = match arguments.bus.clone() {
         Some(url) => (url, None),
         None => {
-            let own = OwnFolder::new().map_err(ConformanceError::System)?;
+            let own = TemporaryFolder::new().map_err(ConformanceError::System)?;
             (own.url(), Some(own))
         }
     };
@@ -118,7 +119,7 @@ pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceE
         }
         cases.append(&mut found);
     }
-    tell(&cases);
+    print_results(&cases);
     if let Some(file) = &arguments.junit {
         let text = junit::text("controller", &cases, began.elapsed().as_secs_f64());
         std::fs::write(file, text).map_err(|error| FileError::write(file, error))?;
@@ -127,16 +128,20 @@ pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceE
     Ok(if failed { Exit::BoundBroken } else { Exit::Good })
 }
 
-/// What is done in a session.
+/// Steps of a session.
 type Part = for<'a> fn(Session<'a>) -> Result<Vec<Case>, ConformanceError>;
 
-/// Does it in a thread of FIFO priority. In the main thread the controllers that it starts would inherit the priority, and be
-/// judged better than they are.
-fn with_priority(session: Session<'_>, part: Part, tell: bool) -> Result<Vec<Case>, ConformanceError> {
+/// Runs the steps in a thread of FIFO priority. In the main thread the controllers that it starts would inherit the priority
+/// and appear better than they are.
+fn with_priority(
+    session: Session<'_>,
+    part: Part,
+    report_refusals: bool,
+) -> Result<Vec<Case>, ConformanceError> {
     std::thread::scope(|scope| {
         let thread = scope.spawn(move || {
             let grants = realtime::acquire(&Request::for_a_loop(FIFO_PRIORITY, None));
-            let refusals = grants.refusals().iter().filter(|_| tell);
+            let refusals = grants.refusals().iter().filter(|_| report_refusals);
             refusals.for_each(|refusal| eprintln!("bench: warning: {refusal}"));
             part(session)
         });
@@ -144,7 +149,7 @@ fn with_priority(session: Session<'_>, part: Part, tell: bool) -> Result<Vec<Cas
     })
 }
 
-fn tell(cases: &[Case]) {
+fn print_results(cases: &[Case]) {
     for case in cases {
         let result = match case.check.result {
             CheckResult::Passed => "passed ",
@@ -156,23 +161,23 @@ fn tell(cases: &[Case]) {
     }
 }
 
-/// A controller at work, and what was heard of it.
+/// A running controller and the record of its frames.
 struct Session<'a> {
     arguments: &'a ConformanceArguments,
     interrupt: &'a Interrupt,
-    // Before the line: it is asked to end while its bus is there.
+    // Before the line: the controller is terminated while its bus still exists.
     controller: Option<Controller>,
     line: Line,
     rig: StandIn,
     observer: Observer,
-    /// Cycles that were sent, and the stamps of those that say something of time.
+    /// Cycles that were sent, with their stamps; no stamp where this process was late.
     cycles: Vec<(u64, Option<u64>)>,
     cycle: u64,
     broken: Option<Broken>,
     frames: Vec<CanFrame>,
 }
 
-/// Regular operation, then what must not disturb it.
+/// Regular operation, then disturbances that must have no effect.
 fn regular(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
     let answers = session.wait_for_answers()?;
     let result = if answers { CheckResult::Passed } else { CheckResult::Failed };
@@ -262,7 +267,7 @@ impl<'a> Session<'a> {
         Ok(session)
     }
 
-    /// So many cycles, or fewer when the controller leaves the barrier, falls silent in it, or babbles.
+    /// Runs `count` cycles, or fewer when the controller leaves the barrier, times out in it, or floods the bus.
     fn cycles(&mut self, count: u64, disturbance: Disturbance) -> Result<(), ConformanceError> {
         for _ in 0..count {
             if self.interrupt.came() {
@@ -302,7 +307,7 @@ impl<'a> Session<'a> {
         Ok(!self.observer.received.is_empty())
     }
 
-    /// Waits until the valve has been open for a while, and pushes the carriage when that takes long.
+    /// Waits until the valve has been open for a while; moves the carriage when that takes long.
     fn wait_for_open_valve(&mut self) -> Result<bool, ConformanceError> {
         let mut open_cycles = 0;
         for waited in 1..=self.patience_cycles() {
@@ -336,7 +341,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether the controller was there all the time. A fault that ends it shuts its valve, too, and must not pass for that.
+    /// Whether the controller ran to the end. A crash shuts the valve too, and must not pass for the right reaction.
     fn about_the_end(&mut self, class: &str) -> Case {
         let ended = self.controller.as_mut().and_then(Controller::ended);
         let why = match (&self.broken, ended) {
@@ -396,11 +401,11 @@ impl Controller {
 impl Drop for Controller {
     fn drop(&mut self) {
         if self.ended().is_some() {
-            // Its number may be another's by now.
+            // The process number may have been reused.
             return;
         }
         let _ = kill_process(Pid::from_child(&self.0), Signal::TERM);
-        let until = Instant::now() + END_PATIENCE;
+        let until = Instant::now() + TERMINATION_TIMEOUT;
         while Instant::now() < until {
             if matches!(self.0.try_wait(), Ok(Some(_)) | Err(_)) {
                 return;
@@ -412,9 +417,9 @@ impl Drop for Controller {
     }
 }
 
-struct OwnFolder(std::path::PathBuf);
+struct TemporaryFolder(std::path::PathBuf);
 
-impl OwnFolder {
+impl TemporaryFolder {
     fn new() -> io::Result<Self> {
         let folder = std::env::temp_dir().join(format!("airbench-check-{}", std::process::id()));
         std::fs::DirBuilder::new().mode(0o700).create(&folder)?;
@@ -426,9 +431,9 @@ impl OwnFolder {
     }
 }
 
-impl Drop for OwnFolder {
+impl Drop for TemporaryFolder {
     fn drop(&mut self) {
-        // What the system does not remove it cleans up itself.
+        // A failure leaves a folder in the temporary directory.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }

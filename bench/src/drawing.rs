@@ -1,8 +1,8 @@
-//! Panels one above the other on one time axis, as SVG: what pictures of runs and comparisons are drawn with.
+//! Panels on a common time axis, as SVG, for pictures of runs and comparisons.
 //!
-//! Colours are those of Okabe and Ito, distinguished by colour-blind people; curves of one panel differ in width too where
-//! there are few, so that black and white does. Of the samples that fall into one pixel column the smallest and the largest
-//! are drawn: no spike is lost, and a minute is as small as a second. Legends stand above the curves, not on them.
+//! Colours are those of Okabe and Ito, which colour-blind people can distinguish; where there are few curves they differ in
+//! width too, for black and white. Of the samples in a pixel column the smallest and the largest are drawn: no spike is lost,
+//! and the size of the file does not depend on the length. Legends stand above the curves.
 
 use figures::series::{Series, Span};
 use plotters::coord::Shift;
@@ -10,7 +10,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// Colours in the order in which they are given out.
+/// Colours in the order of their use.
 pub(crate) const COLOURS: [RGBColor; 7] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK];
 /// Measured values.
 pub(crate) const BLUE: RGBColor = RGBColor(0, 114, 178);
@@ -32,20 +32,20 @@ const STRIP: u32 = 58;
 const PANEL_HEAD: u32 = 24;
 const PANEL_BODY: u32 = 172;
 const TIME_LABEL: u32 = 20;
-/// Columns of pixels that a curve is thinned to.
+/// Pixel columns of a curve.
 const COLUMNS: f64 = (WIDTH - LEFT - RIGHT) as f64;
-/// A pause in the samples that breaks a line.
+/// Shortest pause between samples that breaks a line, s.
 const GAP_S: f64 = 0.05;
-/// Mean width of a letter by the height of its font.
+/// Mean width of a letter, relative to the height of its font.
 const LETTER: f64 = 0.53;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
     pub name: String,
     pub colour: RGBColor,
-    /// Its width in pixels.
+    /// Line width, pixels.
     pub width: u32,
-    /// What it shows, in the panel's unit.
+    /// Values over time, in the unit of the panel.
     pub samples: Series,
 }
 
@@ -54,30 +54,30 @@ pub(crate) struct Curve {
 pub(crate) struct Panel {
     /// Quantity and unit.
     pub title: String,
-    /// Its curves, the first undermost.
+    /// Its curves, drawn in this order.
     pub curves: Vec<Curve>,
 }
 
-/// A named stretch of the time axis.
+/// A named interval of the time axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Band {
     pub label: String,
     pub span: Span,
-    /// Whether it is what the picture is about, and left white.
+    /// Whether the interval is the subject of the picture, which stays white.
     pub is_main: bool,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Picture {
-    /// What stands on top, large.
+    /// Heading.
     pub title: String,
-    /// What stands below it, broken into lines.
+    /// Text below the heading, wrapped.
     pub caption: String,
     pub time_name: String,
-    /// What is shown of it.
+    /// Time range of the picture.
     pub range: Span,
     pub mark_s: Option<f64>,
-    /// Strip above the panels; none when empty.
+    /// Intervals of the strip above the panels; no strip when empty.
     pub bands: Vec<Band>,
     /// The panels; those without samples are left out.
     pub panels: Vec<Panel>,
@@ -128,7 +128,7 @@ impl Picture {
         Ok(())
     }
 
-    /// The panel within the range; none when nothing is left.
+    /// The panel within the range; `None` without samples in it.
     fn cut(&self, panel: &Panel) -> Option<Panel> {
         let cut = |curve: &Curve| Curve { samples: curve.samples.within(&self.range), ..curve.clone() };
         let curves: Vec<_> = panel.curves.iter().map(cut).filter(|curve| !curve.samples.is_empty()).collect();
@@ -139,7 +139,7 @@ impl Picture {
         ((time_s - self.range.from_s) / self.range.length_s()).clamp(0.0, 1.0) * COLUMNS
     }
 
-    /// States by name: in their band where they fit, else below it where there is room.
+    /// Names of the intervals: inside where they fit, else below where there is room.
     fn draw_strip(&self, area: &Area<'_>, bands: &[&Band]) -> Result<(), Failure> {
         const FONT: f64 = 13.0;
         let mut free_below = [0.0; 2];
@@ -206,11 +206,11 @@ impl Picture {
     }
 }
 
-/// A number on an axis of this length: with the digits that tell its neighbours apart.
+/// Label of a tick, with as many digits as neighbouring ticks need.
 fn tick(value: f64, length_value: f64) -> String {
     let digits = (1.0 - length_value.log10()).ceil().clamp(0.0, 9.0) as usize;
     let text = format!("{value:.digits$}");
-    // Rounding may leave a zero its sign.
+    // Rounding may leave a negative zero.
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
         text.replace('-', "")
     } else {
@@ -228,7 +228,7 @@ fn draw_line(chart: &mut Chart<'_, '_>, curve: &Curve, samples: Vec<(f64, f64)>)
 
 const LEGEND_FONT: f64 = 14.0;
 
-/// Where each curve's entry of the legend stands, in pixels from the left and in rows: behind the title as far as there is room.
+/// Position of each entry of the legend, in pixels from the left and in rows; entries start after the title if they fit.
 fn legend_places(panel: &Panel) -> Vec<(i32, i32)> {
     let width = |text: &str| text.chars().count() as f64 * LEGEND_FONT * LETTER;
     let start = f64::from(LEFT) + width(&panel.title) + 28.0;
@@ -250,7 +250,7 @@ fn head_height(panel: &Panel) -> u32 {
     PANEL_HEAD + LINE * rows.unsigned_abs()
 }
 
-/// The panel's title on the left, its curves' names behind it.
+/// The title of a panel on the left, the names of its curves after it.
 fn draw_legend(area: &Area<'_>, panel: &Panel) -> Result<(), Failure> {
     let style = ("sans-serif", LEGEND_FONT).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
     area.draw_text(&panel.title, &style, (LEFT as i32, 14))?;
@@ -264,15 +264,15 @@ fn draw_legend(area: &Area<'_>, panel: &Panel) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The samples cut where there are none for a while.
+/// The samples split at pauses.
 fn pieces(samples: &Series) -> Vec<Vec<(f64, f64)>> {
     let gap_s = GAP_S.max(3.0 * samples.period_s());
     let all: Vec<_> = samples.iter().collect();
     all.chunk_by(|one, other| other.0 - one.0 < gap_s).map(<[_]>::to_vec).collect()
 }
 
-/// Smallest and largest value of each pixel column, in the order in which they came; one where they differ by less than
-/// `pixel`, since a line that goes up and down within a pixel draws spikes at its corners.
+/// Smallest and largest value of each pixel column, in their order; one value where they differ by less than `pixel`, which
+/// avoids artefacts of the line joins.
 fn thinned(samples: &[(f64, f64)], column: impl Fn(f64) -> usize, pixel: f64) -> Vec<(f64, f64)> {
     samples
         .chunk_by(|(one, _), (other, _)| column(*one) == column(*other))
@@ -289,7 +289,7 @@ fn thinned(samples: &[(f64, f64)], column: impl Fn(f64) -> usize, pixel: f64) ->
         .collect()
 }
 
-/// The values of a panel with a little room; a flat line gets room of one.
+/// Range of the values with a margin; a constant curve gets a range of one.
 fn value_range(panel: &Panel) -> (f64, f64) {
     let values = panel.curves.iter().flat_map(|curve| curve.samples.values());
     let (low, high) = values

@@ -1,5 +1,4 @@
-//! What a run put on the bus and recorded, in the files that other tools read: CSV, MDF4, MCAP, ASC, BLF, and a trace
-//! of its timing.
+//! Exports frames and tables of a run to the formats of other tools: CSV, MDF4, MCAP, ASC, BLF, and a trace of its timing.
 //!
 //! ```text
 //!   bus.log ─► recorded_log.rs ─┬─► signals.rs (rig.dbc) ─┬─► table.rs   CSV
@@ -9,8 +8,7 @@
 //!                               └─► frames ── python-can ───► foreign.rs ASC, BLF
 //! ```
 //!
-//! The file appears when it is whole: it is written beside its place as `FILE.part` and renamed. How each format looks:
-//! `bench/docs/logs.md`.
+//! Files are written as `FILE.part` and renamed when complete. The formats are described in `bench/docs/logs.md`.
 
 pub(crate) mod cli;
 mod controllers;
@@ -33,7 +31,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use table::Rows;
 
-/// Most rows of a table that is held: a log with a hole of years makes none that fills a disk.
+/// Most rows with a fixed period: a log with a gap of years must not fill the disk.
 const MOST_HELD_ROWS: u64 = 100_000_000;
 
 #[derive(Debug, thiserror::Error)]
@@ -58,17 +56,17 @@ pub(crate) enum ExportError {
     },
 }
 
-/// Exports a log and tells on standard output what became of it.
+/// Exports a log and prints a summary.
 ///
 /// # Errors
-/// [`ExportError`]; there is no file then, or the one that was there before.
+/// [`ExportError`]; the file is unchanged or absent then.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
     let ExportArguments { to, out, every_ms, .. } = arguments;
     if every_ms.is_some() && *to != Format::Csv {
         return Err(ExportError::EveryMs);
     }
     let log = RecordedLog::read(&arguments.source, arguments.interface.as_deref())?;
-    log.tell_cut_line();
+    log.warn_of_cut_line();
     let part = part_of(out);
     let done = match to {
         Format::Csv | Format::Mdf4 => as_signals(&part, &log, *to, *every_ms),
@@ -86,21 +84,21 @@ pub(crate) fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
             Ok(exit)
         }
         Err(error) => {
-            // What is half is of no use; that it cannot be removed either changes nothing.
+            // An incomplete file is of no use; a failure to remove it changes nothing.
             let _ = std::fs::remove_file(&part);
             Err(error)
         }
     }
 }
 
-type Written = (String, Exit);
+type ExportResult = (String, Exit);
 
 fn as_signals(
     part: &Path,
     log: &RecordedLog,
     format: Format,
     every_ms: Option<u32>,
-) -> Result<Written, ExportError> {
+) -> Result<ExportResult, ExportError> {
     let signals = signals_of(log, "are left out");
     let frames: usize = signals.messages.iter().map(|message| message.frames.len()).sum();
     let channels: usize = signals.messages.iter().map(|message| message.spec.signals.len()).sum();
@@ -128,7 +126,7 @@ fn as_signals(
     Ok((reported, Exit::Good))
 }
 
-/// The signals of a log; tells on standard error which frames hold none.
+/// The signals of a log; warns of frames without signals.
 fn signals_of(log: &RecordedLog, consequence: &str) -> Signals {
     let signals = Signals::of(log);
     for (left_out, what) in signals.left_out.iter().zip(LEFT_OUT).filter(|(left_out, _)| left_out.frames > 0)
@@ -143,14 +141,14 @@ fn origin(log: &RecordedLog) -> &'static str {
     if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" }
 }
 
-fn as_recording(part: &Path, log: &RecordedLog) -> Result<Written, ExportError> {
+fn as_recording(part: &Path, log: &RecordedLog) -> Result<ExportResult, ExportError> {
     let signals = signals_of(log, "are in /can alone");
-    let mcap::Written { channels, messages } = mcap::write(part, log, &signals, run_folder(log))?;
+    let mcap::WriteCounts { channels, messages } = mcap::write(part, log, &signals, run_folder(log))?;
     Ok((format!("{messages} messages of {channels} channels"), Exit::Good))
 }
 
-fn as_trace(part: &Path, log: &RecordedLog) -> Result<Written, ExportError> {
-    let trace::Written { frames, cycles, faults } = trace::write(part, log, run_folder(log))?;
+fn as_trace(part: &Path, log: &RecordedLog) -> Result<ExportResult, ExportError> {
+    let trace::WriteCounts { frames, cycles, faults } = trace::write(part, log, run_folder(log))?;
     if cycles == 0 {
         warn("no cycles: their timing is recorded in real time, by --full-timing of emulator and controller");
     }
@@ -158,7 +156,7 @@ fn as_trace(part: &Path, log: &RecordedLog) -> Result<Written, ExportError> {
     Ok((reported, Exit::Good))
 }
 
-/// The folder whose tables share the log's time; tells on standard error when nothing says how they do.
+/// The run's folder if its tables can be aligned with the log; warns otherwise.
 fn run_folder(log: &RecordedLog) -> Option<&Path> {
     let folder = log.file.parent()?;
     if log.cycle_zero_ns.is_some() {
@@ -178,8 +176,8 @@ fn as_frames(
     log: &RecordedLog,
     format: Format,
     python: Option<&Path>,
-) -> Result<Written, ExportError> {
-    // Whether the place can be written is found out here, in words of our own.
+) -> Result<ExportResult, ExportError> {
+    // Checks here that the file can be written, for a better message.
     create(part).map_err(|error| FileError::write(part, error))?;
     let named = std::env::var_os("AIRBENCH_PYTHON").map(PathBuf::from);
     let python = python.map(Path::to_owned).or(named).unwrap_or_else(|| "python3".into());
@@ -199,7 +197,7 @@ fn create(path: &Path) -> io::Result<BufWriter<File>> {
     File::create(path).map(|file| BufWriter::with_capacity(1 << 20, file))
 }
 
-/// Where a file is until it is whole.
+/// Path of the file while it is incomplete.
 pub(crate) fn part_of(out: &Path) -> PathBuf {
     let mut name = out.as_os_str().to_owned();
     name.push(".part");

@@ -1,6 +1,6 @@
-//! Puts the plant into an FMU: description, shared library, rig file and a page, in one archive.
+//! Exports the plant as an FMU: description, shared library, rig file and a page, in one archive.
 //!
-//! The shared library `libplant_fmu.so` is built with the bench (`cargo build --release -p bench -p plant-fmu`) and looked for
+//! The shared library `libplant_fmu.so` is built with the bench (`cargo build --release -p bench -p plant-fmu`) and expected
 //! beside it. The same files give the same archive, to the byte.
 
 use crate::export::part_of;
@@ -44,10 +44,10 @@ pub(crate) enum ExportFmuError {
     NoLibrary { program: PathBuf },
 }
 
-/// Writes the FMU and tells where it is.
+/// Writes the FMU and prints its path.
 ///
 /// # Errors
-/// [`ExportFmuError`]; there is no file then, or the one that was there before.
+/// [`ExportFmuError`]; the file is unchanged or absent then.
 pub(crate) fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
     let ExportFmuArguments { rig, out, library } = arguments;
     let rig_toml = String::from_utf8(read(rig)?).map_err(|error| FileError::read(rig, error.utf8_error()))?;
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError
     let written =
         write(&part, &described.xml, &library, &rig_toml).and_then(|()| std::fs::rename(&part, out));
     written.map_err(|error| {
-        // What is half is of no use; that it cannot be removed either changes nothing.
+        // An incomplete file is of no use; a failure to remove it changes nothing.
         let _ = std::fs::remove_file(&part);
         FileError::write(out, error)
     })?;
@@ -73,7 +73,7 @@ fn library_name() -> String {
     format!("lib{MODEL_IDENTIFIER}.so")
 }
 
-/// The library beside this program, where cargo puts it: on its own, or as what the program was built with.
+/// The library in the folder of this program, where cargo puts it as a target of its own or as a dependency.
 fn beside() -> Result<PathBuf, ExportFmuError> {
     let program = std::env::current_exe().unwrap_or_default();
     let folder = program.parent().unwrap_or(Path::new("."));
@@ -83,7 +83,7 @@ fn beside() -> Result<PathBuf, ExportFmuError> {
 
 fn write(file: &Path, description: &str, library: &[u8], rig_toml: &str) -> io::Result<()> {
     let mut archive = ZipWriter::new(File::create(file)?);
-    // No time of day: the same content is the same file.
+    // No time of day, so that equal content gives equal files.
     let plain =
         SimpleFileOptions::default().compression_method(CompressionMethod::Deflated).unix_permissions(0o644);
     for (name, content) in [

@@ -1,4 +1,4 @@
-//! A door to a bus for programs that know no SocketCAN: the socketcand protocol over TCP.
+//! A gateway from TCP to a bus by the socketcand protocol, for programs without SocketCAN.
 //!
 //! ```text
 //!   python-can ── TCP ──► client: session, bounded queue ──┐
@@ -6,15 +6,14 @@
 //!   …                                                    ──┘
 //! ```
 //!
-//! One thread, one poll over the bus's socket, the listener and all clients. Nobody waits for anybody: a client that does not
-//! read fills its own queue and loses frames, counted and reported; one that goes on not reading is parted with. The gateway is
-//! one peer of the bus, so it hands what a client sends to the other clients itself: a sender does not hear itself, everyone
-//! else does.
+//! One thread, one poll over the bus's socket, the listener and all clients. No client delays another: one that does not read
+//! fills its queue and loses frames, which are counted and reported; one that never reads is disconnected. The gateway is one
+//! peer of the bus and therefore forwards the frames of a client to the other clients itself; the sender does not receive them.
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`parser`] | requests out of bytes |
-//! | [`session`] | the conversation with one client, without socket and clock |
+//! | [`parser`] | parser of requests |
+//! | [`session`] | protocol state of one client, without socket and clock |
 //! | `client` | a socket, its session and its queue |
 //! | [`cli`] | the command line |
 
@@ -25,7 +24,7 @@ mod session;
 
 use crate::say;
 use cli::GatewayArguments;
-use client::{Client, ClientReport, Ended, LONGEST_FRAME};
+use client::{Client, ClientReport, EndReason, LONGEST_FRAME};
 use live::client::wait;
 use live::wall_clock_ns;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, Received};
@@ -40,13 +39,13 @@ use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
-/// Frames of the bus, and connections, that are taken in one turn.
+/// Most frames of the bus, and most connections, that are taken in one turn.
 const FRAMES_A_TURN: usize = 1024;
 const CONNECTIONS_A_TURN: usize = 64;
-/// Clients that have gone and whose reports are kept; of the others the sums alone.
+/// Number of disconnected clients whose reports are kept; of the others the sums alone.
 const REPORTS_KEPT: usize = 100;
-/// Time between two messages about the same.
-const TELL_EVERY: Duration = Duration::from_secs(1);
+/// Least time between two messages on one subject.
+const REPORT_PERIOD: Duration = Duration::from_secs(1);
 
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum GatewayError {
@@ -82,14 +81,14 @@ struct Report {
     frames_lost: u64,
     frames_from_clients: u64,
     frames_not_taken: u64,
-    /// Remote requests and error frames, for which the protocol has no form that clients read.
+    /// Remote requests and error frames, which the protocol cannot carry in a form that clients read.
     frames_not_carried: u64,
-    /// Clients that have gone: the last [`REPORTS_KEPT`].
+    /// The last [`REPORTS_KEPT`] disconnected clients.
     clients: VecDeque<ClientReport>,
     bus_counters: BusCounters,
 }
 
-/// Opens the door and serves until a signal comes.
+/// Listens and serves until SIGINT or SIGTERM.
 pub(crate) fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
     let interrupt = Interrupt::watch().map_err(GatewayError::System)?;
     let mut gateway = Gateway::open(arguments)?;
@@ -98,7 +97,7 @@ pub(crate) fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
         gateway.turn().map_err(GatewayError::System)?;
     }
     let report = gateway.close();
-    // Of an embedded bus only its host knows what did not fit the gateway's queue.
+    // On an embedded bus only the host knows what the gateway's queue lost.
     let dropped = match arguments.bus {
         BusUrl::Can { .. } => format!(", {} lost at its own queue", report.bus_counters.dropped_on_receive),
         BusUrl::Unix { .. } => String::new(),
@@ -128,9 +127,9 @@ struct Gateway {
     began: Instant,
     last_report: Instant,
     refused_reported: u64,
-    /// Frames that did not fit the gateway's own queue at the bus.
+    /// Frames lost to the gateway's queue at the bus.
     dropped_reported: u64,
-    /// Frames may be left from the turn before.
+    /// Whether frames may be left from the last turn.
     more: bool,
     text: String,
     report: Report,
@@ -197,33 +196,33 @@ impl Gateway {
         }
     }
 
-    /// Waits for something to do, and does it.
+    /// Waits for input and processes it.
     fn turn(&mut self) -> io::Result<()> {
         let (readable, someone_waits) = self.wait()?;
         let now_ms = self.now_ms();
         if someone_waits {
-            self.let_in(now_ms);
+            self.accept_connections(now_ms);
         }
         self.carry_from_the_bus(now_ms);
         for place in readable {
             self.read(place, now_ms);
-            self.clients[place].tell_arrival();
+            self.clients[place].announce();
         }
         let now_ms = self.now_ms();
         self.clients.iter_mut().for_each(|client| client.write(now_ms));
-        self.let_go();
-        self.tell();
+        self.remove_ended();
+        self.report_losses();
         Ok(())
     }
 
-    /// Which clients have sent something, and whether somebody waits at the door.
+    /// Indices of the readable clients, and whether a connection waits.
     fn wait(&self) -> io::Result<(Vec<usize>, bool)> {
         let now_ms = self.now_ms();
         let pausing = self.clients.iter().any(|client| client.is_pausing(now_ms));
         let milliseconds = match (self.more, self.bus.is_up()) {
             (true, _) => 0,
             (false, true) if !pausing => 200,
-            // Tries to come back every 100 ms; a pause has 30 ms.
+            // Reconnection attempts every 100 ms; a pause of a client is 30 ms.
             _ => 10,
         };
         let clients =
@@ -231,26 +230,26 @@ impl Gateway {
         wait(&self.listener, clients, self.bus.socket(), milliseconds)
     }
 
-    fn let_in(&mut self, now_ms: u64) {
+    fn accept_connections(&mut self, now_ms: u64) {
         for _ in 0..CONNECTIONS_A_TURN {
             let (stream, address) = match self.listener.accept() {
                 Ok(accepted) => accepted,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 Err(_) => {
-                    // Out of descriptors, most likely: the door stays as it is, and must not be asked without a pause.
+                    // Most likely no file descriptors are left: the next attempt must wait.
                     std::thread::sleep(Duration::from_millis(1));
                     break;
                 }
             };
             if self.clients.len() >= self.most_clients {
                 self.report.connections_refused += 1;
-                // Whether it reads this is its own affair; the socket's buffer takes it at once.
+                // The response fits the socket's buffer; whether the client reads it does not matter.
                 let _ = stream
                     .set_nonblocking(true)
                     .and_then(|()| (&stream).write(b"< error too many clients >"));
                 continue;
             }
-            // A socket that takes no options is that of a client that has gone already.
+            // Fails for a client that has disconnected.
             if let Ok(client) = Client::new(stream, address, now_ms, self.queue_frames, self.read_only) {
                 self.clients.push(client);
                 self.report.connections += 1;
@@ -305,13 +304,13 @@ impl Gateway {
         }
     }
 
-    /// Removes who has gone, and keeps what was counted.
-    fn let_go(&mut self) {
+    /// Removes disconnected clients and adds up their counters.
+    fn remove_ended(&mut self) {
         let (gone, here) =
             std::mem::take(&mut self.clients).into_iter().partition(|client| client.report.ended.is_some());
         self.clients = here;
         for client in gone {
-            tell_loss(&client);
+            report_loss(&client);
             self.account(client.report);
         }
     }
@@ -328,14 +327,14 @@ impl Gateway {
         }
     }
 
-    /// Tells, once a second at most, what was lost, at the clients and before them, and who was refused since.
-    fn tell(&mut self) {
-        if self.last_report.elapsed() < TELL_EVERY {
+    /// Reports losses and refused connections, once a second at most.
+    fn report_losses(&mut self) {
+        if self.last_report.elapsed() < REPORT_PERIOD {
             return;
         }
         self.last_report = Instant::now();
         for client in &mut self.clients {
-            tell_loss(client);
+            report_loss(client);
             client.lost_reported = client.report.frames_lost;
         }
         let refused = self.report.connections_refused;
@@ -354,8 +353,8 @@ impl Gateway {
     }
 
     fn close(mut self) -> Report {
-        self.clients.iter_mut().for_each(|client| client.end(Ended::WithGateway));
-        self.let_go();
+        self.clients.iter_mut().for_each(|client| client.end(EndReason::WithGateway));
+        self.remove_ended();
         self.report.bus_counters = *self.bus.counters();
         self.report
     }
@@ -365,7 +364,7 @@ impl Gateway {
     }
 }
 
-fn tell_loss(client: &Client) {
+fn report_loss(client: &Client) {
     let report = &client.report;
     if report.frames_lost > client.lost_reported {
         eprintln!(

@@ -1,7 +1,7 @@
-//! Checks as test cases, for whatever shows tests.
+//! Checks as test cases in JUnit XML.
 //!
-//! The format is the one that CI systems agree on: `testsuites`, `testsuite`, `testcase` with `failure` or `skipped`. The crates
-//! that write it bring a date library and a UUID generator for forty lines of text.
+//! The elements are those that all CI systems read: `testsuites`, `testsuite`, `testcase` with `failure` or `skipped`. The
+//! crates that write them bring a date library and a UUID generator for forty lines of text.
 
 use crate::soak::model::{Check, CheckResult};
 use std::fmt::Write;
@@ -12,7 +12,7 @@ pub(crate) struct Case {
     pub(crate) check: Check,
 }
 
-/// The text of a file with one suite; `name` is that of the suite, `time_s` what it took.
+/// The text of a file with one suite; `name` is that of the suite, `time_s` its duration.
 pub(crate) fn text(name: &str, cases: &[Case], time_s: f64) -> String {
     let count = |result| cases.iter().filter(|case| case.check.result == result).count();
     let (tests, failures, skipped) = (cases.len(), count(CheckResult::Failed), count(CheckResult::Skipped));
@@ -42,7 +42,7 @@ impl Case {
     }
 }
 
-/// A text on one line, as it may stand in an attribute or between tags.
+/// A text on one line, escaped for attributes and content.
 fn escaped(text: &str) -> String {
     pagekit::page::escaped(&text.replace(['\n', '\t', '\r'], " "))
 }

@@ -1,25 +1,27 @@
-//! The program `bench`, and those of its commands that are small: runs compared and drawn, references to measure beside, soaks,
-//! logs, doors to the bus. Figures of a run, latency reports and the live page are crates of their own: `figures`, `latency`,
-//! `live`; the look of all pages is `pagekit`.
+//! The program `bench` and its smaller commands: comparisons and pictures of runs, reference measurements, soaks, logs,
+//! gateways to the bus. Figures of a run, latency reports and the live page are crates of their own: `figures`, `latency`,
+//! `live`; the style of all pages is `pagekit`.
 //!
 //! | file | holds |
 //! |---|---|
 //! | [`drawing`] | panels on one time axis, as SVG |
-//! | [`picture`] | the pictures of a run: all of it, and around its step or its emergency stop |
+//! | [`picture`] | the pictures of a run: the whole, and around its step or its emergency stop |
 //! | [`runs`] | several runs: whether they are of one experiment, their figures |
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
-//! | [`spread`] | how much the figures of repetitions spread |
-//! | [`probe`] | gaps that a spinning thread sees: did the machine stand still, or did another thread run |
+//! | [`spread`] | the spread of figures over repetitions |
+//! | [`probe`] | scheduling gaps: whether the machine stood still, or another thread ran |
 //! | [`ping_pong`] | round trips of 16 bytes between two processes, as a reference |
 //! | [`can`] | any SocketCAN program on an embedded bus |
 //! | [`conformance`] | whether a foreign controller keeps the contract of the bus |
-//! | [`gateway`] | a door to a bus for clients of the socketcand protocol |
+//! | [`gateway`] | a gateway to a bus for clients of the socketcand protocol |
 //! | [`soak`] | emulator and controllers over hours, every frame accounted for |
 //! | [`recorded_log`] | a log of the bus, checked to its last line |
 //! | [`export`] | a log as CSV, MDF4, ASC, BLF |
-//! | [`replay`] | a log put back on a bus, by absolute time |
+//! | [`replay`] | a log sent on a bus, by absolute time |
 //! | [`export_fmu`] | the plant as an FMU |
-//! | [`cli`], [`program`] | the command line, and what runs its commands |
+//! | [`cli`], [`program`] | the command line, and the dispatch of its commands |
+
+#![warn(missing_docs)] // an interface of other crates
 
 mod can;
 pub mod cli;
@@ -42,12 +44,12 @@ mod spread;
 
 use std::io::Write;
 
-/// A line to standard output. A reader that has gone, as `| head` does, has seen enough.
+/// Prints a line; a closed pipe, as of `| head`, is no error.
 pub(crate) fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
-/// A line to standard error, where nobody may be there to read it.
+/// Prints a warning, if there is a standard error.
 pub(crate) fn warn(line: &str) {
     let _ = writeln!(std::io::stderr(), "bench: {line}");
 }

@@ -1,4 +1,4 @@
-//! Process beside plant and controller: sums up, judges, draws and compares what they left behind.
+//! The program `bench`: tools around emulator and controller.
 
 fn main() -> std::process::ExitCode {
     bench::program::main()

@@ -1,6 +1,6 @@
-//! The pictures of a run: `picture.svg` of all of it, `step.svg` around the largest step, `stop.svg` around an emergency stop.
+//! The pictures of a run: `picture.svg` of the whole, `step.svg` around the largest step, `stop.svg` around an emergency stop.
 //!
-//! Panels are drawn for what there is: a load axis that does nothing has none. The strip on top shows the main chain's states.
+//! Panels are drawn for existing data: an idle load axis has none. The strip on top shows the states of the main chain.
 
 use crate::drawing::{BLUE, Band, Curve, GREEN, PURPLE, Panel, Picture, VERMILION};
 use figures::SummaryError;
@@ -15,10 +15,10 @@ use std::path::Path;
 pub(crate) const METRE_IN_MM: f64 = 1e3;
 const PASCAL_IN_BAR: f64 = 1e-5;
 pub(crate) const PER_CENT: f64 = 100.0;
-/// What a zoom shows before and after its instant.
+/// Time before and after the instant of a zoom.
 const BEFORE_S: f64 = 0.2;
 const AFTER_S: f64 = 0.6;
-/// A load axis that is so far from the carriage moves on its own, and is shown.
+/// A load axis at least this far from the carriage moves independently, and is shown.
 const APART_M: f64 = 0.002;
 
 /// Draws the pictures of a run into `folder`; returns their names.
@@ -31,7 +31,7 @@ pub(crate) fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, 
     if let Some(at_s) = emergency_stop::first_trip_s(record) {
         pictures.push((STOP_SVG, zoom(&whole, "emergency stop", at_s)));
     }
-    // An earlier summary may have drawn one that this one does not.
+    // An earlier summary may have drawn a picture that this one does not.
     for name in [STEP_SVG, STOP_SVG] {
         let _ = std::fs::remove_file(folder.join(name));
     }
@@ -43,7 +43,7 @@ pub(crate) fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, 
     Ok(pictures.into_iter().map(|(name, _)| name).collect())
 }
 
-/// What steps most in a run, and when: the force, else the position.
+/// Name and time of the largest step of a run: of the force, else of the position.
 pub(crate) fn step(record: &Record) -> Option<(String, f64)> {
     let spans = record.experiments();
     let force = largest_step(record.load.numbers("set_force_N"), &spans, 10.0)
@@ -68,7 +68,7 @@ fn whole(record: &Record) -> Picture {
     }
 }
 
-/// The same around an instant, which becomes 0.
+/// A zoom around `at_s`, which becomes time 0.
 fn zoom(whole: &Picture, what: &str, at_s: f64) -> Picture {
     let moved = |span: &Span| Span { from_s: span.from_s - at_s, to_s: span.to_s - at_s };
     let mut zoom = whole.clone();
@@ -95,7 +95,7 @@ pub(crate) fn programs(record: &Record) -> Vec<String> {
     Axis::NAMES.into_iter().filter_map(program).collect()
 }
 
-/// What the experiment says of itself, and the programs of both axes.
+/// The experiment's description of itself, and the programs of both axes.
 fn caption(record: &Record) -> String {
     let about = text(record, &["about"]);
     let programs = programs(record);
@@ -103,7 +103,7 @@ fn caption(record: &Record) -> String {
     about.into_iter().chain(programs).collect::<Vec<_>>().join("\n")
 }
 
-/// The main chain's states.
+/// Intervals of the states of the main chain.
 fn bands(record: &Record) -> Vec<Band> {
     let states = record.leader().states("main_chain").iter();
     let band = |entry: &figures::tables_read::StateSpan| Band {

@@ -1,18 +1,18 @@
-//! Ping-pong: round trips of 16 bytes between two processes, against which those of rig and controller are held.
+//! Ping-pong: round trips of 16 bytes between two processes, as a reference for those of rig and controller.
 //!
 //! ```text
 //!   ping (this process)                    pong (a child of the same program)
 //!     at t_n = t_0 + n · interval   16 bytes ──────►  answers at once
 //!     reads the answer  ◄────────── 16 bytes
 //! ```
-//! Both have the same FIFO priority and lock their memory; each may be pinned. On a bus they are peers as emulator and
-//! controller are, and wait as the controller does (poll, then a batch); on a bare pair of sockets they read plainly, which is
-//! the least that this kernel asks for two switches between processes. The 16 bytes are a `struct can_frame`.
+//! Both have the same FIFO priority and lock their memory; each may be pinned. On a bus they are peers like emulator and
+//! controller and wait as the controller does (poll, then a batch); on a bare pair of sockets they use blocking reads, the
+//! minimum for two process switches on this kernel. The 16 bytes are a `struct can_frame`.
 //!
 //! # Terms
-//! - *Round trip*: from before sending to the answer having been read, both switches included.
-//! - *To arrival*: to the answer's arrival at our queue, by the kernel's stamp. That is what the rig's round trip ends with,
-//!   which does not wait for the answer but finds it at its next cycle.
+//! - *Round trip*: from before sending until the answer is read, both switches included.
+//! - *To arrival*: until the answer arrives at our queue, by the kernel's stamp. The rig's round trip is measured so, since the
+//!   rig does not wait for the answer but finds it at its next cycle.
 
 pub(crate) mod cli;
 mod line;
@@ -24,7 +24,7 @@ use latency::kinds::{PING_PONG, TO_ARRIVAL};
 use line::{Line, OnBus, OnSocket};
 use protocol::bus::{self, BusError, BusUrl, StampClock};
 use protocol::exit::Exit;
-use rally::{PingPongResult, Rhythm};
+use rally::{PingPongResult, PingSchedule};
 use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request, write_hlog};
 use runlog::ping_pong::{PingPongFigures, PingPongFile};
 use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
@@ -35,7 +35,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Silence after which the answering process takes the other one for gone.
+/// Time without pings after which the answering process ends.
 const SILENCE: Duration = Duration::from_secs(10);
 
 #[derive(Debug, thiserror::Error)]
@@ -63,20 +63,20 @@ impl PingPongError {
     }
 }
 
-/// Plays as asked, prints the figures, and writes them where asked.
+/// Measures as asked, prints the figures, and writes them where asked.
 pub(crate) fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
     let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let interrupt = Interrupt::watch().map_err(|error| PingPongError::system("no signal handler", error))?;
-    // Before anything is asked of the system for this process: the child would inherit it.
+    // Before this process acquires real-time privileges, which the child would inherit.
     let (mut line, mut other) = open(arguments)?;
     let played = play(arguments, &mut *line, &interrupt);
-    // On a bare socket it ends by itself when we are gone; on a bus it would wait for more.
+    // On a socket pair the child ends when we close ours; on a bus it would wait for more.
     drop(line);
     let _ = other.kill();
     let _ = other.wait();
     let (rally, grants) = played?;
     let figures = figures(arguments, &rally, &grants);
-    tell(&name(arguments), &figures);
+    print_figures(&name(arguments), &figures);
     if let Some(path) = &arguments.json {
         add(path, &name(arguments), figures)?;
     }
@@ -94,9 +94,9 @@ pub(crate) fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> 
     Ok(if interrupt.came() { Exit::Interrupted } else { Exit::Good })
 }
 
-/// Answers; the process that [`run`] starts.
+/// Answers pings; the process that [`run`] starts.
 pub(crate) fn pong(arguments: &PongArguments) -> Result<Exit, PingPongError> {
-    // Whoever asks may be killed; nobody would end this process then.
+    // The parent may be killed and could not end this process then.
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
         .map_err(|errno| PingPongError::system("no signal when the parent ends", errno))?;
     let mut line = match &arguments.bus {
@@ -122,11 +122,12 @@ fn play(
         let up = if line.is_up() { "" } else { ", which is down" };
         return Err(PingPongError::Silent(format!("within 5 s{bus}{up}")));
     }
-    let rally = rally::ask(line, &MonotonicClock, Rhythm { interval, pings }, interrupt).map_err(gone)?;
+    let rally =
+        rally::ask(line, &MonotonicClock, PingSchedule { interval, pings }, interrupt).map_err(gone)?;
     Ok((rally, grants))
 }
 
-/// Our end, and the process at the other.
+/// Our end, and the process at the other end.
 fn open(arguments: &PingPongArguments) -> Result<(Box<dyn Line>, Child), PingPongError> {
     let program = std::env::current_exe();
     let program = program.map_err(|error| PingPongError::system("this program's own path", error))?;
@@ -165,7 +166,7 @@ fn on_socket(socket: io::Result<OwnedFd>) -> Result<Box<dyn Line>, PingPongError
     Ok(Box::new(OnSocket::new(socket).map_err(|errno| refused(errno.to_string()))?))
 }
 
-/// What this thread gets of what it asks for; warns of what it does not.
+/// Acquires real-time privileges for this thread and warns of refusals.
 pub(crate) fn grants(priority: Option<u8>, cpu: Option<usize>) -> Grants {
     let request = match priority {
         Some(priority) => Request::for_a_loop(priority, cpu),
@@ -199,7 +200,7 @@ fn figures(arguments: &PingPongArguments, rally: &PingPongResult, grants: &Grant
     }
 }
 
-fn tell(name: &str, figures: &PingPongFigures) {
+fn print_figures(name: &str, figures: &PingPongFigures) {
     let us = |ns: Option<u64>| ns.map_or_else(|| "-".to_owned(), |ns| format!("{:.1}", ns as f64 / 1e3));
     let line = |what: &str, of: &Percentiles| {
         format!(
@@ -221,7 +222,7 @@ fn tell(name: &str, figures: &PingPongFigures) {
     }
 }
 
-/// Adds the figures to a file that other ping-pongs may have begun.
+/// Adds the figures to a file of several ping-pongs.
 fn add(path: &Path, name: &str, figures: PingPongFigures) -> Result<(), FileError> {
     let refused = |reason: String| FileError::write(path, reason);
     let mut file: PingPongFile = match std::fs::read_to_string(path) {
@@ -233,7 +234,7 @@ fn add(path: &Path, name: &str, figures: PingPongFigures) -> Result<(), FileErro
     file.figures.insert(name.into(), figures);
     let command: Vec<String> = std::env::args().collect();
     file.commands.insert(name.into(), command.join(" "));
-    // As a value, whose keys are sorted.
+    // As a JSON value, whose keys are sorted.
     let file = serde_json::to_value(file).map_err(|error| refused(error.to_string()))?;
     write_json(path, &file).map_err(|error| refused(error.to_string()))
 }

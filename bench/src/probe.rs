@@ -1,24 +1,24 @@
-//! The spin-gap probe: a thread on each CPU that reads the clock over and over, and notes when it could not.
+//! The spin-gap probe: a thread on each CPU that reads the clock continuously and records when it could not.
 //!
-//! A process that wakes late cannot say whether the machine stood still or something else had the CPU. A thread that never
-//! sleeps can: `CLOCK_MONOTONIC` is the clock of all processes, so its gaps lie beside the late cycles of the same run.
+//! A process that wakes late cannot tell whether the machine stood still or another thread had the CPU. A spinning thread
+//! can: all processes share `CLOCK_MONOTONIC`, so its gaps can be compared with the late cycles of the same run.
 //!
 //! ```text
 //!   a thread for each CPU (SCHED_IDLE, pinned)          main
 //!     read clock … gap! ── bounded queue, try_send ──►  polls, writes probe.csv, ends on a signal
 //! ```
-//! # What it changes
-//! The CPUs never idle, so they leave no sleep state and the hypervisor need not bring them back: wake-ups get *faster*. A
-//! hyperthread beside it loses up to half its speed, and a shared power budget gets tighter. SCHED_IDLE gives way to every
-//! other thread at once. So the probe explains runs; figures that are claimed are measured without it.
+//! # Effect on the machine
+//! The CPUs never idle, so there is no exit from sleep states and no rescheduling by the hypervisor: wake-ups get *faster*. A
+//! sibling hyperthread loses up to half its speed, and a shared power budget gets tighter. SCHED_IDLE yields to every other
+//! thread at once. The probe therefore explains runs; figures that are claimed are measured without it.
 //!
-//! # What a gap does not say
-//! While the thread that is watched for has the CPU, the probe of that CPU has not: a standstill that hits just then shows as
-//! a gap in which another ran. The probes of the other CPUs tell, if all stood still.
+//! # Limits
+//! While the thread under observation has the CPU, the probe of that CPU has not: a stall in that time shows as a gap in which
+//! another thread ran. If the whole machine stalls, the probes of the other CPUs show it.
 //!
 //! # Source
-//! The idea is that of `hwlat_detector` (kernel's tree, `Documentation/trace/hwlat_detector.rst`) and of `sysjitter`, from
-//! user space and without switching interrupts off.
+//! The idea is that of `hwlat_detector` (`Documentation/trace/hwlat_detector.rst` of the kernel) and of `sysjitter`, from user
+//! space and with interrupts enabled.
 
 pub(crate) mod cli;
 mod gaps;
@@ -43,14 +43,14 @@ use thread_priority::{
     thread_native_id,
 };
 
-/// Gaps that wait for the writer: what all CPUs can see in several of its turns.
+/// Capacity of the queue of gaps: what all CPUs can produce in several periods of the writer.
 const QUEUE: usize = 65_536;
-/// Turn of the writer.
-const TURN: Duration = Duration::from_millis(50);
-/// Gaps that reach the table; a probe that was forgotten must not fill the disk.
+/// Period of the writer.
+const WRITE_PERIOD: Duration = Duration::from_millis(50);
+/// Most rows of the table, so that a forgotten probe does not fill the disk.
 const MOST_ROWS: u64 = 2_000_000;
 
-/// What keeps the probe from watching.
+/// Why the probe cannot run.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ProbeError {
     #[error("--cpus {0}: not a list of CPUs such as 0-3,8")]
@@ -63,20 +63,20 @@ pub(crate) enum ProbeError {
     Signals(io::Error),
 }
 
-/// Gaps that were seen on one CPU, by what ran in them.
+/// Sums of the gaps of one CPU, by cause.
 #[derive(Clone, Copy, Debug, Default)]
 struct CpuGaps {
     stood_still: Total,
     another_ran: Total,
 }
 
-/// State that the watching threads share with the writer.
+/// State shared by the spinning threads and the writer.
 struct ProbeState {
     stop: Interrupt,
     dropped: AtomicU64,
 }
 
-/// Watches as asked; see the module.
+/// Runs the probe.
 pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let cpus = cpus(arguments.cpus.as_deref())?;
     let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;
@@ -84,7 +84,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let mut file = LineFile::create(&arguments.out).map_err(ProbeError::Write)?;
     file.lines().extend_from_slice(format!("{}\n", COLUMNS.join(",")).as_bytes());
     file.write_out().map_err(ProbeError::Write)?;
-    // A page that is not there would be a gap of the probe's own making.
+    // A page fault would be a gap caused by the probe.
     realtime::acquire(&Request { lock_memory: true, ..Request::default() });
 
     let state = ProbeState { stop: Interrupt::default(), dropped: AtomicU64::new(0) };
@@ -101,12 +101,12 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
             scope.spawn(move || {
                 let begun = begin(cpu);
                 let good = begun.is_ok();
-                // Before it is reported: what comes between the telling and a first look would be nobody's gap.
-                let looking = Looking::begin(gap_ns, continued);
-                // Whoever waits for it takes what comes.
+                // The first reading comes before the report, so that no gap after the report is missed.
+                let looking = SpinningThread::begin(gap_ns, continued);
+                // The main thread takes one result of each.
                 let _ = ready.send(begun);
                 if good {
-                    looking.go_on(cpu, &sender, state);
+                    looking.spin(cpu, &sender, state);
                 }
             });
         }
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
             let until_ns = arguments.seconds.map(|seconds| began_ns + (seconds * 1e9) as u64);
             let time_up = || until_ns.is_some_and(|until_ns| MonotonicClock.now().as_nanos() >= until_ns);
             while !time_up() && !interrupt.came() {
-                std::thread::sleep(TURN);
+                std::thread::sleep(WRITE_PERIOD);
                 table.take(&gaps)?;
             }
             Ok(())
@@ -126,10 +126,10 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
         state.stop.ask();
         reported
     })?;
-    // A gap that was going on at the end was reported when its thread ran again.
+    // A gap that was open at the end was recorded when its thread ran again.
     table.take(&gaps)?;
     let Table { rows, seen, .. } = table;
-    tell(&seen, MonotonicClock.now().as_nanos() - began_ns);
+    print_sums(&seen, MonotonicClock.now().as_nanos() - began_ns);
     let dropped = state.dropped.load(Ordering::Relaxed);
     if dropped > 0 {
         eprintln!("bench: warning: {dropped} gaps were seen and not kept: the queue to the writer was full");
@@ -153,7 +153,7 @@ fn cpus(list: Option<&str>) -> Result<Vec<usize>, ProbeError> {
     parse_cpu_list(list).filter(|cpus| !cpus.is_empty()).ok_or_else(|| ProbeError::Cpus(list.into()))
 }
 
-/// Puts the calling thread on its CPU, below everything else.
+/// Pins the calling thread to its CPU, at the lowest priority.
 fn begin(cpu: usize) -> Result<(), ProbeError> {
     let grants = realtime::acquire(&Request { cpu: Some(cpu), ..Request::default() });
     if let Some(refusal) = grants.refusals().first() {
@@ -168,22 +168,22 @@ fn begin(cpu: usize) -> Result<(), ProbeError> {
     })
 }
 
-/// A thread that looks at the clock over and over.
-struct Looking {
+/// A spinning thread.
+struct SpinningThread {
     vitals: VitalsReader,
     watch: GapWatch,
 }
 
-impl Looking {
+impl SpinningThread {
     fn begin(gap_ns: u64, continued: Continued) -> Self {
         let vitals = VitalsReader::new(continued);
         Self { vitals, watch: GapWatch::new(gap_ns, MonotonicClock.now().as_nanos()) }
     }
 
-    fn go_on(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, state: &ProbeState) {
+    fn spin(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, state: &ProbeState) {
         let mut going_on = true;
         while going_on {
-            // Looked at before the clock, so that a gap that outlasts the run is reported too.
+            // Checked before the clock is read, so that a gap that outlasts the run is recorded too.
             going_on = !state.stop.came();
             if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), || self.vitals.read())
                 && gaps.try_send((cpu, gap)).is_err()
@@ -194,7 +194,7 @@ impl Looking {
     }
 }
 
-/// The table on the disk, and what it adds up to.
+/// The table on the disk, and the sums of its rows.
 struct Table {
     file: LineFile,
     rows: u64,
@@ -202,7 +202,7 @@ struct Table {
 }
 
 impl Table {
-    /// A row without length for each CPU: from here on it is watched, be there gaps or none.
+    /// A row of zero length for each CPU: observed from here on, with or without gaps.
     fn name_cpus(&mut self, cpus: &[usize], now_ns: u64) -> Result<(), ProbeError> {
         for cpu in cpus {
             self.file.lines().extend_from_slice(format!("{cpu},{now_ns},{now_ns},0\n").as_bytes());
@@ -210,7 +210,7 @@ impl Table {
         self.file.write_out().map_err(ProbeError::Write)
     }
 
-    /// Writes what waits.
+    /// Writes the waiting gaps.
     fn take(&mut self, gaps: &Receiver<(usize, Gap)>) -> Result<(), ProbeError> {
         for (cpu, gap) in gaps.try_iter() {
             self.rows += 1;
@@ -227,7 +227,7 @@ impl Table {
     }
 }
 
-fn tell(seen: &BTreeMap<usize, CpuGaps>, length_ns: u64) {
+fn print_sums(seen: &BTreeMap<usize, CpuGaps>, length_ns: u64) {
     let part = |total: &Total| {
         let share_percent = 100.0 * total.together_ns as f64 / length_ns.max(1) as f64;
         format!("{:>7}  {:>10.1}  {share_percent:>7.3}", total.count, total.longest_ns as f64 / 1e3)

@@ -1,4 +1,4 @@
-//! The program: a command line taken, its command run, its exit code.
+//! The program: parses the command line, runs its command, returns its exit code.
 
 use crate::cli::{Cli, Command, CompareArguments, ReportArguments, SpreadArguments};
 use crate::conformance::{self, ConformanceError};
@@ -19,7 +19,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Runs the command that the process's arguments name.
+/// Runs the command that the process's arguments name; returns the exit code of the process.
 pub fn main() -> ExitCode {
     let done: Result<Exit, Box<dyn std::error::Error>> = match Cli::parse().command {
         Command::Summary { folder } => sum_up(&folder).map_err(Into::into),
@@ -61,7 +61,7 @@ pub fn main() -> ExitCode {
     exit.into()
 }
 
-/// How a command of the bench's own measuring ended.
+/// Exit code of a command, with its error on standard error.
 fn reported<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCode {
     done.unwrap_or_else(|error| {
         eprintln!("bench: {error}");

@@ -1,7 +1,7 @@
-//! A log of the bus (`candump -L`) as it was recorded: checked to its last line before anything is made of it.
+//! A recorded log of the bus (`candump -L`), checked to its last line before it is used.
 //!
-//! A run's folder stands for its `bus.log`, and its `summary.json` says when cycle 0 began: times then count from there, as they
-//! do in `measurement.csv`. A log alone counts from its first frame.
+//! A run's folder stands for its `bus.log`; with the start of cycle 0 from its `summary.json`, times count from there, as in
+//! `measurement.csv`. Times of a log alone count from its first frame.
 //!
 //! Frames are kept in memory, 33 bytes each: an hour of a rig with both controllers some 600 MB.
 
@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// A summary whose cycle 0 lies farther from the log's first frame is of another run, s.
+/// Largest distance of cycle 0 from the log's first frame, s: beyond it the summary is of another run.
 const NEAR_ZERO_S: f64 = 60.0;
 
 const MOST_INTERFACES: usize = 64;
@@ -31,7 +31,7 @@ pub(crate) enum RecordedLogError {
     #[error("{file}:{line}: more than {MOST_INTERFACES} interfaces: is this a log of 'candump -L'?")]
     ManyInterfaces {
         file: PathBuf,
-        /// Line of the first that is too many.
+        /// Line of the first frame beyond the limit.
         line: u64,
     },
     #[error("{0} holds no frame")]
@@ -43,18 +43,18 @@ pub(crate) struct RecordedLog {
     pub file: PathBuf,
     /// Its frames in the order of the file; at least one.
     pub frames: Vec<LogLine>,
-    /// Which of `interfaces` each frame was seen at.
+    /// For each frame the index of its interface in `interfaces`.
     pub seen_at: Vec<u8>,
-    /// Names of the interfaces, each once, in the order in which they come.
+    /// Names of the interfaces, in order of appearance.
     pub interfaces: Vec<String>,
-    /// The last line, when it was cut and left out.
+    /// Number of the last line, if it was incomplete and left out.
     pub cut_line: Option<u64>,
-    /// When cycle 0 began, ns of the log's epoch, where the run's summary tells it.
+    /// Start of cycle 0, ns since the log's epoch, where the run's summary has it.
     pub cycle_zero_ns: Option<u64>,
 }
 
 impl RecordedLog {
-    /// Reads `path`, a run's folder or a log; with `interface`, what was seen there alone.
+    /// Reads `path`, a run's folder or a log; with `interface`, the frames of that interface alone.
     pub(crate) fn read(path: &Path, interface: Option<&str>) -> Result<Self, RecordedLogError> {
         let file = if path.is_dir() { path.join(BUS_LOG) } else { path.to_owned() };
         let opened = File::open(&file).map_err(|error| {
@@ -83,17 +83,17 @@ impl RecordedLog {
             }
         }
         let Some(first): Option<&LogLine> = frames.first() else { return Err(RecordedLogError::Empty(file)) };
-        let cycle_zero_ns = told_zero_ns(&file, first.record.stamp_ns);
+        let cycle_zero_ns = reported_zero_ns(&file, first.record.stamp_ns);
         Ok(Self { file, cut_line: reader.cut_line(), frames, seen_at, interfaces, cycle_zero_ns })
     }
 
-    /// The stamp from which times count, ns of the log's epoch: cycle 0, or the first frame.
+    /// Origin of times, ns since the log's epoch: cycle 0, or the first frame.
     pub(crate) fn origin_ns(&self) -> u64 {
         self.cycle_zero_ns.unwrap_or_else(|| self.frames[0].record.stamp_ns)
     }
 
-    /// Tells on standard error what was left out.
-    pub(crate) fn tell_cut_line(&self) {
+    /// Warns of an incomplete last line.
+    pub(crate) fn warn_of_cut_line(&self) {
         if let Some(line) = self.cut_line {
             let file = self.file.display();
             warn(&format!("{file}:{line}: the last line is cut, and left out: its writer was killed"));
@@ -101,14 +101,14 @@ impl RecordedLog {
     }
 }
 
-/// When cycle 0 began, from the `summary.json` beside a run's log.
-fn told_zero_ns(file: &Path, first_ns: u64) -> Option<u64> {
+/// Start of cycle 0, from the `summary.json` beside a run's log.
+fn reported_zero_ns(file: &Path, first_ns: u64) -> Option<u64> {
     if file.file_name()? != BUS_LOG {
         return None;
     }
     let summary: JoinedSummary = read_json(&file.parent()?.join(SUMMARY_JSON)).ok()?;
     let zero_s = summary.bus_log_cycle_zero_s?;
-    // Stamps of a log are whole microseconds, and so is its zero: a number of this size is not exact below them.
+    // Stamps of a log are whole microseconds, and so is its origin: an f64 of this size is not exact below them.
     let near = zero_s >= 0.0 && (zero_s - first_ns as f64 * 1e-9).abs() < NEAR_ZERO_S;
     near.then(|| (zero_s * 1e6).round() as u64 * 1000)
 }

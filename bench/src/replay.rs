@@ -1,14 +1,14 @@
-//! Puts a recorded log back on a bus by absolute time, and tells how exactly.
+//! Sends a recorded log on a bus by absolute time, and measures the timing error.
 //!
 //! ```text
 //!   bus.log ─► recorded_log.rs ─► schedule.rs: when is what due ─► listen: a live rig? ─► play.rs ─► replay.json, replay.hlog
 //!                                   └─ kind.rs: whose frame is it       └─ refused
 //! ```
 //!
-//! A log holds commands of the past. On a bus with a live rig its valves would follow them, and controllers would be given the
-//! past by a log's sensors: both are refused before the first frame, and end the replay when a rig comes alive later.
+//! A log holds commands of the past. On a bus with a live rig its valves would follow them, and controllers would receive old
+//! sensor values: both are refused before the first frame, and end the replay when a rig starts later.
 //!
-//! Nothing is sent of a log that is not right to its last line.
+//! Nothing is sent from a log with an error in any line.
 
 pub(crate) mod cli;
 mod kind;
@@ -19,7 +19,7 @@ use crate::ping_pong::grants;
 use crate::recorded_log::{RecordedLog, RecordedLogError};
 use crate::say;
 use cli::ReplayArguments;
-use play::{End, Played, heard_of_a_rig, play};
+use play::{End, ReplayStatistics, play, take_rig_frames};
 use protocol::bus::{self, Bus, BusError, StampClock};
 use protocol::exit::Exit;
 use realtime::{Clock, Interrupt, MonotonicClock, write_hlog};
@@ -30,8 +30,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Time between two looks for the bus.
-const LOOK_PERIOD: Duration = Duration::from_millis(10);
+/// Period of the polls for the bus.
+const POLL_PERIOD: Duration = Duration::from_millis(10);
 
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ReplayError {
@@ -49,12 +49,12 @@ pub(crate) enum ReplayError {
     )]
     LiveRig {
         bus: String,
-        /// Frames of the live rig.
+        /// Frames received from the live rig.
         received: u64,
         listened_ms: u64,
-        /// Commands that would have been sent.
+        /// Commands among the frames to send.
         commands: u64,
-        /// Frames of a rig that would have been sent.
+        /// Frames of a rig among the frames to send.
         of_the_rig: u64,
     },
     #[error(transparent)]
@@ -76,13 +76,13 @@ impl ReplayError {
     }
 }
 
-/// Replays a log, and tells on standard output what was done; in a folder too, if asked.
+/// Replays a log and prints the statistics; writes them to a folder too, if asked.
 ///
 /// # Errors
-/// [`ReplayError`]: nothing was sent, save for [`ReplayError::File`].
+/// [`ReplayError`]: nothing was sent, except for [`ReplayError::File`].
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     let log = RecordedLog::read(&arguments.source, arguments.interface.as_deref())?;
-    log.tell_cut_line();
+    log.warn_of_cut_line();
     if log.interfaces.len() > 1 {
         return Err(ReplayError::Interfaces { file: log.file, names: log.interfaces.join(", ") });
     }
@@ -116,7 +116,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let spin = Duration::from_micros(arguments.spin_us);
     let played = play(bus.as_mut(), &MonotonicClock, &schedule, spin, &interrupt);
-    tell(&schedule, &played);
+    print_statistics(&schedule, &played);
     if let Some(out) = &arguments.out {
         write(out, arguments, &log, &schedule, &played, started)?;
     }
@@ -135,22 +135,22 @@ fn connected(bus: &mut dyn Bus, patience: Duration, interrupt: &Interrupt) -> bo
         if bus.is_up() || interrupt.came() || MonotonicClock.now() >= until {
             return bus.is_up();
         }
-        MonotonicClock.wait_until(MonotonicClock.now() + LOOK_PERIOD);
+        MonotonicClock.wait_until(MonotonicClock.now() + POLL_PERIOD);
     }
 }
 
-/// Frames of a rig that come within so long; a rig sends thousands a second.
+/// Number of frames of a rig received within `length`; a rig sends thousands a second.
 fn listen(bus: &mut dyn Bus, length: Duration, interrupt: &Interrupt) -> u64 {
     let until = MonotonicClock.now() + length;
     let mut received = 0;
     while MonotonicClock.now() < until && !interrupt.came() {
-        received += heard_of_a_rig(bus);
-        MonotonicClock.wait_until(until.min(MonotonicClock.now() + LOOK_PERIOD));
+        received += take_rig_frames(bus);
+        MonotonicClock.wait_until(until.min(MonotonicClock.now() + POLL_PERIOD));
     }
-    received + heard_of_a_rig(bus)
+    received + take_rig_frames(bus)
 }
 
-fn tell(schedule: &Schedule, played: &Played) {
+fn print_statistics(schedule: &Schedule, played: &ReplayStatistics) {
     let Schedule { left_out, error_frames, disordered, .. } = schedule;
     let total = schedule.frames.len();
     let how = match played.end {
@@ -177,7 +177,7 @@ fn write(
     arguments: &ReplayArguments,
     log: &RecordedLog,
     schedule: &Schedule,
-    played: &Played,
+    played: &ReplayStatistics,
     started: Duration,
 ) -> Result<(), FileError> {
     let (table, histogram) = (out.join("replay.json"), out.join("replay.hlog"));

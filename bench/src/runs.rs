@@ -1,4 +1,4 @@
-//! Several runs together: their folders read, their experiments held against each other, their figures side by side.
+//! Several runs: their folders, whether their experiments agree, their figures side by side.
 
 use figures::SummaryError;
 use figures::join;
@@ -8,10 +8,10 @@ use runlog::Axis;
 use runlog::run_folder::{FileError, in_order};
 use std::path::{Path, PathBuf};
 
-/// Why runs are not laid side by side.
+/// Why runs cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunsError {
-    /// A folder cannot be read, or a page not written.
+    /// A folder that cannot be read, or a page that cannot be written.
     #[error(transparent)]
     Summary(#[from] SummaryError),
     #[error(transparent)]
@@ -22,14 +22,14 @@ pub(crate) enum RunsError {
     DifferentExperiments { one: PathBuf, title_one: String, other: PathBuf, title_other: String },
 }
 
-/// A run as it is compared.
+/// A run in a comparison.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     pub folder: PathBuf,
-    /// What it is called in tables and legends.
+    /// Its name in tables and legends.
     pub name: String,
     pub record: Record,
-    /// Its figures in the order of [`rows`], those that are known.
+    /// Its known figures in the order of [`rows`].
     figures: Vec<(&'static str, f64)>,
 }
 
@@ -43,13 +43,13 @@ impl Run {
         self.figures.iter().find(|(own, _)| *own == name).map(|(_, value)| *value)
     }
 
-    /// The experiment's begin: the zero of the time axis when runs are laid over each other.
+    /// Start of the experiment, s: time 0 of comparisons.
     pub(crate) fn start_s(&self) -> f64 {
         self.record.experiments().first().map_or(0.0, |span| span.from_s)
     }
 }
 
-/// Reads the runs in `folders`; names that are equal are made different by their parents.
+/// Reads the runs in `folders`; equal names get the names of their parents.
 pub(crate) fn read(folders: &[PathBuf]) -> Result<Vec<Run>, SummaryError> {
     let mut runs = folders.iter().map(|folder| read_one(folder)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<_> = runs.iter().map(|run| run.name.clone()).collect();
@@ -64,7 +64,7 @@ pub(crate) fn read(folders: &[PathBuf]) -> Result<Vec<Run>, SummaryError> {
 fn read_one(folder: &Path) -> Result<Run, SummaryError> {
     let (mut summary, run) = join::read(folder)?;
     let record = record::read(folder, join::experiment(&run)?)?;
-    // The figures are computed anew: an older summary may know fewer.
+    // Computed again: an older summary may lack figures.
     let computed = figures::of(&record);
     join::make_up_errors(&mut summary, &record);
     let summary = in_order(&summary);
@@ -77,18 +77,18 @@ fn read_one(folder: &Path) -> Result<Run, SummaryError> {
     Ok(Run { folder: folder.into(), name, record, figures })
 }
 
-/// Names and units of all figures that runs are compared by.
+/// Names and units of all figures of a comparison.
 pub(crate) fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
     let top = TOP.iter().filter(|figure| figure.is_compared).map(|figure| (figure.name, figure.unit));
     top.chain(figures::definitions().map(|definition| (definition.name, definition.unit)))
 }
 
-/// Refuses runs that asked the rig for different things. Programs, their parameters, recording and bounds may differ:
-/// controllers are what is compared.
+/// Refuses runs with different demands on the rig. Programs, their parameters, recording and bounds may differ, since
+/// controllers are compared.
 pub(crate) fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
     let Some((first, others)) = runs.split_first() else { return Ok(()) };
-    let asked_first = asked(&first.record.experiment);
-    match others.iter().find(|other| asked(&other.record.experiment) != asked_first) {
+    let asked_first = demands(&first.record.experiment);
+    match others.iter().find(|other| demands(&other.record.experiment) != asked_first) {
         None => Ok(()),
         Some(other) => Err(RunsError::DifferentExperiments {
             one: first.folder.clone(),
@@ -99,19 +99,19 @@ pub(crate) fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
     }
 }
 
-/// What an experiment asks of the rig: its state at the start, how it is run, and the set-points of both axes.
-fn asked(experiment: &toml::Table) -> toml::Table {
-    // `start` is left out too: runs are laid over each other from their experiment's begin, whoever gave the sign for it.
+/// The demands of an experiment on the rig: its initial state, its mode, and the set-points of both axes.
+fn demands(experiment: &toml::Table) -> toml::Table {
+    // Without `start`: time begins with the experiment, whatever started it.
     const OWN: [&str; 3] = ["program", "change", "start"];
-    let mut asked = toml::Table::new();
+    let mut demands = toml::Table::new();
     for key in ["rig", "run"].into_iter().chain(Axis::NAMES) {
         if let Some(table) = experiment.get(key).and_then(toml::Value::as_table) {
             let kept = table.iter().filter(|(key, _)| !OWN.contains(&key.as_str()));
             let kept: toml::Table = kept.map(|(key, value)| (key.clone(), value.clone())).collect();
-            asked.insert(key.into(), toml::Value::Table(kept));
+            demands.insert(key.into(), toml::Value::Table(kept));
         }
     }
-    asked
+    demands
 }
 
 #[cfg(test)]

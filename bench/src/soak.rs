@@ -1,4 +1,4 @@
-//! A soak: emulator and controllers over hours, segment after segment, each accounted for to the last frame.
+//! A soak test: emulator and controllers over hours, in segments, each accounted for to the last frame.
 //!
 //! ```text
 //!   plan ──► segment: controllers, load, emulator ──► judge: account, gaps, memory, … ──► soak.json, JUnit, soak.hlog, soak.md
@@ -8,15 +8,15 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`plan`] | which segment comes when |
+//! | [`plan`] | the properties of each segment |
 //! | [`segment`], [`processes`], [`procfs`] | one segment while it runs |
-//! | [`evidence`], [`frame_log`] | what it left, read |
+//! | [`evidence`], [`frame_log`] | reading what it left |
 //! | [`account`], [`memory`] | sent = received + lost, to the frame; whether memory is flat |
 //! | [`judge`] | every check of a segment |
-//! | [`model`], [`keeping`], [`merged`], [`junit`], [`verdict`] | what is known of all, and its files |
-//! | [`rotate`] | big files of older segments go |
+//! | [`model`], [`keeping`], [`merged`], [`junit`], [`verdict`] | results of all segments, and their files |
+//! | [`rotate`] | removal of the large files of older segments |
 //!
-//! It knows emulator and controller as programs and by their files; it talks to neither.
+//! It uses emulator and controller as programs and reads their files.
 
 mod account;
 pub(crate) mod cli;
@@ -50,14 +50,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The rig among the processes of a segment.
+/// Name of the rig among the processes of a segment.
 const EMULATOR: &str = Process::Emulator.name();
 /// Time between two lines of progress, s.
 const PROGRESS_S: f64 = 10.0;
-/// Segments in a row that end before their time, after which the soak gives up: the fault is none of a moment.
+/// Consecutive segments that end early, after which the soak gives up: the fault is permanent.
 const GIVE_UP_AFTER: usize = 3;
 
-/// What keeps a soak from going on.
+/// Why a soak cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SoakError {
     #[error(transparent)]
@@ -82,10 +82,10 @@ impl SoakError {
     }
 }
 
-/// Soaks as the command line asks.
+/// Runs the soak.
 ///
 /// # Errors
-/// [`SoakError`] when it cannot begin or its results cannot be written; how it went is the exit code.
+/// [`SoakError`] when it cannot begin or its results cannot be written; the result is the exit code.
 pub(crate) fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     let bin_dir = bin_dir(arguments)?;
     let (load, load_missing_because) = load(arguments);
@@ -105,7 +105,7 @@ pub(crate) fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     };
     let mut keeping = SoakFolder::open(&arguments.out, settings, planned_s, arguments.anyway)?;
     keeping.soak.load_missing_because = load_missing_because;
-    let soaking = Soaking {
+    let soaking = SoakRun {
         plan: Plan { experiments: arguments.experiments.clone(), load: load.is_some(), loss },
         common: Common { arguments, bin_dir, load: load.unwrap_or_default() },
         interrupt: Interrupt::watch().map_err(SoakError::Signals)?,
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     Ok(exit)
 }
 
-/// Where the programs are; that they and all files are there is looked at before anything is begun.
+/// Folder of the programs; checks that they and all files exist before the start.
 fn bin_dir(arguments: &SoakArguments) -> Result<PathBuf, SoakError> {
     let experiment = |name: &String| arguments.experiment_folder.join(format!("{name}.toml"));
     for file in arguments.experiments.iter().map(experiment).chain([arguments.rig.clone()]) {
@@ -135,7 +135,7 @@ fn bin_dir(arguments: &SoakArguments) -> Result<PathBuf, SoakError> {
     Ok(bin_dir)
 }
 
-/// The load generator's command line with its program's path, or why there is none although one was asked for.
+/// The load generator's command line with the program's path, or why it is missing although it was asked for.
 fn load(arguments: &SoakArguments) -> (Option<Vec<String>>, Option<String>) {
     let mut words: Vec<_> = arguments.load.split_whitespace().map(str::to_owned).collect();
     let Some(program) = words.first().filter(|program| *program != "none") else { return (None, None) };
@@ -155,14 +155,14 @@ fn load(arguments: &SoakArguments) -> (Option<Vec<String>>, Option<String>) {
     }
 }
 
-struct Soaking<'a> {
+struct SoakRun<'a> {
     plan: Plan,
     common: Common<'a>,
     interrupt: Interrupt,
 }
 
-impl Soaking<'_> {
-    /// Runs segments until the time is up, and tells why it ended.
+impl SoakRun<'_> {
+    /// Runs segments until the time is up; returns why it ended.
     fn run(&self, keeping: &mut SoakFolder) -> Result<(Exit, String), SoakError> {
         let mut early_in_a_row = 0;
         loop {
@@ -199,7 +199,7 @@ impl Soaking<'_> {
         }
     }
 
-    /// Runs, judges and records one segment; tells how it ended and the exit codes of its programs.
+    /// Runs, judges and records one segment; returns how it ended and the exit codes of its programs.
     fn segment(&self, keeping: &mut SoakFolder, rig_s: f64) -> Result<(End, Vec<Option<i32>>), SoakError> {
         let spec = self.plan.segment(keeping.next_number());
         let folder = keeping.out().join("segments").join(spec.folder());
@@ -207,18 +207,18 @@ impl Soaking<'_> {
         let (planned_s, elapsed_s) = (keeping.soak.planned_s, keeping.soak.elapsed_s);
         let failed = keeping.soak.totals.failed;
         let mut reported_s = -PROGRESS_S;
-        let mut tell = |at_s: f64| {
+        let mut progress = |at_s: f64| {
             if at_s - reported_s >= PROGRESS_S {
                 reported_s = at_s;
                 let left_min = (planned_s - elapsed_s - at_s).max(0.0) / 60.0;
                 eprintln!(
                     "soak: segment {} ({}): {at_s:.0} of {rig_s:.0} s; {failed} failed so far; {left_min:.1} min left",
                     spec.folder(),
-                    spec.in_words(),
+                    spec.description(),
                 );
             }
         };
-        let outcome = segment::run(&self.common, &spec, rig_s, &folder, &self.interrupt, &mut tell)?;
+        let outcome = segment::run(&self.common, &spec, rig_s, &folder, &self.interrupt, &mut progress)?;
         let load = spec.load.then(|| self.common.load.join(" "));
         write_conditions(&folder, &spec, load.as_deref())?;
         let judged = judge::judge(&spec, &folder, &outcome, keeping.soak.settings.positions_judged);
@@ -234,7 +234,7 @@ impl Soaking<'_> {
             length_s: began.elapsed().as_secs_f64(),
             rig_s,
             finished: true,
-            ended: in_words(&outcome),
+            ended: end_text(&outcome),
             load,
             checks: judged.checks,
             figures: judged.figures,
@@ -259,13 +259,13 @@ impl Soaking<'_> {
     }
 }
 
-/// What a latency report wants to know of a run.
+/// Writes the conditions that a latency report reads.
 fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Result<(), SoakError> {
     let path = folder.join(CONDITIONS_JSON);
     let conditions = Conditions {
         schema_version: SCHEMA_VERSION,
         load_generator: Some(load.unwrap_or("none").into()),
-        group: Some(format!("{}, {}", spec.experiment, spec.in_words())),
+        group: Some(format!("{}, {}", spec.experiment, spec.description())),
         pair: Some(spec.number.into()),
         reference_missing_because: Some("a soak measures no reference".into()),
         ..Conditions::default()
@@ -273,7 +273,7 @@ fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Res
     write_json(&path, &conditions).map_err(|error| SoakError::output(&path, &error))
 }
 
-fn in_words(outcome: &Outcome) -> String {
+fn end_text(outcome: &Outcome) -> String {
     match &outcome.end {
         End::TimeUp => "its time was up".into(),
         End::Interrupted => "interrupted".into(),

@@ -1,4 +1,4 @@
-//! Repetitions of one experiment: how much each figure spreads.
+//! Repetitions of one experiment: the spread of each figure.
 
 use crate::runs::{Run, rows};
 use pagekit::grid::Grid;
@@ -12,7 +12,7 @@ struct Spread {
     #[serde(rename = "n")]
     count: usize,
     mean: f64,
-    /// Of the sample; none from a single run.
+    /// Sample standard deviation; `None` for a single run.
     standard_deviation: Option<f64>,
     least: f64,
     most: f64,
@@ -23,7 +23,7 @@ impl Spread {
         let count = values.len();
         let (least, most) =
             (values.iter().copied().reduce(f64::min)?, values.iter().copied().reduce(f64::max)?);
-        // The sum of equal values need not be a multiple to the bit.
+        // The sum of equal values need not be an exact multiple.
         let mean = if least == most { least } else { values.iter().sum::<f64>() / count as f64 };
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
         Some(Self {

@@ -25,7 +25,7 @@ fuzz_target!(|input: (u8, &[u8])| {
         match action {
             Action::Reply(text) => assert!(text.len() <= LONGEST_REPLY, "{text}"),
             Action::Send(frame) => assert!(frame.data().len() <= 8),
-            Action::Part(_) => assert_eq!(at + 1, whole.len(), "something after the parting"),
+            Action::Disconnect(_) => assert_eq!(at + 1, whole.len(), "something after the end of the connection"),
         }
     }
 });

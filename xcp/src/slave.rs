@@ -62,7 +62,7 @@ pub(crate) struct SlaveParts {
     pub image: Image,
     pub texts: Texts,
     pub lock: Lock,
-    /// DAQ packets that may end_session in a cycle.
+    /// DAQ packets that may be sent in a cycle.
     pub daq_per_cycle: u32,
 }
 

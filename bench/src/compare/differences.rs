@@ -1,8 +1,8 @@
-//! How far runs lie from the first of them: a gap as a picture and as rms values, for a measured rig and its simulations.
+//! Differences of runs from the first, as pictures and as rms values, for a measured rig and its simulations.
 //!
-//! A gap is a difference of means over 20 ms, which leave what models differ by and take the sensors' noise away but for a
-//! fifth; time begins with the experiment. What two runs with equal models differ by (noise, the play of two controllers) is
-//! no gap and is not taken off.
+//! Differences are of means over 20 ms, which keep the differences of models and reduce the noise of the sensors to a fifth;
+//! time begins with the experiment. Differences between runs with equal models (noise, the interplay of two controllers) are
+//! not subtracted.
 
 use super::{change, overlay};
 use crate::drawing::{COLOURS, Curve, Panel, Picture};
@@ -15,7 +15,7 @@ use pagekit::number::in_use;
 /// Length of the means, s.
 const MEAN_S: f64 = 0.02;
 
-struct Shown {
+struct ComparedSignal {
     /// Column of `measurement.csv`.
     column: &'static str,
     title: String,
@@ -23,7 +23,7 @@ struct Shown {
     unit_in_si: f64,
 }
 
-fn shown() -> impl Iterator<Item = Shown> {
+fn shown() -> impl Iterator<Item = ComparedSignal> {
     MEASURED.iter().map(|column| {
         let (name, unit, unit_in_si, drawn) = if let Some(name) = column.strip_suffix("_m") {
             (name, "m", 1e-3, "mm")
@@ -35,11 +35,11 @@ fn shown() -> impl Iterator<Item = Shown> {
             (*column, "1", 1e-2, "%")
         };
         let title = format!("{}, {drawn}", name.replace('_', " "));
-        Shown { column, title, unit, unit_in_si }
+        ComparedSignal { column, title, unit, unit_in_si }
     })
 }
 
-/// Difference of a run from the first, in SI, over the time since the experiment's begin.
+/// Difference of a run from the first, in SI, over the time since the start of the experiment.
 fn difference(first: &Run, run: &Run, column: &str) -> Series {
     let of = |run: &Run| {
         let spans = run.record.experiments();
@@ -84,7 +84,7 @@ pub(crate) fn pictures(runs: &[Run]) -> Vec<Picture> {
     let panels = shown().map(|quantity| {
         let curves = others.iter().enumerate().map(|(place, run)| Curve {
             name: format!("{} - {}", run.name, first.name),
-            // The second run lies over the first and must be seen beside it.
+            // The second run would cover the first, so it gets another colour.
             colour: COLOURS[(place + 1) % COLOURS.len()],
             width: if place == 0 { 2 } else { 1 },
             samples: difference(first, run, quantity.column).map(|value| value / quantity.unit_in_si),

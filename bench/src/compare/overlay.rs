@@ -7,14 +7,14 @@ use figures::record::Record;
 use figures::series::{Series, Span};
 use plotters::style::BLACK;
 
-/// What the picture around a step shows before and after it.
+/// Range of the picture around a step, s.
 const AROUND: Span = Span { from_s: -0.2, to_s: 0.6 };
 
-/// A quantity that runs are laid over each other by.
+/// A quantity that is compared.
 struct Quantity {
     title: &'static str,
     of: fn(&Record) -> Series,
-    /// What the first run wanted it to be.
+    /// Its set-point in the first run.
     wanted: Option<fn(&Record) -> Series>,
 }
 
@@ -55,7 +55,7 @@ const QUANTITIES: &[Quantity] = &[
     },
 ];
 
-/// The whole experiment, and what is around its step if it has one.
+/// Pictures of the whole experiment, and around its step if it has one.
 pub(crate) fn pictures(runs: &[Run]) -> Vec<Picture> {
     let Some(first) = runs.first() else { return Vec::new() };
     let whole = whole(first.title(), runs, panels(runs, Run::start_s));
@@ -72,7 +72,7 @@ pub(crate) fn pictures(runs: &[Run]) -> Vec<Picture> {
     vec![whole, step]
 }
 
-/// The picture of all of the longest experiment.
+/// A picture over the length of the longest experiment.
 pub(super) fn whole(title: String, runs: &[Run], panels: Vec<Panel>) -> Picture {
     let length = |run: &Run| run.record.experiments().last().map(|span| span.to_s - run.start_s());
     Picture {
@@ -86,7 +86,7 @@ pub(super) fn whole(title: String, runs: &[Run], panels: Vec<Panel>) -> Picture 
     }
 }
 
-/// A panel for each quantity; each run's time begins at its `zero_s`.
+/// A panel for each quantity; time 0 of each run is its `zero_s`.
 fn panels(runs: &[Run], zero_s: impl Fn(&Run) -> f64) -> Vec<Panel> {
     let panel = |quantity: &Quantity| {
         let wanted = quantity.wanted.zip(runs.first()).map(|(wanted, first)| Curve {

@@ -1,6 +1,6 @@
-//! The checks: what the contract of the bus asks of a controller, held against what was heard of it.
+//! The checks: the contract of the bus, compared with what the controller sent.
 //!
-//! Source: the repository's `bench/docs/check-controller.md`, a section for each; the contract is `protocol/rig.dbc` and
+//! Source: `bench/docs/check-controller.md`, a section for each check; the contract is `protocol/rig.dbc` and
 //! `docs/buses.md`.
 
 use super::cli::{CheckPace, ConformanceArguments};
@@ -12,19 +12,20 @@ use protocol::periods::CYCLE_NS;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Cycles within which an emergency stop has shut the valve: two of the rig's status.
+/// Cycles within which an emergency stop must shut the valve: two of the rig's status.
 const STOP_WITHIN_CYCLES: u64 = 20;
-/// Cycles without sensors after which a valve must be shut: the 50 ms of the contract, and two ticks for those who count by them.
+/// Cycles without sensors after which a valve must be shut: the 50 ms of the contract, and two ticks for controllers that count
+/// by them.
 const LOSS_WITHIN_CYCLES: u64 = 70;
-/// Age of most commands at most: sensors are answered before the next ones come, or one cycle late.
+/// Largest age of most commands: sensors are answered before the next ones, or one cycle late.
 const USUAL_AGE_CYCLES: u64 = 1;
-/// Quantile of what is judged by most of it.
+/// Share of the commands that a check on most of them requires.
 const MOST: f64 = 0.99;
 
 pub(super) struct Phase<'a> {
-    /// Cycles whose sensors were sent, with their stamps; `None` for the time of a cycle that this process disturbed.
+    /// Cycles whose sensors were sent, with their stamps; `None` where this process disturbed the timing.
     pub(super) cycles: &'a [(u64, Option<u64>)],
-    /// Frames that came in them.
+    /// Frames received in them.
     pub(super) received: &'a [Received],
 }
 
@@ -53,7 +54,7 @@ fn kept(holds: bool) -> CheckResult {
     if holds { CheckResult::Passed } else { CheckResult::Failed }
 }
 
-/// Regular operation: every check that needs nothing but watching.
+/// Regular operation: the checks that need observation alone.
 pub(super) fn regular(phase: &Phase<'_>, arguments: &ConformanceArguments) -> Vec<Case> {
     let commands = phase.commands().count();
     let mut cases = vec![every_cycle("regular", phase, arguments)];
@@ -112,7 +113,7 @@ fn command_age(phase: &Phase<'_>) -> Case {
     let mut never_sent = 0;
     for (_, _, age, _) in phase.commands() {
         match age {
-            // Half of the echo's range: what seems that old answers a cycle that is still to come.
+            // Half of the echo's range: a greater age means a cycle that was not sent yet.
             Some(age) if age < protocol::frames::ECHO_RANGE / 2 => ages.push(age),
             _ => never_sent += 1,
         }
@@ -132,10 +133,10 @@ fn command_age(phase: &Phase<'_>) -> Case {
     case("regular", "command-age", kept(holds), detail)
 }
 
-/// It sends nothing but what is its own to send, as rig.dbc has it.
+/// It sends only its own frames, in the form of rig.dbc.
 fn identifiers(phase: &Phase<'_>) -> Case {
     let mut others = phase.received.iter().filter_map(|received| match &received.frame {
-        ObservedFrame::NotItsOwn(frame) => Some(frame),
+        ObservedFrame::NotPermitted(frame) => Some(frame),
         _ => None,
     });
     let (first, more) = (others.next(), others.count());
@@ -148,7 +149,7 @@ fn identifiers(phase: &Phase<'_>) -> Case {
     case("regular", "identifiers", kept(first.is_none()), detail)
 }
 
-/// Cycle time, its spread, and the response; in real time only.
+/// Cycle time, its spread, and the response time; in real time only.
 fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     if arguments.pace != CheckPace::Real {
         return ["cycle-time", "response"].map(|name| {
@@ -206,7 +207,7 @@ fn during<'a>(received: &'a [Received], window: &'a Range<u64>) -> impl Iterator
     received.iter().filter(|received| window.contains(&received.cycle))
 }
 
-/// Until when a valve was open after a cycle; `None` when nothing opened it any more.
+/// Last cycle with an open valve within a window; `None` when it stayed shut.
 fn last_open(received: &[Received], window: Range<u64>) -> Option<u64> {
     let open = |received: &&Received| {
         window.contains(&received.cycle)
@@ -226,7 +227,7 @@ fn valve_shut(class: &str, received: &[Received], window: Range<u64>, within: u6
     case(class, "valve-shut", kept(after <= within), detail)
 }
 
-/// After an emergency stop the valve is shut, and stays so while it lasts.
+/// After an emergency stop the valve is shut, and stays shut while the stop lasts.
 pub(super) fn emergency_stop(received: &[Received], window: Range<u64>) -> Vec<Case> {
     vec![valve_shut("emergency-stop", received, window, STOP_WITHIN_CYCLES)]
 }

@@ -1,12 +1,12 @@
-//! The bus as the rig has it, cycle by cycle, in real time or in the barrier.
+//! The bus from the side of the rig, cycle by cycle, in real time or in the barrier.
 //!
 //! ```text
 //!   real      t_k: frames out ── controllers answer ── t_k+1: what came belongs to cycle k
 //!   lockstep  Go(k): frames out, done(k) ── members post ── Go(k+1): what came belongs to cycle k
 //! ```
 //!
-//! Deadlines are absolute. When this process itself is late by a cycle or more, time goes on from there, and the cycle is
-//! reported as disturbed: it says nothing of the controller.
+//! Deadlines are absolute. When this process is late by a cycle or more, time continues from there, and the cycle is marked as
+//! disturbed and not judged.
 
 use super::cli::{CheckPace, ConformanceArguments};
 use protocol::bus::control::{Kind, Role};
@@ -21,28 +21,28 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Lateness of this process that spoils a cycle's times.
-const DISTURBED: Duration = Duration::from_micros(100);
-/// How long members of the barrier may take to join.
-const JOIN_PATIENCE: Duration = Duration::from_secs(30);
+/// Lateness of this process that disturbs the timing of a cycle.
+const DISTURBED_ABOVE: Duration = Duration::from_micros(100);
+/// Time within which members must join the barrier.
+const JOIN_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Why a cycle was not completed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Broken {
-    /// Lockstep: somebody did not answer within the barrier's patience.
+    /// Lockstep: a member did not answer within the time-out of the barrier.
     TimedOut(String),
     NobodyThere,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sent {
-    /// When its sensors were handed to the bus, ns.
+    /// When its sensors were sent, ns.
     pub(super) stamp_ns: u64,
     /// This process was late, before or after.
     pub(super) disturbed: bool,
 }
 
-/// The bus, and who serves it.
+/// The bus, and its host if it is embedded.
 pub(super) struct Line {
     bus: Box<dyn Bus>,
     server: Option<Server>,
@@ -52,7 +52,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Takes the bus into service; on `can://` connects.
+    /// Hosts the bus; on `can://` connects to it.
     pub(super) fn open(url: &BusUrl, arguments: &ConformanceArguments) -> Result<Self, BusError> {
         let clock =
             || -> StampClock { Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns)) };
@@ -78,16 +78,16 @@ impl Line {
         Ok(Self { bus, server, due: (!lockstep).then(|| MonotonicClock.now()), barrier_cycle: 0 })
     }
 
-    /// Waits until the barrier begins; in real time there is nothing to wait for.
+    /// Waits until the barrier begins; returns at once in real time.
     pub(super) fn begin(&mut self) -> Result<(), Broken> {
         if self.due.is_none() {
-            self.wait_for_go(JOIN_PATIENCE, &mut |_, _| {})?;
+            self.wait_for_go(JOIN_TIMEOUT, &mut |_, _| {})?;
         }
         self.due = self.due.map(|_| MonotonicClock.now());
         Ok(())
     }
 
-    /// One cycle: sends its frames, waits for its end, and hands on what came in it.
+    /// One cycle: sends its frames, waits for its end, and passes on the frames received in it.
     pub(super) fn exchange(
         &mut self,
         frames: &[CanFrame],
@@ -95,7 +95,7 @@ impl Line {
     ) -> Result<Sent, Broken> {
         let stamp_ns = MonotonicClock.now().as_nanos();
         for frame in frames {
-            // What a full queue drops shows as a cycle without an answer.
+            // A frame lost to a full queue shows as a cycle without an answer.
             let _ = self.bus.send(frame);
         }
         let Some(due) = self.due else {
@@ -112,7 +112,7 @@ impl Line {
             take(&frame, stamp_ns);
         }
         self.due = Some(if late >= CYCLE { MonotonicClock.now() } else { next });
-        Ok(Sent { stamp_ns, disturbed: late > DISTURBED || began_late > DISTURBED })
+        Ok(Sent { stamp_ns, disturbed: late > DISTURBED_ABOVE || began_late > DISTURBED_ABOVE })
     }
 
     fn wait_for_go(
@@ -125,7 +125,7 @@ impl Line {
             match self.bus.receive() {
                 Received::Frame(frame, stamp_ns) => take(&frame, stamp_ns),
                 Received::Barrier(control) => match control.kind {
-                    // Without members it would go on by itself.
+                    // Without members the barrier would not wait.
                     Kind::Go { members: 0 } => return Err(Broken::NobodyThere),
                     Kind::Go { .. } if control.cycle == self.barrier_cycle => return Ok(()),
                     Kind::TimedOut => return Err(Broken::TimedOut(control.name())),
@@ -142,13 +142,13 @@ impl Drop for Line {
     fn drop(&mut self) {
         if let Some(server) = self.server.take() {
             server.stop.store(true, Ordering::Relaxed);
-            // It ends by itself; what it counted is not asked for.
+            // The thread ends by itself; its counters are not needed.
             let _ = server.thread.join();
         }
     }
 }
 
-/// The host of an embedded bus, in a thread of its own.
+/// The host of an embedded bus in its own thread.
 struct Server {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<()>,
@@ -159,7 +159,7 @@ impl Server {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
-            // Above the loop, as the emulator's host; the loop tells what is refused.
+            // Above the loop, as the emulator's host; the loop reports refusals.
             let fifo_priority = Some(super::FIFO_PRIORITY + 1);
             let request =
                 realtime::Request { fifo_priority, timer_slack: true, ..realtime::Request::default() };

@@ -1,52 +1,52 @@
-//! What a controller sent, frame by frame, with what is wrong about each. Pure: frames, stamps and cycles come from outside.
+//! Record of the frames of a controller, with their violations. No input or output: frames, stamps and cycles are arguments.
 //!
-//! A cycle number comes back from the 12 bits of the echo as the newest one that was sent and has these bits. A cycle that was
-//! never sent, because it was skipped or its sensors were lost, cannot be answered.
+//! The 12 bits of the echo stand for the newest cycle sent that ends with them. A cycle that was never sent, because it was
+//! skipped or its sensors were lost, cannot be answered.
 
 use super::cli::CheckedAxis;
 use protocol::can::CanFrame;
 use protocol::checksum;
 use protocol::frames::{ALIVE_RANGE, DecodeError, ECHO_RANGE, EmergencyStop, Frame, MessageSpec};
 
-/// Frames that are kept of one controller; one that babbles is cut off here.
+/// Most frames that are kept; a controller that floods the bus is cut off here.
 const MOST_FRAMES: usize = 500_000;
 
-/// A frame of the controller under test, as the bus contract sees it.
+/// A frame of the controller under test.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum ObservedFrame {
     Command {
-        /// Opening that it asks for, 0 without its enable bit.
+        /// Opening commanded, 0 without the enable bit.
         opening: f64,
-        /// Cycles between the one that it answers and the newest that was sent; `None` when it answers none.
+        /// Cycles between the one answered and the newest one sent; `None` when it answers none.
         age: Option<u64>,
-        /// How far its counter went since the command before; `None` for the first.
+        /// Difference of its counter from the command before; `None` for the first.
         step: Option<u8>,
     },
-    /// A command that the rig would not take.
+    /// A command that the rig rejects.
     Broken(MalformedCommand),
     Stop(EmergencyStop),
-    /// Another frame that it may send.
-    Own,
-    /// A frame of its own that rig.dbc does not allow, or one that is not its to send: how candump shows it.
-    NotItsOwn(String),
+    /// Another frame that the controller may send.
+    Permitted,
+    /// A frame that violates rig.dbc or belongs to another node, in the notation of candump.
+    NotPermitted(String),
 }
 
-/// Why the rig would not take a command.
+/// Why the rig rejects a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MalformedCommand {
-    /// It has not five bytes.
+    /// Its length is not five bytes.
     Length,
-    /// Its checksum is not that of its identifier and data.
+    /// Its checksum is wrong.
     Checksum,
-    /// Bits that no signal covers are not 0.
+    /// Unused bits are not 0.
     Reserved,
-    /// Its opening is beyond -2047 to 2047 counts.
+    /// Its opening is beyond ±2047 counts.
     Range,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Received {
-    /// The newest cycle that was sent when it came.
+    /// The newest cycle that had been sent.
     pub(super) cycle: u64,
     pub(super) stamp_ns: u64,
     pub(super) frame: ObservedFrame,
@@ -54,13 +54,13 @@ pub(super) struct Received {
 
 pub(super) struct Observer {
     command: &'static MessageSpec,
-    /// Nodes of rig.dbc whose frames it may send.
+    /// Nodes of rig.dbc whose frames the controller may send.
     nodes: Vec<&'static str>,
     /// By cycle: whether the sensors of the axis were sent.
     sent: Vec<bool>,
     last_alive: Option<u8>,
     pub(super) received: Vec<Received>,
-    /// The opening that acts.
+    /// The opening in effect.
     pub(super) opening: f64,
 }
 
@@ -78,13 +78,13 @@ impl Observer {
         }
     }
 
-    /// The sensors of `cycle` go out now, if they do.
+    /// Records that `cycle` is sent now, with or without sensors.
     pub(super) fn note_sent(&mut self, cycle: u64, with_sensors: bool) {
         self.sent.resize(cycle as usize, false);
         self.sent.push(with_sensors);
     }
 
-    /// Takes a frame that came at `stamp_ns`, after the cycle noted last.
+    /// Records a frame that arrived at `stamp_ns`, after the last recorded cycle.
     pub(super) fn take(&mut self, frame: &CanFrame, stamp_ns: u64) {
         if self.received.len() < MOST_FRAMES {
             let frame = self.judge(frame);
@@ -93,7 +93,7 @@ impl Observer {
         }
     }
 
-    /// Whether it sent more than anybody could.
+    /// Whether the controller floods the bus.
     pub(super) fn babbles(&self) -> bool {
         self.received.len() >= MOST_FRAMES
     }
@@ -110,8 +110,8 @@ impl Observer {
             Ok(Frame::DriveEmergencyStop(stop) | Frame::LoadEmergencyStop(stop)) if allowed => {
                 ObservedFrame::Stop(stop)
             }
-            Ok(_) if allowed => ObservedFrame::Own,
-            _ => ObservedFrame::NotItsOwn(frame.to_string()),
+            Ok(_) if allowed => ObservedFrame::Permitted,
+            _ => ObservedFrame::NotPermitted(frame.to_string()),
         }
     }
 
@@ -139,7 +139,7 @@ impl Observer {
         ObservedFrame::Command { opening, age: self.age(u64::from(command.echo)), step }
     }
 
-    /// How old the newest cycle is that was sent and ends with these bits.
+    /// Age of the newest cycle sent that ends with these bits.
     fn age(&self, echo: u64) -> Option<u64> {
         let newest = (self.sent.len() as u64).checked_sub(1)?;
         let age = newest.wrapping_sub(echo) % ECHO_RANGE;
@@ -213,11 +213,11 @@ mod tests {
             CanFrame::new(0x150, &[0; 4]),
             CanFrame::from_raw(0x8000_0110, &[]),
         ];
-        let not = |text: &str| ObservedFrame::NotItsOwn(text.into());
+        let not = |text: &str| ObservedFrame::NotPermitted(text.into());
         let expected = [
             ObservedFrame::Stop(stop),
             not("10B#0300"),
-            ObservedFrame::Own,
+            ObservedFrame::Permitted,
             not("150#00000000"),
             not("00000110#"),
         ];

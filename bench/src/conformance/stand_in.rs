@@ -1,15 +1,15 @@
-//! A rig for the check: says on the bus what the rig says, obeys valves, and can be asked to fall silent or to stop.
+//! A stand-in for the rig: sends the frames of a rig, follows valve commands, and injects losses of sensors and stops.
 //!
-//! It is no plant and stands for none: a carriage follows its valve with a lag, so that a controller has something to move and
-//! its set-points come true. Pressures and forces stand still. A controller is judged by what it sends, never by where the
-//! carriage goes.
+//! It is no model of the plant: a carriage follows its valve with a lag, so that a controller has something to move and reaches
+//! its set-points. Pressures and forces are constant. Controllers are judged by what they send, never by the position of the
+//! carriage.
 //!
 //! ```text
 //!   v' = (V s(u) - v) / T        s(u) = sign(u) max(|u| - 0.03, 0)        V = 1.15 m/s, T = 30 ms
 //! ```
 //!
-//! V and the dead band are those of the nominal valve between an opening of 0.03 and 0.3 (plant/rig.toml, choked exhaust); T is a
-//! guess, shorter than the air's lag.
+//! V and the dead band are those of the nominal valve between openings of 0.03 and 0.3 (plant/rig.toml, choked exhaust); T is a
+//! guess, shorter than the lag of the air.
 
 use super::cli::CheckedAxis;
 use protocol::can::CanFrame;
@@ -22,24 +22,24 @@ const DEAD_BAND: f64 = 0.03;
 const SPEED_M_PER_S: f64 = 1.15;
 const LAG_S: f64 = 0.03;
 const STROKE_M: f64 = 0.5;
-/// An identifier that rig.dbc does not know.
+/// An identifier that is not in rig.dbc.
 const UNKNOWN_ID: u16 = 0x5A5;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Disturbance {
     pub(super) sensors_lost: bool,
-    /// Frames that a controller has to pass over, beside the right ones.
+    /// Frames that a controller must ignore are sent beside the valid ones.
     pub(super) noise: bool,
-    /// The emergency stop is tripped, since this cycle.
+    /// The emergency stop is tripped since this cycle.
     pub(super) stopped_since: Option<u64>,
-    /// Cycles that were skipped right before this one.
+    /// Cycles that were skipped just before this one.
     pub(super) skipped: u64,
 }
 
 pub(super) struct StandIn {
     axis: CheckedAxis,
     lockstep: bool,
-    /// Of the drive and the load, in rig coordinates.
+    /// Positions of drive and load, in rig coordinates.
     positions_m: [f64; 2],
     velocity_m_per_s: f64,
     skipped: u64,
@@ -50,7 +50,7 @@ impl StandIn {
         Self { axis, lockstep, positions_m: [0.1, 0.5], velocity_m_per_s: 0.0, skipped: 0 }
     }
 
-    /// What it says in `cycle`, in the order of identifiers but for a tick that announces skipped cycles.
+    /// The frames of `cycle` in the order of identifiers, except that a tick with skipped cycles comes first.
     pub(super) fn frames(&mut self, cycle: u64, disturbance: &Disturbance, frames: &mut Vec<CanFrame>) {
         frames.clear();
         self.skipped += disturbance.skipped;
@@ -97,7 +97,7 @@ impl StandIn {
         }
     }
 
-    /// Moves the carriage for one cycle under this opening of the axis's valve.
+    /// Moves the carriage for one cycle at this opening of the valve.
     pub(super) fn advance(&mut self, opening: f64) {
         let drive = (opening.abs() - DEAD_BAND).max(0.0).copysign(opening) * SPEED_M_PER_S;
         self.velocity_m_per_s += (drive - self.velocity_m_per_s) * CYCLE_S / LAG_S;
@@ -108,7 +108,7 @@ impl StandIn {
         *position_m = (*position_m + sign * self.velocity_m_per_s * CYCLE_S).clamp(0.0, STROKE_M);
     }
 
-    /// Somebody moves the carriage by so much, where there is room for it.
+    /// Moves the carriage by `way_m`, within its stroke.
     pub(super) fn push(&mut self, way_m: f64) {
         let position_m = &mut self.positions_m[usize::from(self.axis == CheckedAxis::Load)];
         *position_m += if *position_m > STROKE_M / 2.0 { -way_m } else { way_m };

@@ -1,7 +1,7 @@
-//! Which tables of controllers in a run's folder are of this run.
+//! Which tables of controllers in a run's folder belong to this run.
 //!
-//! The rig removes reports of an earlier run at its start, their tables remain ([`runlog::run_folder::results`]): a table whose
-//! axis no report names is of an earlier run, or its controller was killed before it wrote one.
+//! At its start the rig removes the reports of an earlier run, but their tables remain ([`runlog::run_folder::results`]): a
+//! table of an axis without a report belongs to an earlier run, or its controller was killed.
 
 use crate::warn;
 use runlog::Axis;
@@ -10,10 +10,10 @@ use runlog::process::Process;
 use runlog::run_folder::{FileError, controller_csv, read_json};
 use std::path::Path;
 
-/// Whether the table of an axis, `controller-AXIS.csv`, is of this run; says so where there is one that is not.
+/// Whether the table of an axis, `controller-AXIS.csv`, belongs to this run; warns of one that does not.
 ///
 /// # Errors
-/// A report that is none.
+/// A report that cannot be read.
 pub(super) fn has_axis(folder: &Path, axis: Axis) -> Result<bool, FileError> {
     let is_named = folder.join(Process::ControllerOf(axis).report()).exists() || {
         let both = folder.join(Process::Controller.report());
@@ -22,12 +22,12 @@ pub(super) fn has_axis(folder: &Path, axis: Axis) -> Result<bool, FileError> {
     Ok(is_named || left_out(&folder.join(controller_csv(axis))))
 }
 
-/// Whether the cycles of a controller, `NAME-timing.csv`, are of this run; says so where there are some that are not.
+/// Whether `NAME-timing.csv` of a controller belongs to this run; warns of one that does not.
 pub(super) fn has_process(folder: &Path, controller: Process) -> bool {
     folder.join(controller.report()).exists() || left_out(&folder.join(controller.timing()))
 }
 
-/// Says that a table is left out, if it is there; false.
+/// Warns that a table is left out, if it exists; returns false.
 fn left_out(table: &Path) -> bool {
     if table.exists() {
         warn(&format!("{}: left out, as no report of a controller of this run names it", table.display()));

@@ -1,7 +1,7 @@
-//! ASC and BLF, written by python-can: no Rust library writes BLF, and what the field's tools expect of both is known there.
+//! ASC and BLF by python-can: no Rust library writes BLF, and python-can follows the conventions of both formats.
 //!
-//! The python is a process of its own that gets the log's frames as candump lines, so that what it reads has been checked. It
-//! reads back what it wrote and compares (`bench/python/convert_log.py`).
+//! The Python process gets the frames of the log as candump lines, so that its input has been checked. It reads back what it
+//! wrote and compares (`bench/python/convert_log.py`).
 
 use super::ExportError;
 use super::cli::Format;
@@ -12,10 +12,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 const SCRIPT: &str = include_str!("../../python/convert_log.py");
-/// What the script ends with where python-can is not installed.
+/// Exit code of the script where python-can is not installed.
 const NO_PYTHON_CAN: i32 = 77;
 
-/// Writes `out`, which need not have the format's ending, and tells what was not equal when it was read back.
+/// Writes `out`, whatever its extension, and returns the differences found when reading it back.
 pub(super) fn write(
     out: &Path,
     log: &RecordedLog,
@@ -38,7 +38,7 @@ pub(super) fn write(
         let mut lines = BufWriter::new(input);
         // Channels of these formats are numbers.
         let names: Vec<_> = (0..log.interfaces.len()).map(|number| format!("can{number}")).collect();
-        // A script that ended early says so by its exit code.
+        // A script that ended early reports by its exit code.
         let _ = log
             .frames
             .iter()

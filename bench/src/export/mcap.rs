@@ -7,7 +7,7 @@
 //! Messages are JSON, described by JSON Schema: Foxglove and PlotJuggler plot every number of them. Their time is that of
 //! `bus.log`: row k of a table is at cycle 0 plus its `time_s`. They are written in the order of time, without compression.
 //!
-//! Source: MCAP 1 [mcap.dev/spec], by the crate `mcap`; the `mcap` of PyPI reads the same values (a test holds both together).
+//! Source: MCAP 1 [mcap.dev/spec], by the crate `mcap`; a test compares with the reader `mcap` of PyPI.
 
 use super::ExportError;
 use super::controllers;
@@ -27,7 +27,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Tables of a run's folder and their channels, a controller's with its axis.
+/// Tables of a run's folder and their channels, those of a controller with its axis.
 fn tables() -> [(String, String, Option<Axis>); 5] {
     let of_rig = |name: &str, topic: &str| (name.to_owned(), topic.to_owned(), None);
     let of_axis = |axis: Axis| (controller_csv(axis), format!("/controller/{}", axis.name()), Some(axis));
@@ -40,8 +40,8 @@ fn tables() -> [(String, String, Option<Axis>); 5] {
     ]
 }
 
-/// What was written.
-pub(super) struct Written {
+/// Counters of what was written.
+pub(super) struct WriteCounts {
     pub(super) channels: usize,
     pub(super) messages: u64,
 }
@@ -50,7 +50,7 @@ pub(super) struct Written {
 struct Stream<'a> {
     channel: u16,
     sequence: u32,
-    /// Time of the next message, ns of the log's epoch; `None` at the end.
+    /// Time of the next message, ns since the log's epoch; `None` at the end.
     next_ns: Option<u64>,
     source: Source<'a>,
 }
@@ -58,31 +58,31 @@ struct Stream<'a> {
 enum Source<'a> {
     Table {
         table: RunTable,
-        /// Cycle 0, ns of the log's epoch.
+        /// Time of cycle 0, ns since the log's epoch.
         origin_ns: u64,
     },
     Signals {
         message: &'a MessageFrames,
-        /// Place of the next frame.
+        /// Index of the next frame.
         next: usize,
     },
     Frames {
         log: &'a RecordedLog,
-        /// Place of the next frame.
+        /// Index of the next frame.
         next: usize,
     },
 }
 
-/// Writes everything of a run to `part`: its log, and the tables of `folder` where there is one.
+/// Writes a run to `part`: its log, and the tables of `folder` if there is one.
 ///
 /// # Errors
-/// A table that is none, or what the system says about `part`.
+/// A table that cannot be read, or a failure to write `part`.
 pub(super) fn write(
     part: &Path,
     log: &RecordedLog,
     signals: &Signals,
     folder: Option<&Path>,
-) -> Result<Written, ExportError> {
+) -> Result<WriteCounts, ExportError> {
     let unwritten = |error: mcap::McapError| FileError::write(part, error);
     let file = super::create(part).map_err(|error| FileError::write(part, error))?;
     let options = WriteOptions::new().library(concat!("airbench ", env!("CARGO_PKG_VERSION")));
@@ -128,7 +128,7 @@ pub(super) fn write(
     }
     let _ = file.finish().map_err(unwritten)?;
     file.into_inner().flush().map_err(|error| FileError::write(part, error))?;
-    Ok(Written { channels: streams.len(), messages })
+    Ok(WriteCounts { channels: streams.len(), messages })
 }
 
 fn channel(file: &mut Writer<BufWriter<File>>, topic: &str, source: &Source<'_>) -> McapResult<u16> {
@@ -146,7 +146,7 @@ fn channel(file: &mut Writer<BufWriter<File>>, topic: &str, source: &Source<'_>)
     file.add_channel(schema, topic, "json", &BTreeMap::new())
 }
 
-/// A key's type, what it means, and its unit, as far as there are any.
+/// JSON Schema of a key: type, meaning and unit, as far as they are known.
 fn property(kind: &str, about: &str, unit: &str) -> Value {
     let mut property = json!({ "type": kind });
     if !about.is_empty() {
@@ -186,7 +186,7 @@ impl Source<'_> {
         }
     }
 
-    /// Time of the next message, ns of the log's epoch; of a table, its row is read.
+    /// Time of the next message, ns since the log's epoch; reads the row of a table.
     fn next_ns(&mut self) -> Result<Option<u64>, FileError> {
         Ok(match self {
             Self::Table { table, origin_ns } => table.next_ns()?.map(|ns| *origin_ns + ns),
@@ -195,7 +195,7 @@ impl Source<'_> {
         })
     }
 
-    /// Writes the next message and goes past it. An empty cell has no key.
+    /// Writes the next message and advances. An empty cell has no key.
     fn write_json(&mut self, out: &mut Vec<u8>) -> Result<(), FileError> {
         out.push(b'{');
         match self {
@@ -232,7 +232,7 @@ impl Source<'_> {
     }
 }
 
-/// Appends a key and its value to an object that is not closed yet.
+/// Appends a key and its value to an open object.
 fn key(out: &mut Vec<u8>, name: &str, value: &Value) {
     let comma = if out.last() == Some(&b'{') { "" } else { "," };
     // Writing to memory cannot fail.

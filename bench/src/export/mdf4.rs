@@ -1,22 +1,22 @@
-//! Signals as MDF4: a group for each message with a time of its own, a channel for each signal, with unit and meaning.
+//! Signals as MDF4: a group with its own time for each message, a channel with unit and meaning for each signal.
 //!
-//! Physical values are 64-bit numbers in SI, everything else integers. Time is in s since the origin; the file's start is the
-//! origin's, ns since 1970, so that it is 1970 for lockstep, whose time has no date.
+//! Physical values are 64-bit floats in SI, all others integers. Time is in s since the origin; the start time of the file is
+//! the origin in ns since 1970, so that lockstep, whose time has no date, starts in 1970.
 //!
-//! Source: ASAM MDF 4.1, by the crate `mdf4-rs`; asammdf reads the same values, units and times (a test holds both together).
+//! Source: ASAM MDF 4.1, by the crate `mdf4-rs`; a test compares values, units and times with asammdf.
 
 use super::signals::{MessageFrames, Signals, name, value};
 use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 use protocol::frames::{SignalKind, SignalSpec};
 
-/// Where the start time stands in a header block: links of 8 bytes behind 24 bytes of head [ASAM MDF 4.1, HD block].
+/// Offset of the start time in a header block: 24 bytes of head and links of 8 bytes [ASAM MDF 4.1, HD block].
 const START_TIME_OFFSET: u64 = 72;
 
 pub(super) fn write(path: &str, signals: &Signals, origin_ns: u64) -> mdf4_rs::Result<()> {
     let mut file = MdfWriter::new(path)?;
     file.init_mdf_file()?;
     if let Some(header) = file.get_block_position("hd_block") {
-        // The crate writes 0; a link is 8 bytes in the same order as this number.
+        // The crate writes 0; a link is 8 bytes in the byte order of this number.
         file.update_link(header + START_TIME_OFFSET, origin_ns)?;
     }
     for message in &signals.messages {
@@ -77,7 +77,7 @@ fn data_type(signal: &SignalSpec) -> DataType {
     }
 }
 
-/// What a signal means, with the names of its states.
+/// Meaning of a signal, with the names of its states.
 pub(super) fn comment(signal: &SignalSpec) -> String {
     let states: Vec<_> =
         signal.values.iter().enumerate().map(|(raw, name)| format!("{raw} {name}")).collect();
@@ -88,7 +88,7 @@ pub(super) fn comment(signal: &SignalSpec) -> String {
     }
 }
 
-/// Seconds from the origin to the stamp; the difference is exact before it is rounded once.
+/// Seconds from the origin to the stamp; the difference is exact and rounded once.
 fn seconds(stamp_ns: u64, origin_ns: u64) -> f64 {
     (i128::from(stamp_ns) - i128::from(origin_ns)) as f64 / 1e9
 }

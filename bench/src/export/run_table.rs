@@ -1,6 +1,6 @@
 //! A table of a run's folder, read row by row: `time_s` is its first column, and a comment line begins with `#`.
 //!
-//! The end of a column's name is its unit (`drive_position_m`); a column of words is known by its name.
+//! The end of a column's name is its unit (`drive_position_m`); columns of words are listed by name.
 
 use crate::warn;
 use figures::record::CHAINS;
@@ -49,10 +49,10 @@ impl RunTable {
         &self.names
     }
 
-    /// Goes to the next row; its time since cycle 0, ns. `None` at the end.
+    /// Advances to the next row; returns its time since cycle 0, ns, or `None` at the end.
     ///
     /// # Errors
-    /// A row of another width, or whose time is none.
+    /// A row of another width, or with an invalid time.
     pub(super) fn next_ns(&mut self) -> Result<Option<u64>, FileError> {
         if !self.read_line()? {
             return Ok(None);
@@ -76,13 +76,13 @@ impl RunTable {
     /// A cell of the row as a number.
     ///
     /// # Errors
-    /// It is no finite number.
+    /// The cell is no finite number.
     pub(super) fn number(&self, cell: &str) -> Result<f64, FileError> {
         let number = cell.parse().ok().filter(|number: &f64| number.is_finite());
         number.ok_or_else(|| self.refused(&format!("'{cell}' is no finite number")))
     }
 
-    /// The next line that is no comment. A last line without its end, which a killed process may leave, is left out.
+    /// The next line that is no comment. An incomplete last line, which a killed process may leave, is skipped.
     fn read_line(&mut self) -> Result<bool, FileError> {
         loop {
             self.row.clear();
@@ -112,7 +112,7 @@ pub(super) fn holds_words(column: &str) -> bool {
     CHAINS.contains(&column) || OF_FAULTS.contains(&column)
 }
 
-/// Unit of a column by the end of its name; empty for a plain number and for words.
+/// Unit of a column by the end of its name; empty for a dimensionless number and for words.
 pub(super) fn unit(column: &str) -> &'static str {
     unit_of(column).unwrap_or_default()
 }

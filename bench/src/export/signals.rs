@@ -1,7 +1,6 @@
-//! The frames of a log as signals, by `rig.dbc`: for each message its stamps and data.
+//! The frames of a log as signals of `rig.dbc`: stamps and data of each message.
 //!
-//! What `rig.dbc` does not know or does not allow (length, checksum, range) is no signal; it is counted, with the line of the
-//! first.
+//! Frames that `rig.dbc` does not know or does not allow (length, checksum, range) are counted, with the line of the first.
 
 use crate::recorded_log::RecordedLog;
 use protocol::frames::{DecodeError, Frame, MESSAGES, MessageSpec, SignalKind, SignalSpec};
@@ -15,26 +14,26 @@ pub(super) struct MessageFrames {
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Signals {
-    /// Messages that are in it, by identifier.
+    /// Messages in the log, by identifier.
     pub(super) messages: Vec<MessageFrames>,
-    /// What is no signal.
-    pub(super) left_out: [LeftOut; 2],
+    /// Frames without signals, by the kinds of [`LEFT_OUT`].
+    pub(super) left_out: [UndecodedFrames; 2],
 }
 
-/// Frames that are no signals.
+/// A count of frames without signals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct LeftOut {
+pub(super) struct UndecodedFrames {
     pub(super) frames: u64,
     pub(super) first_line: u64,
 }
 
-/// What the two kinds of frames that are left out are called.
+/// Names of the two kinds of frames without signals.
 pub(super) const LEFT_OUT: [&str; 2] = ["that rig.dbc does not know", "that rig.dbc does not allow"];
 
 impl Signals {
     pub(super) fn of(log: &RecordedLog) -> Self {
         let mut frames: Vec<Vec<(u64, u64)>> = vec![Vec::new(); MESSAGES.len()];
-        let mut left_out = [LeftOut::default(); 2];
+        let mut left_out = [UndecodedFrames::default(); 2];
         for logged in &log.frames {
             match Frame::decode(&logged.record.frame) {
                 Ok(frame) => {
@@ -68,7 +67,7 @@ pub(super) fn name(message: &MessageSpec, signal: &SignalSpec) -> String {
     format!("{}.{}", message.name, signal.field)
 }
 
-/// The value of a signal, in SI; the number of a state, 0 or 1 for a flag.
+/// The value of a signal in SI; the number of a state, 0 or 1 for a flag.
 pub(super) fn value(signal: &SignalSpec, word: u64) -> f64 {
     let raw = signal.raw(word);
     if signal.kind == SignalKind::Physical { signal.physical(raw) } else { raw as f64 }

@@ -1,12 +1,12 @@
 //! Signals as a CSV table on one time axis.
 //!
-//! Either a row for each stamp, where what was not sent at it stays empty; or a row every so many milliseconds, holding what was
-//! seen last at or before it. Nothing is interpolated.
+//! Either a row for each stamp, with empty cells for signals not sent then; or a row every fixed period with the last value at
+//! or before it. No interpolation.
 
 use super::signals::{MessageFrames, Signals, name, value};
 use std::io::{self, Write};
 
-/// How rows are laid over time.
+/// Time axis of the rows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rows {
     /// Stamp of time 0, ns.
@@ -15,7 +15,7 @@ pub(super) struct Rows {
     pub(super) every_ms: Option<u32>,
 }
 
-/// Writes the table and tells how many rows it has.
+/// Writes the table; returns its number of rows.
 pub(super) fn write(out: &mut impl Write, signals: &Signals, rows: Rows) -> io::Result<u64> {
     write!(out, "time_s")?;
     for message in &signals.messages {
@@ -30,10 +30,10 @@ pub(super) fn write(out: &mut impl Write, signals: &Signals, rows: Rows) -> io::
     }
 }
 
-/// A row for each stamp; where a message comes twice at one stamp, its second frame makes a second row.
+/// A row for each stamp; a second frame of a message at one stamp makes a second row.
 fn as_stamped(out: &mut impl Write, signals: &Signals, origin_ns: u64) -> io::Result<u64> {
     let messages = &signals.messages;
-    // Stamp, how many of the same message and stamp came before, message, data.
+    // Stamp, number of earlier frames of this message and stamp, message, data.
     let mut all: Vec<(u64, u32, u32, u64)> = Vec::new();
     for (place, message) in messages.iter().enumerate() {
         let begin = all.len();
@@ -58,13 +58,13 @@ fn as_stamped(out: &mut impl Write, signals: &Signals, origin_ns: u64) -> io::Re
     Ok(count)
 }
 
-/// A row each `every_ns`, from the last multiple before the first stamp.
+/// A row every `every_ns`, from the last multiple before the first stamp.
 fn held(out: &mut impl Write, signals: &Signals, origin_ns: u64, every_ns: u64) -> io::Result<u64> {
     let mut messages = signals.messages.clone();
     messages.iter_mut().for_each(|message| message.frames.sort_by_key(|frame| frame.0));
     let stamps = || messages.iter().flat_map(|message| &message.frames).map(|frame| frame.0);
     let (Some(first), Some(last)) = (stamps().min(), stamps().max()) else { return Ok(0) };
-    // Back from the origin by whole rows, so that rows stand at multiples of the period.
+    // Back from the origin by whole rows, so that rows are at multiples of the period.
     let rows_before = origin_ns.saturating_sub(first).div_ceil(every_ns);
     let mut at_ns = match origin_ns.checked_sub(rows_before * every_ns) {
         Some(start) => start + (first.max(start) - start) / every_ns * every_ns,

@@ -6,9 +6,9 @@
 //!   bus.log                 ─► bus         an instant for each frame, a row for each identifier
 //!   faults.csv              ─► rig         an instant, drawn across all rows
 //! ```
-//! Time is in us since the first frame, or since cycle 0 where that was earlier. Timing rows count on the monotonic clock, frames
-//! on that of the log: cycle 0 was due at a known time of both. A row's stages have measured lengths; they are drawn one
-//! behind the other from waking on, in the order of the process [`runlog::timing`].
+//! Time is in us since the first frame, or since cycle 0 if that was earlier. Timing rows use the monotonic clock, frames that
+//! of the log: the due time of cycle 0 is known in both. The stages of a row have measured lengths; they are drawn one after
+//! the other from the wake-up on, in the order of the process [`runlog::timing`].
 //!
 //! Source: "Trace Event Format", Google 2016: X is a slice, i an instant, M metadata.
 
@@ -38,9 +38,9 @@ const CYCLES: u32 = 1;
 const WAKE_UPS: u32 = 2;
 const FAULTS: u32 = 3;
 
-/// What was written.
+/// Counters of what was written.
 #[derive(Debug, Default)]
-pub(super) struct Written {
+pub(super) struct WriteCounts {
     pub(super) frames: usize,
     pub(super) cycles: usize,
     pub(super) faults: usize,
@@ -57,17 +57,17 @@ struct Event<'a> {
     /// Length of a slice, us.
     #[serde(skip_serializing_if = "Option::is_none")]
     dur: Option<f64>,
-    /// How far an instant is drawn: t its thread, p its process, g everything.
+    /// Scope of an instant: t its thread, p its process, g global.
     #[serde(skip_serializing_if = "Option::is_none")]
     s: Option<&'static str>,
     #[serde(skip_serializing_if = "Value::is_null")]
     args: Value,
 }
 
-/// The file, and when its time 0 is.
+/// The file and the origin of its time.
 struct Trace {
     file: BufWriter<File>,
-    /// Time 0, ns of the log's epoch.
+    /// Time 0, ns since the log's epoch.
     start_ns: u64,
     is_first: bool,
 }
@@ -80,11 +80,15 @@ struct ProcessCycles {
     rows: Vec<CycleTiming>,
 }
 
-/// Writes a trace to `part`: the frames of the log, and cycles and faults of `folder` where there is one.
+/// Writes a trace to `part`: the frames of the log, and cycles and faults of `folder` if there is one.
 ///
 /// # Errors
-/// A table that is none, or what the system says about `part`.
-pub(super) fn write(part: &Path, log: &RecordedLog, folder: Option<&Path>) -> Result<Written, ExportError> {
+/// A table that cannot be read, or a failure to write `part`.
+pub(super) fn write(
+    part: &Path,
+    log: &RecordedLog,
+    folder: Option<&Path>,
+) -> Result<WriteCounts, ExportError> {
     let processes = folder.map(processes).transpose()?.unwrap_or_default();
     let faults = folder.map(|folder| RunTable::open(&folder.join(FAULTS_CSV))).transpose()?.flatten();
     let stamps = log.frames.iter().map(|logged| logged.record.stamp_ns);
@@ -92,7 +96,7 @@ pub(super) fn write(part: &Path, log: &RecordedLog, folder: Option<&Path>) -> Re
     let unwritten = |error: io::Error| FileError::write(part, error);
     let file = super::create(part).map_err(unwritten)?;
     let mut trace = Trace { file, start_ns, is_first: true };
-    let mut written = Written { frames: log.frames.len(), ..Written::default() };
+    let mut written = WriteCounts { frames: log.frames.len(), ..WriteCounts::default() };
     let zero_us = microseconds(i128::from(log.origin_ns()) - i128::from(start_ns));
     let about =
         json!({ "cycle_zero_us": log.cycle_zero_ns.map(|_| zero_us), "log": log.file.display().to_string() });
@@ -118,7 +122,7 @@ pub(super) fn write(part: &Path, log: &RecordedLog, folder: Option<&Path>) -> Re
     Ok(written)
 }
 
-/// The processes whose cycles are known; those of controllers only beside the rig's, which says when cycle 0 was.
+/// The processes with recorded cycles; controllers only beside the rig, whose record has the time of cycle 0.
 fn processes(folder: &Path) -> Result<Vec<ProcessCycles>, FileError> {
     let mut processes = Vec::new();
     for process in Process::ALL {
@@ -192,8 +196,8 @@ impl Trace {
         Ok(())
     }
 
-    /// A slice for each cycle with its stages, and one for the wait before it; `offset_ns` turns the monotonic clock into the
-    /// trace's.
+    /// A slice for each cycle with its stages, and one for the wait before it; `offset_ns` converts the monotonic clock to the
+    /// time of the trace.
     fn cycles(&mut self, process: &ProcessCycles, offset_ns: i128) -> io::Result<()> {
         let pid = process.pid;
         self.name("process_name", pid, 0, process.name)?;
@@ -204,7 +208,7 @@ impl Trace {
             let [due_ns, woke_ns, done_ns] =
                 [row.due_ns, row.woke_ns, row.done_ns].map(|ns| i128::from(ns) + offset_ns);
             let wake_up_us = microseconds(woke_ns - due_ns);
-            // Slices of a thread must not overlap: a row that was due before the one before it woke begins there.
+            // Slices of a thread must not overlap: a row that was due before the previous wake-up begins there.
             let waits_from_ns = due_ns.max(previous_woke_ns).min(woke_ns);
             previous_woke_ns = woke_ns;
             let args = json!({ "wake_up_us": wake_up_us });

@@ -1,9 +1,9 @@
-//! One connection: its socket, its conversation, its bounded queue, and what was counted of it.
+//! One connection: its socket, its session, its bounded queue, and its counters.
 //!
-//! Frames of the bus wait in the queue until the socket takes them; what does not fit is lost to this client alone, and
-//! counted. A reply that does not fit ends the connection: the client asks and does not read.
+//! Frames of the bus wait in the queue until the socket accepts them; what does not fit is lost to this client alone, and
+//! counted. A reply that does not fit ends the connection: the client sends requests and does not read.
 
-use super::session::{Action, GREETING, Parting, Session};
+use super::session::{Action, DisconnectReason, GREETING, Session};
 use live::client::is_not_ready;
 use protocol::can::CanFrame;
 use rustix::net::sockopt;
@@ -15,43 +15,43 @@ use std::time::Duration;
 
 /// Longest text of a frame: "< frame 1FFFFFFF 4294967295.999999 0011223344556677 >".
 pub(super) const LONGEST_FRAME: usize = 53;
-/// Room for replies beside the frames.
+/// Room for replies beside the frames, bytes.
 const REPLIES: usize = 4096;
-/// What the kernel may hold for a client, bytes; it takes twice of it.
+/// Send buffer of a client's socket, bytes; the kernel doubles it.
 const SEND_BUFFER: usize = 64 << 10;
-/// Something was queued for so long, and the client took nothing: it is gone or stands still.
-const STUCK_MS: u64 = 30_000;
-/// Silence after which the kernel asks whether the other side is still there, and time between two questions.
+/// Longest time with a queue of which the client reads nothing.
+const STALLED_MS: u64 = 30_000;
+/// Idle time before the first keep-alive probe, and time between probes.
 const KEEP_ALIVE: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(10)];
-/// Bytes taken from a client in one turn, so that one that floods does not keep the others waiting.
+/// Most bytes read from a client in one turn, so that a flood does not delay the others.
 const READ_A_TURN: usize = 4096;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Ended {
-    /// The client closed it, or its machine went.
+pub(super) enum EndReason {
+    /// The client closed the connection, or its machine failed.
     ByClient,
-    /// It read nothing for 30 s, or asked without reading the answers.
+    /// It read nothing for 30 s, or sent requests without reading the answers.
     ReadsNothing,
     WithGateway,
     #[serde(untagged)]
-    Parted(Parting),
+    Disconnected(DisconnectReason),
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct ClientReport {
     pub(super) address: SocketAddr,
-    /// Frames of the bus that were queued for it.
+    /// Frames of the bus queued for it.
     pub(super) frames_to_client: u64,
-    /// Frames that its queue had no room for.
+    /// Frames lost to its full queue.
     pub(super) frames_lost: u64,
-    /// Frames that it sent and the bus took.
+    /// Frames that it sent and the bus accepted.
     pub(super) frames_from_client: u64,
-    /// Frames that it sent and the bus did not take.
+    /// Frames that it sent and the bus did not accept.
     pub(super) frames_not_taken: u64,
     pub(super) requests_refused: u64,
-    /// Why it is gone; none while it is here.
-    pub(super) ended: Option<Ended>,
+    /// Why the connection ended; `None` while it is open.
+    pub(super) ended: Option<EndReason>,
 }
 
 pub(super) struct Client {
@@ -59,7 +59,7 @@ pub(super) struct Client {
     session: Session,
     outgoing: VecDeque<u8>,
     most_bytes: usize,
-    /// Bytes at the front of the queue that do not wait for the pause to be over.
+    /// Bytes at the front of the queue that are not subject to the pause.
     at_once: usize,
     last_progress_ms: u64,
     pub(super) report: ClientReport,
@@ -68,7 +68,7 @@ pub(super) struct Client {
 }
 
 impl Client {
-    /// Greets a client that has come.
+    /// Accepts a client and sends the greeting.
     pub(super) fn new(
         stream: TcpStream,
         address: SocketAddr,
@@ -113,18 +113,18 @@ impl Client {
         self.session.is_raw()
     }
 
-    /// Whether something may be written now.
+    /// Whether output may be written now.
     pub(super) fn has_something_to_write(&self, now_ms: u64) -> bool {
         self.ready_bytes(now_ms) > 0
     }
 
-    /// Whether something waits for the pause to be over.
+    /// Whether output waits for the end of the pause.
     pub(super) fn is_pausing(&self, now_ms: u64) -> bool {
         !self.session.pause_is_over(now_ms)
     }
 
-    /// Tells, once, that it hears the bus from now on.
-    pub(super) fn tell_arrival(&mut self) {
+    /// Announces the client once, when it enters raw mode.
+    pub(super) fn announce(&mut self) {
         if self.is_raw() && !std::mem::replace(&mut self.announced, true) {
             eprintln!("gateway: client {} is on the bus", self.report.address);
         }
@@ -140,14 +140,14 @@ impl Client {
         self.report.frames_to_client += 1;
     }
 
-    /// Takes what the client has sent; `send` puts a frame on the bus and tells whether it was taken.
+    /// Processes input; `send` puts a frame on the bus and returns whether it was accepted.
     pub(super) fn read(&mut self, bus: &str, now_ms: u64, mut send: impl FnMut(&CanFrame) -> bool) {
         let mut bytes = [0; READ_A_TURN];
         let read = match self.stream.read(&mut bytes) {
-            Ok(0) => return self.end(Ended::ByClient),
+            Ok(0) => return self.end(EndReason::ByClient),
             Ok(read) => read,
             Err(error) if is_not_ready(&error) => return,
-            Err(_) => return self.end(Ended::ByClient),
+            Err(_) => return self.end(EndReason::ByClient),
         };
         let mut actions = Vec::new();
         self.session.take(&bytes[..read], bus, now_ms, &mut actions);
@@ -157,15 +157,15 @@ impl Client {
                 Action::Reply(text) => self.reply(&text),
                 Action::Send(frame) if send(&frame) => self.report.frames_from_client += 1,
                 Action::Send(_) => self.report.frames_not_taken += 1,
-                Action::Part(why) => {
+                Action::Disconnect(why) => {
                     self.write(now_ms);
-                    self.end(Ended::Parted(why));
+                    self.end(EndReason::Disconnected(why));
                 }
             }
         }
     }
 
-    /// Writes what the socket takes, and parts with a client that takes nothing or does not get to the point.
+    /// Writes what the socket accepts, and ends a connection that stalls or does not reach raw mode.
     pub(super) fn write(&mut self, now_ms: u64) {
         loop {
             let ready = self.ready_bytes(now_ms);
@@ -174,25 +174,25 @@ impl Client {
             }
             let front = self.outgoing.as_slices().0;
             match self.stream.write(&front[..front.len().min(ready)]) {
-                Ok(0) => return self.end(Ended::ByClient),
+                Ok(0) => return self.end(EndReason::ByClient),
                 Ok(written) => {
                     self.outgoing.drain(..written);
                     self.at_once = self.at_once.saturating_sub(written);
                     self.last_progress_ms = now_ms;
                 }
                 Err(error) if is_not_ready(&error) => break,
-                Err(_) => return self.end(Ended::ByClient),
+                Err(_) => return self.end(EndReason::ByClient),
             }
         }
         if self.session.is_overdue(now_ms) {
-            self.end(Ended::Parted(Parting::NoRawMode));
-        } else if !self.outgoing.is_empty() && now_ms.saturating_sub(self.last_progress_ms) >= STUCK_MS {
-            self.end(Ended::ReadsNothing);
+            self.end(EndReason::Disconnected(DisconnectReason::NoRawMode));
+        } else if !self.outgoing.is_empty() && now_ms.saturating_sub(self.last_progress_ms) >= STALLED_MS {
+            self.end(EndReason::ReadsNothing);
         }
     }
 
-    /// Ends the conversation; the first reason stays.
-    pub(super) fn end(&mut self, why: Ended) {
+    /// Ends the connection; the first reason is kept.
+    pub(super) fn end(&mut self, why: EndReason) {
         self.report.ended.get_or_insert(why);
     }
 
@@ -202,7 +202,7 @@ impl Client {
 
     fn reply(&mut self, text: &str) {
         if self.outgoing.len() + text.len() > self.most_bytes + REPLIES {
-            return self.end(Ended::ReadsNothing);
+            return self.end(EndReason::ReadsNothing);
         }
         self.outgoing.extend(text.as_bytes());
         self.at_once = self.outgoing.len();

@@ -1,4 +1,4 @@
-//! Requests of the socketcand protocol out of a stream of bytes, in bounded memory.
+//! Parser of the requests of the socketcand protocol, in bounded memory.
 //!
 //! ```text
 //!   stream  = { white space | "<" words ">" }        no line ends; a request may come in pieces
@@ -6,44 +6,44 @@
 //!   ID      = 1 to 8 hex digits; BYTE = 1 or 2 hex digits; LEN = 0 to 8, as many bytes follow
 //! ```
 //!
-//! An identifier is a 29-bit one when it is written with 8 digits (python-can), has bit 31 set (SavvyCAN: id | 0x80000000) or
-//! exceeds 11 bits (socketcand). Remote requests, error frames and CAN FD are refused.
+//! An identifier is extended (29 bits) when it has 8 digits (python-can), has bit 31 set (SavvyCAN: id | 0x80000000) or exceeds
+//! 11 bits (socketcand). Remote requests, error frames and CAN FD are refused.
 //!
-//! Anything else than white space between requests is [`Refusal::NotTheProtocol`]: a web page that is made to post to the port
-//! sends a request line of HTTP first, and must not get as far as its body.
+//! Anything but white space between requests is [`Refusal::NotTheProtocol`]: a web page that posts to the port sends an HTTP
+//! request line first and must not reach its body.
 //!
 //! Source: socketcand, `doc/protocol.md`; python-can 4, `interfaces/socketcand`; SavvyCAN, `socketcand.cpp`.
 
 use protocol::bus::LONGEST_NAME;
 use protocol::can::{CanFrame, EXTENDED_FLAG};
 
-/// Longest request in bytes, brackets not counted: twice what the longest one that is allowed needs.
+/// Longest request in bytes without brackets: twice the longest valid one.
 pub(super) const LONGEST_REQUEST: usize = 128;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Request {
     /// Use the bus of this name.
     Open(String),
-    /// Every frame from now on.
+    /// Receive every frame from now on.
     RawMode,
     Echo,
     Send(CanFrame),
 }
 
-/// Why something is no request.
+/// Why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refusal {
-    /// A command that is not in the list above.
+    /// A command outside the grammar above.
     UnknownCommand,
-    /// A known command with other words than it has.
+    /// A known command with wrong arguments.
     Malformed,
-    /// More than [`LONGEST_REQUEST`] bytes; passed over up to its end.
+    /// More than [`LONGEST_REQUEST`] bytes; skipped to its end.
     TooLong,
-    /// Bytes outside of `< … >`: the client speaks something else.
+    /// Bytes outside `< … >`: the client speaks another protocol.
     NotTheProtocol,
 }
 
-/// Where the stream is.
+/// State of the parser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Place {
     #[default]
@@ -52,7 +52,7 @@ enum Place {
     PassingOver,
 }
 
-/// Takes bytes as they come and gives requests as they are complete.
+/// Incremental parser.
 #[derive(Clone, Debug)]
 pub(super) struct Parser {
     place: Place,
@@ -67,7 +67,7 @@ impl Default for Parser {
 }
 
 impl Parser {
-    /// Takes the next byte; what it completes, if anything.
+    /// Takes the next byte; returns the request that it completes.
     pub(super) fn push(&mut self, byte: u8) -> Option<Result<Request, Refusal>> {
         match (self.place, byte) {
             (Place::Between, b'<') => {
@@ -79,7 +79,7 @@ impl Parser {
                 self.place = Place::Between;
                 Some(read(&self.bytes[..self.length]))
             }
-            // What came before was cut off: a new request begins.
+            // The request before was incomplete: a new one begins.
             (Place::Inside, b'<') => {
                 self.length = 0;
                 Some(Err(Refusal::Malformed))
@@ -105,7 +105,7 @@ impl Parser {
 /// The request between the brackets.
 ///
 /// # Errors
-/// What is wrong with it; never [`Refusal::TooLong`] or [`Refusal::NotTheProtocol`].
+/// Why it is refused; never [`Refusal::TooLong`] or [`Refusal::NotTheProtocol`].
 pub(super) fn read(bytes: &[u8]) -> Result<Request, Refusal> {
     let text = std::str::from_utf8(bytes).map_err(|_| Refusal::Malformed)?;
     let mut words = text.split_ascii_whitespace();
@@ -123,7 +123,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Request, Refusal> {
     if words.next().is_some() { Err(Refusal::Malformed) } else { Ok(request) }
 }
 
-/// ID LEN BYTE…, without what may follow.
+/// Parses ID LEN BYTE….
 fn frame<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     const LARGEST_EXTENDED: u32 = 0x1FFF_FFFF;
     const LARGEST_STANDARD: u32 = 0x7FF;
@@ -142,7 +142,7 @@ fn frame<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     Some(CanFrame::from_raw(if extended { id | EXTENDED_FLAG } else { id }, &data[..length]))
 }
 
-/// A number of 1 to `most` hex digits, and nothing else: `from_str_radix` would take a sign.
+/// A number of 1 to `most` hex digits; `from_str_radix` alone would accept a sign.
 fn hexadecimal(digits: &str, most: usize) -> Option<u32> {
     let fits = (1..=most).contains(&digits.len()) && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
     fits.then(|| u32::from_str_radix(digits, 16).ok()).flatten()

@@ -1,15 +1,15 @@
-//! The conversation with one client: bytes in, what to do out. No socket, no clock: the time is handed in.
+//! Protocol state of one client: input bytes, output actions. No socket, no clock: the time is an argument.
 //!
 //! ```text
 //!                "< hi >"          < open NAME >          < rawmode >
 //!   connected ────────────► Greeted ────────────► Opened ────────────► Raw ── frames, 30 ms after the ok
 //!                              │  "< ok >"           │      "< ok >"    │
-//!                              └── another name, bytes that are no request, or not raw within 10 s: parted
+//!                              └── unknown bus, bytes that are no request, or not raw within 10 s: disconnected
 //! ```
 //!
-//! In every state `< echo >` is answered by the same, and what is not understood by `< error … >`. `< send … >` is taken from
-//! `Opened` on, as socketcand does, and answered by nothing. The pause before the first frame is for python-can, which
-//! compares one whole read with `< ok >`.
+//! In every state `< echo >` is answered by itself, and what is not understood by `< error … >`. `< send … >` is accepted from
+//! `Opened` on, as by socketcand, and not answered. The pause before the first frame is for python-can, which compares one
+//! whole read with `< ok >`.
 //!
 //! Source: socketcand, `doc/protocol.md`.
 
@@ -17,43 +17,43 @@ use super::parser::{Parser, Refusal, Request};
 use protocol::can::CanFrame;
 use std::fmt::Write;
 
-/// What a client hears first.
+/// First text that a client receives.
 pub(crate) const GREETING: &str = "< hi >";
 /// Time between the answer to `< rawmode >` and the first frame, ms.
 pub(crate) const PAUSE_MS: u64 = 30;
-/// Time to get from the greeting to raw mode, ms: who takes longer is no client.
-pub(crate) const PATIENCE_MS: u64 = 10_000;
-/// Requests refused in one session after which it ends: nobody understands the other.
+/// Longest time from the greeting to raw mode, ms.
+pub(crate) const RAW_MODE_WITHIN_MS: u64 = 10_000;
+/// Refused requests after which a session ends.
 pub(crate) const MOST_REFUSED: u64 = 100;
 
-/// What the server has to do.
+/// An action of the server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     /// Send this text to the client.
     Reply(String),
     Send(CanFrame),
-    /// Send what was replied, then end the connection; why.
-    Part(Parting),
+    /// Send the replies, then end the connection for this reason.
+    Disconnect(DisconnectReason),
 }
 
 /// Why the gateway ends a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Parting {
+pub(crate) enum DisconnectReason {
     NotTheProtocol,
     UnknownBus,
     NoRawMode,
-    /// Nothing but requests that are none.
+    /// Too many requests were refused.
     TooManyRefused,
 }
 
-/// Where the conversation is.
+/// State of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Greeted,
     Opened,
     Raw { since_ms: u64 },
-    Parted,
+    Closed,
 }
 
 #[derive(Clone, Debug)]
@@ -66,15 +66,15 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    /// A client that was greeted at `now_ms`, of a clock of the caller's choice; one that is `read_only` sends nothing.
+    /// A client greeted at `now_ms`, of any clock; a `read_only` one may not send.
     pub(crate) fn new(now_ms: u64, read_only: bool) -> Self {
         Self { state: State::Greeted, parser: Parser::default(), began_ms: now_ms, refused: 0, read_only }
     }
 
-    /// Takes what the client sent; `bus` is the name of the bus that is here. Adds to `actions` what is to be done, in order.
+    /// Processes input; `bus` is the name of the bus. Appends the actions in order.
     pub(crate) fn take(&mut self, bytes: &[u8], bus: &str, now_ms: u64, actions: &mut Vec<Action>) {
         for byte in bytes {
-            if self.state == State::Parted {
+            if self.state == State::Closed {
                 return;
             }
             match self.parser.push(*byte) {
@@ -85,12 +85,12 @@ impl Session {
         }
     }
 
-    /// Whether frames of the bus are queued for this client: it is in raw mode.
+    /// Whether the client is in raw mode, so that frames of the bus are queued for it.
     pub(crate) fn is_raw(&self) -> bool {
         matches!(self.state, State::Raw { .. })
     }
 
-    /// Whether what is queued after the answer to `< rawmode >` may be written.
+    /// Whether the pause after the answer to `< rawmode >` is over.
     pub(crate) fn pause_is_over(&self, now_ms: u64) -> bool {
         match self.state {
             State::Raw { since_ms } => now_ms.saturating_sub(since_ms) >= PAUSE_MS,
@@ -98,10 +98,10 @@ impl Session {
         }
     }
 
-    /// Whether the client has taken too long to get to raw mode.
+    /// Whether the client has taken too long to reach raw mode.
     pub(crate) fn is_overdue(&self, now_ms: u64) -> bool {
         matches!(self.state, State::Greeted | State::Opened)
-            && now_ms.saturating_sub(self.began_ms) >= PATIENCE_MS
+            && now_ms.saturating_sub(self.began_ms) >= RAW_MODE_WITHIN_MS
     }
 
     /// Requests refused so far.
@@ -118,7 +118,7 @@ impl Session {
             }
             (Request::Open(_), State::Greeted) => {
                 actions.push(reply("< error could not open bus >"));
-                self.part(Parting::UnknownBus, actions);
+                self.disconnect(DisconnectReason::UnknownBus, actions);
             }
             (Request::RawMode, State::Opened) => {
                 self.state = State::Raw { since_ms: now_ms };
@@ -127,7 +127,7 @@ impl Session {
             (Request::Send(frame), State::Opened | State::Raw { .. }) if !self.read_only => {
                 actions.push(Action::Send(frame));
             }
-            // Out of place, or not allowed.
+            // Out of order, or not allowed.
             _ => self.refuse(Refusal::UnknownCommand, actions),
         }
     }
@@ -138,17 +138,17 @@ impl Session {
             Refusal::UnknownCommand => "< error unknown command >",
             Refusal::Malformed => "< error malformed command >",
             Refusal::TooLong => "< error command too long >",
-            Refusal::NotTheProtocol => return self.part(Parting::NotTheProtocol, actions),
+            Refusal::NotTheProtocol => return self.disconnect(DisconnectReason::NotTheProtocol, actions),
         };
         actions.push(reply(text));
         if self.refused >= MOST_REFUSED {
-            self.part(Parting::TooManyRefused, actions);
+            self.disconnect(DisconnectReason::TooManyRefused, actions);
         }
     }
 
-    fn part(&mut self, why: Parting, actions: &mut Vec<Action>) {
-        self.state = State::Parted;
-        actions.push(Action::Part(why));
+    fn disconnect(&mut self, why: DisconnectReason, actions: &mut Vec<Action>) {
+        self.state = State::Closed;
+        actions.push(Action::Disconnect(why));
     }
 }
 
@@ -156,8 +156,8 @@ fn reply(text: &str) -> Action {
     Action::Reply(text.into())
 }
 
-/// Appends a frame of the bus as a client reads it; false for remote requests and error frames, which the protocol cannot carry
-/// to python-can. `stamp_ns`: since the Unix epoch.
+/// Appends a frame as clients read it, with `stamp_ns` since the Unix epoch; returns false for remote requests and error
+/// frames, which the protocol cannot carry to python-can.
 pub(crate) fn write_frame(text: &mut String, frame: &CanFrame, stamp_ns: u64) -> bool {
     use protocol::can::{ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
     let raw_id = frame.raw_id();
@@ -205,18 +205,23 @@ mod tests {
     #[test]
     fn another_bus_another_protocol_and_babble_are_parted_with() {
         let open = talk(&mut Session::new(0, false), "< open can7 >< open bus0 >", 0);
-        assert_eq!(open, [reply("< error could not open bus >"), Action::Part(Parting::UnknownBus)]);
+        assert_eq!(
+            open,
+            [reply("< error could not open bus >"), Action::Disconnect(DisconnectReason::UnknownBus)]
+        );
         let http = talk(&mut Session::new(0, false), "POST / HTTP/1.1\r\n\r\n< open bus0 >", 0);
-        assert_eq!(http, [Action::Part(Parting::NotTheProtocol)]);
+        assert_eq!(http, [Action::Disconnect(DisconnectReason::NotTheProtocol)]);
         let babble = talk(&mut Session::new(0, false), &"< x >".repeat(1000), 0);
         assert_eq!(babble.len() as u64, MOST_REFUSED + 1);
-        assert_eq!(babble.last(), Some(&Action::Part(Parting::TooManyRefused)));
+        assert_eq!(babble.last(), Some(&Action::Disconnect(DisconnectReason::TooManyRefused)));
     }
 
     #[test]
     fn who_does_not_get_to_raw_mode_is_overdue_and_a_client_in_raw_mode_never() {
         let mut session = Session::new(500, false);
-        assert!(!session.is_overdue(500 + PATIENCE_MS - 1) && session.is_overdue(500 + PATIENCE_MS));
+        assert!(
+            !session.is_overdue(500 + RAW_MODE_WITHIN_MS - 1) && session.is_overdue(500 + RAW_MODE_WITHIN_MS)
+        );
         talk(&mut session, "< open bus0 >< rawmode >", 600);
         assert!(!session.is_overdue(u64::MAX));
     }

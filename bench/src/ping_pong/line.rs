@@ -1,4 +1,4 @@
-//! What ping and pong travel on: a bus, waited for as the controller waits, or a bare pair of sockets, read plainly.
+//! Transport of ping and pong: a bus, waited for as the controller waits, or a bare pair of sockets with blocking reads.
 
 use protocol::bus::{Bus, Received};
 use protocol::can::{CAN_FRAME_BYTES, CanFrame};
@@ -8,26 +8,26 @@ use rustix::net::{RecvFlags, SendFlags, recv, send};
 use std::os::fd::OwnedFd;
 use std::time::Duration;
 
-/// The other end is gone for good.
+/// The other end has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Gone;
+pub(super) struct Disconnected;
 
-/// A way between two processes for 16 bytes.
+/// A transport of 16-byte frames between two processes.
 pub(super) trait Line {
-    /// Hands a frame over; false when it was dropped.
+    /// Sends a frame; false when it was dropped.
     fn send(&mut self, frame: &CanFrame) -> bool;
 
-    /// Waits for frames for a while and hands each on, with its arrival in ns of CLOCK_MONOTONIC where that is known.
-    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Gone>;
+    /// Waits for frames for a while and passes each on, with its arrival in ns of CLOCK_MONOTONIC where that is known.
+    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Disconnected>;
 
-    /// Whether it can carry anything yet.
+    /// Whether it is connected.
     fn is_up(&self) -> bool;
 }
 
-/// Longest wait, that of the controller.
-pub(super) const PATIENCE: Duration = Duration::from_millis(20);
+/// Longest wait, as of the controller.
+pub(super) const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
-/// A bus: poll, then a batch with `recvmmsg`, as the controller does it.
+/// A bus: poll, then a batch with `recvmmsg`, as the controller does.
 pub(super) struct OnBus(pub(super) Box<dyn Bus>);
 
 impl Line for OnBus {
@@ -35,8 +35,8 @@ impl Line for OnBus {
         self.0.send(frame).is_ok()
     }
 
-    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Gone> {
-        self.0.wait_readable(PATIENCE);
+    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Disconnected> {
+        self.0.wait_readable(LONGEST_WAIT);
         while let Received::Frame(frame, stamp_ns) = self.0.receive() {
             take(&frame, Some(stamp_ns));
         }
@@ -48,12 +48,12 @@ impl Line for OnBus {
     }
 }
 
-/// One end of a pair of SEQPACKET sockets: a blocking read, the least that two processes can do.
+/// One end of a pair of SEQPACKET sockets with blocking reads.
 pub(super) struct OnSocket(OwnedFd);
 
 impl OnSocket {
     pub(super) fn new(socket: OwnedFd) -> rustix::io::Result<Self> {
-        set_socket_timeout(&socket, Timeout::Recv, Some(PATIENCE))?;
+        set_socket_timeout(&socket, Timeout::Recv, Some(LONGEST_WAIT))?;
         Ok(Self(socket))
     }
 }
@@ -63,7 +63,7 @@ impl Line for OnSocket {
         send(&self.0, &frame.to_bytes(), SendFlags::NOSIGNAL).is_ok()
     }
 
-    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Gone> {
+    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Disconnected> {
         let mut bytes = [0; CAN_FRAME_BYTES];
         match recv(&self.0, &mut bytes, RecvFlags::empty()) {
             Ok((CAN_FRAME_BYTES, _)) => {
@@ -72,7 +72,7 @@ impl Line for OnSocket {
                 }
                 Ok(())
             }
-            Ok((0, _)) | Err(Errno::CONNRESET | Errno::PIPE) => Err(Gone),
+            Ok((0, _)) | Err(Errno::CONNRESET | Errno::PIPE) => Err(Disconnected),
             _ => Ok(()),
         }
     }

@@ -1,45 +1,49 @@
-//! The two sides: one asks at a fixed rhythm and measures, the other answers at once.
+//! The two sides: one sends at a fixed period and measures, the other answers at once.
 
-use super::line::{Gone, Line};
+use super::line::{Disconnected, Line};
 use protocol::can::CanFrame;
 use realtime::{Clock, Instant, Interrupt, Recorder};
 use std::time::Duration;
 
-/// Identifiers that no frame of `rig.dbc` has, and that CANopen and diagnostics leave free.
+/// Identifiers that are not in `rig.dbc` and that CANopen and diagnostics leave free.
 const PING_ID: u16 = 0x7F0;
 const PONG_ID: u16 = 0x7F1;
-/// A ping without an answer for so long is lost.
+/// Time after which an unanswered ping is lost.
 const LOST_AFTER: Duration = Duration::from_secs(1);
-/// How long to try for a first answer.
+/// Longest wait for the first answer.
 const FIRST_ANSWER: Duration = Duration::from_secs(5);
-/// Time between two tries for it.
+/// Period of the attempts before it.
 const TRY_PERIOD: Duration = Duration::from_millis(50);
 
 #[derive(Debug, Default)]
 pub(super) struct PingPongResult {
     pub(super) sent: u64,
     pub(super) answered: u64,
-    /// Pings left out because the one before them was not back in time.
+    /// Pings omitted because the one before was still in flight.
     pub(super) skipped: u64,
-    /// From before sending to having read the answer, ns.
+    /// From before sending until the answer was read, ns.
     pub(super) round_trip_ns: Recorder,
-    /// From before sending to the answer's arrival at our queue, ns, where the line tells it.
+    /// From before sending until the answer's arrival at our queue, ns, where the line reports it.
     pub(super) to_arrival_ns: Recorder,
 }
 
-/// How long and how often.
+/// Period and number of pings.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rhythm {
+pub(super) struct PingSchedule {
     pub(super) interval: Duration,
     pub(super) pings: u64,
 }
 
-/// Waits for the other side to answer at all; false when it does not.
-pub(super) fn serve(line: &mut dyn Line, clock: &impl Clock, interrupt: &Interrupt) -> Result<bool, Gone> {
+/// Waits for the first answer; false without one.
+pub(super) fn serve(
+    line: &mut dyn Line,
+    clock: &impl Clock,
+    interrupt: &Interrupt,
+) -> Result<bool, Disconnected> {
     let until = clock.now() + FIRST_ANSWER;
     while clock.now() < until && !interrupt.came() {
         let again = clock.now() + TRY_PERIOD;
-        // A bus that is not there yet is looked for by trying.
+        // Attempts, since a bus may not exist yet.
         line.send(&ping(0));
         let mut answered = false;
         while clock.now() < again && !answered {
@@ -52,22 +56,22 @@ pub(super) fn serve(line: &mut dyn Line, clock: &impl Clock, interrupt: &Interru
     Ok(false)
 }
 
-/// Asks as long as the rhythm says, or until interrupted.
+/// Sends pings as scheduled, or until interrupted.
 pub(super) fn ask(
     line: &mut dyn Line,
     clock: &impl Clock,
-    rhythm: Rhythm,
+    schedule: PingSchedule,
     interrupt: &Interrupt,
-) -> Result<PingPongResult, Gone> {
+) -> Result<PingPongResult, Disconnected> {
     let mut rally = PingPongResult::default();
-    let start = clock.now() + rhythm.interval;
-    let interval_ns = rhythm.interval.as_nanos() as u64;
+    let start = clock.now() + schedule.interval;
+    let interval_ns = schedule.interval.as_nanos() as u64;
     let mut beat = 0;
-    while beat < rhythm.pings && !interrupt.came() {
+    while beat < schedule.pings && !interrupt.came() {
         let due = Instant::from_nanos(start.as_nanos() + beat * interval_ns);
         clock.wait_until(due);
         rally.sent += 1;
-        // Number 0 is the one that found the other side.
+        // Number 0 was the first attempt.
         if let Some((read, arrived_ns)) = exchange(line, clock, rally.sent, interrupt)? {
             rally.answered += 1;
             rally.round_trip_ns.record(read.0);
@@ -75,19 +79,19 @@ pub(super) fn ask(
                 rally.to_arrival_ns.record(arrived_ns.saturating_sub(read.1));
             }
         }
-        // Beats that passed meanwhile are left out: their pings would measure the same wait again.
+        // Pings due meanwhile are omitted: they would measure the same wait again.
         let passed = clock.now().saturating_duration_since(due).as_nanos() as u64 / interval_ns;
-        rally.skipped += passed.min(rhythm.pings - beat - 1);
+        rally.skipped += passed.min(schedule.pings - beat - 1);
         beat += 1 + passed;
     }
     Ok(rally)
 }
 
-/// Answers until the other side is gone or silent for `silence`.
+/// Answers until the other side has ended or is silent for `silence`.
 pub(super) fn answer(line: &mut dyn Line, clock: &impl Clock, silence: Duration) {
     let mut received = clock.now();
     loop {
-        // Answered once the batch is taken, as the controller does; there is one ping at a time.
+        // Answered after the batch is taken, as the controller does; there is one ping at a time.
         let mut asked = None;
         let waited = line.wait(&mut |frame, _| asked = number(frame, PING_ID).or(asked));
         if let Some(number) = asked {
@@ -100,15 +104,15 @@ pub(super) fn answer(line: &mut dyn Line, clock: &impl Clock, silence: Duration)
     }
 }
 
-/// Length until the answer was read with the time of sending, in ns, and when it arrived.
-type Exchanged = ((u64, u64), Option<u64>);
+/// Round-trip time and time of sending, in ns, and the time to arrival.
+type RoundTrip = ((u64, u64), Option<u64>);
 
 fn exchange(
     line: &mut dyn Line,
     clock: &impl Clock,
     number: u64,
     interrupt: &Interrupt,
-) -> Result<Option<Exchanged>, Gone> {
+) -> Result<Option<RoundTrip>, Disconnected> {
     let sent = clock.now();
     line.send(&ping(number));
     loop {
@@ -154,7 +158,7 @@ mod tests {
         [a, b].map(|socket| OnSocket::new(socket).unwrap())
     }
 
-    const RHYTHM: Rhythm = Rhythm { interval: Duration::from_millis(1), pings: 50 };
+    const SCHEDULE: PingSchedule = PingSchedule { interval: Duration::from_millis(1), pings: 50 };
 
     #[test]
     fn every_ping_is_answered_or_counted_as_left_out() {
@@ -162,9 +166,9 @@ mod tests {
         let pong = std::thread::spawn(move || answer(&mut theirs, &MonotonicClock, Duration::from_secs(60)));
         let interrupt = Interrupt::default();
         assert_eq!(serve(&mut ours, &MonotonicClock, &interrupt), Ok(true));
-        let rally = ask(&mut ours, &MonotonicClock, RHYTHM, &interrupt).unwrap();
+        let rally = ask(&mut ours, &MonotonicClock, SCHEDULE, &interrupt).unwrap();
         assert_eq!(rally.answered, rally.sent);
-        assert_eq!(rally.sent + rally.skipped, RHYTHM.pings);
+        assert_eq!(rally.sent + rally.skipped, SCHEDULE.pings);
         assert_eq!(rally.round_trip_ns.percentiles().count, rally.sent);
         assert_eq!(rally.to_arrival_ns.percentiles().count, 0, "a bare socket knows no arrivals");
         drop(ours);
@@ -178,8 +182,8 @@ mod tests {
         interrupt.ask();
         assert_eq!(serve(&mut ours, &MonotonicClock, &interrupt), Ok(false));
         drop(theirs);
-        let rally = ask(&mut ours, &MonotonicClock, RHYTHM, &Interrupt::default());
-        assert_eq!(rally.err(), Some(Gone));
+        let rally = ask(&mut ours, &MonotonicClock, SCHEDULE, &Interrupt::default());
+        assert_eq!(rally.err(), Some(Disconnected));
     }
 
     #[test]

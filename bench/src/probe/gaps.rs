@@ -1,22 +1,22 @@
-//! A gap: what a thread that does nothing but read the clock sees when it is not running, and whose fault it was.
+//! A gap: the interval in which a spinning thread did not run, and its cause.
 //!
 //! ```text
 //!   looks at the clock   | | | | | |              | | | |        gap: from the last look before to the first one after
 //!                                  └── length ────┘
 //! ```
-//! Somebody else had the CPU if the kernel counted a switch away from the thread meanwhile, and had it wait for most of the
-//! gap. A switch alone does not say so: the counts reach back up to a millisecond, in which a short one may have come before.
-//! Without a switch the thread *was* running, and the CPU under it stood still: a hypervisor, the firmware (SMI), or the
-//! kernel's own interrupt work.
+//! Another thread had the CPU if the kernel counted a switch away from the thread and the thread waited for most of the gap. A
+//! switch alone is no proof: the counters reach back up to a millisecond, in which a short switch may have come before. Without
+//! a switch the thread was running, and the CPU itself stood still: a hypervisor, the firmware (SMI), or interrupt work of the
+//! kernel.
 
 use realtime::VitalCounts;
 
-/// How often the counts are read when nothing happens, so that they tell of a gap and of little before it.
+/// Period of reading the counters without a gap, so that they cover a gap and little before it.
 const REFRESH_NS: u64 = 1_000_000;
 
-/// Whether something other than the watching thread had the CPU for most of `length_ns`. The thread never gives it away by
-/// itself: somebody stopped the process.
-fn explain(counted: &VitalCounts, length_ns: u64) -> bool {
+/// Whether another thread had the CPU for most of `length_ns`, or the process was stopped: the spinning thread never yields by
+/// itself.
+fn was_preempted(counted: &VitalCounts, length_ns: u64) -> bool {
     let untold = counted.run_delay_ns == 0;
     counted.voluntary_switches > 0
         || (counted.involuntary_switches > 0 && (untold || counted.run_delay_ns >= length_ns / 2))
@@ -25,15 +25,15 @@ fn explain(counted: &VitalCounts, length_ns: u64) -> bool {
 /// A gap on one CPU, on CLOCK_MONOTONIC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Gap {
-    /// Last look before it, ns.
+    /// Last reading before it, ns.
     pub from_ns: u64,
-    /// First look after it, ns.
+    /// First reading after it, ns.
     pub to_ns: u64,
-    /// Whether another thread had the CPU, or somebody stopped the probe.
+    /// Whether another thread had the CPU, or the probe was stopped.
     pub another_ran: bool,
 }
 
-/// Finds gaps in looks at the clock.
+/// Finds gaps in the readings of the clock.
 #[derive(Debug)]
 pub(super) struct GapWatch {
     gap_ns: u64,
@@ -42,12 +42,12 @@ pub(super) struct GapWatch {
 }
 
 impl GapWatch {
-    /// A watch whose first look is at `now_ns`.
+    /// A watch whose first reading is `now_ns`.
     pub(super) fn new(gap_ns: u64, now_ns: u64) -> Self {
         Self { gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
     }
 
-    /// The next look. `counts` tells what was counted since it was last called.
+    /// The next reading; `counts` returns the counters since its last call.
     pub(super) fn look(&mut self, now_ns: u64, counts: impl FnOnce() -> VitalCounts) -> Option<Gap> {
         let from_ns = std::mem::replace(&mut self.last_ns, now_ns);
         let length_ns = now_ns - from_ns;
@@ -56,12 +56,12 @@ impl GapWatch {
             return None;
         }
         self.refreshed_ns = now_ns;
-        let another_ran = explain(&counts(), length_ns);
+        let another_ran = was_preempted(&counts(), length_ns);
         is_gap.then_some(Gap { from_ns, to_ns: now_ns, another_ran })
     }
 }
 
-/// Gaps of one kind, added up.
+/// Sum of the gaps of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Total {
     pub count: u64,

@@ -1,6 +1,6 @@
 //! The replay's command line.
 
-use super::kind::LeftOut;
+use super::kind::Exclusion;
 use clap::Args;
 use protocol::bus::BusUrl;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub(crate) struct ReplayArguments {
     /// Leave out what controllers, console and bench sent (commands), what the rig sent (rig), or identifiers in hexadecimal
     /// (120, or 8 digits); several, with commas between.
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
-    pub leave_out: Vec<LeftOut>,
+    pub leave_out: Vec<Exclusion>,
     /// Take what was seen at this interface alone.
     #[arg(long, value_name = "NAME")]
     pub interface: Option<String>,

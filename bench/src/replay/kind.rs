@@ -1,18 +1,18 @@
-//! Whose frame is it, and may it be sent: what a log holds, by identifier.
+//! The senders of the frames of a log, by identifier, and whether the frames may be sent.
 //!
 //! | kind | frames | beside a live rig |
 //! |---|---|---|
 //! | command | of controllers, console and bench in `rig.dbc` | stale: valves would follow the past |
-//! | rig | of the rig in `rig.dbc` | a second rig: controllers would be given the past |
-//! | other | identifiers that `rig.dbc` does not know | nobody of ours acts on them |
+//! | rig | of the rig in `rig.dbc` | a second rig: controllers would receive old sensor values |
+//! | other | identifiers that `rig.dbc` does not know | ignored by rig and controllers |
 //!
-//! An error frame is what an interface reports to its own host; nobody can send it.
+//! An error frame is a report of an interface to its host; it cannot be sent.
 
 use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG};
 use protocol::frames::MessageSpec;
 use std::str::FromStr;
 
-/// The node of `rig.dbc` that the emulator is.
+/// The node of the emulator in `rig.dbc`.
 const RIG: &str = "Rig";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub(super) enum Kind {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum LeftOut {
+pub(crate) enum Exclusion {
     /// All of [`Kind::Command`].
     Commands,
     /// All of [`Kind::Rig`].
@@ -35,13 +35,13 @@ pub(crate) enum LeftOut {
     Identifier(u32),
 }
 
-/// A word that is no part of a log.
+/// An invalid value of --leave-out.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is neither 'commands' nor 'rig' nor an identifier of 3 or 8 hexadecimal digits")]
-pub(crate) struct NotToBeLeftOut(String);
+pub(crate) struct InvalidExclusion(String);
 
 impl Kind {
-    /// Of a frame, by its identifier: a malformed frame of the rig is still one that only a rig sends.
+    /// By the identifier: a malformed frame of the rig still comes from a rig.
     pub(super) fn of(frame: &CanFrame) -> Self {
         if frame.raw_id() & ERROR_FLAG != 0 {
             return Self::Error;
@@ -54,7 +54,7 @@ impl Kind {
     }
 }
 
-impl LeftOut {
+impl Exclusion {
     pub(crate) fn names(self, frame: &CanFrame) -> bool {
         match self {
             Self::Commands => Kind::of(frame) == Kind::Command,
@@ -64,10 +64,10 @@ impl LeftOut {
     }
 }
 
-impl FromStr for LeftOut {
-    type Err = NotToBeLeftOut;
+impl FromStr for Exclusion {
+    type Err = InvalidExclusion;
 
-    fn from_str(text: &str) -> Result<Self, NotToBeLeftOut> {
+    fn from_str(text: &str) -> Result<Self, InvalidExclusion> {
         let hex = text.bytes().all(|byte| byte.is_ascii_hexdigit());
         let number = u32::from_str_radix(text, 16).ok().filter(|_| hex);
         match (text, text.len(), number) {
@@ -75,7 +75,7 @@ impl FromStr for LeftOut {
             ("rig", _, _) => Ok(Self::Rig),
             (_, 3, Some(id)) if id < 0x800 => Ok(Self::Identifier(id)),
             (_, 8, Some(id)) if id < 0x2000_0000 => Ok(Self::Identifier(id | EXTENDED_FLAG)),
-            _ => Err(NotToBeLeftOut(text.into())),
+            _ => Err(InvalidExclusion(text.into())),
         }
     }
 }
@@ -104,14 +104,14 @@ mod tests {
     #[test]
     fn what_is_left_out_is_named_by_word_or_identifier() {
         let frame = |raw_id| CanFrame::from_raw(raw_id, &[]);
-        let left_out = |text: &str| text.parse::<LeftOut>().unwrap();
+        let left_out = |text: &str| text.parse::<Exclusion>().unwrap();
         assert!(left_out("commands").names(&frame(0x111)) && !left_out("commands").names(&frame(0x121)));
         assert!(left_out("rig").names(&frame(0x121)) && !left_out("rig").names(&frame(0x111)));
         assert!(left_out("7fF").names(&frame(REMOTE_FLAG | 0x7FF)));
         assert!(!left_out("000007FF").names(&frame(0x7FF)));
         assert!(left_out("000007FF").names(&frame(EXTENDED_FLAG | 0x7FF)));
         for text in ["", "command", "800", "+12", "20000000", "12"] {
-            assert!(text.parse::<LeftOut>().is_err(), "{text}");
+            assert!(text.parse::<Exclusion>().is_err(), "{text}");
         }
     }
 }

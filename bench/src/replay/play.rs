@@ -1,8 +1,7 @@
-//! Sends frames when they are due, and watches for a rig meanwhile.
+//! Sends frames when they are due, and watches for a rig.
 //!
-//! The thread waits until each frame's absolute due time, in pieces, so that Ctrl-C and a rig that comes alive are seen within
-//! [`PIECE`]. Error of a frame = when the bus took it - when it was due; it is never negative, and counts what a late
-//! predecessor cost, too.
+//! The thread waits until each frame's absolute due time, in steps of [`WAIT_STEP`], so that it notices Ctrl-C and a rig. Error
+//! of a frame = time when the bus accepted it - due time; it is never negative and includes the delay by a late predecessor.
 
 use super::kind::Kind;
 use super::schedule::Schedule;
@@ -10,32 +9,32 @@ use protocol::bus::{Bus, Received};
 use realtime::{Clock, Instant, Interrupt, Recorder};
 use std::time::Duration;
 
-/// Longest wait between two looks at the bus and for Ctrl-C.
-const PIECE: Duration = Duration::from_millis(5);
+/// Longest wait between two polls of the bus and of Ctrl-C.
+const WAIT_STEP: Duration = Duration::from_millis(5);
 /// Time from the decision to begin until the first frame is due.
 const LEAD: Duration = Duration::from_millis(20);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
-    /// With the last frame.
+    /// After the last frame.
     Whole,
     /// By Ctrl-C or SIGTERM.
     Interrupted,
-    /// A rig came alive, and the log would have disturbed it.
+    /// A rig started that the log would have disturbed.
     LiveRig,
 }
 
-pub(super) struct Played {
+pub(super) struct ReplayStatistics {
     pub(super) end: End,
-    /// Frames that the bus took.
+    /// Frames that the bus accepted.
     pub(super) sent: u64,
-    /// Frames that it did not take.
+    /// Frames that it did not accept.
     pub(super) dropped: u64,
     pub(super) error_ns: Recorder,
 }
 
-/// Frames of a rig that wait at our queue: somebody else's, since no bus lets a peer hear itself.
-pub(super) fn heard_of_a_rig(bus: &mut dyn Bus) -> u64 {
+/// Number of waiting frames of a rig; they are of another node, since no peer receives its frames.
+pub(super) fn take_rig_frames(bus: &mut dyn Bus) -> u64 {
     let mut heard = 0;
     while let Received::Frame(frame, _) = bus.receive() {
         heard += u64::from(Kind::of(&frame) == Kind::Rig);
@@ -50,8 +49,8 @@ pub(super) fn play(
     schedule: &Schedule,
     spin: Duration,
     interrupt: &Interrupt,
-) -> Played {
-    let mut played = Played { end: End::Whole, sent: 0, dropped: 0, error_ns: Recorder::new() };
+) -> ReplayStatistics {
+    let mut played = ReplayStatistics { end: End::Whole, sent: 0, dropped: 0, error_ns: Recorder::new() };
     let start = clock.now() + LEAD;
     let disturbs = schedule.disturbs_a_rig();
     for next in &schedule.frames {
@@ -84,14 +83,14 @@ fn wait(
         if interrupt.came() {
             return Some(End::Interrupted);
         }
-        // What others send is taken in any case: a queue that is full would say nothing of a rig.
-        if heard_of_a_rig(bus) > 0 && disturbs {
+        // Frames of others are always taken: a full queue would hide a rig.
+        if take_rig_frames(bus) > 0 && disturbs {
             return Some(End::LiveRig);
         }
         let now = clock.now();
         if now >= due {
             return None;
         }
-        clock.wait_until(due.min(now + PIECE));
+        clock.wait_until(due.min(now + WAIT_STEP));
     }
 }

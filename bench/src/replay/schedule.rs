@@ -1,14 +1,14 @@
-//! When each frame of a log is due, and what is not sent at all.
+//! Due time of each frame of a log, and the frames that are not sent.
 //!
-//! due = start + (stamp - first stamp), absolute: a late frame delays no other, and nothing drifts. A stamp that lies before an
-//! earlier line's is due with that one and counted; order on the bus is that of the log.
+//! due = start + (stamp - first stamp), absolute: a late frame delays no other, and there is no drift. A stamp before an
+//! earlier line's is due with that line and counted; the order on the bus is that of the log.
 
-use super::kind::{Kind, LeftOut};
+use super::kind::{Exclusion, Kind};
 use crate::recorded_log::RecordedLog;
 use protocol::can::CanFrame;
 use std::time::Duration;
 
-/// Longest log: what is longer has a stamp of another clock in it.
+/// Longest log: a longer one contains a stamp of another clock.
 pub(super) const LONGEST: Duration = Duration::from_secs(7 * 24 * 3600);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,14 +18,14 @@ pub(super) struct Due {
     pub(super) frame: CanFrame,
 }
 
-/// What is sent, and what is not.
+/// The frames to send, and counts of the others.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Schedule {
     pub(super) frames: Vec<Due>,
-    /// Left out because the file says so.
+    /// Left out on request.
     pub(super) left_out: u64,
     pub(super) error_frames: u64,
-    /// Stamps before an earlier line's.
+    /// Frames with a stamp before an earlier line's.
     pub(super) disordered: u64,
     /// Commands among `frames`.
     pub(super) commands: u64,
@@ -40,7 +40,7 @@ pub(super) struct TooLong {
 }
 
 impl Schedule {
-    pub(super) fn of(log: &RecordedLog, leave_out: &[LeftOut]) -> Result<Self, TooLong> {
+    pub(super) fn of(log: &RecordedLog, leave_out: &[Exclusion]) -> Result<Self, TooLong> {
         let first_ns = log.frames[0].record.stamp_ns;
         let mut schedule = Self::default();
         let mut newest_ns = first_ns;
@@ -66,7 +66,7 @@ impl Schedule {
         Ok(schedule)
     }
 
-    /// Whether it may not be sent beside a live rig.
+    /// Whether it must not be sent beside a live rig.
     pub(super) fn disturbs_a_rig(&self) -> bool {
         self.commands + self.of_the_rig > 0
     }
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use runlog::candump::LogReader;
 
-    fn schedule(text: &str, leave_out: &[LeftOut]) -> Result<Schedule, TooLong> {
+    fn schedule(text: &str, leave_out: &[Exclusion]) -> Result<Schedule, TooLong> {
         let frames = LogReader::new(text.as_bytes()).map(Result::unwrap).collect();
         let log = RecordedLog {
             file: "a.log".into(),
@@ -104,9 +104,9 @@ mod tests {
         let text = "(0.1) a 110#0000000000\n(0.1) a 120#0000000000000000\n(0.1) a 7F0#\n(0.1) a 20000004#\n";
         let all = schedule(text, &[]).unwrap();
         assert_eq!((all.commands, all.of_the_rig, all.error_frames, all.frames.len()), (1, 1, 1, 3));
-        let without_commands = schedule(text, &[LeftOut::Commands]).unwrap();
+        let without_commands = schedule(text, &[Exclusion::Commands]).unwrap();
         assert!(without_commands.disturbs_a_rig(), "a second rig's sensors");
-        let others = schedule(text, &[LeftOut::Commands, LeftOut::Rig]).unwrap();
+        let others = schedule(text, &[Exclusion::Commands, Exclusion::Rig]).unwrap();
         assert_eq!((others.disturbs_a_rig(), others.left_out, others.frames.len()), (false, 2, 1));
     }
 

@@ -1,4 +1,4 @@
-//! The account of a segment's frames, to the last one: for every identifier and every receiver
+//! The account of the frames of a segment, exact to the frame, for every identifier and every receiver
 //!
 //! ```text
 //!   sent = received + lost on the wire + lost at the receiver's queue + passed before it came + passed after it left
@@ -9,10 +9,10 @@
 //!   gaps at the receiver + before its first frame + after its last  =  sent + refused at the sender - received
 //! ```
 //!
-//! Counters and ticks count what a sender wanted to send, so what its own transmit queue refused is missing in the second line
-//! too, and stands there beside `sent`. That line is the other way to the same number: from the counters that senders put into
-//! commands (4 bits) and from the rig's ticks (how many sensor frames it has sent), without anything that host or kernel say.
-//! No tolerance anywhere: a host counts what passed while a peer was not there, so the ends of a connection are exact too.
+//! Counters and ticks count the frames that a sender meant to send, so frames refused by its transmit queue are missing in the
+//! second equation too and are added to `sent`. That equation is an independent count: from the counters in commands (4 bits)
+//! and from the rig's ticks (number of sensor frames sent), without data of host or kernel. There is no tolerance: a host
+//! counts what passed while a peer was absent, so the ends of a connection are exact too.
 
 use protocol::frames::ALIVE_RANGE;
 use serde::{Deserialize, Serialize};
@@ -51,47 +51,47 @@ impl<const N: usize> From<[(&str, u64); N]> for Counts {
     }
 }
 
-/// What the host of the embedded bus saw of a peer.
+/// Counters of the host of the embedded bus for a peer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Seen {
-    /// Frames that it took from the peer.
+pub(super) struct PeerCounts {
+    /// Frames received from the peer.
     pub taken: Counts,
-    /// Frames of others before the peer came.
+    /// Frames of others before the peer connected.
     pub before: Counts,
-    /// Frames that it put into the peer's queue.
+    /// Frames put into the peer's queue.
     pub delivered: Counts,
-    /// Frames that did not fit the queue.
+    /// Frames lost to its full queue.
     pub dropped: Counts,
-    /// Frames of others while the peer was off a modelled bus.
+    /// Frames of others while the peer was in bus-off of a modelled bus.
     pub missed_in_bus_off: Counts,
-    /// Frames of others after the peer had left.
+    /// Frames of others after the peer disconnected.
     pub after: Counts,
 }
 
-/// Gaps that a receiver saw by what frames say of themselves.
+/// Gaps that a receiver found by counters in the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Gaps {
-    /// The rig, of an axis's commands: gaps between the first and the last one, whose counters these are.
+    /// The rig, for the commands of an axis: gaps between the first and the last command.
     Commands {
-        /// Missing in between.
+        /// Missing between them.
         lost: u64,
-        /// Counter of the first command that came; a sender's first has 1.
+        /// Counter of the first command received; a sender starts with 1.
         first: u8,
         last: u8,
-        /// Times that a command expired, came too late to be taken, or jumped: what was lost there, four bits cannot tell.
+        /// Times that a command expired, came too late, or its counter jumped: four bits cannot tell how many were lost there.
         pauses: u64,
     },
-    /// A controller, of its axis's sensors, by the rig's ticks.
+    /// A controller, for the sensors of its axis, by the rig's ticks.
     Sensors {
-        /// Missing between the first and the last tick, which says that no more come.
+        /// Missing between the first and the last tick; the last one announces the end.
         lost: u64,
-        /// Missing before the first tick that came.
+        /// Missing before the first tick received.
         before: u64,
     },
 }
 
 impl Gaps {
-    /// All that is missing, when `sent` were sent; sums to the frame.
+    /// Number of missing frames when `sent` were sent; exact.
     pub(super) fn missing(&self, sent: u64) -> u64 {
         match *self {
             Self::Commands { lost, first, last, .. } => {
@@ -111,34 +111,34 @@ impl Gaps {
     }
 }
 
-/// A process on the bus, as it and the host tell.
+/// A process on the bus, with its counters and those of the host.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Party {
+pub(super) struct Participant {
     pub name: String,
-    /// Frames that it handed to the bus.
+    /// Frames that it passed to the bus.
     pub sent: Counts,
-    /// Frames that its transmit queue, or a bus that was down, did not take.
+    /// Frames refused by its transmit queue, or by a bus that was down.
     pub refused: Counts,
     /// Frames that it took from the bus.
     pub received: Counts,
-    /// Frames that the kernel dropped at its queue, of whatever identifier; only SocketCAN tells.
+    /// Frames of any identifier dropped by the kernel at its queue; SocketCAN only.
     pub overflow: u64,
-    /// What the host saw of it; `None` without a host.
-    pub seen: Option<Seen>,
-    /// Gaps by identifier, of those that have any to see.
+    /// Counters of the host; `None` without a host.
+    pub seen: Option<PeerCounts>,
+    /// Gaps by identifier, where frames have counters.
     pub gaps: BTreeMap<String, Gaps>,
 }
 
-/// What the wire of the embedded bus did.
+/// Counters of the wire of the embedded bus.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wire {
-    /// Frames that it lost on purpose.
+    /// Frames lost by injection.
     pub injected: Counts,
-    /// Frames that a modelled wire never sent: at a full transmit queue, or in bus-off.
+    /// Frames that a modelled wire never sent: full transmit queue, or bus-off.
     pub never_sent: Counts,
     pub passed: Counts,
-    /// Peers that are none of ours, which may have sent.
-    pub others: Vec<Seen>,
+    /// Peers other than the processes of the segment, which may have sent.
+    pub others: Vec<PeerCounts>,
 }
 
 /// One identifier at one receiver.
@@ -150,21 +150,21 @@ pub(crate) struct Row {
     pub receiver: String,
     /// Frames sent, by the sender's count.
     pub sent: u64,
-    /// Frames that the sender's transmit queue did not take: never sent, and missing all the same.
+    /// Frames refused by the sender's transmit queue: never sent, but counted as missing.
     pub refused_at_sender: u64,
     /// Frames received, by the receiver's count.
     pub received: u64,
-    /// Lost on the wire on purpose, or never sent by a modelled one, by the host's count.
+    /// Lost by injection, or never sent by a modelled wire, by the host's count.
     pub lost_on_wire: u64,
-    /// Lost at the receiver's queue, or missed in bus-off, by the host's count; on can:// the kernel's.
+    /// Lost at the receiver's queue, or missed in bus-off, by the host's count; on can:// by the kernel's.
     pub lost_at_queue: u64,
-    /// Passed before the receiver was on the bus.
+    /// Passed before the receiver connected.
     pub before_it_came: u64,
-    /// Passed after it had left.
+    /// Passed after it disconnected.
     pub after_it_left: u64,
-    /// Missing by the gaps that the receiver saw and the ends of its series; null where frames carry no count.
+    /// Missing by the gaps at the receiver and the ends of its series; null where frames have no counter.
     pub missing_by_gaps: Option<u64>,
-    /// Pauses and restarts of the sender, or answers too old to be taken: frames lost in them leave no gap to be seen.
+    /// Pauses and restarts of the sender, or answers that came too late: frames lost in them leave no gap.
     #[serde(default)]
     pub pauses: u64,
 }
@@ -173,9 +173,9 @@ pub(crate) struct Row {
 pub(super) struct Account {
     /// Each identifier at each receiver.
     pub rows: Vec<Row>,
-    /// What does not add up, a sentence each; empty when everything does.
+    /// Contradictions of the account, a sentence each; empty when it balances.
     pub broken: Vec<String>,
-    /// Where gaps and counts differ, a sentence each.
+    /// Contradictions between gaps and counts, a sentence each.
     pub gaps_broken: Vec<String>,
 }
 
@@ -189,8 +189,8 @@ impl Row {
     }
 }
 
-/// Adds up who sent and who received what. `wire`: on the embedded bus.
-pub(super) fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
+/// Computes the account; `wire` is that of the embedded bus.
+pub(super) fn close(parties: &[Participant], wire: Option<&Wire>) -> Account {
     let mut account = Account::default();
     let senders = senders(parties, wire);
     if let Some(wire) = wire {
@@ -228,7 +228,7 @@ pub(super) fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
     account
 }
 
-fn senders(parties: &[Party], wire: Option<&Wire>) -> BTreeMap<String, (String, u64)> {
+fn senders(parties: &[Participant], wire: Option<&Wire>) -> BTreeMap<String, (String, u64)> {
     let mut senders: BTreeMap<String, (String, u64)> = BTreeMap::new();
     let strangers = wire.map_or(&[][..], |wire| &wire.others).iter().map(|seen| ("another", &seen.taken));
     for (name, sent) in parties.iter().map(|party| (party.name.as_str(), &party.sent)).chain(strangers) {
@@ -243,9 +243,9 @@ fn senders(parties: &[Party], wire: Option<&Wire>) -> BTreeMap<String, (String, 
     senders
 }
 
-/// What the host says of itself must be whole before it is held against others.
+/// Checks the host's counters for consistency before they are compared with others.
 fn check_host(
-    parties: &[Party],
+    parties: &[Participant],
     wire: &Wire,
     senders: &BTreeMap<String, (String, u64)>,
     broken: &mut Vec<String>,
@@ -273,8 +273,8 @@ fn check_host(
     }
 }
 
-/// The kernel counts what it dropped and does not say of which identifier: the sum must be what is missing in all.
-fn take_overflow(party: &Party, rows: &mut [Row], broken: &mut Vec<String>) {
+/// Distributes the overflow of the kernel, which has no identifiers: the sum must equal all missing frames.
+fn take_overflow(party: &Participant, rows: &mut [Row], broken: &mut Vec<String>) {
     let missing: i128 = rows.iter().map(Row::missing).sum();
     if missing == i128::from(party.overflow) && rows.iter().all(|row| row.missing() >= 0) {
         rows.iter_mut().for_each(|row| row.lost_at_queue = row.sent - row.received);

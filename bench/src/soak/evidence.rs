@@ -1,7 +1,7 @@
-//! What a segment left in its folder, read: reports of its programs, the frame log, and who was who on the bus.
+//! Reads what a segment left in its folder: reports of its programs, the frame log, and the peers of the bus.
 
 use super::EMULATOR;
-use super::account::{self, Account, Counts, Gaps, Party, Seen, Wire};
+use super::account::{self, Account, Counts, Gaps, Participant, PeerCounts, Wire};
 use super::frame_log::{self, FrameLog, known_name};
 use super::model::Figures;
 use super::plan::Spec;
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// The files of a segment; empty where there is none.
+/// The files of a segment; defaults for missing ones.
 pub(super) struct SegmentFiles {
     pub summary: Summary,
     /// `run.json`; the machine as it stands, which goes into `soak.json`.
@@ -26,16 +26,15 @@ pub(super) struct SegmentFiles {
     pub machine: Value,
     /// `controller*.json` by its name.
     pub controllers: BTreeMap<String, ControllerReport>,
-    /// What `summary.json` and each `controller*.json` have in common, by process.
+    /// The common part of `summary.json` and each `controller*.json`, by process.
     pub reports: BTreeMap<String, ProcessReport>,
     /// `bus.log`, or why it cannot be read.
     pub log: Result<FrameLog, String>,
-    /// Files that are there and cannot be read, or are not as their types have them, each with the reason: what they would have
-    /// said is not known.
+    /// Files that exist but cannot be read or do not fit their types, each with the reason; their content is unknown.
     pub damaged: Vec<String>,
 }
 
-/// A file as its type; the type's default where there is no file, and where it is `damaged`.
+/// Reads a file as its type; returns the default for a missing file, and for an invalid one, which goes to `damaged`.
 fn read_json<T: DeserializeOwned + Default>(path: &Path, damaged: &mut Vec<String>) -> T {
     let read = match std::fs::read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return T::default(),
@@ -48,7 +47,7 @@ fn read_json<T: DeserializeOwned + Default>(path: &Path, damaged: &mut Vec<Strin
     })
 }
 
-/// Counts by the names of identifiers, unknown ones together.
+/// Counts by the names of identifiers, unknown ones added up.
 pub(super) fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts {
     let mut counts = Counts::default();
     by_name.into_iter().for_each(|(id, frames)| counts.add(&known_name(&id), frames));
@@ -79,7 +78,7 @@ impl SegmentFiles {
     /// The account, or why there is none.
     ///
     /// # Errors
-    /// A sentence that says which file is damaged, who left no report, or was on the bus twice.
+    /// A sentence with the damaged file, the missing report, or the duplicate peer.
     pub(super) fn account(&self, outcome: &Outcome) -> Result<Account, String> {
         if let Some(damaged) = self.damaged.first() {
             return Err(format!("no account: {damaged}"));
@@ -104,7 +103,7 @@ impl SegmentFiles {
         Ok(account::close(&parties, Some(&wire)))
     }
 
-    fn rig(&self) -> Party {
+    fn rig(&self) -> Participant {
         let counters = self.log.as_ref().map(|log| log.counters.clone()).unwrap_or_default();
         let axes = [("110", &self.summary.drive_commands), ("111", &self.summary.load_commands)];
         let gaps = axes.iter().filter_map(|(id, commands)| {
@@ -112,11 +111,16 @@ impl SegmentFiles {
             let pauses = commands.expired + commands.refused_stale + commands.breaks;
             Some(((*id).to_owned(), Gaps::Commands { lost: commands.lost, first, last, pauses }))
         });
-        Party { gaps: gaps.collect(), ..self.party(EMULATOR) }
+        Participant { gaps: gaps.collect(), ..self.party(EMULATOR) }
     }
 
-    /// Each peer of the host goes to its process.
-    fn wire(&self, host: &HostReport, outcome: &Outcome, parties: &mut [Party]) -> Result<Wire, String> {
+    /// Assigns each peer of the host to its process.
+    fn wire(
+        &self,
+        host: &HostReport,
+        outcome: &Outcome,
+        parties: &mut [Participant],
+    ) -> Result<Wire, String> {
         let mut wire = Wire {
             injected: counts(host.injected_loss.by_name()),
             passed: counts(host.on_wire.by_name()),
@@ -127,7 +131,7 @@ impl SegmentFiles {
             wire.never_sent.add_all(&counts(node.dropped_in_bus_off.by_name()));
         }
         for peer in &host.peers {
-            let seen = Seen {
+            let seen = PeerCounts {
                 taken: counts(peer.received_by_id.by_name()),
                 before: counts(peer.before_it_came.by_name()),
                 delivered: counts(peer.delivered.by_name()),
@@ -135,7 +139,7 @@ impl SegmentFiles {
                 missed_in_bus_off: counts(peer.missed_in_bus_off.by_name()),
                 after: counts(peer.after_it_left.by_name()),
             };
-            let is_of = |party: &&mut Party| {
+            let is_of = |party: &&mut Participant| {
                 let pid = outcome.exits.get(&party.name).map(|(pid, ..)| format!("process {pid}"));
                 pid.as_ref() == Some(&peer.name)
             };
@@ -171,26 +175,26 @@ impl SegmentFiles {
         self.controllers.values().find_map(|reported| reported.axes.get("drive"))
     }
 
-    fn party(&self, name: &str) -> Party {
+    fn party(&self, name: &str) -> Participant {
         let bus = self.reports.get(name).and_then(|report| report.bus).unwrap_or_default();
-        Party {
+        Participant {
             name: name.into(),
             sent: counts(bus.sent_by_id.by_name()),
             refused: counts(bus.dropped_on_send_by_id.by_name()),
             received: counts(bus.received_by_id.by_name()),
             overflow: bus.dropped_on_receive,
-            ..Party::default()
+            ..Participant::default()
         }
     }
 
-    fn controller(&self, name: &str, reported: &ControllerReport) -> Party {
+    fn controller(&self, name: &str, reported: &ControllerReport) -> Participant {
         let sensors = [(Axis::Drive, "120"), (Axis::Load, "121")].into_iter();
         let gaps = sensors.filter_map(|(axis, id)| {
             let axis = reported.axes.get(axis.name())?;
             let (lost, before) = (axis.sensors_lost?, axis.sensors_missed_before_first_tick?);
             Some((id.to_owned(), Gaps::Sensors { lost, before }))
         });
-        Party { gaps: gaps.collect(), ..self.party(name) }
+        Participant { gaps: gaps.collect(), ..self.party(name) }
     }
 }
 

@@ -1,7 +1,7 @@
-//! What `bus.log` tells: frames of each identifier, and the counters of the first and the last command of each axis.
+//! Content of `bus.log`: number of frames of each identifier, and the counters of the first and the last command of each axis.
 //!
-//! The log is the rig's own record, line by line as candump writes: `(stamp) interface identifier#data`. Long ones are read as
-//! a stream, so that a soak of days needs no more memory than one of minutes.
+//! The log is the rig's record in the format of candump: `(stamp) interface identifier#data`. It is read as a stream, so that
+//! memory does not depend on its length.
 
 use super::account::Counts;
 use protocol::bus::OTHERS;
@@ -47,7 +47,7 @@ pub(super) fn read(path: &Path) -> io::Result<FrameLog> {
     Ok(FrameLog { frames: by_name, counters })
 }
 
-/// The name of an identifier as peers count it: what `rig.dbc` does not know stands together.
+/// Name of an identifier as peers count it; those outside `rig.dbc` share one.
 pub(super) fn known_name(name: &str) -> String {
     let known = name.len() == 3
         && u16::from_str_radix(name, 16).is_ok_and(|id| MESSAGES.iter().any(|spec| spec.id == id));

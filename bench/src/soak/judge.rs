@@ -1,4 +1,4 @@
-//! What a finished segment is worth: its files read, its account closed, every check with its result.
+//! Judges a finished segment: reads its files, computes the account, makes every check.
 
 use super::EMULATOR;
 use super::account::{self, Account};
@@ -14,10 +14,10 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Standard deviations that the injected loss may be away from its probability.
+/// Standard deviations that the number of injected losses may differ from its expectation.
 const LOSS_DEVIATIONS: f64 = 5.0;
 
-/// Checks of a finished segment, with the figures that they rest on.
+/// Checks of a finished segment, with the underlying figures.
 pub(super) struct SegmentVerdict {
     pub checks: Vec<Check>,
     pub figures: Figures,
@@ -35,7 +35,7 @@ pub(super) fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positio
     let mut checks = vec![processes(outcome)];
     match &account {
         Ok(account) => checks.extend([
-            result("account", &account.broken, || in_numbers(account)),
+            result("account", &account.broken, || account_summary(account)),
             result("gaps", &account.gaps_broken, || {
                 "missing frames are the same by counts and by gaps".into()
             }),
@@ -65,7 +65,7 @@ fn result(name: &str, broken: &[String], good: impl Fn() -> String) -> Check {
 }
 
 fn processes(outcome: &Outcome) -> Check {
-    // Asked to end by a signal, the rig says 130, with everything saved.
+    // Stopped by a signal, the rig exits with 130 after saving everything.
     let asked = matches!(outcome.end, End::Interrupted | End::DiskFull(_));
     let as_expected =
         |name: &str, code: Option<i32>| code == Some(0) || (asked && name == EMULATOR && code == Some(130));
@@ -81,7 +81,7 @@ fn processes(outcome: &Outcome) -> Check {
     result("processes", &broken, || "all programs ended as they should".into())
 }
 
-fn in_numbers(account: &Account) -> String {
+fn account_summary(account: &Account) -> String {
     let sum = |part: fn(&account::Row) -> u64| account.rows.iter().map(part).sum::<u64>();
     format!(
         "{} frames for {} pairs of identifier and receiver: {} received, {} lost on the wire on purpose, {} lost at queues, \
@@ -95,7 +95,7 @@ fn in_numbers(account: &Account) -> String {
     )
 }
 
-/// The injected loss was as frequent as asked for; that every lost frame was found is the account's and the gaps' affair.
+/// Checks the rate of the injected loss; whether every lost frame was found is checked by the account and the gaps.
 fn loss(spec: &Spec, evidence: &SegmentFiles, account: &Account) -> Check {
     let host = evidence.summary.bus_host.as_ref();
     let injected = host.map_or(0, |host| host.injected_loss.total());
@@ -134,7 +134,7 @@ fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
     Check::new("memory", result, &detail)
 }
 
-/// Every record reached the files, and the log holds every frame that the rig counted.
+/// Checks that every record reached the files, and that the log holds every frame that the rig counted.
 fn records(evidence: &SegmentFiles, outcome: &Outcome) -> Check {
     let mut broken = Vec::new();
     for (name, report) in &evidence.reports {
@@ -163,11 +163,11 @@ fn records(evidence: &SegmentFiles, outcome: &Outcome) -> Check {
     })
 }
 
-/// A stall from which on position errors are the machine's and not the controllers': five cycles with an old valve opening.
+/// Shortest stall that excuses position errors: five cycles with an old valve opening.
 const STALL_NS: u64 = 5_000_000;
 
-/// Why broken bounds on position errors do not count, if they do not.
-fn excuse(evidence: &SegmentFiles, judge: bool) -> Option<String> {
+/// Why broken bounds on position errors do not count, if so.
+fn position_exemption(evidence: &SegmentFiles, judge: bool) -> Option<String> {
     let late = |report: &ProcessReport| report.timing.stages.wakeup_ns.max;
     let stall_ns = evidence.reports.values().filter_map(late).max().unwrap_or_default();
     if !judge {
@@ -179,7 +179,7 @@ fn excuse(evidence: &SegmentFiles, judge: bool) -> Option<String> {
     }
 }
 
-/// The position errors against the experiment's bounds on them; what did not come about in the segment's time is not judged.
+/// Compares the position errors with the experiment's bounds; errors that the segment was too short for are not judged.
 fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
     let drive = evidence.drive();
     let errors_m = [
@@ -211,9 +211,9 @@ fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
             if judged.values().all(|bound| bound.kept) {
                 return Check::new("positions", CheckResult::Passed, &reported.join("; "));
             }
-            let excuse = excuse(evidence, judge);
-            let result = if excuse.is_some() { CheckResult::Skipped } else { CheckResult::Failed };
-            reported.extend(excuse);
+            let exemption = position_exemption(evidence, judge);
+            let result = if exemption.is_some() { CheckResult::Skipped } else { CheckResult::Failed };
+            reported.extend(exemption);
             Check::new("positions", result, &reported.join("; "))
         }
     }

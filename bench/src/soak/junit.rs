@@ -1,4 +1,4 @@
-//! `soak-junit.xml`: the checks of all segments as test cases, for whatever shows tests.
+//! `soak-junit.xml`: the checks of all segments as test cases.
 
 use super::model::{Check, CheckResult, Segment, Soak};
 use crate::junit::Case;
@@ -17,7 +17,7 @@ fn cases(segment: &Segment) -> Vec<Case> {
         let check = Check::new("finished", CheckResult::Skipped, &segment.ended);
         return vec![Case { class, time_s: 0.0, check }];
     }
-    // The segment's time stands at its first check, so that the cases add up to the soak.
+    // The first check has the time of the segment, so that the cases add up to the soak.
     let time_s = |place| if place == 0 { segment.length_s } else { 0.0 };
     let checks = segment.checks.iter().enumerate();
     let case = |(place, check): (usize, &Check)| Case {

@@ -1,4 +1,4 @@
-//! A soak's own files: read at the start, written whole after every segment, so that whenever it is killed they tell of all
+//! The files of a soak: read at the start, written after every segment, so that a killed soak leaves the results of all
 //! segments before.
 //!
 //! `soak.json` is the one that the others are made of, and the one that a soak goes on from. Each appears by being renamed.
@@ -18,16 +18,16 @@ pub(super) struct SoakFolder {
     pub soak: Soak,
     pub merged: Merged,
     out: PathBuf,
-    /// Held as long as we live: one soak in a folder.
+    /// Lock on the folder, held for the life of the process.
     _lock: File,
 }
 
 impl SoakFolder {
-    /// Opens the soak in `out`, a new one or the one that is there.
+    /// Opens the soak in `out`, new or existing.
     ///
     /// # Errors
-    /// [`SoakError`]: another soak is at work here, the files cannot be read or written, or the settings differ and `anyway`
-    /// was not said.
+    /// [`SoakError`]: another soak runs in this folder, files cannot be read or written, or the settings differ without
+    /// `anyway`.
     pub(super) fn open(
         out: &Path,
         settings: Settings,
@@ -67,7 +67,7 @@ impl SoakFolder {
         Ok(keeping)
     }
 
-    /// Segments that are there and not in the account: the soak was killed while they ran.
+    /// Finds segments outside the account: the soak was killed while they ran.
     fn find_cut_off(&mut self) -> Result<(), SoakError> {
         let folder = self.out.join("segments");
         let entries = std::fs::read_dir(&folder).map_err(|error| SoakError::output(&folder, &error))?;
@@ -95,7 +95,7 @@ impl SoakFolder {
         self.soak.segments.iter().map(|segment| segment.spec.number).max().unwrap_or(0) + 1
     }
 
-    /// Adds up and writes everything.
+    /// Computes the totals and writes all files.
     pub(super) fn write(&mut self) -> Result<(), SoakError> {
         let failed = |path: &Path, error: &io::Error| SoakError::output(path, error);
         let soak = &mut self.soak;

@@ -1,6 +1,6 @@
-//! Whether a process's memory stays flat: a robust slope, and its last quarter against its second.
+//! Whether a process's memory is constant: a robust slope, and the last quarter against the second.
 //!
-//! The beginning is left out, a minute or a quarter of the record: buffers grow to their size. Of the rest
+//! The beginning is left out, a minute or a quarter of the record, in which buffers grow. Of the rest
 //!
 //! ```text
 //!   slope    median of the slopes between all pairs of samples [Theil 1950, Sen 1968]: a step or a spike does not move it
@@ -13,34 +13,34 @@
 use figures::median::median;
 use serde::{Deserialize, Serialize};
 
-/// Steepest slope that counts as flat, KiB an hour: 64 a minute.
+/// Largest slope of constant memory, KiB per hour: 64 per minute.
 pub(super) const SLOPE_LIMIT_KIB_PER_H: f64 = 64.0 * 60.0;
-/// Largest growth from the second quarter to the last that counts as flat.
+/// Largest growth from the second quarter to the last of constant memory.
 pub(super) const GROWTH_LIMIT_PERCENT: f64 = 1.0;
-/// Growth that a record without a slope may have all the same, KiB: lists that grow to their bound, and the kernel's batches.
+/// Growth allowed to short records, KiB: lists that grow to their bound, and the batches of the kernel.
 const SHORT_GROWTH_KIB: f64 = 512.0;
-/// What is left out at most, s.
+/// Longest beginning that is left out, s.
 const START_S: f64 = 60.0;
-/// Shortest record, start left out, whose slope is judged, s.
+/// Shortest record, without its beginning, whose slope is judged, s.
 const SLOPE_NEEDS_S: f64 = 120.0;
-/// Samples, start left out, below which nothing is judged.
+/// Fewest samples, without the beginning, of a record that is judged.
 const FEWEST_SAMPLES: usize = 16;
-/// Samples that are paired with each other at most; a longer record is thinned out.
+/// Most samples used for pairs; a longer record is thinned.
 const PAIRED_SAMPLES: usize = 600;
 
-/// Memory of a process at a time.
+/// Memory of a process at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sample {
-    /// Since the segment's start.
+    /// Time since the segment's start.
     pub at_s: f64,
     pub rss_kib: u64,
-    /// The largest it ever was.
+    /// Peak so far.
     pub peak_rss_kib: u64,
-    /// Resident memory with shared pages in part; read more seldom.
+    /// Proportional set size; sampled less often.
     pub pss_kib: Option<u64>,
 }
 
-/// What a process's memory did.
+/// Memory statistics of a process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Memory {
     pub samples: usize,
@@ -48,18 +48,18 @@ pub(crate) struct Memory {
     pub rss_first_kib: u64,
     /// The same, last sample.
     pub rss_last_kib: u64,
-    /// The largest it ever was.
+    /// Peak.
     pub peak_rss_kib: u64,
-    /// Resident memory with shared pages in part, last sample.
+    /// Proportional set size, last sample.
     pub pss_last_kib: Option<u64>,
-    /// Slope of the resident memory; null when the record is too short for one.
+    /// Slope of the resident memory; null for a short record.
     pub slope_kib_per_h: Option<f64>,
-    /// Median of the last quarter above that of the second; null when the record is too short.
+    /// Growth of the median from the second quarter to the last; null for a short record.
     pub growth_percent: Option<f64>,
 }
 
 impl Memory {
-    /// Of a record in the order of time.
+    /// Statistics of a record in the order of time.
     pub(crate) fn of(record: &[Sample]) -> Self {
         let Some((first, last)) = record.first().zip(record.last()) else { return Self::default() };
         let start_s = first.at_s + START_S.min((last.at_s - first.at_s) / 4.0);
@@ -83,7 +83,7 @@ impl Memory {
         }
     }
 
-    /// Whether it is flat; `None` when the record is too short to tell.
+    /// Whether memory is constant; `None` when the record is too short.
     pub(crate) fn is_flat(&self) -> Option<bool> {
         let slope_kept = self.slope_kib_per_h.is_none_or(|slope| slope < SLOPE_LIMIT_KIB_PER_H);
         let small = |growth_percent: f64| {
@@ -94,7 +94,7 @@ impl Memory {
     }
 }
 
-/// The median slope between all pairs.
+/// Median of the slopes of all pairs.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let step = points.len().div_ceil(PAIRED_SAMPLES);
     let points: Vec<_> = points.iter().step_by(step).collect();
@@ -105,7 +105,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     middle(slopes)
 }
 
-/// The median; 0 of none.
+/// The median; 0 for no values.
 fn middle(values: Vec<f64>) -> f64 {
     median(values).map_or(0.0, |median| median.value)
 }

@@ -1,5 +1,5 @@
-//! Distributions of all segments together: their `.hlog` files added up by tag, bin by bin, so that a percentile of the soak is
-//! one of its samples and no mean of percentiles.
+//! Distributions of all segments: the histograms of their `.hlog` files added up by tag, so that percentiles of the soak are
+//! those of all samples.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -19,10 +19,10 @@ use std::time::Duration;
 #[derive(Clone, Default)]
 pub(super) struct Merged(BTreeMap<String, Histogram<u64>>);
 
-/// A distribution as `soak.json` keeps it: figures for people, and the histogram to go on with.
+/// A distribution in `soak.json`: percentiles, and the histogram from which a later start goes on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StoredDistribution {
-    /// Half of the samples were at most this, ns.
+    /// Median, ns.
     pub p50_ns: u64,
     pub p90_ns: u64,
     pub p99_ns: u64,
@@ -35,7 +35,7 @@ pub(crate) struct StoredDistribution {
 }
 
 impl Merged {
-    /// Adds what a segment left in its folder. Tells what cannot be read.
+    /// Adds the histograms of a segment's folder; returns the files that cannot be read.
     pub(super) fn add_segment(&mut self, folder: &Path) -> Vec<String> {
         let mut unread = Vec::new();
         let logs = Process::ALL.map(|process| folder.join(process.hlog()));
@@ -51,7 +51,7 @@ impl Merged {
         let mut deserializer = Deserializer::new();
         let mut reader = BufReader::new(File::open(path)?);
         let mut line = Vec::new();
-        // A killed process leaves a last line without its end; the others stand.
+        // A killed process may leave an incomplete last line; the others are valid.
         while reader.read_until(b'\n', &mut line)? > 0 && line.ends_with(b"\n") {
             for entry in IntervalLogIterator::new(&line) {
                 if let Ok(LogEntry::Interval(interval)) = entry {
@@ -72,7 +72,7 @@ impl Merged {
         self.0.get_mut(tag).map_or(Ok(()), |histogram| histogram.add(more)).map_err(io::Error::other)
     }
 
-    /// Takes up what an earlier start kept.
+    /// Restores the distributions of an earlier start.
     pub(super) fn from_kept(kept: &BTreeMap<String, StoredDistribution>) -> io::Result<Self> {
         let mut merged = Self::default();
         for (tag, kept) in kept {
@@ -82,15 +82,15 @@ impl Merged {
         Ok(merged)
     }
 
-    /// What to keep.
+    /// The distributions for `soak.json`.
     ///
     /// # Errors
-    /// A histogram that cannot be written, which no counts of ours bring about.
+    /// A histogram that cannot be serialised; counts of ours never cause it.
     pub(super) fn keep(&self) -> io::Result<BTreeMap<String, StoredDistribution>> {
         self.0.iter().map(|(tag, histogram)| Ok((tag.clone(), kept(histogram)?))).collect()
     }
 
-    /// Writes all of it as one interval, under a temporary name first.
+    /// Writes all distributions as one interval, to a temporary file that is renamed.
     pub(super) fn write(&self, path: &Path, started_unix_s: f64, length: Duration) -> io::Result<()> {
         let tagged = self.0.iter().filter(|(tag, _)| !tag.is_empty());
         let parts: Vec<_> = tagged.map(|(tag, histogram)| (tag.as_str(), histogram)).collect();

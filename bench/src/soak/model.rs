@@ -1,4 +1,4 @@
-//! `soak.json`: everything that a soak knows, whole after each segment. The other result files are made of it.
+//! `soak.json`: all results of a soak, rewritten after each segment; the other result files are derived from it.
 
 use super::account::Row;
 use super::memory::Memory;
@@ -15,45 +15,45 @@ pub(crate) const SOAK_SCHEMA_VERSION: u32 = 1;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Soak {
     pub schema_version: u32,
-    /// Whether its results may be trusted so far.
+    /// Whether its results so far may be trusted.
     pub trusted: bool,
-    /// The same in one line, with what for or why not.
+    /// The verdict in one line, with its reasons.
     pub verdict: String,
     /// First start, s since 1970.
     pub started_unix_s: f64,
-    /// When this was written, s since 1970.
+    /// Time of this write, s since 1970.
     pub updated_unix_s: f64,
-    /// Length asked for.
+    /// Planned length, s.
     pub planned_s: f64,
-    /// Time soaked, of all starts.
+    /// Time soaked in all starts, s.
     pub elapsed_s: f64,
     /// Why the last start ended; null while it runs, or when it was killed.
     pub ended_because: Option<String>,
     pub settings: Settings,
-    /// Why there is no load generator although one was asked for; null otherwise.
+    /// Why the requested load generator is missing; null otherwise.
     pub load_missing_because: Option<String>,
-    /// The machine, as the emulator's first `run.json` tells it.
+    /// The machine, from the emulator's first `run.json`.
     pub machine: Value,
     /// Sums over all segments.
     pub totals: Totals,
     /// Distributions of all segments together, by tag.
     pub distributions: BTreeMap<String, StoredDistribution>,
     pub folder_bytes: u64,
-    /// Resident memory of the soak itself after the last segment.
+    /// Resident memory of the soak process after the last segment.
     pub own_rss_kib: u64,
     pub segments: Vec<Segment>,
 }
 
-/// What must be the same when a soak goes on.
+/// Settings that must not change between starts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Settings {
     pub bus: String,
     pub experiments: Vec<String>,
-    /// Length of a segment with all around it.
+    /// Length of a segment including start and end, s.
     pub segment_s: f64,
     /// Command line of the load generator; null for none.
     pub load: Option<String>,
-    /// Probability of loss in the segments that lose; null when none does.
+    /// Probability of loss in the segments with loss; null without any.
     pub loss: Option<f64>,
     pub emulator_options: String,
     pub controller_options: String,
@@ -63,7 +63,7 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// What differs from another, a few words each.
+    /// Names of the differing settings.
     pub(crate) fn differences(&self, other: &Self) -> Vec<String> {
         let tables = [self, other].map(|settings| serde_json::to_value(settings).unwrap_or_default());
         let keys = tables[0].as_object().into_iter().flatten().map(|(key, _)| key);
@@ -78,15 +78,15 @@ impl Settings {
 pub(crate) struct Totals {
     /// Segments that were accounted for.
     pub segments: usize,
-    /// Those of them with a broken check.
+    /// Segments with a failed check.
     pub failed: usize,
-    /// Segments of which nothing is known, because the soak itself was killed.
+    /// Segments without results, because the soak was killed.
     pub unfinished: usize,
     /// Cycles of the rig.
     pub cycles: u64,
-    /// Cycles that it computed late and did not send.
+    /// Cycles computed late and not sent.
     pub skipped: u64,
-    /// Commands that came too old or grew too old.
+    /// Commands that arrived too old or expired.
     pub stale_commands: u64,
     /// Frames sent, one for each sender.
     pub frames_sent: u64,
@@ -94,11 +94,11 @@ pub(crate) struct Totals {
     pub frames_due: u64,
     /// Frames received, one for each receiver.
     pub frames_received: u64,
-    /// Frames lost on purpose, one for each receiver.
+    /// Frames lost by injection, one for each receiver.
     pub lost_on_wire: u64,
     /// Frames lost at receivers' queues.
     pub lost_at_queue: u64,
-    /// Frames that passed while a receiver was not there.
+    /// Frames that passed while a receiver was absent.
     pub not_there: u64,
 }
 
@@ -109,14 +109,14 @@ pub(crate) struct Segment {
     pub folder: String,
     /// Start, s since 1970.
     pub started_unix_s: f64,
-    /// Length with all around it.
+    /// Length including start and end, s.
     pub length_s: f64,
-    /// How long the rig was to run.
+    /// Planned run time of the rig, s.
     pub rig_s: f64,
-    /// False when the soak was killed while it ran: then only its folder tells of it.
+    /// False when the soak was killed during the segment.
     pub finished: bool,
     pub ended: String,
-    /// The load generator that ran beside it, by its command line.
+    /// Command line of the load generator that ran beside it.
     pub load: Option<String>,
     pub checks: Vec<Check>,
     pub figures: Figures,
@@ -125,9 +125,9 @@ pub(crate) struct Segment {
     pub memory: BTreeMap<String, Memory>,
     /// Bytes of its folder at its end.
     pub file_bytes: u64,
-    /// The same, a second of the rig.
+    /// Bytes per second of run time of the rig.
     pub file_bytes_per_s: u64,
-    /// Whether its big files are gone.
+    /// Whether its large files were removed.
     pub rotated: bool,
 }
 
@@ -135,7 +135,7 @@ pub(crate) struct Segment {
 pub(crate) struct Check {
     pub name: String,
     pub result: CheckResult,
-    /// What was found, in a line or more.
+    /// Findings, in a line or more.
     pub detail: String,
 }
 
@@ -154,29 +154,29 @@ pub(crate) enum CheckResult {
     Skipped,
 }
 
-/// Figures of a segment's run; what nobody reported is null.
+/// Figures of a segment's run; null where no report has them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Figures {
     /// Cycles of the rig.
     pub cycles: Option<u64>,
-    /// Cycles that it computed late and did not send.
+    /// Cycles computed late and not sent.
     pub skipped: Option<u64>,
-    /// Wake-ups that missed at least one.
+    /// Wake-ups that missed at least one cycle.
     pub overruns: Option<u64>,
-    /// Commands that came too old or grew too old.
+    /// Commands that arrived too old or expired.
     pub stale_commands: Option<u64>,
     /// Frames sent, one for each sender.
     pub frames_sent: u64,
-    /// Largest error while the set-point moved.
+    /// Largest error while the set-point moved, m.
     pub position_error_dynamic_m: Option<f64>,
-    /// Largest mean error at rest.
+    /// Largest mean error at rest, m.
     pub position_error_static_m: Option<f64>,
     /// Repetitions of the experiment that were completed.
     pub repetitions: Option<u64>,
 }
 
 impl Segment {
-    /// One that was running when the soak was killed.
+    /// A segment that was interrupted by the death of the soak.
     pub(crate) fn cut_off(number: u32, experiment: &str, folder: &str) -> Self {
         Self {
             spec: Spec { number, experiment: experiment.into(), ..Spec::default() },
@@ -186,7 +186,7 @@ impl Segment {
         }
     }
 
-    /// Whether a check was broken.
+    /// Whether a check failed.
     pub(crate) fn failed(&self) -> bool {
         self.checks.iter().any(|check| check.result == CheckResult::Failed)
     }

@@ -1,5 +1,5 @@
-//! Which segment comes when: experiment, processes, load and loss by the segment's number alone, so that a soak that is
-//! taken up again goes on as if it had never stopped.
+//! Properties of each segment: experiment, processes, load and loss depend on its number alone, so that a resumed soak
+//! continues as if it had not stopped.
 //!
 //! ```text
 //!   way   processes   load   loss        the experiments go round at their own pace; when both rounds end together, the ways
@@ -11,13 +11,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Shortest segment, s: below it there is nothing but its start and its end.
+/// Shortest segment, s: a shorter one has nothing between start and end.
 pub(super) const SHORTEST_SEGMENT_S: f64 = 8.0;
-/// Usual length of a segment, s.
+/// Default length of a segment, s.
 const USUAL_SEGMENT_S: f64 = 300.0;
-/// Segments that the shortest soak is cut into: one of each way.
+/// Least number of segments of a soak: one of each way.
 const WAYS: u32 = 4;
-/// What of a segment is no run of the rig, s: starting, ending, reading what was left.
+/// Time of a segment without a run of the rig, s: starting, ending, reading its files.
 const AROUND_S: f64 = 2.5;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,11 +25,11 @@ pub(crate) struct Spec {
     /// Its number, from 1.
     pub number: u32,
     pub experiment: String,
-    /// Whether each axis has a controller process of its own.
+    /// Whether each axis has its own controller process.
     pub two_processes: bool,
     /// Whether the load generator runs.
     pub load: bool,
-    /// Probability that a frame is lost on purpose; null without.
+    /// Probability of an injected loss of a frame; null without injection.
     pub loss: Option<f64>,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct Plan {
     pub experiments: Vec<String>,
     /// Whether there is a load generator.
     pub load: bool,
-    /// Probability of loss in the segments that lose; null for none.
+    /// Probability of loss in the segments with loss; null without any.
     pub loss: Option<f64>,
 }
 
@@ -62,8 +62,8 @@ impl Spec {
         format!("{:04}-{}", self.number, self.experiment)
     }
 
-    /// What sets it apart, in words.
-    pub(crate) fn in_words(&self) -> String {
+    /// Its properties for messages.
+    pub(crate) fn description(&self) -> String {
         let mut words =
             vec![if self.two_processes { "two controllers" } else { "one controller" }.to_owned()];
         words.extend(self.load.then(|| "under load".to_owned()));
@@ -72,14 +72,14 @@ impl Spec {
     }
 }
 
-/// Length of a segment with all around it, for a soak of `planned_s`.
+/// Length of a segment including start and end, for a soak of `planned_s`.
 pub(super) fn segment_s(asked_s: Option<f64>, planned_s: f64) -> f64 {
     asked_s.unwrap_or_else(|| (planned_s / f64::from(WAYS)).clamp(SHORTEST_SEGMENT_S, USUAL_SEGMENT_S))
 }
 
-/// How long the rig runs in the next segment, of `segment_s` with all around it; `None` when too little of the soak is left.
+/// Run time of the rig in the next segment, of length `segment_s`; `None` when too little of the soak is left.
 pub(super) fn rig_s(segment_s: f64, left_s: f64) -> Option<f64> {
-    // The last one may be shorter or longer than the others by a part that would be none of its own.
+    // The last segment is longer or shorter than the others instead of a remainder of its own.
     let with_rest = if left_s < segment_s + SHORTEST_SEGMENT_S { left_s } else { segment_s };
     (with_rest >= SHORTEST_SEGMENT_S).then(|| ((with_rest - AROUND_S) * 10.0).round() / 10.0)
 }
@@ -124,7 +124,7 @@ mod tests {
             [(false, false, false), (true, true, false), (true, false, true), (false, true, false)]
         );
         assert_eq!(seen[2].folder(), "0003-e2");
-        assert_eq!(seen[2].in_words(), "two controllers, 1 % loss");
+        assert_eq!(seen[2].description(), "two controllers, 1 % loss");
     }
 
     #[test]

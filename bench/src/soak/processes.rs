@@ -1,5 +1,5 @@
-//! Programs that a soak starts: in process groups of their own, so that Ctrl-C at the terminal reaches the soak alone, and bound
-//! to it, so that none goes on when it is killed.
+//! Programs that a soak starts: in process groups of their own, so that Ctrl-C at the terminal reaches the soak alone, and with
+//! a parent-death signal, so that none survives it.
 
 use super::cli::ChildArguments;
 use rustix::process::{
@@ -16,17 +16,17 @@ use std::time::{Duration, Instant};
 const POLL: Duration = Duration::from_millis(20);
 
 /// A program that a soak started.
-pub(crate) struct Running {
+pub(crate) struct RunningProgram {
     pub name: String,
     child: Child,
     ended: Option<ExitStatus>,
 }
 
-impl Running {
-    /// Starts a program; what it says goes to a file.
+impl RunningProgram {
+    /// Starts a program with its output in a file.
     pub(crate) fn start(name: &str, program: &Path, arguments: &[OsString], said: &Path) -> io::Result<Self> {
         let file = File::create(said)?;
-        // Through this program, which binds itself to us and becomes the other one: the same process.
+        // Through this program, which sets the parent-death signal and executes the other: the same process.
         let child = Command::new(std::env::current_exe()?)
             .arg("soak-child")
             .arg(std::process::id().to_string())
@@ -45,7 +45,7 @@ impl Running {
         self.child.id()
     }
 
-    /// Whether it still runs.
+    /// Whether it is running.
     pub(crate) fn is_running(&mut self) -> bool {
         if self.ended.is_none() {
             self.ended = self.child.try_wait().ok().flatten();
@@ -58,7 +58,7 @@ impl Running {
     }
 
     fn signal(&mut self, signal: Signal) {
-        // Gone already: that is what was asked for.
+        // Fails where the process has ended.
         if self.is_running()
             && let Some(pid) = Pid::from_raw(self.pid() as i32)
         {
@@ -77,21 +77,21 @@ impl Running {
         true
     }
 
-    /// Sees to it that it ends: what it was asked for before it gets so long for, then it is killed with all that it started.
+    /// Ensures its end: waits for `patience`, then kills its process group.
     pub(crate) fn end(&mut self, patience: Duration) -> Option<ExitStatus> {
         if !self.wait_until(Instant::now() + patience) {
             self.signal(Signal::KILL);
             self.wait_until(Instant::now() + patience);
         }
         if let Some(group) = Pid::from_raw(self.pid() as i32) {
-            // Nobody left in the group is the usual case.
+            // Usually the group is empty already.
             let _ = kill_process_group(group, Signal::KILL);
         }
         self.ended
     }
 }
 
-impl Drop for Running {
+impl Drop for RunningProgram {
     fn drop(&mut self) {
         self.interrupt();
         self.end(Duration::from_secs(2));
@@ -107,13 +107,13 @@ pub(crate) fn end_in_words(status: Option<ExitStatus>) -> String {
     }
 }
 
-/// Becomes the program, after asking for a SIGTERM when `parent` ends. Returns only when that fails.
+/// Executes the program, after requesting SIGTERM at the end of `parent`. Returns only on failure.
 #[must_use]
 pub(crate) fn become_child(arguments: &ChildArguments) -> io::Error {
     if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
         return error.into();
     }
-    // It may have ended before it was asked for.
+    // The parent may have ended before the request.
     if getppid().map(Pid::as_raw_pid) != Some(arguments.parent) {
         return io::Error::other("the soak that started this has gone");
     }

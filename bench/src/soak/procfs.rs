@@ -1,17 +1,17 @@
-//! What the system tells of processes, files and interfaces while a segment runs.
+//! Data of the system about processes, files and interfaces.
 
 use super::memory::Sample;
 use std::path::Path;
 
-/// Memory of a process; `None` when it is gone. With `pss`, the kernel walks all its pages, which holds its address space for a
-/// moment: seldom enough, that disturbs nobody.
+/// Memory of a process; `None` when it has ended. With `pss` the kernel walks all pages and locks the address space briefly, so
+/// it is sampled rarely.
 pub(super) fn memory(pid: u32, at_s: f64, pss: bool) -> Option<Sample> {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
     let pss_kib = pss
         .then(|| std::fs::read_to_string(format!("/proc/{pid}/smaps_rollup")).ok())
         .flatten()
         .and_then(|text| kib(&text, "Pss:"));
-    // A process that has ended and is not yet waited for has a status without memory.
+    // A zombie has a status without memory.
     Some(Sample { at_s, rss_kib: kib(&status, "VmRSS:")?, peak_rss_kib: kib(&status, "VmHWM:")?, pss_kib })
 }
 
@@ -19,7 +19,7 @@ fn kib(text: &str, key: &str) -> Option<u64> {
     text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok()
 }
 
-/// Bytes of all files in a folder and below.
+/// Bytes of all files in a folder, recursively.
 pub(super) fn folder_bytes(folder: &Path) -> u64 {
     let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
     let bytes = entries.filter_map(Result::ok).map(|entry| match entry.file_type() {
@@ -30,19 +30,19 @@ pub(super) fn folder_bytes(folder: &Path) -> u64 {
     bytes.sum()
 }
 
-/// Bytes free for this user on the disk of a folder; `None` when the system does not tell.
+/// Free bytes for this user on the disk of a folder; `None` when the system does not report them.
 pub(super) fn free_bytes(folder: &Path) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder).ok()?;
     Some(disk.f_bavail * disk.f_frsize)
 }
 
-/// Frames that an interface has sent since it is there; `None` when it does not tell.
+/// Frames sent by an interface since it exists; `None` when the system does not report them.
 pub(super) fn sent_by_interface(interface: &str) -> Option<u64> {
     let path = format!("/sys/class/net/{interface}/statistics/tx_packets");
     std::fs::read_to_string(path).ok()?.trim().parse().ok()
 }
 
-/// Sockets that listen to all frames of a CAN interface, error frames apart; `None` without CAN in the kernel.
+/// Number of sockets that receive all frames of a CAN interface, error frames apart; `None` without CAN in the kernel.
 pub(super) fn listeners(interface: &str) -> Option<usize> {
     let list = std::fs::read_to_string("/proc/net/can/rcvlist_all").ok()?;
     Some(list.lines().filter(|line| line.split_whitespace().next() == Some(interface)).count())

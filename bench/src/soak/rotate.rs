@@ -1,4 +1,5 @@
-//! Big files of older segments go, so that a soak of any length needs a known room: the newest and the failed ones keep theirs.
+//! Removes large files of older segments, so that a soak of any length needs a known space: the newest and the failed ones keep
+//! theirs.
 
 use super::model::Segment;
 use runlog::process::{HLOG_END, TIMING_END};
@@ -7,7 +8,7 @@ use runlog::{Axis, flight_dump};
 use std::io;
 use std::path::Path;
 
-/// Removes the big files of segments that keep theirs no longer; marks them.
+/// Removes the large files of older segments and marks the segments.
 pub(super) fn rotate(out: &Path, segments: &mut [Segment], keep: u64, keep_failed: u64) -> io::Result<()> {
     let (mut newest, mut failed) = (0, 0);
     for segment in segments.iter_mut().rev() {
@@ -23,7 +24,7 @@ pub(super) fn rotate(out: &Path, segments: &mut [Segment], keep: u64, keep_faile
 }
 
 fn remove_big(folder: &Path) -> io::Result<()> {
-    // Gone already, by hand or with its folder: that is what is wanted.
+    // Removed by hand already.
     let gone = |result: io::Result<()>| match result {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         result => result,
@@ -45,7 +46,7 @@ fn remove_big(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether a file grows with a segment's length. What such tables and logs add up to stands in `soak.json` and `soak.hlog`.
+/// Whether a file grows with the segment's length. Sums of such tables and logs are in `soak.json` and `soak.hlog`.
 fn is_big(name: &str) -> bool {
     [BUS_LOG, MEASUREMENT_CSV, TRUTH_CSV, PROBE_CSV].contains(&name)
         || Axis::ALL.into_iter().any(|axis| controller_csv(axis) == name)

@@ -1,13 +1,13 @@
-//! One segment while it runs: emulator, controllers and load started in their order, watched once a second, ended together.
+//! Runs one segment: emulator, controllers and load are started in order, sampled once a second, and ended together.
 //!
-//! The controllers come first, so that on can:// everybody listens before the first frame; the rig ends by itself after its time,
-//! and its farewell ends the controllers. When one of them goes before its time, the others are ended too: what they
-//! have recorded stays, and the next segment is another one.
+//! The controllers start first, so that on can:// all listen before the first frame; the rig ends after its time, and its last
+//! tick ends the controllers. When one of them ends early, the others are ended too: their records stay, and the next segment
+//! is independent.
 
 use super::cli::SoakArguments;
 use super::memory::Sample;
 use super::plan::Spec;
-use super::processes::{Running, end_in_words};
+use super::processes::{RunningProgram, end_in_words};
 use super::procfs;
 use super::{EMULATOR, SoakError};
 use protocol::bus::BusUrl;
@@ -18,57 +18,57 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Between two looks at the processes.
-const LOOK: Duration = Duration::from_millis(50);
-/// Between two samples of memory and files.
-const SAMPLE: Duration = Duration::from_secs(1);
-/// Samples from one look at the proportional share to the next.
+/// Period of the polls of the processes.
+const POLL_PERIOD: Duration = Duration::from_millis(50);
+/// Period of the samples of memory and files.
+const SAMPLE_PERIOD: Duration = Duration::from_secs(1);
+/// Number of samples between two of the proportional set size.
 const PSS_EVERY: usize = 10;
-/// How long controllers may take to listen on can://.
-const LISTEN: Duration = Duration::from_secs(20);
-/// How long programs may take to save and end.
-const SAVE: Duration = Duration::from_secs(20);
+/// Longest time until controllers listen on can://.
+const LISTEN_TIMEOUT: Duration = Duration::from_secs(20);
+/// Longest time for programs to save and end.
+const SAVE_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// What all segments of a soak have in common.
+/// Properties common to all segments of a soak.
 pub(super) struct Common<'a> {
     pub arguments: &'a SoakArguments,
     pub bin_dir: PathBuf,
-    /// Command line of the load generator, its program first; empty for none.
+    /// Command line of the load generator, program first; empty without one.
     pub load: Vec<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum End {
     TimeUp,
-    /// Somebody asked the soak to end.
+    /// The soak was asked to end.
     Interrupted,
-    /// The disk is nearly full: so many bytes are left.
+    /// The disk is nearly full: free bytes.
     DiskFull(u64),
-    /// A program ended before its time, or did not end.
+    /// A program ended early, or did not end.
     Early(String),
 }
 
-/// What a segment leaves besides its files.
+/// Results of a segment besides its files.
 pub(super) struct Outcome {
     pub end: End,
-    /// Each program's process number, and its exit code, `None` when it has none; by name.
+    /// Process number, exit code (`None` after a signal) and end in words of each program, by name.
     pub exits: BTreeMap<String, (u32, Option<i32>, String)>,
     pub memory: BTreeMap<String, Vec<Sample>>,
-    /// Frames that the interface sent meanwhile; `None` on the embedded bus, and where the system does not tell.
+    /// Frames that the interface sent meanwhile; `None` on the embedded bus, and where the system does not report them.
     pub sent_by_interface: Option<u64>,
 }
 
-/// Tells a person how far the segment is: seconds since its start.
-pub(super) type Tell<'a> = dyn FnMut(f64) + 'a;
+/// Reports progress: seconds since the start of the segment.
+pub(super) type Progress<'a> = dyn FnMut(f64) + 'a;
 
-/// Runs a segment of `rig_s` in `folder`, which is made.
+/// Runs a segment of `rig_s` in `folder`, which is created.
 pub(super) fn run(
     common: &Common<'_>,
     spec: &Spec,
     rig_s: f64,
     folder: &Path,
     interrupt: &Interrupt,
-    tell: &mut Tell<'_>,
+    progress: &mut Progress<'_>,
 ) -> Result<Outcome, SoakError> {
     std::fs::create_dir_all(folder).map_err(|error| SoakError::output(folder, &error))?;
     let interface = interface(&common.arguments.bus);
@@ -83,13 +83,13 @@ pub(super) fn run(
         rig_s,
         |free| free < common.arguments.min_free_mb * 1_000_000,
         interrupt,
-        tell,
+        progress,
         folder,
     );
     if end != End::TimeUp {
-        // The rig's farewell ends the controllers with all that they were sent; so it goes first.
+        // The rig's last tick ends the controllers after they received everything; so the rig ends first.
         running[0].interrupt();
-        running[0].wait_until(Instant::now() + SAVE / 2);
+        running[0].wait_until(Instant::now() + SAVE_TIMEOUT / 2);
     }
     let controllers_end = Instant::now() + Duration::from_secs(2);
     for program in running.iter_mut().skip(1) {
@@ -98,7 +98,7 @@ pub(super) fn run(
         }
     }
     let exits = running.iter_mut().map(|program| {
-        let status = program.end(SAVE);
+        let status = program.end(SAVE_TIMEOUT);
         (program.name.clone(), (program.pid(), status.and_then(|status| status.code()), end_in_words(status)))
     });
     let exits = exits.collect();
@@ -122,7 +122,7 @@ struct Start<'a> {
 }
 
 impl Start<'_> {
-    /// The bus of this segment; the seed goes with its number, so that each loses others.
+    /// The bus of this segment; the seed is its number, so that losses differ between segments.
     fn bus(&self) -> BusUrl {
         let mut bus = self.common.arguments.bus.clone();
         if let (BusUrl::Unix { wire, .. }, Some(loss)) = (&mut bus, self.spec.loss) {
@@ -131,7 +131,7 @@ impl Start<'_> {
         bus
     }
 
-    fn program(&self, name: &str, program: &str, more: Vec<OsString>) -> Result<Running, SoakError> {
+    fn program(&self, name: &str, program: &str, more: Vec<OsString>) -> Result<RunningProgram, SoakError> {
         let (path, asked) = (self.common.bin_dir.join(program), self.common.arguments);
         let experiment = asked.experiment_folder.join(format!("{}.toml", self.spec.experiment));
         let mut arguments: Vec<OsString> = vec!["run".into(), "--bus".into(), self.bus().to_string().into()];
@@ -143,19 +143,19 @@ impl Start<'_> {
         self.start(name, &path, &arguments)
     }
 
-    fn start(&self, name: &str, path: &Path, arguments: &[OsString]) -> Result<Running, SoakError> {
+    fn start(&self, name: &str, path: &Path, arguments: &[OsString]) -> Result<RunningProgram, SoakError> {
         let said = self.folder.join(format!("{name}.txt"));
-        Running::start(name, path, arguments, &said)
+        RunningProgram::start(name, path, arguments, &said)
             .map_err(|error| SoakError::Program { program: path.into(), reason: error.to_string() })
     }
 
-    fn emulator(&self, rig_s: f64) -> Result<Running, SoakError> {
+    fn emulator(&self, rig_s: f64) -> Result<RunningProgram, SoakError> {
         let mut more: Vec<OsString> = vec!["--seconds".into(), rig_s.to_string().into()];
         more.extend(self.common.arguments.emulator_options.split_whitespace().map(Into::into));
         self.program(EMULATOR, "emulator", more)
     }
 
-    fn controllers(&self) -> Result<Vec<Running>, SoakError> {
+    fn controllers(&self) -> Result<Vec<RunningProgram>, SoakError> {
         let interface = interface(&self.common.arguments.bus);
         let before = interface.and_then(procfs::listeners);
         let mut controllers = Vec::new();
@@ -166,23 +166,23 @@ impl Start<'_> {
             controllers.push(self.program(process.name(), "controller", more)?);
         }
         if let Some((interface, before)) = interface.zip(before) {
-            let until = Instant::now() + LISTEN;
+            let until = Instant::now() + LISTEN_TIMEOUT;
             let wanted = before + controllers.len();
             while procfs::listeners(interface).is_some_and(|now| now < wanted) && Instant::now() < until {
-                std::thread::sleep(LOOK);
+                std::thread::sleep(POLL_PERIOD);
             }
         }
         Ok(controllers)
     }
 
-    fn load(&self) -> Result<Option<Running>, SoakError> {
+    fn load(&self) -> Result<Option<RunningProgram>, SoakError> {
         let Some((program, arguments)) = self.common.load.split_first() else { return Ok(None) };
         let arguments: Vec<OsString> = arguments.iter().map(Into::into).collect();
         self.start("load", Path::new(program), &arguments).map(Some)
     }
 }
 
-/// What is watched while programs run.
+/// Samples taken while programs run.
 struct Watch {
     began: Instant,
     samples: usize,
@@ -190,24 +190,24 @@ struct Watch {
 }
 
 impl Watch {
-    /// Waits until the emulator, the first of `running`, has ended, or something ends the segment before.
+    /// Waits until the emulator, the first of `running`, has ended, or the segment ends early.
     fn until_the_end(
         &mut self,
-        running: &mut [Running],
+        running: &mut [RunningProgram],
         rig_s: f64,
         too_full: impl Fn(u64) -> bool,
         interrupt: &Interrupt,
-        tell: &mut Tell<'_>,
+        progress: &mut Progress<'_>,
         folder: &Path,
     ) -> End {
-        let latest = self.began + Duration::from_secs_f64(rig_s) + SAVE;
+        let latest = self.began + Duration::from_secs_f64(rig_s) + SAVE_TIMEOUT;
         loop {
-            if self.began.elapsed() >= SAMPLE * self.samples as u32 {
+            if self.began.elapsed() >= SAMPLE_PERIOD * self.samples as u32 {
                 self.sample(running);
                 if let Some(free) = procfs::free_bytes(folder).filter(|free| too_full(*free)) {
                     return End::DiskFull(free);
                 }
-                tell(self.began.elapsed().as_secs_f64());
+                progress(self.began.elapsed().as_secs_f64());
             }
             if interrupt.came() {
                 return End::Interrupted;
@@ -218,7 +218,7 @@ impl Watch {
             if gone.iter().any(|name| name == EMULATOR) && in_time {
                 return End::TimeUp;
             }
-            // The farewell is heard a little before the rig's own end.
+            // Controllers receive the last tick slightly before the rig ends.
             if !gone.is_empty() && !in_time {
                 let after_s = self.began.elapsed().as_secs_f64();
                 return End::Early(format!("{} ended after {after_s:.1} of {rig_s} s", gone.join(" and ")));
@@ -226,11 +226,11 @@ impl Watch {
             if Instant::now() > latest {
                 return End::Early("the emulator did not end in time".into());
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_PERIOD);
         }
     }
 
-    fn sample(&mut self, running: &mut [Running]) {
+    fn sample(&mut self, running: &mut [RunningProgram]) {
         let at_s = self.began.elapsed().as_secs_f64();
         let pss = self.samples.is_multiple_of(PSS_EVERY);
         for program in running.iter_mut() {

@@ -1,14 +1,14 @@
-//! A soak in one line and on one page: whether it may be trusted, and what for or why not.
+//! The verdict of a soak in one line and on one page: whether it may be trusted, and the reasons.
 
 use super::model::{CheckResult, Segment, Soak};
 use std::fmt::Write;
 
-/// Broken checks that the one line names.
+/// Most failed checks that the one line names.
 const NAMED: usize = 4;
-/// Characters of each that it quotes; soak.md has all of them.
+/// Most characters of each that it quotes; soak.md has all of them.
 const QUOTED: usize = 120;
 
-/// Whether the soak may be trusted, and the line that says so.
+/// Whether the soak may be trusted, and the line with the reasons.
 pub(super) fn of(soak: &Soak) -> (bool, String) {
     let totals = &soak.totals;
     if totals.segments == 0 {
@@ -109,7 +109,7 @@ fn row(segment: &Segment) -> String {
     format!(
         "| {} | {} | {:.0} | {result} | {} | {} | {} | {} | {error} |\n",
         segment.folder,
-        segment.spec.in_words(),
+        segment.spec.description(),
         segment.length_s,
         figure(segment.figures.skipped),
         figure(segment.figures.stale_commands),

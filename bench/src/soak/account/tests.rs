@@ -4,34 +4,34 @@ use super::*;
 
 /// A rig and a controller; two of 1000 sensor frames were lost on the wire, one at the controller's queue, three passed before it
 /// came; of 996 commands one was lost on the wire, and one came when the rig had left.
-fn whole() -> (Vec<Party>, Wire) {
-    let rig = Party {
+fn whole() -> (Vec<Participant>, Wire) {
+    let rig = Participant {
         name: "emulator".into(),
         sent: Counts::from([("120", 1000), ("130", 100)]),
         received: Counts::from([("110", 994)]),
-        seen: Some(Seen {
+        seen: Some(PeerCounts {
             taken: Counts::from([("120", 1000), ("130", 100)]),
             delivered: Counts::from([("110", 994)]),
             after: Counts::from([("110", 1)]),
-            ..Seen::default()
+            ..PeerCounts::default()
         }),
         // 996 = 62 * 16 + 4: the last one sent has counter 4; the last that came 3, so one is missing behind it.
         gaps: BTreeMap::from([("110".into(), Gaps::Commands { lost: 0, first: 2, last: 3, pauses: 0 })]),
-        ..Party::default()
+        ..Participant::default()
     };
-    let controller = Party {
+    let controller = Participant {
         name: "controller".into(),
         sent: Counts::from([("110", 996)]),
         received: Counts::from([("120", 994), ("130", 100)]),
-        seen: Some(Seen {
+        seen: Some(PeerCounts {
             taken: Counts::from([("110", 996)]),
             before: Counts::from([("120", 3)]),
             delivered: Counts::from([("120", 994), ("130", 100)]),
             dropped: Counts::from([("120", 1)]),
-            ..Seen::default()
+            ..PeerCounts::default()
         }),
         gaps: BTreeMap::from([("120".into(), Gaps::Sensors { lost: 2, before: 4 })]),
-        ..Party::default()
+        ..Participant::default()
     };
     let wire = Wire {
         injected: Counts::from([("120", 2), ("110", 1)]),
@@ -41,7 +41,7 @@ fn whole() -> (Vec<Party>, Wire) {
     (vec![rig, controller], wire)
 }
 
-fn broken(change: impl Fn(&mut Vec<Party>, &mut Wire)) -> Account {
+fn broken(change: impl Fn(&mut Vec<Participant>, &mut Wire)) -> Account {
     let (mut parties, mut wire) = whole();
     change(&mut parties, &mut wire);
     close(&parties, Some(&wire))
@@ -91,7 +91,7 @@ fn gaps_that_differ_by_one_break_the_gaps_alone() {
 
 #[test]
 fn a_stranger_that_sends_is_a_sender_and_its_frames_must_arrive() {
-    let stranger = Seen { taken: Counts::from([("108", 5)]), ..Seen::default() };
+    let stranger = PeerCounts { taken: Counts::from([("108", 5)]), ..PeerCounts::default() };
     let account = broken(|parties, wire| {
         wire.others = vec![stranger.clone()];
         wire.passed.add("108", 5);
