@@ -13,12 +13,12 @@ use std::path::PathBuf;
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
 }
 
 /// What the controller can do.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Run an experiment with the rig on a bus.
     Run(Box<RunArguments>),
     /// Run an experiment with the plant model inside this process: no bus, faster than real time, the same program.
@@ -38,18 +38,18 @@ pub enum Command {
 
 /// What an A2L file is made for.
 #[derive(Args, Debug)]
-pub struct A2lArguments {
+pub(crate) struct A2lArguments {
     /// What is controlled.
     #[command(flatten)]
-    pub files: FileArguments,
+    pub(crate) files: FileArguments,
     /// Axis that the file describes.
     #[arg(long, value_enum)]
-    pub axis: OneAxis,
+    pub(crate) axis: OneAxis,
 }
 
 /// One of the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum OneAxis {
+pub(crate) enum OneAxis {
     /// Position controlled.
     Drive,
     /// Force controlled.
@@ -58,14 +58,14 @@ pub enum OneAxis {
 
 /// An algorithm as a file.
 #[derive(Args, Debug)]
-pub struct Library {
+pub(crate) struct Library {
     /// Shared library, built against airbench_algorithm.h.
-    pub file: PathBuf,
+    pub(crate) file: PathBuf,
 }
 
 /// How the controllers are paced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Pace {
+pub(crate) enum Pace {
     /// Answer the rig's frames as they arrive.
     Real,
     /// Join the barrier of the embedded bus.
@@ -74,7 +74,7 @@ pub enum Pace {
 
 /// Which axes a process controls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Axes {
+pub(crate) enum Axes {
     /// The drive's alone; another process has the load.
     Drive,
     /// The load's alone; another process has the drive.
@@ -85,7 +85,7 @@ pub enum Axes {
 
 impl Axes {
     /// The axes, in the order in which they are answered.
-    pub fn list(self) -> &'static [Axis] {
+    pub(crate) fn list(self) -> &'static [Axis] {
         match self {
             Self::Drive => &[Axis::Drive],
             Self::Load => &[Axis::Load],
@@ -96,64 +96,64 @@ impl Axes {
 
 /// How to run with a rig on a bus.
 #[derive(Args, Debug)]
-pub struct RunArguments {
+pub(crate) struct RunArguments {
     /// What is controlled.
     #[command(flatten)]
-    pub files: FileArguments,
+    pub(crate) files: FileArguments,
     /// Bus: can://IFACE (SocketCAN) or unix:///PATH (embedded).
     #[arg(long, default_value_t = BusUrl::default_embedded())]
-    pub bus: BusUrl,
+    pub(crate) bus: BusUrl,
     /// Which axes this process controls.
     #[arg(long, value_enum, default_value_t = Axes::Both)]
-    pub axis: Axes,
+    pub(crate) axis: Axes,
     /// Run without the other axis's controller; needs --axis drive or load.
     #[arg(long)]
-    pub alone: bool,
+    pub(crate) alone: bool,
     /// real: answer frames as they arrive; lockstep: join the barrier.
     #[arg(long, value_enum, default_value_t = Pace::Real)]
-    pub pace: Pace,
+    pub(crate) pace: Pace,
     /// Look for changes of the program files while running, and take over their numbers.
     #[arg(long)]
-    pub watch: bool,
+    pub(crate) watch: bool,
     /// Let XCP on CAN measure the controllers (drive 0x1E0 and 0x1E1, load 0x1E2 and 0x1E3), and change their parameters with the
     /// key of FILE; without FILE nothing can be changed. See controller/docs/xcp.md.
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
-    pub xcp: Option<Option<PathBuf>>,
+    pub(crate) xcp: Option<Option<PathBuf>>,
     /// Write the time stamps of every cycle to controller-timing.csv, about 200 bytes a cycle; only with --pace real.
     #[arg(long)]
-    pub full_timing: bool,
+    pub(crate) full_timing: bool,
     /// Freeze the flight recorder when waking or executing takes longer than this, in us; with --pace real.
     #[arg(long, default_value_t = 500, value_name = "US", value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
-    pub flight_late_us: u64,
+    pub(crate) flight_late_us: u64,
     /// Turn off the flight recorder.
     #[arg(long)]
-    pub no_flight: bool,
+    pub(crate) no_flight: bool,
     /// How long bus and sensors may be gone before giving up, in s.
     #[arg(long, default_value_t = 10.0, value_parser = grace)]
-    pub bus_grace: f64,
+    pub(crate) bus_grace: f64,
     /// FIFO priority, 1 to 99.
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(1..=99))]
-    pub fifo_priority: u8,
+    pub(crate) fifo_priority: u8,
     /// CPU to be pinned to; not pinned without it.
     #[arg(long)]
-    pub cpu: Option<usize>,
+    pub(crate) cpu: Option<usize>,
     /// Ask the system for no priority, no locked memory and no latency request.
     #[arg(long)]
-    pub no_realtime: bool,
+    pub(crate) no_realtime: bool,
 }
 
 /// How to rehearse.
 #[derive(Args, Debug)]
-pub struct RehearseArguments {
+pub(crate) struct RehearseArguments {
     /// What is controlled.
     #[command(flatten)]
-    pub files: FileArguments,
+    pub(crate) files: FileArguments,
     /// Seed of the sensors' noise.
     #[arg(long, default_value_t = 1)]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// End after this much of the rig's time, in s, if the experiment is not done before.
     #[arg(long, default_value_t = 600.0, value_parser = grace)]
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 fn grace(text: &str) -> Result<f64, String> {

@@ -3,11 +3,13 @@
 //! | file | holds |
 //! |---|---|
 //! | [`cli`], [`listing`] | command line, and the commands that print |
-//! | [`run`], [`pace`] | a run: threads; the node goes on frames or the barrier, and leaves the bus |
+//! | [`run`], [`pace`] | a run: threads; the loop over frames or the barrier, and its end |
 //! | [`rehearse`] | the command of a rehearsal |
-//! | [`timing`] | when everything of a cycle happened; histograms, timing tables, flight recorder |
+//! | [`timing`] | time stamps of a cycle; histograms, timing tables, flight recorder |
 //! | [`recording`], [`report`] | tables and report of a run |
-//! | [`reload`] | numbers of changed program files, taken over while running |
+//! | [`reload`] | changed numbers of program files, applied while running |
+
+#![warn(missing_docs)] // an interface of other crates
 
 pub mod cli;
 mod listing;
@@ -25,10 +27,10 @@ use clap::Parser;
 use plugin::command;
 use std::process::ExitCode;
 
-/// The controllers of a process, each within reach of XCP where that is asked for.
+/// The node with the controllers of a process, each with an XCP port if asked for.
 type Node = axis_control::node::ControllerNode<xcp::port::Port>;
 
-/// Runs the command that the process's arguments name.
+/// Runs the command that the process's arguments name; returns the exit code of the process.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(arguments) => run::run(&arguments),

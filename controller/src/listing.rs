@@ -1,4 +1,4 @@
-//! The list of all algorithms and of all parameters, for people.
+//! Lists of all algorithms and parameters.
 
 use crate::cli::{A2lArguments, OneAxis};
 use crate::run::RunError;
@@ -14,12 +14,12 @@ use std::io::{self, Write};
 use xcp::a2l::{self, AxisDescription};
 
 pub(crate) fn print() -> Exit {
-    // A closed pipe is the reader's wish.
+    // A closed pipe, as of `| head`, is no error.
     let _ = write(&mut io::stdout().lock());
     Exit::Good
 }
 
-/// Prints the parameters of the axes that the experiment speaks of, as a parameter set.
+/// Prints the parameters of the axes of the experiment, as a parameter set.
 pub(crate) fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(files)?;
     let mut texts = Vec::new();
@@ -28,7 +28,7 @@ pub(crate) fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> 
         let program = controller.program();
         texts.push(parameter_set::text(axis, program.variables(), program.values()));
     }
-    // A closed pipe is the reader's wish.
+    // A closed pipe, as of `| head`, is no error.
     let _ = write!(io::stdout(), "{}", texts.join("\n"));
     Ok(Exit::Good)
 }

@@ -1,7 +1,7 @@
-//! What moves the controllers: the rig's frames as they arrive, or the lockstep barrier.
+//! The loop of the controllers, driven by the rig's frames as they arrive, or by the lockstep barrier.
 //!
-//! In real time the controllers have no clock of their own that could drift against the rig's: the sensors of a cycle wake
-//! them, and their wake-up latency is counted from the arrival of the frame at our queue (see [`crate::timing`]).
+//! In real time the controllers have no clock of their own that could drift against that of the rig: the sensors of a cycle
+//! wake them, and their wake-up latency counts from the arrival of the frame at our queue (see [`crate::timing`]).
 
 use crate::Node;
 use crate::timing::{Stopwatch, StopwatchAccount};
@@ -12,28 +12,27 @@ use protocol::bus::{Bus, BusError, Received};
 use realtime::{Clock, Continued, Interrupt, VitalsReader};
 use std::time::{Duration, Instant as WallInstant};
 
-/// Longest wait for a frame before looking at the world again.
-const PATIENCE: Duration = Duration::from_millis(20);
+/// Longest wait for a frame before signals and silence are checked.
+const LONGEST_WAIT: Duration = Duration::from_millis(20);
 /// Silence of the rig after which a message is printed; the rig shuts its valve by itself.
 const SILENCE: Duration = Duration::from_millis(200);
-/// Silence after Done that counts as the rig's end.
+/// Silence after Done that counts as the end of the rig.
 const DONE_SILENCE: Duration = Duration::from_secs(1);
-/// Silence of the bus after which a rig that ended is expected to say nothing more: five times what lies between two of its
-/// farewells.
-const QUIET: Duration = Duration::from_millis(50);
-/// Longest stay after the rig's end on a bus that others keep busy.
-const LONGEST_STAY: Duration = Duration::from_millis(300);
-/// Answers that the allocation count leaves out at the start.
+/// Silence of the bus after the end of the rig that counts as the end of all frames: five times the interval of the last ticks.
+const END_SILENCE: Duration = Duration::from_millis(50);
+/// Longest time that frames are drained from a busy bus after the end of the rig.
+const LONGEST_DRAIN: Duration = Duration::from_millis(300);
+/// Answers at the start without allocation count.
 const WARM_UP: u64 = 1000;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum End {
-    /// The rig said that it ends, or fell silent after Done.
+    /// The rig announced its end, or was silent after Done.
     RigEnded,
     Interrupted,
-    /// The bus was gone, or no sensors came, for longer than the grace time.
+    /// The bus was down, or no sensors came, for longer than the grace time.
     BusGone,
-    /// The experiment was aborted or a fault stopped it, and nothing may start it again.
+    /// The experiment was aborted or stopped by a fault, and cannot be started again.
     Stopped,
     LockstepTimeout,
 }
@@ -42,14 +41,15 @@ pub(crate) enum End {
 pub(crate) struct RunContext<'a> {
     pub(crate) node: &'a mut Node,
     pub(crate) bus: &'a mut dyn Bus,
-    /// How long the rig may be silent.
+    /// Longest silence of the rig.
     pub(crate) grace: Duration,
     pub(crate) interrupt: &'a Interrupt,
 }
 
 pub(crate) struct RunOutcome {
     pub(crate) end: End,
-    /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
+    /// Allocations in the 1 ms path after warm-up; `None` without the counting allocator, and for a run shorter than the
+    /// warm-up.
     pub(crate) allocations: Option<u64>,
     pub(crate) stopwatch: StopwatchAccount,
 }
@@ -62,24 +62,24 @@ pub(crate) fn run_real(
 ) -> RunOutcome {
     let RunContext { node, bus, grace, interrupt } = context;
     let mut vitals = VitalsReader::new(continued);
-    let mut rig = RigLife::new(node);
-    // Not being connected yet is no loss; only what was up can be lost.
+    let mut rig = RigActivity::new(node);
+    // A bus that was never up is not lost.
     let mut was_up = true;
     let mut ever_up = false;
     let mut disconnects = 0;
     let mut watch = None;
     stopwatch.begin();
     let end = loop {
-        bus.wait_readable(PATIENCE);
+        bus.wait_readable(LONGEST_WAIT);
         if watch.is_none() && node.answered() >= WARM_UP {
             watch = Some(realtime::allocations::watch());
         }
         stopwatch.woke();
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
             let sensors = node.take(&frame);
-            stopwatch.took(&frame, stamp_ns, sensors);
+            stopwatch.frame_taken(&frame, stamp_ns, sensors);
         }
-        stopwatch.took_all();
+        stopwatch.batch_taken();
         let answered = node.answer(&mut stopwatch.bus(bus));
         stopwatch.answered(answered, || vitals.read());
         if interrupt.came() {
@@ -89,7 +89,7 @@ pub(crate) fn run_real(
             break End::RigEnded;
         }
         ever_up |= bus.is_up();
-        // Both at once after a stall in which it went and came back.
+        // Both events, after a stall in which the bus went and returned.
         let times_gone = bus.counters().disconnects;
         let went = times_gone != std::mem::replace(&mut disconnects, times_gone);
         if went && ever_up && was_up {
@@ -100,7 +100,7 @@ pub(crate) fn run_real(
             was_up = bus.is_up();
             node.tell(if was_up { NodeEvent::BusBack } else { NodeEvent::BusLost });
         }
-        let quiet = rig.quiet(node);
+        let quiet = rig.silence(node);
         if node.stopped_for() > STOPPED_CYCLES {
             break End::Stopped;
         }
@@ -118,19 +118,19 @@ pub(crate) fn run_real(
     RunOutcome { end, allocations, stopwatch: stopwatch.finish() }
 }
 
-/// Takes what is still said on the bus when `rig_ended`, then takes leave and what had arrived by then. The frames are counted by
-/// the bus and have no other effect.
+/// Takes the remaining frames of the bus if `rig_ended`, then leaves it and takes what had arrived by then. The bus counts the
+/// frames; they have no other effect.
 ///
-/// The rig says several times that it ends, and whoever shares the bus may still speak; a controller that left at the first word
-/// would leave frames in its queue that the bus delivered and that nobody received, and the account would have an open end.
-pub(crate) fn hear_out(bus: &mut dyn Bus, rig_ended: bool) {
+/// The rig announces its end several times, and other nodes may still send. A controller that left at the first announcement
+/// would leave delivered frames in its queue, and the account of the frames would not balance.
+pub(crate) fn drain_and_leave(bus: &mut dyn Bus, rig_ended: bool) {
     let take_all = |bus: &mut dyn Bus| {
         std::iter::from_fn(|| matches!(bus.receive(), Received::Frame(..)).then_some(())).count()
     };
     let began = WallInstant::now();
     let mut last_heard = began;
-    while rig_ended && bus.is_up() && last_heard.elapsed() < QUIET && began.elapsed() < LONGEST_STAY {
-        bus.wait_readable(QUIET);
+    while rig_ended && bus.is_up() && last_heard.elapsed() < END_SILENCE && began.elapsed() < LONGEST_DRAIN {
+        bus.wait_readable(END_SILENCE);
         if take_all(bus) > 0 {
             last_heard = WallInstant::now();
         }
@@ -139,26 +139,26 @@ pub(crate) fn hear_out(bus: &mut dyn Bus, rig_ended: bool) {
     take_all(bus);
 }
 
-struct RigLife {
-    heard: (PerAxis, Option<u64>),
+struct RigActivity {
+    counts: (PerAxis, Option<u64>),
     last: WallInstant,
     silent: bool,
 }
 
-impl RigLife {
+impl RigActivity {
     fn new(node: &Node) -> Self {
-        Self { heard: Self::heard(node), last: WallInstant::now(), silent: false }
+        Self { counts: Self::counts(node), last: WallInstant::now(), silent: false }
     }
 
-    /// What others say is no life of the rig: it sends sensors and ticks.
-    fn heard(node: &Node) -> (PerAxis, Option<u64>) {
+    /// Counts of the rig's frames, sensors and ticks; those of other nodes do not count.
+    fn counts(node: &Node) -> (PerAxis, Option<u64>) {
         (node.view().received, node.view().cycle())
     }
 
-    /// For how long it has been silent; tells a person when that begins.
-    fn quiet(&mut self, node: &mut Node) -> Duration {
-        let before = std::mem::replace(&mut self.heard, Self::heard(node));
-        if self.heard != before {
+    /// Duration of its silence; reports when the silence begins.
+    fn silence(&mut self, node: &mut Node) -> Duration {
+        let before = std::mem::replace(&mut self.counts, Self::counts(node));
+        if self.counts != before {
             self.last = WallInstant::now();
         }
         let quiet = self.last.elapsed();
@@ -184,7 +184,7 @@ pub(crate) fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOut
             Received::Barrier(control) => match control.kind {
                 Kind::Go { .. } => {
                     waiting_since = None;
-                    // Here, since a run that goes on never finds the queue empty.
+                    // Checked here, since the queue of a running rig is never empty.
                     if interrupt.came() {
                         break End::Interrupted;
                     }
@@ -204,10 +204,10 @@ pub(crate) fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOut
                 if interrupt.came() {
                     break End::Interrupted;
                 }
-                // A host that went took the rig with it; simulated time does not go on elsewhere.
+                // Without its host the bus has no rig, and simulated time ends.
                 let since = *waiting_since.get_or_insert_with(WallInstant::now);
                 if bus.counters().disconnects > 0 || since.elapsed() > grace {
-                    // The farewell itself may be lost on the wire; a rig that goes when all is done has ended.
+                    // The last tick may be lost on the wire; a rig that leaves when all is done has ended.
                     let ended = node.ending() || node.done();
                     break if ended { End::RigEnded } else { End::BusGone };
                 }

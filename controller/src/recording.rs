@@ -1,6 +1,6 @@
-//! `controller-drive.csv` and `controller-load.csv`: what only a controller knows, a row for each recorded cycle.
+//! `controller-drive.csv` and `controller-load.csv`: the internal values of a controller, a row for each recorded cycle.
 //!
-//! A thread of its own polls the queues, so that the 1 ms path wakes nobody.
+//! A separate thread polls the queues, so that the 1 ms path wakes no thread.
 
 use crate::reload::Reloader;
 use crate::report::axis_of;
@@ -70,25 +70,25 @@ pub(crate) struct Writer {
     pub(crate) tables: Tables,
     pub(crate) records: Receiver<AxisRecord>,
     pub(crate) news: Receiver<NodeEvent>,
-    /// Who looks at the program files, if anybody does.
+    /// Poller of the program files, with `--watch`.
     pub(crate) reloader: Option<Reloader>,
-    /// Who does what XCP asks for, if it may.
+    /// Worker for parameter files, with `--xcp`.
     pub(crate) parameter_files: Option<ParameterFileWorker>,
-    /// Stamps of the stopwatch and their recorder, where time is real.
+    /// Queues of the stopwatch and their recorder, in real time.
     pub(crate) timing: Option<TimingQueues>,
 }
 
-/// What is left when the queues' senders are gone.
-pub(crate) struct Written {
+/// Results of the writer when the senders of its queues are gone.
+pub(crate) struct WriterResult {
     pub(crate) reported: Vec<NodeEvent>,
     pub(crate) failure: Option<String>,
     pub(crate) timing: Option<TimingFigures>,
 }
 
 impl Writer {
-    /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
-    /// which does not return, when an algorithm never does, with everything written.
-    pub(crate) fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
+    /// Writes rows and prints events until the senders are gone. `failed` is called when nothing can be written any more;
+    /// `stuck`, which does not return, when an algorithm does not return, after everything was written.
+    pub(crate) fn run(self, failed: impl Fn(), stuck: impl Fn()) -> WriterResult {
         let Self { mut tables, records, news, mut reloader, mut parameter_files, mut timing } = self;
         let mut reported = Vec::new();
         let mut last_flush = Instant::now();
@@ -96,7 +96,7 @@ impl Writer {
         let mut watch = Stuck::default();
         loop {
             let mut finished = false;
-            // No more than wait: where rows come faster than they are written, news are not to wait for their end.
+            // At most the rows that wait now, so that events are not delayed where rows arrive faster than they are written.
             for _ in 0..=records.len() {
                 match records.try_recv() {
                     Ok(record) if failure.is_none() => {
@@ -106,7 +106,7 @@ impl Writer {
                     Err(gone) => finished = gone == TryRecvError::Disconnected,
                 }
             }
-            reloader.iter_mut().for_each(Reloader::look);
+            reloader.iter_mut().for_each(Reloader::poll);
             parameter_files.iter_mut().for_each(ParameterFileWorker::poll);
             for item in news.try_iter() {
                 protocol::say!("controller: {}", sentence(item));
@@ -121,7 +121,7 @@ impl Writer {
                 note(&mut failure, if finished { timing.finish() } else { timing.poll() });
             }
             if watch.look() {
-                // The process ends here; a failure of the last write has nobody left to be reported to.
+                // The process ends here, so that a failure of the last write cannot be reported.
                 let _ = tables.write_out();
                 let _ = timing.as_mut().map(TimingQueues::finish);
                 stuck();
@@ -136,7 +136,7 @@ impl Writer {
                 failed();
             }
             if finished || failure.is_some() {
-                return Written { reported, failure, timing: timing.map(|timing| timing.figures()) };
+                return WriterResult { reported, failure, timing: timing.map(|timing| timing.figures()) };
             }
             std::thread::sleep(POLL_PERIOD);
         }

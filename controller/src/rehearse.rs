@@ -1,6 +1,6 @@
 //! `controller rehearse`: a rehearsal with the files of a run.
 //!
-//! It leaves what a run on a bus leaves, save for what only a bus has: no `bus.log`, no latencies.
+//! It leaves the files of a run, without those of the bus: no `bus.log`, no latencies.
 
 use crate::cli::RehearseArguments;
 use crate::recording::{Tables, sentence};
@@ -25,10 +25,10 @@ use runlog::timing_recorder::TimingFigures;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Rehearses as the command line asks.
+/// Rehearses an experiment.
 ///
 /// # Errors
-/// [`RunError`] when it cannot start or be saved; how it went is the exit code.
+/// [`RunError`] when it cannot start or be saved; the result is the exit code.
 pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(&arguments.files)?;
     let file = arguments.files.experiment.display().to_string();
@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     save(arguments, &inputs, &scene, finished)
 }
 
-/// Removes what runs in real time left; a rehearsal has no timing.
+/// Removes the timing files of runs in real time.
 fn clear_timing(out: &Path) -> std::io::Result<()> {
     for process in Process::ALL {
         if process != Process::Emulator {
@@ -84,7 +84,7 @@ fn clear_timing(out: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Ends the process when an algorithm never returns, which this thread could not.
+/// Ends the process when an algorithm does not return and blocks its thread.
 fn end_when_stuck() {
     std::thread::spawn(|| {
         let mut watch = Stuck::default();

@@ -1,7 +1,7 @@
-//! Parameters changed while running: the program files are looked at, and numbers that changed are handed to the loop.
+//! Changes of parameters while running: polls the program files and passes changed numbers to the loop.
 //!
-//! It runs in the recorder's thread. A file that is wrong changes nothing and says why; what needs more than a number (another
-//! algorithm, library or linearisation), or a number that is read at the start only, needs another start, and says so.
+//! It runs in the recorder's thread. An invalid file changes nothing and is reported; so are changes that need a restart
+//! (another algorithm, library or linearisation, or a number that is fixed at the start).
 
 use axis_control::node::Change;
 use axis_control::program::Variable;
@@ -13,14 +13,14 @@ use settings::SettingsError;
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
-const LOOK_PERIOD: Duration = Duration::from_millis(250);
+const POLL_PERIOD: Duration = Duration::from_millis(250);
 
 struct ProgramFile {
     axis: Axis,
     path: PathBuf,
     changed: Option<SystemTime>,
     text: String,
-    makings: FixedSettings,
+    fixed: FixedSettings,
     variables: Vec<Variable>,
     values: Vec<f64>,
 }
@@ -29,7 +29,7 @@ pub(crate) struct Reloader {
     rig: RigParameters,
     files: Vec<ProgramFile>,
     changes: Sender<Change>,
-    looked: Instant,
+    last_poll: Instant,
 }
 
 impl Reloader {
@@ -39,14 +39,14 @@ impl Reloader {
             ProgramFile::new(source, *axis, &inputs.rig).ok()
         };
         let files = axes.iter().filter_map(watched).collect();
-        Self { rig: inputs.rig.clone(), files, changes, looked: Instant::now() }
+        Self { rig: inputs.rig.clone(), files, changes, last_poll: Instant::now() }
     }
 
-    pub(crate) fn look(&mut self) {
-        if self.looked.elapsed() < LOOK_PERIOD {
+    pub(crate) fn poll(&mut self) {
+        if self.last_poll.elapsed() < POLL_PERIOD {
             return;
         }
-        self.looked = Instant::now();
+        self.last_poll = Instant::now();
         for file in &mut self.files {
             let changed = std::fs::metadata(&file.path).and_then(|file| file.modified()).ok();
             if changed == file.changed {
@@ -62,24 +62,24 @@ impl Reloader {
 
 impl ProgramFile {
     fn new(source: &Source, axis: Axis, rig: &RigParameters) -> Result<Self, SettingsError> {
-        let makings = source.makings()?;
+        let fixed = source.makings()?;
         let program = source.program(axis, rig, false)?;
         let (variables, values) = (program.variables().to_vec(), program.values().to_vec());
         let path = source.path.clone();
         let changed = std::fs::metadata(&path).and_then(|file| file.modified()).ok();
-        Ok(Self { axis, path, changed, text: source.text.clone(), makings, variables, values })
+        Ok(Self { axis, path, changed, text: source.text.clone(), fixed, variables, values })
     }
 
-    /// Hands on the numbers that changed: all of them, or none and why not.
+    /// Queues the numbers that changed: all of them, or none with the reason.
     fn take_over(&mut self, rig: &RigParameters, changes: &Sender<Change>) -> Result<(), String> {
         let source = Source::read(&self.path).map_err(|error| error.to_string())?;
         if source.text == self.text {
             return Ok(());
         }
         let reported = |problem: String| format!("{}: {problem}", self.path.display());
-        // Before a library is loaded that would not be used.
-        let makings = source.makings().map_err(|error| error.to_string())?;
-        if let Some(problem) = other_making(&self.makings, &makings) {
+        // Checked before the library is loaded.
+        let fixed = source.makings().map_err(|error| error.to_string())?;
+        if let Some(problem) = fixed_change(&self.fixed, &fixed) {
             return Err(reported(problem));
         }
         let new = Self::new(&source, self.axis, rig).map_err(|error| error.to_string())?;
@@ -108,13 +108,13 @@ impl ProgramFile {
     }
 }
 
-/// What is said of the first thing that another program is made of.
-fn other_making(old: &FixedSettings, new: &FixedSettings) -> Option<String> {
+/// Message about the first setting that needs a restart.
+fn fixed_change(old: &FixedSettings, new: &FixedSettings) -> Option<String> {
     let mut keys = new.keys().chain(old.keys());
     let key = keys.find(|key| old.get(*key) != new.get(*key))?;
     let what = if key.ends_with("linearisation") { "linearisation" } else { "algorithm" };
     let reported =
-        |makings: &FixedSettings| makings.get(key).map_or("left out".into(), |text| format!("\"{text}\""));
+        |settings: &FixedSettings| settings.get(key).map_or("left out".into(), |text| format!("\"{text}\""));
     Some(format!("{key} is {} and was {}; another {what} needs another start", reported(new), reported(old)))
 }
 
@@ -193,9 +193,9 @@ still_m = 0.001
             let text = format!("title = \"t\"\n[algorithm]\nlibrary = \"{name}\"\n");
             Source { path: "p.toml".into(), title: "t".into(), text }.makings().unwrap()
         };
-        let problem = other_making(&library("a.so"), &library("b.so")).unwrap();
+        let problem = fixed_change(&library("a.so"), &library("b.so")).unwrap();
         assert!(problem.starts_with("algorithm.library is \"b.so\" and was \"a.so\""), "{problem}");
-        assert_eq!(other_making(&library("a.so"), &library("a.so")), None);
+        assert_eq!(fixed_change(&library("a.so"), &library("a.so")), None);
     }
 
     #[test]

@@ -49,7 +49,7 @@ fn of_axis<P: CalibrationPort>(
     }
 }
 
-/// Of every controller of a node, without what XCP did.
+/// Reports of all controllers of a node, without their XCP counters.
 pub(crate) fn of_node<P: CalibrationPort>(
     node: &ControllerNode<P>,
     inputs: &Inputs,
@@ -63,7 +63,7 @@ pub(crate) fn is_done(axis: &AxisReport) -> bool {
     axis.chain_state == MainChainState::Done.name()
 }
 
-/// The axis that was stopped, the one with the fault before one that only followed it.
+/// The axis that was stopped; one with a fault before one that followed it.
 pub(crate) fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &AxisReport)> {
     [MainChainState::Fault, MainChainState::Aborted].iter().find_map(|state| {
         let (name, axis) = axes.iter().find(|(_, axis)| axis.chain_state == state.name())?;
@@ -71,7 +71,7 @@ pub(crate) fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &Axi
     })
 }
 
-/// The process that runs these axes, as its files are named.
+/// The process that runs these axes, for the names of its files.
 pub(crate) fn process(axes: &[Axis]) -> Process {
     match axes {
         [axis] => Process::ControllerOf(axis_of(*axis)),
@@ -79,7 +79,7 @@ pub(crate) fn process(axes: &[Axis]) -> Process {
     }
 }
 
-/// The axis as files name it.
+/// The axis of the file names.
 pub(crate) fn axis_of(axis: Axis) -> runlog::Axis {
     match axis {
         Axis::Drive => runlog::Axis::Drive,

@@ -1,9 +1,9 @@
-//! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
+//! One run of the controllers: reads files, opens the bus, starts threads, saves everything however it ends.
 
 use crate::Node;
 use crate::cli::{Axes, Pace, RunArguments};
 use crate::pace::{self, End, RunContext, RunOutcome};
-use crate::recording::{Tables, Writer, Written};
+use crate::recording::{Tables, Writer, WriterResult};
 use crate::reload::Reloader;
 use crate::report::{self, AxisReport, Report};
 use crate::timing::Stopwatch;
@@ -30,12 +30,12 @@ use xcp::config::XcpConfig;
 use xcp::parameter_files::{AxisParameters, ParameterFileWorker};
 use xcp::port::{Port, Queues};
 
-/// Rows that fit the queue: 16 s of both axes.
+/// Capacity of the queue of rows: 16 s of both axes.
 const ROW_QUEUE: usize = 32 * 1024;
 const NEWS_QUEUE: usize = 1024;
 const CHANGE_QUEUE: usize = 1024;
 const NOTE_QUEUE: usize = 1024;
-/// One copy of an axis's parameters is under way at most.
+/// At most one copy of an axis's parameters is in transit.
 const RETURNED_QUEUE: usize = 2;
 
 #[derive(Debug, thiserror::Error)]
@@ -70,10 +70,10 @@ impl RunError {
     }
 }
 
-/// Runs the controllers as the command line asks.
+/// Runs the controllers.
 ///
 /// # Errors
-/// [`RunError`] when the run cannot start or be saved; how it went is the exit code.
+/// [`RunError`] when the run cannot start or be saved; the result is the exit code.
 pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     if arguments.pace == Pace::Lockstep && matches!(arguments.bus, BusUrl::Can { .. }) {
         return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
@@ -116,7 +116,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let timing = real_time.then(|| setup::begin(arguments, &started, signals.freeze)).transpose()?;
     let (stopwatch, timing) = timing.unzip();
     std::thread::scope(|scope| {
-        // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
+        // The writer owns the receivers: when it fails, no sender blocks on a full queue.
         let asking = &signals.interrupt;
         let writer = scope.spawn(move || {
             let writer = Writer { tables, records, news, reloader, parameter_files, timing };
@@ -124,7 +124,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         });
         let bus = bus.as_mut();
         let (interrupt, continued) = (&signals.interrupt, signals.continued);
-        let parts = Work { arguments, inputs: &inputs, node, stopwatch, bus, interrupt, continued };
+        let parts = ControlLoop { arguments, inputs: &inputs, node, stopwatch, bus, interrupt, continued };
         let work = scope.spawn(|| parts.run());
         let finished = join(work);
         let written = join(writer);
@@ -132,7 +132,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     })
 }
 
-/// A port for each controller, and the worker for their files; their A2L files go into the run's folder.
+/// A port for each controller, and the worker for their files; writes their A2L files into the run's folder.
 fn open_xcp(
     arguments: &RunArguments,
     inputs: &Inputs,
@@ -148,7 +148,7 @@ fn open_xcp(
         let (returned_sender, returned) = bounded(RETURNED_QUEUE);
         let queues = Queues { notes: note_sender.clone(), returned };
         let title = inputs.program_title(axis);
-        // In simulated time everything is the same in each run, seeds too.
+        // In simulated time runs repeat exactly, seeds included.
         let random = if arguments.pace == Pace::Real { random()? } else { [0; 16] };
         ports.push(Port::new(controller, &title, config, random, queues).map_err(RunError::input)?);
         let (variables, values) = (program.variables().to_vec(), program.values().to_vec());
@@ -162,7 +162,7 @@ fn open_xcp(
     Ok((ports, Some(ParameterFileWorker::new(notes, axes, changes.clone(), out))))
 }
 
-/// Where seeds begin: what the system holds for random.
+/// Start of the seeds, from the random source of the system.
 fn random() -> Result<[u8; 16], RunError> {
     const SOURCE: &str = "/dev/urandom";
     let mut bytes = [0; 16];
@@ -185,7 +185,7 @@ impl Signals {
     }
 }
 
-/// Ends the process whose loop is stuck in an algorithm, for good: its thread cannot be asked to.
+/// Ends the process whose loop is stuck in an algorithm; its thread cannot be stopped.
 fn end_stuck(out: &Path, axes: &[Axis]) {
     protocol::say!("controller: {STUCK}");
     let exit = Exit::BoundBroken;
@@ -198,7 +198,7 @@ fn end_stuck(out: &Path, axes: &[Axis]) {
     std::process::exit(exit as i32);
 }
 
-struct Finished {
+struct LoopResult {
     outcome: RunOutcome,
     grants: Grants,
     bus: BusCounters,
@@ -211,11 +211,11 @@ struct Finished {
 
 struct FinishedRun {
     started: RunStart,
-    finished: Finished,
-    written: Written,
+    finished: LoopResult,
+    written: WriterResult,
 }
 
-struct Work<'a> {
+struct ControlLoop<'a> {
     arguments: &'a RunArguments,
     inputs: &'a Inputs,
     node: Node,
@@ -225,9 +225,9 @@ struct Work<'a> {
     continued: Continued,
 }
 
-impl Work<'_> {
-    /// The node goes at the end, and with it the sending ends of the recorder's queues.
-    fn run(self) -> Result<Finished, RunError> {
+impl ControlLoop<'_> {
+    /// Consumes the node, and with it the senders of the recorder's queues.
+    fn run(self) -> Result<LoopResult, RunError> {
         let Self { arguments, inputs, mut node, stopwatch, bus, interrupt, continued } = self;
         let grants = acquire_realtime(arguments);
         let grace = Duration::from_secs_f64(arguments.bus_grace);
@@ -237,7 +237,7 @@ impl Work<'_> {
             None => pace::run_lockstep(context, member_name(arguments.axis))?,
         };
         if arguments.pace == Pace::Real {
-            pace::hear_out(bus, outcome.end == End::RigEnded);
+            pace::drain_and_leave(bus, outcome.end == End::RigEnded);
         }
         let mut axes = report::of_node(&node, inputs);
         for axis in Axis::ALL {
@@ -245,7 +245,7 @@ impl Work<'_> {
                 report.xcp = Some(port.counters());
             }
         }
-        Ok(Finished {
+        Ok(LoopResult {
             outcome,
             grants,
             bus: *bus.counters(),
@@ -276,7 +276,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
 }
 
 fn verdict(arguments: &RunArguments, run: &FinishedRun) -> (Exit, String) {
-    let Finished { outcome, axes, .. } = &run.finished;
+    let LoopResult { outcome, axes, .. } = &run.finished;
     let done = arguments.files.repeat || axes.values().all(report::is_done);
     let stopped = report::stopped(axes);
     let aborted = || {
@@ -303,7 +303,7 @@ fn verdict(arguments: &RunArguments, run: &FinishedRun) -> (Exit, String) {
 fn save(arguments: &RunArguments, inputs: &Inputs, run: FinishedRun) -> Result<Exit, RunError> {
     let (exit, ended_because) = verdict(arguments, &run);
     let FinishedRun { started, finished, written } = run;
-    let Finished { outcome, grants, bus, axes, .. } = finished;
+    let LoopResult { outcome, grants, bus, axes, .. } = finished;
     let sum = |of: fn(&AxisReport) -> u64| axes.values().map(of).sum::<u64>();
     protocol::say!(
         "controller: {ended_because}; {} cycles answered, {} sensor frames lost",

@@ -1,23 +1,23 @@
-//! When everything of a cycle happened, as the 1 ms path stamps it; nothing of it runs in lockstep or in a rehearsal.
+//! Time stamps of a cycle in the 1 ms path; unused in lockstep and in a rehearsal.
 //!
 //! ```text
 //!   sensors arrive ── woke ── take(frame)* ── step ── send* ── done        one wake-up
 //!        due                    receive      the rest  in bus.send
 //! ```
 //!
-//! A row is a cycle that was answered. One process for both axes may wake twice for it, since the load's sensors follow the
-//! drive's. Then the lengths of both wake-ups add up in one row, and `done` stands where it would be without the wait in between,
-//! which is the rig's and no work of ours; `command_ns` of the load tells when it was really answered. So receive, step and send
-//! are the whole of `done - woke`. Two cycles that were answered in one wake-up, the load's and after a stall the drive's next,
-//! each took all of it.
+//! A row is an answered cycle. A process for both axes may wake twice for it, since the sensors of the load follow those of the
+//! drive. Then the stages of both wake-ups are added in one row, and `done` excludes the wait in between, which is no work of
+//! this process; `command_ns` of the load is the true time of its answer. Receive, step and send therefore add up to the time
+//! from `woke` to `done`. If two cycles are answered in one wake-up (the load's, and after a stall the drive's next), each row
+//! has the whole wake-up.
 //!
-//! Sensors that were overtaken by newer ones before anybody woke are in no row, save as its `skipped`. So that a stall shows
-//! with everything that waited, the waiting of each such frame of the axis that wakes us is handed over by itself.
+//! Sensors that were overtaken by newer ones before the wake-up are in no row, except in its `skipped`. To show a stall with
+//! all frames that waited, the wait of each such frame of the waking axis is a sample of its own.
 //!
-//! What arrived before the loop began to wait was not late: a cycle is due then at the earliest, and sensors from before are
-//! counted apart.
+//! Frames that arrived before the loop started were not late: the earliest due time of a cycle is the start, and earlier
+//! sensors are counted separately.
 //!
-//! This side stamps and hands over; the recorder's thread ([`queues`]) does the rest. Nothing here allocates, locks, prints or
+//! This side stamps and queues; the recorder's thread ([`queues`]) does the rest. Nothing here allocates, locks, prints or
 //! blocks.
 
 pub(crate) mod queues;
@@ -32,14 +32,14 @@ use realtime::{Clock, VitalCounts};
 use runlog::timing::{CycleTiming, Exchange};
 pub(crate) use timed_bus::TimedBus;
 
-/// Cycles that an answer may be older than the newest one and still belong to the same rig; below, the rig began anew.
+/// Largest age of an answer in cycles; an older one means that the rig restarted.
 const SAME_RIG: u64 = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Measured {
-    /// Sensors of the axis that wakes us that begin no row.
+pub(crate) enum TimingSample {
+    /// Sensors of the waking axis that begin no row.
     Waited {
-        /// When they arrived at our queue, ns.
+        /// Arrival at our queue, ns.
         arrived_ns: u64,
         woke_ns: u64,
     },
@@ -47,23 +47,23 @@ pub(crate) enum Measured {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Passed {
-    /// When it arrived or was handed over, ns.
+pub(crate) struct StampedFrame {
+    /// Time of arrival or of sending, ns.
     pub(crate) stamp_ns: u64,
     pub(crate) frame: CanFrame,
     pub(crate) sent: bool,
 }
 
 pub(crate) struct Outlets {
-    pub(crate) measured: Sender<Measured>,
-    pub(crate) frames: Sender<Passed>,
+    pub(crate) measured: Sender<TimingSample>,
+    pub(crate) frames: Sender<StampedFrame>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct StopwatchAccount {
-    /// Stamps and frames that found no room in a queue.
+    /// Samples and frames lost to a full queue.
     pub(crate) dropped: u64,
-    /// Sensors of the axis that wakes us that had arrived before the loop began, and that no row answers.
+    /// Sensors of the waking axis that arrived before the loop started and that no row answers.
     pub(crate) before_start: u64,
 }
 
@@ -71,13 +71,13 @@ pub(crate) struct StopwatchAccount {
 struct WakeUp {
     woke_ns: u64,
     received_ns: u64,
-    /// Summed over the frames sent.
+    /// Sum over the frames sent.
     send_ns: u64,
-    /// When the command of each axis was handed over; 0: not.
+    /// Time of sending of the command of each axis; 0: not sent.
     handed_ns: [u64; 2],
 }
 
-/// Stamps wake-ups and puts the rows together.
+/// Stamps wake-ups and assembles the rows.
 pub(crate) struct Stopwatch<C> {
     clock: C,
     own: [bool; 2],
@@ -86,19 +86,19 @@ pub(crate) struct Stopwatch<C> {
     account: StopwatchAccount,
     began_ns: u64,
     wake_up: WakeUp,
-    /// Arrival of the newest sensors of each own axis; 0: they are answered.
+    /// Arrival of the newest sensors of each axis of this process; 0: answered.
     arrived_ns: [u64; 2],
-    /// The newest sensors of the axis that wakes us, until they are in a row.
-    waiting: Option<Measured>,
+    /// The newest sensors of the waking axis, until they are in a row.
+    waiting: Option<TimingSample>,
     pending: Option<CycleTiming>,
     newest: Option<u64>,
 }
 
 impl<C: Clock + Send> Stopwatch<C> {
-    /// A stopwatch for a process with these axes, the first of which wakes it.
+    /// A stopwatch for a process with these axes, of which the first wakes it.
     ///
     /// # Panics
-    /// Without axes: no process has none.
+    /// Without axes.
     pub(crate) fn new(clock: C, axes: &[Axis], outlets: Outlets) -> Self {
         let wakes = *axes.first().expect("a process controls an axis");
         let own = Axis::ALL.map(|axis| axes.contains(&axis));
@@ -125,22 +125,22 @@ impl<C: Clock + Send> Stopwatch<C> {
         self.wake_up = WakeUp { woke_ns: self.now_ns(), ..WakeUp::default() };
     }
 
-    /// A frame was taken that had arrived at `stamp_ns`; `sensors` tells whose sensors it was.
-    pub(crate) fn took(&mut self, frame: &CanFrame, stamp_ns: u64, sensors: Option<Axis>) {
-        self.hand_over_frame(Passed { stamp_ns, frame: *frame, sent: false });
+    /// A frame was taken that had arrived at `stamp_ns`; `sensors` is the axis whose sensors it carries.
+    pub(crate) fn frame_taken(&mut self, frame: &CanFrame, stamp_ns: u64, sensors: Option<Axis>) {
+        self.queue_frame(StampedFrame { stamp_ns, frame: *frame, sent: false });
         let Some(axis) = sensors.filter(|axis| self.own[axis.index()]) else { return };
         self.arrived_ns[axis.index()] = stamp_ns;
         if axis == self.wakes && stamp_ns < self.began_ns {
             self.account.before_start += 1;
         } else if axis == self.wakes {
-            let waited = Measured::Waited { arrived_ns: stamp_ns, woke_ns: self.wake_up.woke_ns };
+            let waited = TimingSample::Waited { arrived_ns: stamp_ns, woke_ns: self.wake_up.woke_ns };
             if let Some(overtaken) = self.waiting.replace(waited) {
-                self.hand_over(overtaken);
+                self.queue_sample(overtaken);
             }
         }
     }
 
-    pub(crate) fn took_all(&mut self) {
+    pub(crate) fn batch_taken(&mut self) {
         self.wake_up.received_ns = self.now_ns();
     }
 
@@ -148,8 +148,7 @@ impl<C: Clock + Send> Stopwatch<C> {
         TimedBus::new(self, bus)
     }
 
-    /// The axes answered these cycles. When that made a row whole, `vitals` is asked what the kernel counted since it was asked
-    /// last.
+    /// The axes answered these cycles. When that completes a row, `vitals` returns the kernel counters since its last call.
     pub(crate) fn answered(&mut self, cycles: [Option<u64>; 2], vitals: impl FnOnce() -> VitalCounts) {
         if cycles == [None; 2] {
             return;
@@ -191,11 +190,11 @@ impl<C: Clock + Send> Stopwatch<C> {
         let handed_ns = self.wake_up.handed_ns[axis.index()];
         let older = self.newest.is_some_and(|newest| cycle <= newest && newest - cycle < SAME_RIG);
         if let Some(waited) = waited.filter(|_| !begins || older) {
-            self.hand_over(waited);
+            self.queue_sample(waited);
         }
         if begins {
             if older {
-                // Its row has gone: the other axis was a cycle ahead.
+                // The other axis was a cycle ahead, and the row is complete.
                 return;
             }
             self.flush();
@@ -203,10 +202,10 @@ impl<C: Clock + Send> Stopwatch<C> {
             self.newest = Some(cycle);
             let due_ns = arrived_ns.max(self.began_ns);
             if axis == self.wakes && (1..self.began_ns).contains(&arrived_ns) {
-                // Answered all the same: in its row it waited since the loop began.
+                // It was answered all the same; in its row the wait counts from the start of the loop.
                 self.account.before_start -= 1;
             }
-            // Sensors that arrive while others are being taken wait for nobody.
+            // Sensors that arrive while others are taken have no wait.
             let woke_ns = self.wake_up.woke_ns.max(due_ns);
             self.wake_up.woke_ns = woke_ns;
             self.pending = Some(CycleTiming { cycle, skipped, due_ns, woke_ns, ..CycleTiming::default() });
@@ -216,26 +215,26 @@ impl<C: Clock + Send> Stopwatch<C> {
         }
     }
 
-    /// Hands what is left over; nothing is measured any more.
+    /// Queues what is left; ends the measurement.
     pub(crate) fn finish(mut self) -> StopwatchAccount {
         self.flush();
         if let Some(waited) = self.waiting.take() {
-            self.hand_over(waited);
+            self.queue_sample(waited);
         }
         self.account
     }
 
     fn flush(&mut self) {
         if let Some(row) = self.pending.take() {
-            self.hand_over(Measured::Cycle(row));
+            self.queue_sample(TimingSample::Cycle(row));
         }
     }
 
-    fn hand_over(&mut self, measured: Measured) {
+    fn queue_sample(&mut self, measured: TimingSample) {
         self.account.dropped += u64::from(self.outlets.measured.try_send(measured).is_err());
     }
 
-    fn hand_over_frame(&mut self, passed: Passed) {
+    fn queue_frame(&mut self, passed: StampedFrame) {
         self.account.dropped += u64::from(self.outlets.frames.try_send(passed).is_err());
     }
 

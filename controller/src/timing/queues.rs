@@ -1,6 +1,6 @@
-//! The queues of the stopwatch, emptied into the [`TimingRecorder`] by the recorder's thread, which may wait for the disk.
+//! The receivers of the stopwatch, which the recorder's thread empties into the [`TimingRecorder`]; it may block on the disk.
 
-use super::{Measured, Passed};
+use super::{StampedFrame, TimingSample};
 use crossbeam_channel::Receiver;
 use realtime::flight::keep_first;
 use realtime::{Clock, Freeze, MonotonicClock};
@@ -8,17 +8,17 @@ use runlog::candump::FrameRecord;
 use runlog::timing_recorder::{TimingFigures, TimingRecorder};
 use std::io;
 
-/// The receiving ends of the stopwatch, and the recorder of what comes by them.
+/// The receivers of the stopwatch, and the recorder of its samples.
 pub(crate) struct TimingQueues {
-    pub(crate) measured: Receiver<Measured>,
-    pub(crate) frames: Receiver<Passed>,
+    pub(crate) measured: Receiver<TimingSample>,
+    pub(crate) frames: Receiver<StampedFrame>,
     /// Set by SIGUSR1.
     pub(crate) freeze: Freeze,
     pub(crate) recorder: TimingRecorder,
 }
 
 impl TimingQueues {
-    /// Empties the queues, and writes what is over.
+    /// Empties the queues, and writes completed intervals.
     pub(crate) fn poll(&mut self) -> io::Result<()> {
         self.empty()?;
         let now = MonotonicClock.now();
@@ -29,16 +29,16 @@ impl TimingQueues {
     }
 
     fn empty(&mut self) -> io::Result<()> {
-        // No more than wait, so that no queue is emptied for ever while the other runs over.
+        // At most the samples that wait now, so that one queue does not overflow while the other is emptied.
         for _ in 0..self.frames.len() {
-            let Ok(Passed { stamp_ns, frame, sent }) = self.frames.try_recv() else { break };
+            let Ok(StampedFrame { stamp_ns, frame, sent }) = self.frames.try_recv() else { break };
             self.recorder.frame(FrameRecord { stamp_ns, frame }, !sent);
         }
         for _ in 0..self.measured.len() {
             let Ok(measured) = self.measured.try_recv() else { break };
             match measured {
-                Measured::Waited { arrived_ns, woke_ns } => self.recorder.waited(arrived_ns, woke_ns),
-                Measured::Cycle(row) => self.recorder.row(&row)?,
+                TimingSample::Waited { arrived_ns, woke_ns } => self.recorder.waited(arrived_ns, woke_ns),
+                TimingSample::Cycle(row) => self.recorder.row(&row)?,
             }
         }
         Ok(())
@@ -52,7 +52,7 @@ impl TimingQueues {
         self.recorder.write_out()
     }
 
-    /// Empties the queues a last time and writes all that is left.
+    /// Empties the queues a last time and writes everything.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         let mut written = self.empty();
         keep_first(&mut written, self.recorder.finish(MonotonicClock.now()));

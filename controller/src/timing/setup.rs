@@ -1,4 +1,4 @@
-//! Both sides of the timing of a run, made before its threads start.
+//! Creates both sides of the timing of a run before its threads start.
 
 use super::queues::TimingQueues;
 use super::{Outlets, Stopwatch};
@@ -12,20 +12,20 @@ use runlog::flight_dump::Log;
 use runlog::timing_recorder::{Due, TimingRecorder, TimingSetup};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Rows and waits that fit the queue: 16 s of cycles, and as many sensors that were overtaken.
+/// Capacity of the queue of samples: 16 s of cycles, and as many overtaken sensors.
 const MEASURED_QUEUE: usize = 32 * 1024;
-/// Frames that fit the queue, some eight for each of those cycles.
+/// Capacity of the queue of frames, some eight for each of those cycles.
 const FRAME_QUEUE: usize = 128 * 1024;
 /// Interface name in the log of the embedded bus.
 const EMBEDDED_INTERFACE: &str = "bus0";
 
-/// When a run started, on the clocks that its files speak.
+/// Start of a run on the clocks of its files.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RunStart {
     pub(crate) unix_s: f64,
-    /// The same on the monotonic clock.
+    /// The start on the monotonic clock.
     pub(crate) at: Instant,
-    /// What turns stamps of the monotonic clock into ns since 1970.
+    /// Offset from the monotonic clock to ns since 1970.
     pub(crate) epoch_offset_ns: u64,
 }
 
@@ -38,7 +38,7 @@ impl RunStart {
     }
 }
 
-/// What the controllers' thread stamps with, and what the recorder's thread records with.
+/// The stopwatch of the loop, and the queues of the recorder's thread.
 pub(crate) fn begin(
     arguments: &RunArguments,
     started: &RunStart,

@@ -73,8 +73,8 @@ struct Bench {
     clock: Moved,
     wire: Wire,
     stopwatch: Stopwatch<Moved>,
-    measured: Receiver<Measured>,
-    frames: Receiver<Passed>,
+    measured: Receiver<TimingSample>,
+    frames: Receiver<StampedFrame>,
 }
 
 impl Bench {
@@ -93,10 +93,10 @@ impl Bench {
     fn wake_up(&mut self, arrived: &[(Axis, u64)], cycles: [Option<u64>; 2]) {
         self.stopwatch.woke();
         for (axis, stamp_ns) in arrived {
-            self.stopwatch.took(&sensors(*axis, 0), *stamp_ns, Some(*axis));
+            self.stopwatch.frame_taken(&sensors(*axis, 0), *stamp_ns, Some(*axis));
         }
         self.clock.pass(5);
-        self.stopwatch.took_all();
+        self.stopwatch.batch_taken();
         self.clock.pass(7);
         for axis in Axis::ALL {
             if cycles[axis.index()].is_some() {
@@ -112,8 +112,8 @@ impl Bench {
 
     fn rows(&self) -> Vec<CycleTiming> {
         let rows = self.measured.try_iter().filter_map(|measured| match measured {
-            Measured::Cycle(row) => Some(row),
-            Measured::Waited { .. } => None,
+            TimingSample::Cycle(row) => Some(row),
+            TimingSample::Waited { .. } => None,
         });
         rows.collect()
     }
@@ -195,8 +195,8 @@ fn a_stall_is_a_row_that_skips_and_a_wait_for_each_frame_of_the_axis_that_wakes(
     let (mut rows, mut waits_ns) = (Vec::new(), Vec::new());
     for measured in bench.measured.try_iter() {
         match measured {
-            Measured::Cycle(row) => rows.push(row),
-            Measured::Waited { arrived_ns, woke_ns } => waits_ns.push(woke_ns - arrived_ns),
+            TimingSample::Cycle(row) => rows.push(row),
+            TimingSample::Waited { arrived_ns, woke_ns } => waits_ns.push(woke_ns - arrived_ns),
         }
     }
     assert_eq!(waits_ns, (0..49).map(|cycle| 50_000 - cycle * 1000).collect::<Vec<_>>());
@@ -234,7 +234,7 @@ fn an_axis_alone_has_rows_and_waits_of_its_own() {
     bench.wake_up(&[(Axis::Drive, bench.now() - 50)], [None, None]);
     bench.wake_up(&[(Axis::Load, bench.now() - 20)], [None, Some(7)]);
     let measured: Vec<_> = bench.measured.try_iter().collect();
-    let [Measured::Cycle(row)] = measured[..] else { panic!("a row alone in {measured:?}") };
+    let [TimingSample::Cycle(row)] = measured[..] else { panic!("a row alone in {measured:?}") };
     assert_eq!((row.woke_ns - row.due_ns, row.drive, row.load.answers), (20, Exchange::default(), 7));
 }
 
@@ -251,8 +251,8 @@ fn sensors_that_nobody_answers_have_waited_too() {
     let waits: Vec<_> = measured
         .try_iter()
         .map(|measured| match measured {
-            Measured::Waited { arrived_ns, woke_ns } => woke_ns - arrived_ns,
-            Measured::Cycle(row) => row.woke_ns - row.due_ns,
+            TimingSample::Waited { arrived_ns, woke_ns } => woke_ns - arrived_ns,
+            TimingSample::Cycle(row) => row.woke_ns - row.due_ns,
         })
         .collect();
     assert_eq!(waits, [20, 10 + 12, 30]);
@@ -292,7 +292,7 @@ fn the_load_may_come_first() {
     bench.wake_up(&[(Axis::Load, bench.now() - 5)], [None, Some(7)]);
     bench.wake_up(&[(Axis::Drive, bench.now() - 10)], [Some(7), None]);
     let measured: Vec<_> = bench.measured.try_iter().collect();
-    let [Measured::Waited { arrived_ns, woke_ns }, Measured::Cycle(row)] = measured[..] else {
+    let [TimingSample::Waited { arrived_ns, woke_ns }, TimingSample::Cycle(row)] = measured[..] else {
         panic!("a wait and a row in {measured:?}")
     };
     assert_eq!((woke_ns - arrived_ns, row.woke_ns - row.due_ns), (10, 5));
@@ -327,7 +327,7 @@ fn the_last_row_is_handed_over_whole_or_not() {
     bench.wake_up(&[(Axis::Drive, bench.now())], [Some(7), None]);
     let Bench { stopwatch, measured, .. } = bench;
     assert_eq!(stopwatch.finish(), StopwatchAccount::default());
-    assert!(measured.try_iter().any(|measured| matches!(measured, Measured::Cycle(_))));
+    assert!(measured.try_iter().any(|measured| matches!(measured, TimingSample::Cycle(_))));
 }
 
 #[test]
@@ -378,10 +378,10 @@ fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
         for (axis, alive) in arrived {
             let frame = sensors(*axis, *alive);
             let whose = node.take(&frame);
-            bench.stopwatch.took(&frame, bench.now(), whose);
+            bench.stopwatch.frame_taken(&frame, bench.now(), whose);
             bench.clock.pass(1);
         }
-        bench.stopwatch.took_all();
+        bench.stopwatch.batch_taken();
         let cycles = node.answer(&mut bench.stopwatch.bus(&mut bench.wire));
         bench.stopwatch.answered(cycles, VitalCounts::default);
     }

@@ -1,6 +1,6 @@
-//! A bus that tells how long sending took, and when the command of each axis was handed over.
+//! A bus that stamps the duration of sending, and the time of sending of the command of each axis.
 
-use super::{Passed, Stopwatch};
+use super::{StampedFrame, Stopwatch};
 use protocol::bus::control::Role;
 use protocol::bus::{Bus, BusCounters, BusError, Received, SendError};
 use protocol::can::CanFrame;
@@ -32,7 +32,7 @@ impl<C: Clock + Send> Bus for TimedBus<'_, C> {
                 Some(id) if id == LOAD_VALVE_COMMAND.id => wake_up.handed_ns[1] = stamp_ns,
                 _ => {}
             }
-            self.stopwatch.hand_over_frame(Passed { stamp_ns, frame: *frame, sent: true });
+            self.stopwatch.queue_frame(StampedFrame { stamp_ns, frame: *frame, sent: true });
         }
         sent
     }

@@ -16,8 +16,8 @@ const MS: u64 = 1_000_000;
 
 struct Bench {
     run: TempDir,
-    measured: Sender<Measured>,
-    frames: Sender<Passed>,
+    measured: Sender<TimingSample>,
+    frames: Sender<StampedFrame>,
     started: Instant,
     queues: TimingQueues,
 }
@@ -55,7 +55,7 @@ impl Bench {
     }
 
     fn tell(&self, row: CycleTiming) {
-        self.measured.send(Measured::Cycle(row)).unwrap();
+        self.measured.send(TimingSample::Cycle(row)).unwrap();
     }
 
     fn dumps(&self) -> Vec<String> {
@@ -73,7 +73,7 @@ fn each_row_and_each_wait_is_a_sample() {
     let rows = [bench.row(7, 20_000, 50_000), bench.row(8, 30_000, 100_000)];
     rows.iter().for_each(|row| bench.tell(*row));
     // Nobody answers after these.
-    bench.measured.send(Measured::Waited { arrived_ns: 1000, woke_ns: 91_000 }).unwrap();
+    bench.measured.send(TimingSample::Waited { arrived_ns: 1000, woke_ns: 91_000 }).unwrap();
     bench.queues.finish().unwrap();
     let TimingFigures { stages, flight, .. } = bench.queues.figures();
     assert_eq!((stages.wakeup_ns.count, stages.execution_ns.count, stages.completion_ns.count), (3, 2, 3));
@@ -99,7 +99,7 @@ fn sensors_that_were_overtaken_are_answered_when_the_row_after_them_is_done() {
     let row = CycleTiming { skipped: 49, ..bench.row(57, 1_000_000, 60_000) };
     for n in (1..50).rev() {
         let arrived_ns = row.due_ns - n * MS;
-        bench.measured.send(Measured::Waited { arrived_ns, woke_ns: row.woke_ns }).unwrap();
+        bench.measured.send(TimingSample::Waited { arrived_ns, woke_ns: row.woke_ns }).unwrap();
     }
     bench.tell(row);
     bench.queues.finish().unwrap();
@@ -131,7 +131,7 @@ fn late_slow_overtaken_and_faulty_freeze_the_recorder_and_the_rest_does_not() {
     assert_eq!(reported(&|bench| bench.tell(bench.row(7, 500_001, 0))), ["controller-0000000007-late"]);
     assert_eq!(reported(&|bench| bench.tell(bench.row(7, 0, 500_001))), ["controller-0000000007-slow"]);
     let overrun = |bench: &mut Bench| {
-        bench.measured.send(Measured::Waited { arrived_ns: 0, woke_ns: 3 * MS }).unwrap();
+        bench.measured.send(TimingSample::Waited { arrived_ns: 0, woke_ns: 3 * MS }).unwrap();
         bench.tell(CycleTiming { skipped: 2, ..bench.row(9, 0, 0) });
     };
     assert_eq!(reported(&overrun), ["controller-0000000009-overrun"]);
@@ -146,11 +146,11 @@ fn a_dump_holds_the_rows_and_the_frames_both_ways_and_how_long_the_oldest_sensor
         let stamp_ns = bench.started.as_nanos() + cycle * MS;
         for sent in [false, true] {
             let stamp_ns = stamp_ns + u64::from(sent);
-            bench.frames.send(Passed { stamp_ns, frame, sent }).unwrap();
+            bench.frames.send(StampedFrame { stamp_ns, frame, sent }).unwrap();
         }
     }
     bench.tell(bench.row(6, 0, 0));
-    bench.measured.send(Measured::Waited { arrived_ns: MS, woke_ns: 4 * MS }).unwrap();
+    bench.measured.send(TimingSample::Waited { arrived_ns: MS, woke_ns: 4 * MS }).unwrap();
     bench.tell(CycleTiming { skipped: 2, ..bench.row(9, 1000, 2000) });
     bench.queues.finish().unwrap();
     let dump = bench.run.path().join("flight/controller-0000000009-overrun");
@@ -190,7 +190,7 @@ fn cyclic_frames_that_came_have_an_account_and_sent_and_broken_ones_have_none() 
         (4, sensors, false),
         (5, tick, false),
     ] {
-        bench.frames.send(Passed { stamp_ns: ms * MS, frame, sent }).unwrap();
+        bench.frames.send(StampedFrame { stamp_ns: ms * MS, frame, sent }).unwrap();
     }
     bench.queues.poll().unwrap();
     let arrivals = bench.queues.figures().arrivals;
