@@ -1,5 +1,5 @@
-//! Tells the program from which commit it is built, so that a run's record can say it. Here and not in a crate that others use:
-//! this script runs after each commit, and whatever depends on it is built anew.
+//! Passes the commit of the build to the program, for the record of a run. In this crate and not in a library, since the script
+//! runs after each commit and all dependents are rebuilt.
 //!
 //! Nothing here can fail a build: outside git, or without git, the commit is unknown.
 
@@ -11,14 +11,14 @@ fn main() {
     println!("cargo::rustc-env=AIRBENCH_BUILD_COMMIT={}", commit().as_deref().unwrap_or("unknown"));
 }
 
-/// The commit that is checked out, if this checkout is a git repository of its own and not a copy within somebody else's.
+/// The commit that is checked out, if this checkout is the top of a git repository.
 fn commit() -> Option<String> {
     let top = answer("git", &["rev-parse", "--show-toplevel"])?;
     let ours = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?.canonicalize().ok()?;
     if Path::new(&top).canonicalize().ok()? != ours {
         return None;
     }
-    // The log of HEAD grows with each commit and each checkout. A path that is not there would run this script every time.
+    // The log of HEAD grows with each commit and each checkout. A missing path would run this script on every build.
     if let Some(log) = answer("git", &["rev-parse", "--path-format=absolute", "--git-path", "logs/HEAD"])
         && Path::new(&log).exists()
     {

@@ -1,4 +1,4 @@
-//! `emulator bus-load`: load and response times of the bus as text, or beside what a run showed as a table for the docs.
+//! `emulator bus-load`: load and response times of the bus as text, or with the values of a run as a table for the docs.
 
 use crate::cli::BusLoadArguments;
 use crate::run::RunError;
@@ -16,14 +16,14 @@ use std::path::Path;
 /// Prints the bus load of the rig's messages and the response times, or the page's table.
 ///
 /// # Errors
-/// [`RunError::Input`] when the run's summary cannot be read, or is of a bus that took no time.
+/// [`RunError::Input`] when the run's summary cannot be read, or has no wire times.
 pub(crate) fn print(arguments: &BusLoadArguments) -> Result<Exit, RunError> {
     let analysis = RigAnalysis::worst_case(BIT_RATE_PER_S);
     let text = match &arguments.markdown {
         None => format!("{}\n\n{analysis}", BusLoad::of_rig()),
         Some(summary) => markdown(&analysis, &wire_time(summary)?),
     };
-    // Whoever closed the pipe, such as `head`, has read enough.
+    // A closed pipe, as of `| head`, is no error.
     let _ = writeln!(std::io::stdout(), "{text}");
     Ok(Exit::Good)
 }

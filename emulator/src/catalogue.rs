@@ -1,6 +1,6 @@
-//! `emulator effects`: the catalogue as text for a person, or as JSON for a program.
+//! `emulator effects`: the catalogue as text, or as JSON.
 //!
-//! Everything comes from the data sheets of the effects, so there is no second place where a name or a range is written.
+//! All names and ranges come from the data sheets of the effects.
 
 use crate::cli::EffectsArguments;
 use crate::run::RunError;
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-/// Width that sentences are broken at.
+/// Line width of sentences.
 const WIDTH: usize = 100;
 
 pub(crate) fn print(arguments: &EffectsArguments) -> Result<Exit, RunError> {
@@ -21,7 +21,7 @@ pub(crate) fn print(arguments: &EffectsArguments) -> Result<Exit, RunError> {
     } else {
         SHEETS.iter().map(as_text).collect::<Vec<_>>().join("\n")
     };
-    // Whoever closed the pipe, such as `head`, has read enough.
+    // A closed pipe, as of `| head`, is no error.
     let _ = writeln!(std::io::stdout(), "{text}");
     Ok(Exit::Good)
 }
@@ -105,7 +105,7 @@ fn number(key: &EffectKey) -> Value {
         "drawn": key.drawn,
         "signed": key.signed,
         "default": key.default,
-        // An infinite one, which JSON cannot hold, means that no number in the range makes the rig the baseline.
+        // An infinite neutral value, which JSON cannot hold: no number in the range gives the baseline.
         "neutral": key.neutral.filter(|value| value.is_finite()),
         "meaning": key.meaning,
     })

@@ -1,14 +1,13 @@
-//! The rig's console: commands of a person, one a line, for a run with `--console`: at standard input, and from whoever is
-//! connected to the telemetry.
+//! The rig's console: commands, one a line, for a run with `--console`, from standard input and from viewers of the telemetry.
 //!
 //! ```text
 //!   standard input ── thread: read, check, answer ──┬── bounded queue ──► rig loop, one command a cycle, try_recv
 //!   telemetry ─────── the same, never waiting ──────┘
 //! ```
 //!
-//! A command acts at the start of the cycle that takes it: what is typed is not reproducible, not even in lockstep, and stands
-//! among the events of `summary.json`. The end of the input closes the console, not the run. Starting and aborting
-//! experiments is no business of the rig: that is RunControl, on the bus.
+//! A command acts at the start of the cycle that takes it: typed commands are not reproducible, not even in lockstep, and
+//! appear among the events of `summary.json`. The end of the input closes the console, not the run. Experiments are started and
+//! aborted by RunControl on the bus.
 
 use crate::faults::overlay::on_wire;
 use crate::faults::{Fault, NEEDS_HOST};
@@ -18,10 +17,10 @@ use protocol::frames::{HAND_FORCE, SignalSpec};
 use runlog::telemetry::LONGEST_LINE;
 use std::io::{self, BufRead, Read};
 
-/// Commands that may wait; a person is slower than the loop, and a file that is piped in waits for it.
+/// Capacity of the command queue; a piped file waits for the loop.
 const QUEUE: usize = 16;
 
-/// What a person may type.
+/// Help text with all commands.
 pub(crate) const HELP: &str = "stop | release        the rig's own emergency stop; others release theirs
 link | unlink         the load's eye in the carriage
 weights KG            weights on the carriage, in all
@@ -32,10 +31,10 @@ mend NAME AT          mends it; 'mend all' mends everything
 help                  this list
 quit                  ends the run; everything is saved";
 
-/// What the console asks of the rig loop.
+/// A command to the rig loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Command {
-    /// Something that a person does to the rig.
+    /// An action on the rig.
     Act(Action),
     /// A hand pushes in +x from now on.
     Hand {
@@ -43,28 +42,28 @@ pub(crate) enum Command {
         force_n: f64,
     },
     Break(Fault),
-    /// Something is mended: what is broken like this, or everything.
+    /// Mends the faults of this name and place, or all.
     Mend(Option<Fault>),
     Quit,
 }
 
-/// What the rig can be asked for.
+/// Bounds of commands in this run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Most weights on the carriage, kg.
+    /// Greatest added mass on the carriage, kg.
     pub added_limit_kg: f64,
-    /// Whether this emulator hosts the bus, so that faults can be on it.
+    /// Whether this emulator hosts the bus, so that it can inject faults of the bus.
     pub hosts_bus: bool,
 }
 
-/// The sending end of the console's commands, which checks them.
+/// Checks commands and queues them.
 #[derive(Clone)]
 pub(crate) struct Console {
     limits: Limits,
     queue: Sender<Command>,
 }
 
-/// Opens the console; the rig loop takes its commands.
+/// Opens the console; the rig loop takes commands from the receiver.
 #[must_use]
 pub(crate) fn open(limits: Limits) -> (Console, Receiver<Command>) {
     let (queue, receiver) = bounded(QUEUE);
@@ -72,18 +71,18 @@ pub(crate) fn open(limits: Limits) -> (Console, Receiver<Command>) {
 }
 
 impl Console {
-    /// Obeys what is typed at standard input, and says there what there is to say.
+    /// Executes the lines of standard input in a thread, and answers on standard error.
     pub(crate) fn listen(self) {
         let answer = |text: &str| text.lines().for_each(|line| protocol::say!("emulator: console: {line}"));
-        // It ends with its input, with the loop, or with the process: nobody can wait for a thread that reads a terminal.
+        // The thread ends with its input, with the loop, or with the process: a thread that reads a terminal cannot be joined.
         std::thread::spawn(move || {
             answer("open; 'help' lists the commands");
             self.read(&mut io::stdin().lock(), answer);
         });
     }
 
-    /// Obeys a line without waiting for the loop, and gives what there is to say.
-    pub(crate) fn obey(&self, line: &str) -> Result<&'static str, String> {
+    /// Executes a line without waiting for the loop; returns the answer.
+    pub(crate) fn execute(&self, line: &str) -> Result<&'static str, String> {
         match parse(line, self.limits)? {
             None => Ok(""),
             Some(Line::Help) => Ok(HELP),
@@ -95,7 +94,7 @@ impl Console {
         }
     }
 
-    /// Reads commands until the input ends or nobody takes them any more.
+    /// Executes lines until the input ends or the loop is gone.
     fn read(&self, input: &mut impl BufRead, mut answer: impl FnMut(&str)) {
         while let Ok(Some(line)) = next_line(input) {
             match line.and_then(|line| parse(&line, self.limits)) {
@@ -109,7 +108,7 @@ impl Console {
     }
 }
 
-/// The next line, or why it is none; `None` at the end of the input.
+/// The next line, or why it is invalid; `None` at the end of the input.
 fn next_line(input: &mut impl BufRead) -> io::Result<Option<Result<String, String>>> {
     let mut bytes = Vec::new();
     if input.by_ref().take(LONGEST_LINE as u64).read_until(b'\n', &mut bytes)? == 0 {
@@ -123,7 +122,7 @@ fn next_line(input: &mut impl BufRead) -> io::Result<Option<Result<String, Strin
     Ok(Some(Ok(String::from_utf8_lossy(&bytes).into_owned())))
 }
 
-/// What is said to a line that is longer than any command.
+/// Message about a line that is longer than any command.
 pub(crate) fn too_long() -> String {
     format!("a line of more than {LONGEST_LINE} bytes is no command")
 }
@@ -172,7 +171,7 @@ fn parse(line: &str, limits: Limits) -> Result<Option<Line>, String> {
     }
 }
 
-/// A fault from its name and the words behind it: its place, and numbers as `key=value`.
+/// Parses a fault: its name, its place, and numbers as `key=value`.
 fn fault(name: &str, words: &[&str], limits: Limits) -> Result<Fault, String> {
     let (numbers, places): (Vec<&str>, Vec<&str>) = words.iter().partition(|word| word.contains('='));
     let ([] | [_]) = places[..] else {
@@ -190,18 +189,18 @@ fn fault(name: &str, words: &[&str], limits: Limits) -> Result<Fault, String> {
     Ok(fault)
 }
 
-/// The fault of this name at this place, whatever its numbers.
+/// The fault of this name at this place, without numbers.
 fn like(name: &str, place: &[&str]) -> Result<Fault, String> {
     Fault::like(name, place.first().copied()).map_err(|error| error.to_string())
 }
 
 fn number(what: &str, text: &str, (least, most): (f64, f64), unit: &str) -> Result<f64, String> {
-    // A NaN lies in no range.
+    // A NaN is in no range.
     let value = text.parse().ok().filter(|value: &f64| (least..=most).contains(value));
     value.ok_or_else(|| format!("{what} '{text}': allowed are {least} to {most} {unit}"))
 }
 
-/// The console's hand can do what the bus's can.
+/// The signal of rig.dbc that bounds the force of a hand.
 fn hand_signal(name: &str) -> &'static SignalSpec {
     let signal = HAND_FORCE.signals.iter().find(|signal| signal.name == name);
     signal.expect("rig.dbc has a force for each part that a hand can be on")
@@ -311,18 +310,18 @@ mod tests {
         let mut input = "stop\nstop\n".as_bytes();
         console.read(&mut input, |_| {});
         assert_eq!(input, b"stop\n");
-        assert_eq!(console.obey("stop"), Err("the run is over".into()));
+        assert_eq!(console.execute("stop"), Err("the run is over".into()));
     }
 
     #[test]
     fn a_viewer_never_waits() {
         let (console, receiver) = open(LIMITS);
-        assert_eq!(console.obey("help"), Ok(HELP));
-        assert!(console.obey("dance").unwrap_err().contains("is none of"));
+        assert_eq!(console.execute("help"), Ok(HELP));
+        assert!(console.execute("dance").unwrap_err().contains("is none of"));
         for _ in 0..QUEUE {
-            assert_eq!(console.obey("stop"), Ok(""));
+            assert_eq!(console.execute("stop"), Ok(""));
         }
-        assert!(console.obey("stop").unwrap_err().contains("try again"));
+        assert!(console.execute("stop").unwrap_err().contains("try again"));
         assert_eq!(receiver.try_iter().count(), QUEUE);
     }
 }

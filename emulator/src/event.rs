@@ -1,4 +1,4 @@
-//! Events of the 1 ms path: small copies without allocation, whose texts the writer thread makes.
+//! Events of the 1 ms path: small copies without allocation; the writer thread formats them.
 
 use crate::faults::mark::Mark;
 use plant::scene::{HandForces, Outcome};
@@ -9,14 +9,14 @@ use serde::{Serialize, Serializer};
 pub(crate) type Event = event::Event<Mark>;
 pub(crate) type EventKind = event::EventKind<Mark>;
 
-/// Written as the [`FaultMark`] that others read.
+/// Serialised as the [`FaultMark`] that others read.
 impl Serialize for Mark {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         FaultMark::from(*self).serialize(serializer)
     }
 }
 
-/// The event of what came of an action at the rig.
+/// The event for the outcome of an action.
 pub(crate) fn of_outcome(outcome: Outcome) -> EventKind {
     match outcome {
         Outcome::Stopped => EventKind::EmergencyStop,
@@ -31,12 +31,12 @@ pub(crate) fn of_outcome(outcome: Outcome) -> EventKind {
     }
 }
 
-/// The event of a changed push of the console's hand.
+/// The event for a changed force of the console's hand.
 pub(crate) fn of_hand(HandForces { carriage_n, load_eye_n }: HandForces) -> EventKind {
     EventKind::ConsoleHand { carriage_n, load_eye_n }
 }
 
-/// The axis as events name it.
+/// The axis of the events.
 pub(crate) fn axis_of(axis: plant::Axis) -> Axis {
     match axis {
         plant::Axis::Drive => Axis::Drive,

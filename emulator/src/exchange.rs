@@ -1,4 +1,4 @@
-//! When the sensors of an axis went out, when the commands that answer them came, and from which cycle on they act.
+//! Time stamps of the exchange with a controller: sensors sent, answering command received, first cycle in which it acts.
 //!
 //! ```text
 //!   t_7 ─ sensors 7 ──────────► t_8 ───────────► t_9          (rig's cycles)
@@ -11,18 +11,18 @@
 use protocol::frames::ECHO_RANGE;
 use runlog::timing::{CycleTiming, Exchange};
 
-/// What a cycle's exchange was, and how old the command is that acts.
+/// The exchange of a cycle, and the age of the command in effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct AxisCycle {
     /// Stamps of the timing table.
     pub exchange: Exchange,
-    /// When the sensors that the newly acting command answers were handed over; meaningless without such a command.
+    /// Time of sending of the sensors that a newly acting command answers; meaningless without such a command.
     pub answered_sensors_ns: u64,
-    /// Age of the command that acts, in cycles that were sent; 0 when none does.
+    /// Age of the command in effect, in cycles sent; 0 without one.
     pub age_cycles: u64,
 }
 
-/// What the real-time thread tells of time.
+/// Time stamps from the real-time thread.
 #[derive(Clone, Copy, Debug)]
 #[allow(
     clippy::large_enum_variant,
@@ -31,27 +31,27 @@ pub(crate) struct AxisCycle {
 pub(crate) enum TimingRecord {
     Cycle {
         row: CycleTiming,
-        /// Its exchange, drive and load.
+        /// Exchange of drive and load.
         axes: [AxisCycle; 2],
     },
-    /// The overrun that ended the run: cycles from `first` on that were missed and that no cycle follows.
+    /// The overrun that ended the run: cycles from `first` on were missed, and no cycle follows.
     Stopped { first: u64, skipped: u64, late_ns: u64, woke_ns: u64 },
 }
 
-/// Round trip of a command: from sensors sent to the command that answers them.
+/// Round trip of a command: from sending the sensors to the arrival of the command that answers them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundTrip {
     /// 0 for drive, 1 for load.
     pub axis: usize,
     /// The cycle in which it was taken.
     pub cycle: u64,
-    /// From its sensors handed over to its arrival.
+    /// From sending its sensors to its arrival, ns.
     pub ns: u64,
 }
 
 /// Exchange of one axis. Allocates nothing after the start.
 pub(crate) struct ExchangeWatch {
-    /// When the sensors of a cycle were handed over, by the cycle's low bits; 0 where they were not.
+    /// Time of sending of a cycle's sensors, by the cycle's low bits; 0: not sent.
     sent_ns: Box<[u64; ECHO_RANGE as usize]>,
     /// The last command taken in this cycle: arrival, and the cycle that it answers.
     taken: Option<(u64, u64)>,
@@ -59,7 +59,7 @@ pub(crate) struct ExchangeWatch {
 }
 
 impl ExchangeWatch {
-    /// Begins `cycle`, whose sensors were handed over at `stamp_ns`, or not.
+    /// Begins `cycle`, whose sensors were sent at `stamp_ns`, if at all.
     pub(crate) fn begin(&mut self, cycle: u64, stamp_ns: Option<u64>) {
         let sensors_ns = stamp_ns.unwrap_or(0);
         self.sent_ns[slot(cycle)] = sensors_ns;
@@ -68,8 +68,8 @@ impl ExchangeWatch {
             AxisCycle { exchange: Exchange { sensors_ns, ..Exchange::default() }, ..AxisCycle::default() };
     }
 
-    /// Takes note of an accepted command that arrived at `stamp_ns`, `cycle` being the newest one; tells its round trip, if its
-    /// sensors were handed over.
+    /// Records an accepted command that arrived at `stamp_ns` in `cycle`, the newest one; returns its round trip if its sensors
+    /// were sent.
     pub(crate) fn taken(&mut self, echo: u16, stamp_ns: u64, cycle: u64) -> Option<u64> {
         let behind = cycle.wrapping_sub(u64::from(echo)) % ECHO_RANGE;
         self.taken = Some((stamp_ns, cycle.saturating_sub(behind)));
@@ -77,7 +77,7 @@ impl ExchangeWatch {
         (sent_ns != 0).then(|| stamp_ns.saturating_sub(sent_ns))
     }
 
-    /// The command that acts over this cycle has this age, if one acts; a command taken in this cycle is the one.
+    /// Records the age of the command in effect, if any; a command taken in this cycle is the one.
     pub(crate) fn latched(&mut self, age_cycles: Option<u64>) {
         let Some(age_cycles) = age_cycles else { return };
         self.now.age_cycles = age_cycles;
@@ -100,7 +100,7 @@ impl Default for ExchangeWatch {
 }
 
 impl AxisCycle {
-    /// Age in ns at the start of the first cycle in which the command acts, `due_ns`; `None` when none newly acts.
+    /// Age in ns at the start of the first cycle in which the command acts, `due_ns`; `None` without a newly acting command.
     pub(crate) fn age_ns(&self, due_ns: u64) -> Option<u64> {
         let known = self.exchange.command_ns != 0 && self.answered_sensors_ns != 0;
         known.then(|| due_ns.saturating_sub(self.answered_sensors_ns))

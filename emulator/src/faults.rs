@@ -1,4 +1,4 @@
-//! Faults on purpose: what can be broken, when it is, and how it is reported.
+//! Fault injection: the table of faults, their schedule, and their record.
 //!
 //! ```text
 //!   faults.toml ── script.rs ──┐                              ┌─► plant::faults      valve, hose, friction, supply, sensors
@@ -11,10 +11,10 @@
 //! |---|---|
 //! | [`table`] | every fault: name, places, numbers with unit and range, description |
 //! | [`script`] | a file of faults with their times and conditions, checked |
-//! | [`schedule`] | what begins and ends when in a run |
-//! | [`overlay`] | what those that are active do to plant, sensors and hands |
-//! | [`mark`] | that a fault began or ended, for every log |
-//! | [`listing`] | `emulator faults`: the table for a person, a program, a page |
+//! | [`schedule`] | begin and end of faults in a run |
+//! | [`overlay`] | effect of the active faults on plant, sensors and hands |
+//! | [`mark`] | the record of a begin or end, for every log |
+//! | [`listing`] | `emulator faults`: the table as text, JSON and Markdown |
 
 pub(crate) mod listing;
 pub(crate) mod mark;
@@ -29,13 +29,13 @@ use table::{FaultSpec, MOST_KEYS};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
     pub(crate) spec: &'static FaultSpec,
-    /// Its place, as an index into those of the table.
+    /// Index of its place in the table.
     place: u8,
     /// Its numbers, in the order of the table's keys.
     values: [f64; MOST_KEYS],
 }
 
-/// Why something is no fault of the table.
+/// Why a fault is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum FaultError {
     #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are{near}", near = of_the_kind(.0))]
@@ -44,7 +44,7 @@ pub(crate) enum FaultError {
     Place { fault: &'static str, at: String, allowed: String },
     #[error("unknown key {key} = {value}; {fault} has {known}")]
     Key { fault: &'static str, key: String, value: String, known: String },
-    /// A number that has no default is not there.
+    /// A number without default is missing.
     #[error("{fault} needs {key}; allowed: {range}")]
     Missing { fault: &'static str, key: &'static str, range: String },
     /// Out of range, not finite, or no number.
@@ -53,13 +53,13 @@ pub(crate) enum FaultError {
 }
 
 /// Most places of a fault that a message names.
-const PLACES_TOLD: usize = 12;
+const MOST_PLACES_NAMED: usize = 12;
 
-/// Why a fault of the bus cannot be put into a run.
+/// Why a fault of the bus cannot be injected.
 pub(crate) const NEEDS_HOST: &str =
     "only the embedded bus that this emulator hosts can do it; use --bus unix:///PATH without another host";
 
-/// The faults that begin with the same word as a name that is none.
+/// Hint for an unknown name: the faults that begin with the same word.
 fn of_the_kind(name: &str) -> String {
     let kind = name.split('-').next();
     let near: Vec<_> =
@@ -68,7 +68,7 @@ fn of_the_kind(name: &str) -> String {
 }
 
 impl Fault {
-    /// A fault of this name at this place, for comparisons: its numbers mean nothing.
+    /// A fault of this name at this place, for comparisons; its numbers are unset.
     pub(crate) fn like(name: &str, at: Option<&str>) -> Result<Self, FaultError> {
         let spec = table::spec(name).ok_or_else(|| FaultError::Unknown(name.to_owned()))?;
         let numbers: Vec<_> =
@@ -76,8 +76,8 @@ impl Fault {
         Self::new(name, at, &numbers)
     }
 
-    /// The fault of this name at this place (`None`: where it can be at one place only, or at the bus as a whole), with the
-    /// numbers that are given by key: as number, and as written.
+    /// The fault of this name at this place (`None`: its only place, or the whole bus), with the numbers given by key, as
+    /// number and as text.
     pub(crate) fn new(
         name: &str,
         at: Option<&str>,
@@ -87,11 +87,11 @@ impl Fault {
         let places = spec.places.names();
         let place = match at {
             Some(at) => places.iter().position(|place| place == at),
-            None => spec.places.has_usual_place().then_some(0),
+            None => spec.places.has_default_place().then_some(0),
         };
         let place = place.ok_or_else(|| {
-            let reported = places.iter().take(PLACES_TOLD).cloned().collect::<Vec<_>>().join(", ");
-            let more = if places.len() > PLACES_TOLD { ", …: 'emulator faults' has all" } else { "" };
+            let reported = places.iter().take(MOST_PLACES_NAMED).cloned().collect::<Vec<_>>().join(", ");
+            let more = if places.len() > MOST_PLACES_NAMED { ", …: 'emulator faults' has all" } else { "" };
             let at = at.unwrap_or_default().to_owned();
             FaultError::Place { fault: spec.name, at, allowed: format!("one of {reported}{more}") }
         })?;
@@ -123,22 +123,22 @@ impl Fault {
     }
 
     /// Its place by name.
-    pub fn place(&self) -> String {
+    pub(crate) fn place(&self) -> String {
         self.spec.places.names().swap_remove(usize::from(self.place))
     }
 
-    /// Its place among those of its kind.
+    /// Index of its place.
     pub(crate) fn place_index(&self) -> usize {
         usize::from(self.place)
     }
 
-    /// Its numbers by their keys.
+    /// Its numbers by key, each in the unit of the table.
     pub fn numbers(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.spec.keys.iter().map(|key| &*key.name).zip(self.values)
     }
 
     /// Its numbers, in the order of the table's keys.
-    pub fn values(&self) -> [f64; MOST_KEYS] {
+    pub(crate) fn values(&self) -> [f64; MOST_KEYS] {
         self.values
     }
 }

@@ -1,4 +1,4 @@
-//! The end of a run: `summary.json` written, the run reported in a few lines, the exit code chosen.
+//! The end of a run: writes `summary.json`, prints a few lines, chooses the exit code.
 
 use crate::cli::RunArguments;
 use crate::event::Event;
@@ -12,7 +12,7 @@ use runlog::summary::Summary;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Saves what is left to save, tells the run in a few lines, and says how it went.
+/// Saves the remaining files, prints the result of the run, and returns the exit code.
 pub(crate) fn finish(
     arguments: &RunArguments,
     started: &RunStart,
@@ -23,13 +23,13 @@ pub(crate) fn finish(
     protocol::say!("emulator: {reason}");
     let path = arguments.out.join(SUMMARY_JSON);
     let summary = summarise(outcome, written, started.epoch_offset_ns, reason, exit == Exit::Good);
-    tell(&summary, &arguments.out);
+    print_summary(&summary, &arguments.out);
     write_json(&path, &summary).map_err(|error| RunError::output(&path, &error))?;
     Ok(exit)
 }
 
-/// The run in a few lines, for whoever watches.
-fn tell(summary: &Summary<Event>, folder: &Path) {
+/// Prints the run in a few lines.
+fn print_summary(summary: &Summary<Event>, folder: &Path) {
     let Summary { overruns, frames_sent, frames_received, .. } = summary;
     let (cycles, skipped) = (summary.cycles.unwrap_or_default(), summary.skipped.unwrap_or_default());
     let Summary { frames_malformed, stale_commands, .. } = summary;
@@ -118,7 +118,7 @@ fn summarise(
     }
 }
 
-/// The exit code of an end, and the sentence that tells it.
+/// The exit code of an end, and its message.
 fn verdict(end: &End) -> (Exit, String) {
     match end {
         End::ControllersDone => (Exit::Good, "the controllers are done".into()),

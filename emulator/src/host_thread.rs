@@ -1,4 +1,4 @@
-//! The thread that hosts the embedded bus: the rig is where the cable ends.
+//! The thread that hosts the embedded bus.
 
 use protocol::bus::host::{Host, HostReport};
 use realtime::Request;
@@ -6,20 +6,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-/// A host that serves in the background.
+/// A host in its own thread.
 pub(crate) struct HostThread {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<std::io::Result<HostReport>>,
 }
 
 impl HostThread {
-    /// Starts serving, with FIFO priority when `fifo_priority` names one and the machine grants it.
+    /// Starts the host, with FIFO priority if `fifo_priority` is given and granted.
     #[must_use]
     pub(crate) fn start(host: Host, fifo_priority: Option<u8>) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
-            // The rig loop asks for the same and tells the refusals; one telling is enough.
+            // The rig loop makes the same request and reports the refusals.
             let _grants =
                 realtime::acquire(&Request { fifo_priority, timer_slack: true, ..Request::default() });
             host.serve(&stopped)
@@ -27,7 +27,7 @@ impl HostThread {
         Self { stop, thread }
     }
 
-    /// Stops serving and tells what the host counted; `None` when it failed, which it has reported.
+    /// Stops the host and returns its counters; `None` when it failed, which it has reported.
     #[must_use]
     pub(crate) fn stop(self) -> Option<HostReport> {
         self.stop.store(true, Ordering::Relaxed);

@@ -1,7 +1,7 @@
-//! What a run reads before it starts: rig, experiment and sealed file, checked, with messages a person can act on.
+//! Input files of a run: rig, experiment and sealed file, checked, with messages that name the remedy.
 //!
-//! Sealed effects go into the plant and nowhere else: everything that describes the run is made of the rig file. What is wrong
-//! in a sealed file is reported with line and key, because then no run begins.
+//! Sealed effects go into the plant alone: everything that describes the run is made from the rig file. Errors of a sealed file
+//! are reported with line and key, since no run begins then.
 
 use crate::faults::NEEDS_HOST;
 use crate::faults::overlay::on_wire;
@@ -11,24 +11,24 @@ use crate::wire_limits;
 use plant::{Plant, RigParameters, Scene};
 use std::path::{Path, PathBuf};
 
-/// Everything that was read.
+/// The checked inputs.
 pub(crate) struct Inputs {
-    /// The rig file as it stands.
+    /// Text of the rig file.
     pub rig_toml: String,
-    /// The experiment file as it stands.
+    /// Text of the experiment file.
     pub experiment_toml: Option<String>,
-    /// Its `[rig]`: setup, hands, and what people do when.
+    /// Its `[rig]`: set-up, hands, and actions of people.
     pub scene: Scene,
-    /// The rig's numbers as the rig file has them, without what is sealed.
+    /// The rig's parameters in the rig file, without sealed effects.
     pub rig: RigParameters,
     /// Whether a sealed file was read.
     pub sealed: bool,
-    /// The plant in its initial state, with what is sealed.
+    /// The plant in its initial state, with sealed effects.
     pub plant: Plant,
 }
 
 impl Inputs {
-    /// Reads and checks the files; `sealed` takes the place of the file that the experiment names.
+    /// Reads and checks the files; `sealed` replaces the file that the experiment names.
     pub(crate) fn read(
         rig: &Path,
         experiment: Option<&Path>,
@@ -54,7 +54,7 @@ impl Inputs {
                 .map_err(|error| RunError::Input(error.to_string()))?,
             None => parameters.clone(),
         };
-        // What the file says is checked; a default may not suit a rig of another size.
+        // Values of the file were checked; a default may not fit a rig of another size.
         let plant = Plant::new(&simulated, &scene.setup()).map_err(|error| {
             let file = experiment.unwrap_or(Path::new("default setup"));
             RunError::Input(format!("{}: [rig] {error}", file.display()))
@@ -63,11 +63,11 @@ impl Inputs {
     }
 }
 
-/// A script of faults as read.
+/// A fault script.
 pub(crate) struct Script {
-    /// The file as it stands.
+    /// Text of the file.
     pub toml: String,
-    /// The same, checked.
+    /// The parsed script.
     pub script: FaultScript,
     file: String,
 }
@@ -81,7 +81,7 @@ impl Script {
         Ok(Self { toml, script, file })
     }
 
-    /// Refuses faults of the bus where nobody could carry them out.
+    /// Refuses faults of the bus unless this emulator hosts it.
     pub(crate) fn check_host(&self, hosts_bus: bool) -> Result<(), RunError> {
         let planned = self.script.faults.iter().find(|planned| on_wire(&planned.fault).is_some());
         match planned.filter(|_| !hosts_bus) {
@@ -94,7 +94,7 @@ impl Script {
     }
 }
 
-/// The sealed file of an experiment, which lies beside it unless it says otherwise.
+/// The sealed file of an experiment, relative to its folder.
 fn named_by(experiment: Option<&Path>, scene: &Scene) -> Option<PathBuf> {
     let folder = experiment.and_then(Path::parent).unwrap_or(Path::new(""));
     scene.sealed.as_ref().map(|sealed| folder.join(sealed))
@@ -105,7 +105,7 @@ fn place(file: &Path, line: Option<usize>) -> String {
     line.map_or_else(|| file.display().to_string(), |line| format!("{}:{line}", file.display()))
 }
 
-/// Line, from 1, of `key` in `[table]`; `None` when the file leaves it at its default.
+/// Line, from 1, of `key` in `[table]`; `None` for a default.
 fn line_of_key(text: &str, table: &str, key: &str) -> Option<usize> {
     let head = text.lines().position(|line| line.trim() == format!("[{table}]"))?;
     let within = text.lines().skip(head).position(|line| line.trim_start().starts_with(key))?;

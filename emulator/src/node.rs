@@ -1,4 +1,4 @@
-//! The emulator's node: the rig on its bus with its console and its records, whatever paces the cycles.
+//! The emulator's node: the rig on its bus with its console and its records, in any pace.
 //!
 //! ```text
 //!   t_k  missed cycles ──► publish(k) ─────────► take(frame)* ────────────► act(k) ──► t_k+1
@@ -6,14 +6,14 @@
 //!        sent              send frames           (in lockstep: before Go)   step the plant
 //! ```
 //!
-//! The cycle itself is that of [`rig_node`]. Missed cycles are computed with the command that acted before, so a stall changes
-//! which inputs there are and never the physics. Nothing here allocates, locks, prints or blocks.
+//! The cycle itself is that of [`rig_node`]. Missed cycles are computed with the command in effect before, so that a stall
+//! changes the inputs and never the physics. Nothing here allocates, locks, prints or blocks.
 
 use crate::console::Command;
 use crate::event::{Event, EventKind, axis_of, of_hand};
 use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
 use crate::faults::mark::Mark;
-use crate::faults::schedule::{Broken, FaultSchedule};
+use crate::faults::schedule::{FaultSchedule, FaultTargets};
 use crate::recording::Recorder;
 use crate::rig::BreakableRig;
 use crossbeam_channel::Receiver;
@@ -30,31 +30,31 @@ use runlog::summary::FrameCounters;
 use runlog::timing::CycleTiming;
 use std::time::Duration;
 
-/// Longest wait for room in the recorder's queue after a stall, in ms; a writer that is slower than this has failed.
+/// Longest wait for room in the recorder's queue after a stall, ms; a slower writer has failed.
 const LONGEST_WAIT_MS: u32 = 2000;
 
 pub(crate) struct NodeParts {
     /// The plant in its initial state.
     pub plant: Plant,
     pub sensors: Sensors,
-    /// Who does what to it by hand.
+    /// Actions of people on it.
     pub people: People,
     pub faults: FaultSchedule,
-    /// What is typed, if the console is open.
+    /// Typed commands, with the console.
     pub console: Option<Receiver<Command>>,
-    /// Where cycles, frames and events go.
+    /// Queues of cycles, frames and events.
     pub recorder: Recorder,
-    /// Whether frames of the bench (hand force, link, weights) are obeyed.
+    /// Whether frames of the bench (hand force, link, weights) are processed.
     pub bench_frames: bool,
-    /// Whether simulated time is the bus's time.
+    /// Whether the bus has simulated time.
     pub lockstep: bool,
 }
 
-/// What the node counted.
+/// Counters of the node.
 pub(crate) struct NodeFigures {
-    /// Frames by what became of them.
+    /// Frames by their result.
     pub frames: FrameCounters,
-    /// Commands of drive and load by what became of them.
+    /// Commands of drive and load by their result.
     pub commands: [CommandCounters; 2],
     /// Cycles computed without being sent.
     pub skipped: u64,
@@ -78,7 +78,7 @@ pub(crate) struct EmulatorNode {
 }
 
 impl EmulatorNode {
-    /// Puts the rig on its bus, before cycle 0.
+    /// A node before cycle 0.
     pub(crate) fn new(parts: NodeParts) -> Self {
         let NodeParts { plant, sensors, people, faults, console, recorder, bench_frames, lockstep } = parts;
         Self {
@@ -96,13 +96,13 @@ impl EmulatorNode {
         }
     }
 
-    /// Computes `count` cycles from `first` on that the loop missed, with the commands that acted before.
+    /// Computes `count` missed cycles from `first` on, with the commands in effect before.
     pub(crate) fn miss(&mut self, first: u64, count: u64) {
         if count == 0 {
             return;
         }
         self.node.skip(first, count);
-        self.tell(first + count, EventKind::Skipped { cycles: count });
+        self.record_event(first + count, EventKind::Skipped { cycles: count });
         let mut left_ms = LONGEST_WAIT_MS;
         for cycle in first..first + count {
             self.wait_for_writer(&mut left_ms);
@@ -111,7 +111,7 @@ impl EmulatorNode {
         }
     }
 
-    /// After a stall longer than the queue, waiting for the writer costs nothing that is not lost already.
+    /// Waits for the writer, up to `left_ms`: after a stall longer than the queue the wait costs no further cycle.
     fn wait_for_writer(&self, left_ms: &mut u32) {
         while *left_ms > 0 && self.recorder.is_full() {
             *left_ms -= 1;
@@ -119,10 +119,10 @@ impl EmulatorNode {
         }
     }
 
-    /// Samples the sensors of `cycle` and sends what is due. `after_miss` sends the tick first, so that receivers know
-    /// which cycle the sensors are of.
+    /// Samples the sensors of `cycle` and sends the frames that are due. `after_miss` sends the tick first, so that receivers
+    /// know the cycle of the sensors.
     pub(crate) fn publish(&mut self, cycle: u64, after_miss: bool, bus: &mut dyn Bus) {
-        self.take_typed(cycle);
+        self.take_console_command(cycle);
         let readings = self.begin(cycle);
         let Self { node, recorder, exchange, .. } = self;
         node.publish(cycle, after_miss, &readings, |frame| {
@@ -134,29 +134,29 @@ impl EmulatorNode {
             }
         });
         self.send_fault_marks(bus);
-        self.look_at_the_bus(cycle, bus);
+        self.check_bus(cycle, bus);
     }
 
-    /// Tells when the bus goes and comes, also when it did both since the last look, as after a stall.
-    fn look_at_the_bus(&mut self, cycle: u64, bus: &dyn Bus) {
+    /// Reports that the bus went or returned, also when it did both since the last call, as after a stall.
+    fn check_bus(&mut self, cycle: u64, bus: &dyn Bus) {
         let disconnects = bus.counters().disconnects;
         let went = disconnects != std::mem::replace(&mut self.bus_disconnects, disconnects);
         if went && self.bus_was_up {
             self.bus_was_up = false;
-            self.tell(cycle, EventKind::BusLost);
+            self.record_event(cycle, EventKind::BusLost);
         }
         if bus.is_up() != self.bus_was_up {
             self.bus_was_up = bus.is_up();
-            self.tell(cycle, if self.bus_was_up { EventKind::BusBack } else { EventKind::BusLost });
+            self.record_event(cycle, if self.bus_was_up { EventKind::BusBack } else { EventKind::BusLost });
         }
     }
 
-    /// Says farewell: a tick that tells the controllers that no more sensors come after `cycle`.
+    /// Sends the last tick: no sensors follow after `cycle`.
     pub(crate) fn publish_end(&mut self, cycle: u64, bus: &mut dyn Bus) {
         send(&self.node.tick(TickCause::Farewell, cycle), bus, &mut self.recorder);
     }
 
-    /// Takes a frame that arrived before `cycle`.
+    /// Processes a frame that arrived before `cycle`.
     pub(crate) fn take(&mut self, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
         self.recorder.frame(FrameRecord { stamp_ns, frame: *frame });
         match Frame::decode(frame) {
@@ -167,7 +167,7 @@ impl EmulatorNode {
             Err(_) => {
                 self.frames.ignored.malformed += 1;
                 if self.frames.ignored.malformed == 1 {
-                    self.tell(cycle, EventKind::Malformed { raw_id: frame.raw_id() });
+                    self.record_event(cycle, EventKind::Malformed { raw_id: frame.raw_id() });
                 }
             }
         }
@@ -202,7 +202,7 @@ impl EmulatorNode {
                 self.frames.second_rig += 1;
                 if self.frames.second_rig == 1 {
                     let id = frame.standard_id().unwrap_or_default();
-                    self.tell(cycle, EventKind::SecondRig { id });
+                    self.record_event(cycle, EventKind::SecondRig { id });
                 }
             }
             _ => {}
@@ -215,27 +215,27 @@ impl EmulatorNode {
             let Latched { change, age_cycles } = self.node.latch(axis);
             self.exchange[axis as usize].latched(age_cycles);
             if let Some(change) = change {
-                self.tell(cycle, change_event(change, axis));
+                self.record_event(cycle, change_event(change, axis));
             }
         }
         self.advance(cycle);
     }
 
-    /// Hands over when everything of this cycle happened: `row` without the exchange, which the node knows.
-    pub(crate) fn tell_timing(&mut self, row: CycleTiming) {
+    /// Records the time stamps of this cycle: `row` without the exchange, which the node adds.
+    pub(crate) fn record_timing(&mut self, row: CycleTiming) {
         let axes = self.exchange.each_ref().map(ExchangeWatch::cycle);
         let [AxisCycle { exchange: drive, .. }, AxisCycle { exchange: load, .. }] = axes;
         self.recorder.timing(TimingRecord::Cycle { row: CycleTiming { drive, load, ..row }, axes });
     }
 
-    /// Hands over the overrun that ends the run.
-    pub(crate) fn tell_overrun(&mut self, overrun: &Overrun, woke_ns: u64) {
+    /// Records the overrun that ends the run.
+    pub(crate) fn record_overrun(&mut self, overrun: &Overrun, woke_ns: u64) {
         let Overrun { index: first, skipped, late_by } = *overrun;
         let late_ns = late_by.as_nanos() as u64;
         self.recorder.timing(TimingRecord::Stopped { first, skipped, late_ns, woke_ns });
     }
 
-    /// Records `cycle` with what acts over it, and steps the plant: for cycles that were sent and for those that were missed.
+    /// Records `cycle` with its inputs and steps the plant, for sent and for missed cycles.
     fn advance(&mut self, cycle: u64) {
         self.recorder.cycle(self.node.step(cycle));
     }
@@ -251,13 +251,13 @@ impl EmulatorNode {
         self.chains_done[axis] = Some(status.main_chain == MainChainState::Done);
     }
 
-    /// Lets people and faults do what is due in `cycle`, then samples.
+    /// Executes the actions of people and the faults that are due in `cycle`, then samples the sensors.
     fn begin(&mut self, cycle: u64) -> [AxisReadings; 2] {
         let Self { node, recorder, .. } = self;
         node.begin(cycle, &mut |kind| recorder.event(Event { cycle, kind }))
     }
 
-    /// Tells the bench which faults began and ended, where it listens.
+    /// Sends the begins and ends of faults to the bench, if its frames are enabled.
     fn send_fault_marks(&mut self, bus: &mut dyn Bus) {
         while let Some((fault, active)) = self.node.rig_mut().next_fault_mark() {
             if self.bench_frames {
@@ -271,8 +271,8 @@ impl EmulatorNode {
         node.rig_mut().act(action, |kind| recorder.event(Event { cycle, kind }));
     }
 
-    /// Takes one command of the console, if one waits: a flood of them is spread over cycles.
-    fn take_typed(&mut self, cycle: u64) {
+    /// Takes one command of the console, if one waits: a flood is spread over cycles.
+    fn take_console_command(&mut self, cycle: u64) {
         let Some(Ok(command)) = self.console.as_ref().map(Receiver::try_recv) else { return };
         match command {
             Command::Act(action) => self.act_by_hand(action, cycle),
@@ -280,7 +280,7 @@ impl EmulatorNode {
                 let hand = self.node.rig_mut().hand(Hand::Console);
                 *hand.on(on) = force_n;
                 let kind = of_hand(*hand);
-                self.tell(cycle, kind);
+                self.record_event(cycle, kind);
             }
             Command::Break(fault) => self.break_or_mend(cycle, |faults, broken, tell| {
                 faults.break_by_hand(fault, broken, tell);
@@ -295,26 +295,26 @@ impl EmulatorNode {
     fn break_or_mend(
         &mut self,
         cycle: u64,
-        act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
+        act: impl FnOnce(&mut FaultSchedule, FaultTargets<'_>, &mut dyn FnMut(Mark)),
     ) {
         let Self { node, recorder, .. } = self;
         node.rig_mut().break_or_mend(act, |kind| recorder.event(Event { cycle, kind }));
     }
 
-    fn tell(&mut self, cycle: u64, kind: EventKind) {
+    fn record_event(&mut self, cycle: u64, kind: EventKind) {
         self.recorder.event(Event { cycle, kind });
     }
 
-    /// Whether every controller that was heard says that its chain is done.
+    /// Whether every controller received so far reports that its chain is done.
     pub(crate) fn controllers_done(&self) -> bool {
         self.chains_done.iter().flatten().count() > 0 && self.chains_done.iter().flatten().all(|done| *done)
     }
 
-    /// Whether the plant's state is finite; when not, which is reported, the run must end with silence on the bus.
+    /// Whether the state of the plant is finite; otherwise, which is recorded, the run must end with silence on the bus.
     pub(crate) fn is_finite(&mut self, cycle: u64) -> bool {
         let finite = self.node.rig().plant().state().is_finite();
         if !finite {
-            self.tell(cycle, EventKind::NotFinite);
+            self.record_event(cycle, EventKind::NotFinite);
         }
         finite
     }
@@ -336,7 +336,7 @@ impl EmulatorNode {
         self.node.skipped()
     }
 
-    /// The figures of the run; the node goes, and with it the recorder's sending ends.
+    /// The counters of the run; drops the node and the senders of the recorder's queues.
     pub(crate) fn into_figures(self) -> NodeFigures {
         NodeFigures {
             frames: self.frames,
@@ -347,10 +347,10 @@ impl EmulatorNode {
     }
 }
 
-/// Sends and records a frame; gives its stamp. What the bus did not take is counted there.
+/// Sends and records a frame; returns its stamp. The bus counts refused frames.
 ///
 /// # Panics
-/// If a value is beyond its range in `rig.dbc`: sensors saturate within it, which a test holds against the rig's ranges.
+/// If a value is beyond its range in `rig.dbc`: sensors saturate within it, which a test checks against the rig's ranges.
 fn send(frame: &Frame, bus: &mut dyn Bus, recorder: &mut Recorder) -> Option<u64> {
     let frame = frame
         .encode()

@@ -1,4 +1,4 @@
-//! What moves the rig from cycle to cycle: the real clock, or the lockstep barrier.
+//! The loop over the cycles of the rig: by the real clock, or by the lockstep barrier.
 
 pub(crate) mod lockstep;
 pub(crate) mod real;
@@ -11,7 +11,7 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// How time passes.
+/// Source of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pace {
     /// One cycle each millisecond of the machine's clock.
@@ -45,57 +45,57 @@ impl fmt::Display for Pace {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum End {
     ControllersDone,
-    /// The time that was asked for has passed.
+    /// The requested time has passed.
     TimeUp,
-    /// Somebody typed quit at the console.
+    /// Quit was typed at the console.
     Quit,
     Interrupted,
-    /// The writer could not write; it has said why.
+    /// The writer failed and has reported why.
     OutputFailed,
-    /// The bus was gone for longer than the grace time.
+    /// The bus was down for longer than the grace time.
     BusGone,
     /// Another rig was on the bus before this one.
     SecondRig,
-    /// Lockstep: not all expected members joined in time.
+    /// Lockstep: expected members did not join in time.
     NobodyJoined,
-    /// Lockstep: all members left without saying Done.
+    /// Lockstep: all members left before Done.
     MembersLeft,
-    /// Lockstep: this member was not done in time.
+    /// Lockstep: this member missed its time-out.
     LockstepTimeout(String),
     Overrun(Overrun),
-    /// The plant's state is no longer finite.
+    /// The plant's state is not finite.
     NotFinite,
 }
 
-/// What both paces share with the rest of the program.
+/// State shared with the rest of the program.
 #[derive(Default)]
 pub(crate) struct Shared {
     /// Set by the signals that end a run.
     pub interrupt: Interrupt,
     /// Set by the signal that freezes the flight recorder.
     pub freeze: Freeze,
-    /// How often the process was continued after a stop.
+    /// Number of continuations of the process after stops.
     pub continued: Continued,
-    /// Set by the writer when it cannot write.
+    /// Set by the writer on failure.
     pub output_failed: AtomicBool,
     /// Newest cycle, for the progress line.
     pub cycle: AtomicU64,
     /// Skipped cycles, for the progress line.
     pub skipped: AtomicU64,
-    /// Whether a controller was heard, for the progress line.
+    /// Whether a controller was received, for the progress line.
     pub controller_received: AtomicBool,
 }
 
-/// When a run ends by itself.
+/// Limits of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Cycles to run; `None` runs until the controllers are done.
+    /// Number of cycles; `None` runs until the controllers are done.
     pub cycles: Option<u64>,
-    /// How long the bus may be gone.
+    /// Longest loss of the bus.
     pub bus_grace: Duration,
-    /// Lockstep: how long to wait for the members to join.
+    /// Lockstep: longest wait for the members to join.
     pub join: Duration,
-    /// Lockstep: how long a member may take for a cycle.
+    /// Lockstep: longest time of a member for a cycle.
     pub cycle: Duration,
 }
 
@@ -104,25 +104,26 @@ pub(crate) struct RunContext<'a> {
     pub node: &'a mut EmulatorNode,
     pub bus: &'a mut dyn Bus,
     pub limits: &'a Limits,
-    /// What is shared with the rest of the program.
+    /// State shared with the rest of the program.
     pub shared: &'a Shared,
 }
 
-/// What a pace leaves behind.
+/// Results of the loop.
 pub(crate) struct RunOutcome {
     pub end: End,
     /// Cycles begun, skipped ones included.
     pub cycles: u64,
-    /// When cycle 0 was due, in ns of the run's clock.
+    /// Due time of cycle 0, ns of the run's clock.
     pub cycle_zero_ns: u64,
     /// Statistics of the loop; `None` in lockstep, which has no schedule.
     pub statistics: Option<LoopStatistics>,
-    /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
+    /// Allocations in the 1 ms path after warm-up; `None` without the counting allocator, and for a run shorter than the
+    /// warm-up.
     pub allocations: Option<u64>,
 }
 
 impl RunContext<'_> {
-    /// Tells the progress after `cycles`, and why the run should end, if it should.
+    /// Publishes the progress after `cycles`; returns why the run should end, if it should.
     fn after_cycle(&mut self, cycles: u64) -> Option<End> {
         let Self { node, limits, shared, .. } = self;
         shared.cycle.store(cycles, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! The program: a command line taken, its command run, its exit code.
+//! The program: parses the command line, runs its command, returns its exit code.
 
 use crate::bus_load;
 use crate::cli::{BusArguments, Cli, Command, DEFAULT_FIFO_PRIORITY};
@@ -12,7 +12,7 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Runs the command that the process's arguments name.
+/// Runs the command that the process's arguments name; returns the exit code of the process.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(arguments) => run::run(&arguments),
@@ -45,7 +45,7 @@ fn host_bus(arguments: &BusArguments) -> Result<Exit, RunError> {
         std::thread::sleep(Duration::from_millis(20));
     }
     let Some(report) = host.stop() else { return Ok(Exit::BusFailed) };
-    // Whoever closed the pipe has read enough.
+    // A closed pipe is no error.
     let _ = writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&report).unwrap_or_default());
     Ok(if time_up() { Exit::Good } else { Exit::Interrupted })
 }

@@ -1,8 +1,8 @@
-//! The rig of the emulator: the plant with people around it, and what breaks on purpose.
+//! The rig of the emulator: the plant with people and injected faults.
 
 use crate::event::{EventKind, of_outcome};
 use crate::faults::mark::Mark;
-use crate::faults::schedule::{Broken, FaultSchedule};
+use crate::faults::schedule::{FaultSchedule, FaultTargets};
 use plant::scene::{Action, HandForces, Holder, RigCall};
 use plant::tables::CycleRecord;
 use plant::{AxisReadings, People, Plant, Sensors};
@@ -27,7 +27,7 @@ impl BreakableRig {
         self.peopled.plant()
     }
 
-    /// Hands that push from now on.
+    /// Forces of a hand, from now on.
     pub(crate) fn hand(&mut self, whose: Hand) -> &mut HandForces {
         self.peopled.hand(whose)
     }
@@ -36,20 +36,20 @@ impl BreakableRig {
         self.peopled.act(action, |outcome| tell(of_outcome(outcome)));
     }
 
-    /// Lets a person do something to what is broken.
+    /// Starts or ends faults by hand.
     pub(crate) fn break_or_mend(
         &mut self,
-        act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
+        act: impl FnOnce(&mut FaultSchedule, FaultTargets<'_>, &mut dyn FnMut(Mark)),
         mut tell: impl FnMut(EventKind),
     ) {
         let (plant, sensors, inputs) = self.peopled.parts();
-        let broken = Broken { plant, sensors, inputs };
+        let broken = FaultTargets { plant, sensors, inputs };
         act(&mut self.faults, broken, &mut |mark| tell(EventKind::Fault(mark)));
     }
 
     /// The next mark for the bench's frame: number of the fault, and whether it begins.
     pub(crate) fn next_fault_mark(&mut self) -> Option<(u16, bool)> {
-        self.faults.next_to_tell()
+        self.faults.next_mark()
     }
 }
 
@@ -60,7 +60,7 @@ impl SimulatedRig for BreakableRig {
     fn sample(&mut self, cycle: u64, tell: &mut dyn FnMut(EventKind)) -> [AxisReadings; 2] {
         self.peopled.let_people_act(cycle, |outcome| tell(of_outcome(outcome)));
         let (plant, sensors, inputs) = self.peopled.parts();
-        let broken = Broken { plant, sensors, inputs };
+        let broken = FaultTargets { plant, sensors, inputs };
         self.faults.begin_cycle(cycle, broken, |mark| tell(EventKind::Fault(mark)));
         *self.peopled.hand(Hand::Faults) = self.faults.hands();
         self.peopled.sample_sensors()

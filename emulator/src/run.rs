@@ -1,9 +1,9 @@
-//! One run of the rig: files read, bus opened, threads started, everything saved however it ends.
+//! One run of the rig: reads files, opens the bus, starts threads, saves everything however it ends.
 //!
 //! ```text
-//!   main ─ waits, tells progress, sees signals
+//!   main ─ waits, prints progress, handles signals
 //!    ├─ bus host    serves the embedded bus (FIFO, one above the rig loop)
-//!    ├─ writer      empties the queues into the run's folder, and tells viewers
+//!    ├─ writer      empties the queues into the run's folder, and serves viewers
 //!    ├─ console     reads standard input, if asked to
 //!    └─ rig loop    the 1 ms path
 //! ```
@@ -19,7 +19,7 @@ use crate::pace::{self, Limits, Pace, RunContext, RunOutcome, Shared};
 use crate::recording::rig_timing::PROCESS;
 use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
-use crate::telemetry::{Described, Telemetry};
+use crate::telemetry::{RunFacts, Telemetry};
 use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
@@ -43,18 +43,18 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Interface name in the log of the embedded bus, and of every lockstep run, so that logs can be compared.
 const EMBEDDED_INTERFACE: &str = "bus0";
-/// How often progress is reported.
+/// Period of the progress lines.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(5);
 
-/// What keeps a run from starting.
+/// Why a run cannot start.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunError {
-    /// A file cannot be read, or says something that is not allowed.
+    /// A file that cannot be read or is invalid.
     #[error("{0}")]
     Input(String),
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A file of the run's folder cannot be written.
+    /// A file of the run's folder that cannot be written.
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
     Output { file: String, reason: String },
 }
@@ -74,16 +74,16 @@ impl RunError {
     }
 }
 
-/// Runs the rig as the command line asks.
+/// Runs the rig.
 ///
 /// # Errors
-/// [`RunError`] when the run cannot start; how a run that started went is the exit code.
+/// [`RunError`] when the run cannot start; the result of a run is the exit code.
 pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let lockstep = arguments.pace == Pace::Lockstep;
     if lockstep && matches!(arguments.bus, BusUrl::Can { .. }) {
         return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
     }
-    // Everything that can be refused is looked at before the folder is touched: it may hold an earlier run.
+    // All checks come before the folder is changed: it may hold an earlier run.
     let inputs = Inputs::read(&arguments.rig, arguments.experiment.as_deref(), arguments.sealed.as_deref())?;
     let script = arguments.faults.as_deref().map(Script::read).transpose()?;
     if let Some(script) = script.as_ref().filter(|_| !matches!(arguments.bus, BusUrl::Unix { .. })) {
@@ -92,7 +92,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let periodic = loop_config(arguments)?;
     let shared = watch_signals()?;
 
-    // Simulated time in lockstep, where the log must not show the machine's clock.
+    // Lockstep uses simulated time, so that the log does not depend on the machine.
     let simulated_ns = Arc::new(AtomicU64::new(0));
     let OpenedBus { mut bus, host, orders } = open_bus(arguments, stamp_clock(lockstep, &simulated_ns))?;
     if let Err(error) = script.as_ref().map_or(Ok(()), |script| script.check_host(orders.is_some())) {
@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         }
     };
     let (recorder, records) = recording::queues(lockstep);
-    // From this thread: one of the rig loop's would inherit its priority.
+    // From this thread: a thread started by the rig loop would inherit its priority.
     if let Some(console) = console {
         console.listen();
     }
@@ -119,11 +119,11 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let faults = FaultSchedule::new(by_script, arguments.console, orders);
 
     std::thread::scope(|scope| {
-        // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
+        // The writer owns the receivers: when it fails, no sender blocks on a full queue.
         let for_writer = &shared;
         let writer = scope.spawn(move || writer.run(&records, for_writer));
         let bus = bus.as_mut();
-        let work = RigWork {
+        let work = RigLoop {
             arguments,
             inputs: &inputs,
             started: &started,
@@ -134,7 +134,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
             faults,
         };
         let rig_loop = scope.spawn(|| work.run(recorder, bus, &shared));
-        tell_progress(&rig_loop, &shared);
+        print_progress(&rig_loop, &shared);
         let outcome = join(rig_loop);
         let written = join(writer);
         let thread_report = host.and_then(HostThread::stop);
@@ -144,12 +144,12 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     })
 }
 
-/// Watches for Ctrl-C and SIGTERM.
+/// Watches for SIGINT and SIGTERM.
 pub(crate) fn watch_interrupt() -> Result<Interrupt, RunError> {
     Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }
 
-/// Watches for all signals that mean something to a run.
+/// Watches for all signals of a run.
 fn watch_signals() -> Result<Shared, RunError> {
     let refused = |error| RunError::Input(format!("cannot watch for SIGUSR1 and SIGCONT: {error}"));
     Ok(Shared {
@@ -160,11 +160,11 @@ fn watch_signals() -> Result<Shared, RunError> {
     })
 }
 
-/// When a run's clock started, in the clocks that its files speak.
+/// Start of a run's clock, in the clocks of its files.
 pub(crate) struct RunStart {
     /// Seconds since 1970; `None` in lockstep.
     pub(crate) unix_s: Option<f64>,
-    /// What turns the run's clock into the stamps of `bus.log`.
+    /// Offset from the run's clock to the stamps of `bus.log`, ns.
     pub(crate) epoch_offset_ns: u64,
     /// The start on CLOCK_MONOTONIC, the clock of all stamps.
     pub(crate) monotonic: realtime::Instant,
@@ -182,7 +182,7 @@ impl RunStart {
     }
 }
 
-/// What the rig loop hands back.
+/// Results of the rig loop.
 pub(crate) struct LoopOutcome {
     pub(crate) paced: RunOutcome,
     pub(crate) figures: NodeFigures,
@@ -190,8 +190,8 @@ pub(crate) struct LoopOutcome {
     pub(crate) host: Option<HostReport>,
 }
 
-/// What the rig loop's thread is made of.
-struct RigWork<'a> {
+/// Inputs of the rig loop's thread.
+struct RigLoop<'a> {
     arguments: &'a RunArguments,
     inputs: &'a Inputs,
     started: &'a RunStart,
@@ -202,7 +202,7 @@ struct RigWork<'a> {
     faults: FaultSchedule,
 }
 
-impl RigWork<'_> {
+impl RigLoop<'_> {
     fn run(self, recorder: Recorder, bus: &mut dyn Bus, shared: &Shared) -> Result<LoopOutcome, RunError> {
         let Self { arguments, inputs, started, simulated_ns, periodic, console, script, faults } = self;
         let grants = acquire_realtime(arguments);
@@ -228,7 +228,7 @@ impl RigWork<'_> {
             Pace::Real => pace::real::run(context, MonotonicClock, periodic),
             Pace::Lockstep => pace::lockstep::run(context, simulated_ns)?,
         };
-        // Taking the figures drops the node and with it the queues' sending ends, which lets the writer finish.
+        // Dropping the node drops the senders of the queues, so that the writer ends.
         let host = bus.host_report();
         Ok(LoopOutcome { paced, figures: node.into_figures(), bus: *bus.counters(), host })
     }
@@ -250,12 +250,12 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
     grants
 }
 
-/// The rig's peer, and who hosts the bus.
+/// The rig's peer, and the host of the bus.
 struct OpenedBus {
     bus: Box<dyn Bus>,
-    /// The thread that hosts the bus, where one is needed.
+    /// The thread that hosts the bus, if this process does.
     host: Option<HostThread>,
-    /// The way to the wire of a bus that is hosted here.
+    /// Queue of orders to the wire of a bus that is hosted here.
     orders: Option<WireOrders>,
 }
 
@@ -280,7 +280,7 @@ fn open_bus(arguments: &RunArguments, clock: StampClock) -> Result<OpenedBus, Ru
             let host = Some(HostThread::start(host, fifo));
             Ok(OpenedBus { bus: bus::open(&arguments.bus, clock)?, host, orders })
         }
-        // A barrier has one rig, which is its host: a second emulator would take the first one's place.
+        // A barrier has one rig, which hosts it: a second emulator would replace the first.
         Err(BusError::HostExists { .. }) if !lockstep => {
             protocol::say!("emulator: {} has a host already; joining it", arguments.bus);
             Ok(OpenedBus { bus: bus::open(&arguments.bus, clock)?, host: None, orders: None })
@@ -347,7 +347,7 @@ fn open_telemetry(
     console: Option<Console>,
 ) -> Result<Option<Telemetry>, RunError> {
     let Some(path) = &arguments.telemetry else { return Ok(None) };
-    let described = Described { arguments, inputs, terms, started_unix_s: started.unix_s };
+    let described = RunFacts { arguments, inputs, terms, started_unix_s: started.unix_s };
     let refused = |error| {
         let path = path.display();
         RunError::Input(format!(
@@ -357,12 +357,12 @@ fn open_telemetry(
     Telemetry::open(path, &described, console).map(Some).map_err(refused)
 }
 
-/// Whether there can be faults in the run.
+/// Whether faults are possible in the run.
 fn can_break(arguments: &RunArguments) -> bool {
     arguments.faults.is_some() || arguments.console
 }
 
-/// Columns of `truth.csv` after the baseline's.
+/// Columns of `truth.csv` after those of the baseline.
 fn truth_columns(arguments: &RunArguments, inputs: &Inputs) -> Vec<String> {
     let mut columns = inputs.plant.term_names();
     columns.extend(can_break(arguments).then(|| "faults_active".to_owned()));
@@ -398,7 +398,7 @@ fn describe(
     write_json(&path, &description).map_err(|error| RunError::output(&path, &error))
 }
 
-fn tell_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
+fn print_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
     let mut reported = Instant::now();
     while !rig_loop.is_finished() {
         std::thread::sleep(Duration::from_millis(10));

@@ -1,8 +1,7 @@
-//! `emulator seal`: draws effects and writes them into a file that nobody but a rig should read.
+//! `emulator seal`: draws effects and writes them into a file that only a rig should read.
 //!
-//! The file appears at once and for its owner alone, and never in place of another: a sealed rig that runs were made with
-//! cannot be drawn again by accident. What was drawn is reported nowhere else, and neither is the seed, which is as good as
-//! the file.
+//! The file appears complete, readable by its owner alone, and never replaces another: a sealed rig of earlier runs cannot be
+//! drawn again by accident. Neither the drawn effects nor the seed, which determines them, are printed.
 
 use crate::cli::{SealArguments, SealedAxis};
 use crate::run::RunError;
@@ -13,14 +12,13 @@ use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
-/// Mode of the sealed file: only its owner reads and writes it.
+/// Mode of the sealed file: readable and writable by its owner alone.
 const MODE: u32 = 0o600;
 
-/// Draws and writes what the command line asks for.
+/// Draws effects and writes the file.
 ///
 /// # Errors
-/// [`RunError::Input`] when so many effects do not exist, or the file does already; [`RunError::Output`] when it cannot be
-/// written.
+/// [`RunError::Input`] when there are not so many effects, or the file exists; [`RunError::Output`] when it cannot be written.
 pub(crate) fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
     let SealArguments { seed, effects, axis, out } = arguments;
     let drawn = draw(*seed, usize::from(*effects), among(*axis))
@@ -36,7 +34,7 @@ pub(crate) fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
         }
         Err(error) => return Err(RunError::output(out, &error)),
     }
-    // Whoever closed the pipe does not want to know.
+    // A closed pipe is no error.
     let _ = writeln!(io::stdout(), "{}", out.display());
     Ok(Exit::Good)
 }
@@ -61,14 +59,14 @@ fn head(arguments: &SealArguments) -> String {
     )
 }
 
-/// Writes under a temporary name beside the file, then gives it the name unless somebody has it.
+/// Writes to a temporary file in the same folder, then links it to the name unless that exists.
 fn write_new(path: &Path, text: &[u8]) -> io::Result<()> {
     let temporary = temporary(path);
     let mut file = OpenOptions::new().write(true).create_new(true).mode(MODE).open(&temporary)?;
     let written = file
         .write_all(text)
         .and_then(|()| file.sync_all())
-        // Unlike renaming, a link takes nobody's place.
+        // Unlike a rename, a link replaces no file.
         .and_then(|()| std::fs::hard_link(&temporary, path));
     let _ = std::fs::remove_file(&temporary);
     written

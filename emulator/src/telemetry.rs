@@ -1,13 +1,13 @@
-//! Telemetry: whoever connects to the socket of `--telemetry` gets the run as it goes, and never slows it down.
+//! Telemetry: viewers connected to the socket of `--telemetry` get the run as a stream, without slowing it down.
 //!
 //! ```text
 //!   1 ms path ──► queues ──► writer thread ──► packet, made once ──┬── buffer of viewer 1 ──► its socket
 //!                                                                  └── buffer of viewer 2 ──► its socket
 //! ```
 //!
-//! The thread that writes the run's files serves it: the 1 ms path does nothing for it that it does not do without. Nothing here
-//! waits. What the buffer of a viewer has no room for is lost to that viewer, by whole records, and counted; lockstep does not
-//! wait for viewers either. The packets are described in [`runlog::telemetry`].
+//! The thread that writes the run's files serves it: the 1 ms path does no extra work. Nothing here blocks. Records that do not
+//! fit the buffer of a viewer are lost to that viewer, and counted; lockstep does not wait for viewers either. The packets are
+//! described in [`runlog::telemetry`].
 
 mod description;
 mod viewer;
@@ -22,21 +22,21 @@ use runlog::telemetry::{
 use std::path::Path;
 use viewer::Viewer;
 
-pub(crate) use description::{Described, description};
+pub(crate) use description::{RunFacts, description};
 
-/// Viewers at a time; one more is parted with at once.
+/// Most viewers at a time; a further one is disconnected at once.
 const MOST_VIEWERS: usize = 8;
 
 pub(crate) struct Telemetry {
     socket: SocketFile,
-    /// The first packet of each viewer, save what it is given at its coming.
+    /// The first packet of each viewer, without the state at the time of its connection.
     description: Description,
-    /// Whether cycles show what only a simulation knows.
+    /// Whether cycles include values of the truth.
     with_truth: bool,
-    /// Takes the commands of viewers; `None` in a run without a console.
+    /// Executes the commands of viewers; `None` without a console.
     console: Option<Console>,
     viewers: Vec<Viewer>,
-    /// The packet that is made; kept so that it need not be allocated anew.
+    /// Buffer for a packet, reused.
     packet: Vec<u8>,
 }
 
@@ -44,7 +44,7 @@ impl Telemetry {
     /// Opens the socket at `path`, readable and writable by this user alone.
     pub(crate) fn open(
         path: &Path,
-        run: &Described<'_>,
+        run: &RunFacts<'_>,
         console: Option<Console>,
     ) -> Result<Self, SocketFileError> {
         let socket = SocketFile::bind(path, SocketType::STREAM, false)?;
@@ -75,7 +75,7 @@ impl Telemetry {
         }
     }
 
-    /// Tells lines of an interval log.
+    /// Sends lines of an interval log.
     pub(crate) fn histograms(&mut self, lines: &[u8]) {
         for line in lines.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
             self.packet.clear();
@@ -84,8 +84,8 @@ impl Telemetry {
         }
     }
 
-    /// Lets viewers in, sends them the description and what `happened` so far, of which the `dropped` events are only counted,
-    /// obeys their commands, and writes what their sockets take.
+    /// Accepts viewers, sends them the description and the events so far (`happened`; of the `dropped` ones only counts),
+    /// executes their commands, and writes what their sockets accept.
     pub(crate) fn serve(&mut self, happened: &[Event], dropped: DroppedEvents) {
         while let Some(socket) = self.socket.accept() {
             if self.viewers.len() >= MOST_VIEWERS {

@@ -1,29 +1,29 @@
-//! Whether the rig of a rig file fits the wire: `rig.dbc` fixes ranges and steps of what crosses it.
+//! Whether the rig of a rig file fits the wire: `rig.dbc` defines ranges and steps of all signals.
 //!
-//! A rig whose sensors differ from the wire's signals would be rounded twice, or make frames that cannot be encoded; both
-//! are reported before the run, with the key to change.
+//! Sensors that differ from the signals of the wire would be rounded twice, or could not be encoded; both are reported before
+//! the run, with the key to change.
 
 use plant::RigParameters;
 use protocol::frames::{DRIVE_SENSORS, MessageSpec, RIG_STATUS, SignalSpec};
 
-/// Steps of sensors and signals are decimal texts of one ratio; they may differ by roundings of the last of 17 digits.
+/// Steps of sensors and signals are decimal texts of one ratio; they may differ by rounding of the last of 17 digits.
 const ROUNDING: f64 = 1e-12;
 
-/// A number of the rig file that the wire cannot carry.
+/// A parameter of the rig file that does not fit the wire.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{table}.{key}: {problem}")]
 pub(crate) struct WireMisfit {
     /// Table of the rig file.
     pub table: &'static str,
     pub key: &'static str,
-    /// What is wrong, and what the wire carries.
+    /// What is wrong, and what the wire can carry.
     pub problem: String,
 }
 
-/// Holds the rig against the wire.
+/// Checks the rig against the wire.
 ///
 /// # Errors
-/// The first number that does not fit.
+/// The first parameter that does not fit.
 pub(crate) fn check(rig: &RigParameters) -> Result<(), WireMisfit> {
     let sensors = rig.sensors();
     let position = signal(DRIVE_SENSORS, "position");

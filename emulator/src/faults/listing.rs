@@ -1,4 +1,4 @@
-//! `emulator faults`: the table of faults for a person, for a program, and for the page; and a script checked.
+//! `emulator faults`: the table of faults as text, as JSON and for the page; check of a script.
 
 use super::script::signals;
 use super::table::{FaultSpec, Places, all};
@@ -25,12 +25,12 @@ pub(crate) fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
         let rows: Vec<_> = all().map(as_text).collect();
         format!("{}\nconditions are on: {}", rows.join(""), signals().collect::<Vec<_>>().join(", "))
     };
-    // Whoever closed the pipe has read enough.
+    // A closed pipe, as of `| head`, is no error.
     let _ = writeln!(std::io::stdout(), "{text}");
     Ok(Exit::Good)
 }
 
-/// Places in words; those of frames are as many as `rig.dbc` has messages.
+/// Places as text; frames are too many to be listed.
 fn places(places: Places) -> String {
     match places {
         Places::Frames => "bus (all frames), or bus.NAME with a frame's name in rig.dbc".to_owned(),
@@ -58,7 +58,7 @@ fn as_json() -> Value {
     })
 }
 
-/// Every fault, as programs read it.
+/// All faults in the form of programs.
 pub(crate) fn faults() -> Vec<FaultEntry> {
     all().map(fault).collect()
 }
@@ -73,7 +73,7 @@ fn fault(spec: &FaultSpec) -> FaultEntry {
     }
 }
 
-/// The table of the page.
+/// The table of `emulator/docs/faults.md`.
 fn as_markdown() -> String {
     let mut text = String::from("| fault | at | numbers | what happens |\n|---|---|---|---|\n");
     for spec in all() {

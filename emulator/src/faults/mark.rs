@@ -1,4 +1,4 @@
-//! That a fault began or ended, as every log of a run has it.
+//! The record of the begin or end of a fault, for every log of a run.
 
 use super::Fault;
 use runlog::event::{FaultChange, FaultMark};
@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 pub(crate) const COLUMNS: &str = "time_s,number,what,fault,at,numbers,cause";
 
-/// Who asked for a fault.
+/// Origin of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cause {
     Script {
@@ -17,7 +17,7 @@ pub(crate) enum Cause {
     Console,
 }
 
-/// A fault that began, ended, or did not.
+/// A fault that began, ended, or could not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mark {
     /// Its number in this run; the script's are those of the file, from 1.

@@ -1,9 +1,8 @@
-//! What active faults do to plant, sensors and hands: each puts its part into one overlay, which is then set as a whole.
+//! Effect of active faults on plant, sensors and hands: each adds to one overlay, which is then applied as a whole.
 //!
-//! Several faults of a kind at a place add up where that means something (offsets, leaks, masses), multiply where they are
-//! factors, and otherwise the strongest counts; so the order in which they began does not matter, save for spikes. Drifts of one
-//! sensor have one error together: it grows by the sum of their rates, and is gone when that sum is 0, not by a part when one of
-//! them ends.
+//! Faults of a kind at one place add up where sums make sense (offsets, leaks, masses), multiply where they are factors, and
+//! otherwise the strongest counts; so their order does not matter, except for spikes. Drifts of one sensor share one error: it
+//! grows by the sum of their rates and is reset when that sum is 0, not in part when one of them ends.
 
 use super::Fault;
 use super::table::{BusKind, Channel, Kind, NODES, put_sensor};
@@ -12,20 +11,21 @@ use plant::scene::HandForces;
 use plant::{RigParameters, parameters};
 use protocol::bus::{Frames, WireFault};
 
-/// From normal litres per minute to m^3/s.
+/// m³/s per normal litre per minute.
 const M3_PER_S_PER_NL_PER_MIN: f64 = 1e-3 / 60.0;
 
-/// What all active faults together do.
+/// Joint effect of all active faults.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Overlay {
+    /// Faults of the plant, for `Plant::set_faults`.
     pub plant: Faults,
-    /// To the sensors of drive and load: position, force, pressure a, pressure b.
-    pub sensors: [[SensorFault; 4]; 2],
-    pub hands: HandForces,
+    /// Faults of the sensors of drive and load: position, force, pressure a, pressure b.
+    pub(crate) sensors: [[SensorFault; 4]; 2],
+    pub(crate) hands: HandForces,
 }
 
 impl Overlay {
-    /// Adds what one fault does; frames and nodes are the wire's affair.
+    /// Adds the effect of a fault; faults of frames and nodes act on the wire instead.
     pub fn put(&mut self, fault: &Fault, rig: &RigParameters) {
         let (place, values) = (fault.place_index(), fault.values());
         let first = values[0];
@@ -69,7 +69,7 @@ impl Overlay {
     }
 }
 
-/// The fault as the wire knows it, and the frames that it concerns; `None` for one that is none of the wire's.
+/// The fault in the form of the wire, and the frames that it concerns; `None` for a fault of plant or sensors.
 pub fn on_wire(fault: &Fault) -> Option<(WireFault, Frames)> {
     let Kind::Bus(kind) = fault.spec.kind else { return None };
     let place = fault.place_index();

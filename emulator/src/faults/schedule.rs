@@ -1,11 +1,11 @@
-//! Faults in the course of a run: what is due in a cycle begins and ends, once for every cycle, missed ones too.
+//! Schedule of the faults of a run: evaluated once for every cycle, missed ones included.
 //!
 //! ```text
-//!   Waiting ── its time, and its condition ──► Active ── its time, somebody mends it, the piston hit ──► Over
+//!   Waiting ── its time, and its condition ──► Active ── its time, a person mends it, the piston hit ──► Over
 //!      └────── its time passes before its condition holds ────────────────────────────────────────────────┘
 //! ```
 //!
-//! Nothing here allocates after construction, and while nothing waits and nothing is active a cycle costs one comparison.
+//! Nothing allocates after construction; without waiting and active faults a cycle costs one comparison.
 
 use super::Fault;
 use super::mark::{Cause, Mark};
@@ -18,9 +18,9 @@ use protocol::bus::{WireOrder, WireOrders};
 use runlog::event::FaultChange;
 use std::collections::VecDeque;
 
-/// Faults that people may have put in by hand and not mended, at once.
+/// Most faults injected by hand at once.
 const MOST_BY_HAND: usize = 64;
-/// Frames that may wait to be sent to the bench: all of a script may begin in one cycle, and end in the next.
+/// Capacity of the queue of marks to the bench: all faults of a script may begin in one cycle and end in the next.
 const MARKS: usize = 2048;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,29 +42,29 @@ struct Entry {
 pub(crate) struct FaultSchedule {
     entries: Vec<Entry>,
     room: usize,
-    /// Whether something waits or is active.
+    /// Whether a fault waits or is active.
     busy: bool,
     next_number: u16,
     seed: u64,
     orders: Option<WireOrders>,
     overlay: Overlay,
-    to_tell: VecDeque<(u16, bool)>,
-    /// Whether there can be any in this run.
+    pending_marks: VecDeque<(u16, bool)>,
+    /// Whether faults are possible in this run.
     possible: bool,
 }
 
-/// What a cycle's faults act on.
-pub(crate) struct Broken<'a> {
-    /// The plant at the cycle's start.
+/// The objects that faults act on in a cycle.
+pub(crate) struct FaultTargets<'a> {
+    /// The plant at the start of the cycle.
     pub plant: &'a mut Plant,
     pub sensors: &'a mut Sensors,
-    /// What acted on it so far.
+    /// Inputs of the plant in the cycle before.
     pub inputs: &'a Inputs,
 }
 
 impl FaultSchedule {
-    /// The faults of a script, and room for those of people when `by_hand`. `orders` is the way to the bus's host, where there
-    /// is one.
+    /// The faults of a script, with room for faults by hand if `by_hand`. `orders` is the queue to the host of the bus, if
+    /// there is one.
     pub(crate) fn new(script: Option<&FaultScript>, by_hand: bool, orders: Option<WireOrders>) -> Self {
         let planned = script.map_or(&[][..], |script| &script.faults);
         let possible = script.is_some() || by_hand;
@@ -84,7 +84,7 @@ impl FaultSchedule {
             seed: script.map_or(1, |script| script.seed),
             orders,
             overlay: Overlay::default(),
-            to_tell: VecDeque::with_capacity(if possible { MARKS } else { 0 }),
+            pending_marks: VecDeque::with_capacity(if possible { MARKS } else { 0 }),
             possible,
         }
     }
@@ -94,7 +94,7 @@ impl FaultSchedule {
         self.possible
     }
 
-    /// Seed of everything that is random.
+    /// Seed of all random faults.
     pub(crate) fn seed(&self) -> u64 {
         self.seed
     }
@@ -107,18 +107,18 @@ impl FaultSchedule {
         self.entries.iter().filter(|entry| matches!(entry.state, State::Active { .. })).count()
     }
 
-    /// What is pushed from outside, in +x.
+    /// External forces of faults, in +x.
     pub(crate) fn hands(&self) -> HandForces {
         self.overlay.hands
     }
 
     /// The next mark for the bench's frame: number of the fault, and whether it begins.
-    pub(crate) fn next_to_tell(&mut self) -> Option<(u16, bool)> {
-        self.to_tell.pop_front()
+    pub(crate) fn next_mark(&mut self) -> Option<(u16, bool)> {
+        self.pending_marks.pop_front()
     }
 
-    /// Lets begin and end what is due in `cycle`, before the sensors are sampled.
-    pub(crate) fn begin_cycle(&mut self, cycle: u64, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+    /// Starts and ends the faults that are due in `cycle`, before the sensors are sampled.
+    pub(crate) fn begin_cycle(&mut self, cycle: u64, broken: FaultTargets<'_>, mut tell: impl FnMut(Mark)) {
         if !self.busy {
             return;
         }
@@ -131,7 +131,7 @@ impl FaultSchedule {
                 State::Waiting { from, .. } if cycle < from => {}
                 State::Waiting { until: Some(Until::Cycle(to)), .. } if cycle >= to => {
                     self.entries[place].state = State::Over;
-                    self.tell(place, FaultChange::NeverBegan, &mut tell);
+                    self.report(place, FaultChange::NeverBegan, &mut tell);
                 }
                 State::Waiting { when, until, .. } => {
                     let met = when.is_none_or(|when| {
@@ -157,13 +157,18 @@ impl FaultSchedule {
             }
         }
         if changed {
-            self.put_into(broken);
+            self.apply(broken);
         }
         self.busy = self.entries.iter().any(|entry| entry.state != State::Over);
     }
 
-    /// Breaks something by hand, from this cycle on.
-    pub(crate) fn break_by_hand(&mut self, fault: Fault, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+    /// Starts a fault by hand, from this cycle on.
+    pub(crate) fn break_by_hand(
+        &mut self,
+        fault: Fault,
+        broken: FaultTargets<'_>,
+        mut tell: impl FnMut(Mark),
+    ) {
         let (number, cause) = (self.next_number, Cause::Console);
         self.entries.retain(|entry| entry.state != State::Over || entry.cause != Cause::Console);
         let wire = on_wire(&fault).is_none() || self.orders.is_some();
@@ -174,12 +179,17 @@ impl FaultSchedule {
         self.next_number += 1;
         self.entries.push(Entry { number, fault, cause, state: State::Active { until: None } });
         self.start(self.entries.len() - 1, None, broken.plant, &mut tell);
-        self.put_into(broken);
+        self.apply(broken);
         self.busy = true;
     }
 
-    /// Mends what is active, whoever broke it: all of it, or the faults that are `like` this one by name and place.
-    pub(crate) fn mend(&mut self, like: Option<&Fault>, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+    /// Ends active faults of any origin: all of them, or those with the name and place of `like`.
+    pub(crate) fn mend(
+        &mut self,
+        like: Option<&Fault>,
+        broken: FaultTargets<'_>,
+        mut tell: impl FnMut(Mark),
+    ) {
         for place in 0..self.entries.len() {
             let Entry { fault, state, .. } = self.entries[place];
             let meant = like.is_none_or(|like| {
@@ -189,24 +199,24 @@ impl FaultSchedule {
                 self.stop(place, &mut tell);
             }
         }
-        self.put_into(broken);
+        self.apply(broken);
     }
 
     fn start(&mut self, place: usize, until: Option<u64>, plant: &mut Plant, tell: &mut impl FnMut(Mark)) {
         let Entry { number, fault, .. } = self.entries[place];
         let mut state = State::Active { until };
         if fault.spec.kind == Kind::Unlink {
-            // Parted rods stay parted: it happens once.
+            // An unlinking happens once and is not repeated.
             plant.unlink();
             state = State::Over;
         }
         let refused = on_wire(&fault).is_some_and(|(fault, frames)| {
-            // Each fault draws for itself.
+            // Each fault has its own random numbers.
             let order = WireOrder::Begin { number, fault, frames, seed: self.seed ^ u64::from(number) << 32 };
             !self.orders.as_ref().is_some_and(|orders| orders.give(order))
         });
         self.entries[place].state = if refused { State::Over } else { state };
-        self.tell(place, if refused { FaultChange::Refused } else { FaultChange::Begins }, tell);
+        self.report(place, if refused { FaultChange::Refused } else { FaultChange::Begins }, tell);
     }
 
     fn stop(&mut self, place: usize, tell: &mut impl FnMut(Mark)) {
@@ -215,25 +225,25 @@ impl FaultSchedule {
             && let Some(orders) = &self.orders
             && !orders.give(WireOrder::End { number })
         {
-            // The host has no room for orders: asked again in the next cycle.
+            // The queue of the host is full: tried again in the next cycle.
             self.entries[place].state = State::Active { until: Some(0) };
             return;
         }
         self.entries[place].state = State::Over;
-        self.tell(place, FaultChange::Ends, tell);
+        self.report(place, FaultChange::Ends, tell);
     }
 
-    fn tell(&mut self, place: usize, what: FaultChange, tell: &mut impl FnMut(Mark)) {
+    fn report(&mut self, place: usize, what: FaultChange, tell: &mut impl FnMut(Mark)) {
         let Entry { number, fault, cause, .. } = self.entries[place];
         tell(Mark { number, what, fault, cause });
         let happened = matches!(what, FaultChange::Begins | FaultChange::Ends);
-        if happened && self.to_tell.len() < self.to_tell.capacity() {
-            self.to_tell.push_back((number, what == FaultChange::Begins));
+        if happened && self.pending_marks.len() < self.pending_marks.capacity() {
+            self.pending_marks.push_back((number, what == FaultChange::Begins));
         }
     }
 
-    /// Sets everything that is active into plant and sensors.
-    fn put_into(&mut self, broken: Broken<'_>) {
+    /// Applies all active faults to plant and sensors.
+    fn apply(&mut self, broken: FaultTargets<'_>) {
         let before = self.overlay;
         self.overlay = Overlay::default();
         for entry in self.entries.iter().filter(|entry| matches!(entry.state, State::Active { .. })) {
@@ -248,7 +258,7 @@ impl FaultSchedule {
     }
 }
 
-/// Whether a push to an end of the stroke has come to it.
+/// Whether a push towards an end of the stroke has reached it.
 fn has_hit(fault: &Fault, plant: &Plant) -> bool {
     if fault.spec.kind != Kind::EndStopHit {
         return false;

@@ -1,4 +1,4 @@
-//! A file of faults: which, where, when, checked before the run.
+//! A fault script: faults with place and time, checked before the run.
 //!
 //! ```toml
 //! seed = 7                         # of everything in it that is random; default 1
@@ -18,7 +18,7 @@
 //! kv_m3_per_h = 1.5                # the fault's own numbers, by their keys
 //! ```
 //!
-//! The same file means the same in real time and in lockstep: times are the rig's cycles.
+//! A script has the same effect in real time and in lockstep: its times are cycles of the rig.
 
 use super::{Fault, FaultError};
 use plant::Truth;
@@ -33,48 +33,50 @@ static FROM: Parameter =
 static TO: Parameter = Parameter::new(("to_s", "s"), [0.0, LONGEST_S], 0.0, "when it ends");
 static FOR: Parameter = Parameter::new(("for_s", "s"), [0.001, LONGEST_S], 0.0, "how long it lasts");
 static SEED: Parameter = Parameter::new(("seed", ""), [0.0, 9e15], 1.0, "of all that is random").whole();
-/// Most faults of a script: their numbers are 16 bits on the bus, and the console's come after them.
+/// Most faults of a script: numbers have 16 bits on the bus, and faults by hand come after the script's.
 const MOST_FAULTS: usize = 1000;
 
-/// A script, checked.
+/// A checked script.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultScript {
-    /// Seed of everything that is random.
-    pub seed: u64,
-    pub faults: Vec<Planned>,
+    /// Seed of all random numbers of its faults.
+    pub(crate) seed: u64,
+    /// Its faults, in the order of the file.
+    pub faults: Vec<ScheduledFault>,
 }
 
-/// A fault with its time.
+/// A fault with its schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Planned {
+pub struct ScheduledFault {
+    /// The fault itself.
     pub fault: Fault,
     /// Line of its head, from 1.
-    pub line: u32,
-    /// First cycle in which it may be.
-    pub from: u64,
-    /// What has to hold besides for the fault to begin.
-    pub when: Option<Condition>,
-    /// When it ends; `None`: never.
+    pub(crate) line: u32,
+    /// First cycle in which it may begin.
+    pub(crate) from: u64,
+    /// Condition that must hold too for it to begin.
+    pub(crate) when: Option<Condition>,
+    /// Its end; `None`: never.
     pub(crate) until: Option<Until>,
 }
 
-/// When a fault ends.
+/// End of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Until {
     Cycle(u64),
-    /// So many cycles after it began.
+    /// Number of cycles after its begin.
     After(u64),
 }
 
-/// A signal that has to be above or below a threshold.
+/// A threshold on a signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Condition {
+pub(crate) struct Condition {
     signal: usize,
     above: bool,
     threshold: f64,
 }
 
-/// Signals of conditions, each with its unit in its name.
+/// A signal of conditions: its name with unit, and its value.
 type Signal = (&'static str, fn(&Truth, [f64; 2]) -> f64);
 
 const SIGNALS: &[Signal] = &[
@@ -93,24 +95,27 @@ const SIGNALS: &[Signal] = &[
     ("supply.pressure_pa", |truth, _| truth.supply_pressure_pa),
 ];
 
-/// Names of the signals that a condition can be on.
-pub fn signals() -> impl Iterator<Item = &'static str> {
+/// Names of the signals of conditions.
+pub(crate) fn signals() -> impl Iterator<Item = &'static str> {
     SIGNALS.iter().map(|(name, _)| *name)
 }
 
 impl Condition {
-    /// Whether it holds, given the truth and the commands that act.
-    pub fn holds(&self, truth: &Truth, valve: [f64; 2]) -> bool {
+    /// Whether it holds, for the true state and the openings in effect.
+    pub(crate) fn holds(&self, truth: &Truth, valve: [f64; 2]) -> bool {
         let value = SIGNALS[self.signal].1(truth, valve);
         if self.above { value > self.threshold } else { value < self.threshold }
     }
 }
 
-/// Keys of a fault that are not its numbers.
-const OWN_KEYS: [&str; 8] = ["name", "at", "from_s", "to_s", "for_s", "when", "above", "below"];
+/// Keys of a fault besides its numbers.
+const SCRIPT_KEYS: [&str; 8] = ["name", "at", "from_s", "to_s", "for_s", "when", "above", "below"];
 
 impl FaultScript {
-    /// The script in `text`; `file` is for messages.
+    /// Parses a script; `file` names it in messages.
+    ///
+    /// # Errors
+    /// The text is no script: file and line, and what is allowed.
     pub fn from_toml(text: &str, file: &str) -> Result<Self, SettingsError> {
         let source = Source::parse(text, Path::new(file))?;
         let mut root = source.root();
@@ -125,13 +130,13 @@ impl FaultScript {
     }
 }
 
-fn planned(source: &Source<'_>, section: &mut Section<'_>) -> Result<Planned, SettingsError> {
+fn planned(source: &Source<'_>, section: &mut Section<'_>) -> Result<ScheduledFault, SettingsError> {
     let name = section.needed_text("name", "'emulator faults' lists them")?.text;
     let at = section.text("at")?.map(|at| at.text);
     let numbers: Vec<_> = section
         .keys()
         .into_iter()
-        .filter(|key| !OWN_KEYS.contains(&key.as_str()))
+        .filter(|key| !SCRIPT_KEYS.contains(&key.as_str()))
         .map(|key| (key.clone(), section.peek_number(&key), section.written(&key)))
         .collect();
     let fault = Fault::new(&name, at.as_deref(), &numbers).map_err(|error| {
@@ -157,7 +162,7 @@ fn planned(source: &Source<'_>, section: &mut Section<'_>) -> Result<Planned, Se
         (None, after) => after.map(Until::After),
     };
     let when = condition(section)?;
-    Ok(Planned { fault, line: section.line() as u32, from, when, until })
+    Ok(ScheduledFault { fault, line: section.line() as u32, from, when, until })
 }
 
 fn condition(section: &mut Section<'_>) -> Result<Option<Condition>, SettingsError> {

@@ -1,8 +1,8 @@
-//! The table: every fault that can be put into a run, and everything that is known of one before it happens.
+//! The table of all faults that can be injected.
 //!
-//! The reader of scripts, the console, the listing, the page and the tests all read it; a new fault is a row. What it does is
-//! an arm in [`super::overlay`], for a sensor in [`put_sensor`], for frames and nodes in the wire; [`super::schedule`] has the
-//! faults that act once or end by an event. This file says what a row is, `rows.rs` has them.
+//! Script reader, console, listing, page and tests read it; a new fault is a row. Its effect is an arm in [`super::overlay`],
+//! for a sensor in [`put_sensor`], for frames and nodes in the wire; [`super::schedule`] has the faults that act once or end by
+//! an event. This file defines a row, `rows.rs` has the rows.
 
 mod rows;
 
@@ -12,7 +12,7 @@ use protocol::bus::WireNode;
 use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_SENSORS, LOAD_VALVE_COMMAND, MESSAGES};
 use runlog::telemetry::{FaultGroup, FaultKey};
 
-/// Most numbers that a fault has.
+/// Most numbers of a fault.
 pub(crate) const MOST_KEYS: usize = 3;
 
 /// A row of the table.
@@ -23,12 +23,12 @@ pub(crate) struct FaultSpec {
     pub group: FaultGroup,
     pub places: Places,
     pub keys: &'static [FaultKey],
-    /// What happens, in a sentence.
+    /// Its effect, in a sentence.
     pub about: &'static str,
     pub kind: Kind,
 }
 
-/// Where faults of a kind can be.
+/// Possible places of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Places {
     /// `drive` or `load`.
@@ -44,29 +44,29 @@ pub(crate) enum Places {
     Node,
 }
 
-/// What a fault is to the code.
+/// Effect of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
-    /// Of a sensor: which channel of the axis, or that of the chamber.
+    /// Of a sensor: the channel of the axis, or that of the chamber.
     Sensor(Channel, SensorKind),
     ValveStuck,
     /// A first-order lag before the spool.
     ValveSlow,
-    /// An opening that is added to the command.
+    /// An opening added to the command.
     ValveOffset,
-    /// The opening is limited to this magnitude.
+    /// A limit on the magnitude of the opening.
     ValveLimited,
     ValveDead,
     SupplySag,
     SupplyLoss,
     /// A laminar gap from a chamber to the atmosphere.
     Leak,
-    /// A hole from a chamber to the atmosphere, with the valve's law of flow.
+    /// An orifice from a chamber to the atmosphere, with the flow law of the valve.
     Burst,
     FrictionRise,
     Unlink,
     AddedMass,
-    /// A push to an end of the stroke.
+    /// A force towards an end of the stroke.
     EndStopHit,
     Bus(BusKind),
 }
@@ -75,15 +75,15 @@ pub(crate) enum Kind {
 pub(crate) enum Channel {
     Position,
     Force,
-    /// Pressure of the chamber that the place names.
+    /// Pressure of the chamber of the place.
     Pressure,
 }
 
-/// What is broken in a sensor.
+/// Fault of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SensorKind {
     Stuck,
-    /// An error that grows.
+    /// An error that grows with time.
     Drift,
     Offset,
     Gain,
@@ -95,7 +95,7 @@ pub(crate) enum SensorKind {
     Quantisation,
 }
 
-/// What is broken on the bus.
+/// Fault of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BusKind {
     Loss,
@@ -134,12 +134,12 @@ impl Places {
         }
     }
 
-    /// Whether the first place is meant when none is named.
-    pub(crate) fn has_usual_place(self) -> bool {
+    /// Whether the first place is the default.
+    pub(crate) fn has_default_place(self) -> bool {
         matches!(self, Self::Supply | Self::Linkage | Self::Bus | Self::Frames)
     }
 
-    /// The identifier that a place of frames names; `None` for all frames.
+    /// The identifier of a place of frames; `None` for all frames.
     pub(crate) fn frame_id(self, place: usize) -> Option<u16> {
         match self {
             Self::Frames => place.checked_sub(1).map(|message| MESSAGES[message].id),
@@ -166,7 +166,7 @@ pub(crate) fn spec(name: &str) -> Option<&'static FaultSpec> {
     all().find(|spec| spec.name == name)
 }
 
-/// Puts a sensor's fault with its numbers into what else is broken in it.
+/// Adds a fault to a sensor's other faults.
 pub(super) fn put_sensor(kind: SensorKind, values: [f64; MOST_KEYS], into: &mut SensorFault) {
     let [first, second, _] = values;
     match kind {

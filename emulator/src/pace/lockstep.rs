@@ -1,4 +1,4 @@
-//! The rig as the barrier's rig: as fast as all members allow, in simulated time.
+//! The rig as the master of the barrier: as fast as all members allow, in simulated time.
 
 use super::{End, RunContext, RunOutcome};
 use protocol::bus::control::{Kind, Role};
@@ -8,8 +8,8 @@ use protocol::periods::CYCLE_NS;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long an interrupted rig still waits for the members' turn.
-const LAST_TURN: Duration = Duration::from_millis(500);
+/// Longest wait of an interrupted rig for the turn of the members.
+const LAST_TURN_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Runs the rig in the barrier; `simulated_ns` is the clock that stamps its frames.
 pub(crate) fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Result<RunOutcome, BusError> {
@@ -36,8 +36,8 @@ pub(crate) fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Resu
         if let Some(end) = context.after_cycle(cycles).or(left) {
             context.node.publish_end(cycles, context.bus);
             context.bus.done(cycle as u32);
-            // What the members answer to the last cycle belongs into the log, as of any other: a member that is gone answers
-            // nothing, and one that hangs ends nothing any more.
+            // The answers to the last cycle belong to the log; a member that has ended gives none, and a time-out has no effect
+            // any more.
             let patience = context.limits.cycle * 2;
             let _ = wait_for_go(&mut context, &mut posted, cycles, patience);
             take(&mut posted, |frame, stamp_ns| context.node.take(frame, stamp_ns, cycles));
@@ -52,7 +52,7 @@ fn take(posted: &mut Vec<(CanFrame, u64)>, mut take: impl FnMut(&CanFrame, u64))
     posted.drain(..).for_each(|(frame, stamp_ns)| take(&frame, stamp_ns));
 }
 
-/// Collects what was posted until the barrier says Go for `cycle`; tells how many members it has.
+/// Collects posted frames until the barrier says Go for `cycle`; returns its number of members.
 fn wait_for_go(
     context: &mut RunContext<'_>,
     posted: &mut Vec<(CanFrame, u64)>,
@@ -62,7 +62,7 @@ fn wait_for_go(
     let mut since: Option<Instant> = None;
     loop {
         match context.bus.receive() {
-            // Stamped in the cycle in which it was posted: the clock still shows it.
+            // Stamped in the cycle in which it was posted: the clock has not advanced yet.
             Received::Frame(frame, stamp_ns) => posted.push((frame, stamp_ns)),
             Received::Barrier(control) => match control.kind {
                 Kind::Go { members } if control.cycle == cycle as u32 => return Ok(members),
@@ -71,8 +71,8 @@ fn wait_for_go(
             },
             Received::Nothing => {
                 let waited = since.get_or_insert_with(Instant::now).elapsed();
-                // In the middle of a cycle the members finish their turn, so that they hear the farewell after it.
-                if context.shared.interrupt.came() && (cycle == 0 || waited >= LAST_TURN) {
+                // In the middle of a cycle the members finish their turn, so that they receive the last tick after it.
+                if context.shared.interrupt.came() && (cycle == 0 || waited >= LAST_TURN_TIMEOUT) {
                     return Err(End::Interrupted);
                 }
                 if waited >= patience {

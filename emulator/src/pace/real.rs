@@ -10,13 +10,13 @@ use runlog::timing::CycleTiming;
 use runlog::timing_recorder::WARM_UP_CYCLES;
 use std::time::{Duration, Instant};
 
-/// How long the answers to the last cycles may still come in after the farewell.
-const FAREWELL: Duration = Duration::from_millis(30);
-/// How often the farewell is said in that time: a frame may be lost.
-const FAREWELLS: u32 = 3;
-/// Frames that may arrive between a cycle's start and a late loop's reading; they belong to the next cycle.
+/// Time for answers to the last cycles after the first last tick.
+const LAST_TICKS_WITHIN: Duration = Duration::from_millis(30);
+/// Number of last ticks in that time: a frame may be lost.
+const LAST_TICKS: u32 = 3;
+/// Most frames between a cycle's start and the reading of a late loop; they belong to the next cycle.
 const EARLY_FRAMES: usize = 256;
-/// Cycles within which a rig that meets another one on its bus knows that it is the later one.
+/// Cycles within which a rig that meets another one knows that it is the later one.
 const NEWCOMER_CYCLES: u64 = 10 * STALE_AFTER_CYCLES;
 
 /// Runs the rig on `clock`.
@@ -33,7 +33,7 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
         let cycle = match periodic.next_cycle() {
             Ok(cycle) => cycle,
             Err(overrun) => {
-                context.node.tell_overrun(&overrun, clock.now().as_nanos());
+                context.node.record_overrun(&overrun, clock.now().as_nanos());
                 break End::Overrun(overrun);
             }
         };
@@ -61,10 +61,10 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
         } else {
             context.after_cycle(cycles)
         };
-        // Measuring is part of the cycle's work, save for handing over what was measured.
+        // Measuring is part of the cycle's work, except for queueing the sample.
         let vitals = vitals.read();
         let done = periodic.end_of_work().unwrap_or(stepped);
-        context.node.tell_timing(CycleTiming {
+        context.node.record_timing(CycleTiming {
             cycle: index,
             skipped: cycle.skipped,
             due_ns: cycle.scheduled.as_nanos(),
@@ -84,9 +84,9 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
         drop(watch);
         realtime::allocations::counted()
     });
-    // A rig with a fault is silent; one that came second leaves the first one's controllers alone.
+    // A faulty rig is silent; the second rig on a bus does not end the first one's controllers.
     if !matches!(end, End::NotFinite | End::SecondRig) {
-        say_farewell(&mut context, &mut inbox, cycles);
+        send_last_ticks(&mut context, &mut inbox, cycles);
     }
     let cycle_zero_ns = start.as_nanos();
     RunOutcome { end, cycles, cycle_zero_ns, statistics: Some(periodic.into_statistics()), allocations }
@@ -96,11 +96,11 @@ fn length_ns(from: realtime::Instant, to: realtime::Instant) -> u64 {
     to.saturating_duration_since(from).as_nanos() as u64
 }
 
-fn say_farewell(context: &mut RunContext<'_>, inbox: &mut Inbox, cycles: u64) {
+fn send_last_ticks(context: &mut RunContext<'_>, inbox: &mut Inbox, cycles: u64) {
     let RunContext { node, bus, .. } = context;
-    for _ in 0..FAREWELLS {
+    for _ in 0..LAST_TICKS {
         node.publish_end(cycles, *bus);
-        let until = Instant::now() + FAREWELL / FAREWELLS;
+        let until = Instant::now() + LAST_TICKS_WITHIN / LAST_TICKS;
         while let Some(left) = until.checked_duration_since(Instant::now()) {
             inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| node.take(frame, stamp_ns, cycles));
             bus.wait_readable(left);
@@ -110,7 +110,7 @@ fn say_farewell(context: &mut RunContext<'_>, inbox: &mut Inbox, cycles: u64) {
     inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| node.take(frame, stamp_ns, cycles));
 }
 
-/// Sorts frames by cycle: what arrived after a cycle's start waits for the next one, however late the loop reads.
+/// Sorts frames by cycle: frames that arrived after a cycle's start wait for the next one, however late the loop reads.
 struct Inbox {
     early: [Option<(CanFrame, u64)>; EARLY_FRAMES],
     count: usize,
@@ -128,7 +128,7 @@ impl Inbox {
                 self.sort(frame, stamp_ns, before_ns, &mut take);
             }
         }
-        // A full shelf leaves the rest in the kernel's queue, which has the stamps.
+        // When the buffer is full the rest stays in the kernel's queue, which has the stamps.
         while self.count < EARLY_FRAMES {
             match bus.receive() {
                 Received::Frame(frame, stamp_ns) => self.sort(frame, stamp_ns, before_ns, &mut take),
@@ -145,7 +145,7 @@ impl Inbox {
         before_ns: u64,
         take: &mut impl FnMut(&CanFrame, u64),
     ) {
-        // Stamps of one peer never go back, so what follows a frame that waits, waits too.
+        // Stamps of one peer never decrease, so frames after a waiting one wait too.
         if stamp_ns < before_ns {
             take(&frame, stamp_ns);
         } else {

@@ -1,6 +1,6 @@
-//! The rig's timing: what every process records, round trips, the age of the commands that act, steps of the wall clock.
+//! The rig's timing: the distributions of every process, round trips, ages of commands, steps of the wall clock.
 //!
-//! In real time only: simulated time is never late.
+//! In real time only.
 
 use crate::event::Event;
 use crate::exchange::{AxisCycle, RoundTrip, TimingRecord};
@@ -17,7 +17,7 @@ use std::io;
 
 /// Name of this process in tags and folders.
 pub(crate) const PROCESS: &str = Process::Emulator.name();
-/// Steps of the wall clock that are kept.
+/// Most steps of the wall clock that are kept.
 const MOST_STEPS: usize = 100;
 
 /// The timing of a run, for `summary.json`; empty in simulated time.
@@ -25,11 +25,11 @@ const MOST_STEPS: usize = 100;
 pub(crate) struct RigTimingReport {
     /// Stages, arrivals, the kernel's counters, the flight recorder.
     pub timing: TimingFigures,
-    /// Sensors handed over to command received, drive and load.
+    /// From sending the sensors to receiving the command, drive and load.
     pub round_trip_ns: [Percentiles; 2],
     /// Age of commands when they begin to act, drive and load.
     pub command_age_ns: [Percentiles; 2],
-    /// Cycles sent, by the age in cycles of the command that acted.
+    /// Cycles sent, by the age in cycles of the command in effect.
     pub command_age_cycles: CommandAges,
     pub wall_clock_steps: Vec<WallClockStep>,
 }
@@ -37,7 +37,7 @@ pub(crate) struct RigTimingReport {
 pub(crate) struct RigTiming {
     recorder: TimingRecorder,
     round_trip: [Further; 2],
-    /// Those of cycles whose rows are to come.
+    /// Round trips of cycles whose rows are still to come.
     trips: VecDeque<RoundTrip>,
     command_age: [Further; 2],
     ages: CommandAges,
@@ -61,7 +61,7 @@ impl RigTiming {
         })
     }
 
-    /// Records what the loop measured.
+    /// Records the time stamps of a cycle.
     pub(crate) fn timing(&mut self, record: &TimingRecord) -> io::Result<()> {
         match record {
             TimingRecord::Cycle { row, axes } => self.cycle(row, axes),
@@ -73,7 +73,7 @@ impl RigTiming {
     }
 
     fn cycle(&mut self, row: &CycleTiming, axes: &[AxisCycle; 2]) -> io::Result<()> {
-        // First the row: it ends the second of the cycles before it.
+        // The row comes first: it ends the interval of the cycles before it.
         let written = self.recorder.row(row);
         self.record_trips(row.cycle);
         for (axis, cycle) in axes.iter().enumerate() {
@@ -88,7 +88,7 @@ impl RigTiming {
         written
     }
 
-    /// Takes a round trip. It waits for the row of its cycle, and so belongs to the second of that, however late both are taken.
+    /// Takes a round trip, which is recorded with the row of its cycle and so belongs to its interval.
     pub(crate) fn round_trip(&mut self, trip: RoundTrip) {
         self.trips.push_back(trip);
     }
@@ -100,20 +100,20 @@ impl RigTiming {
         }
     }
 
-    /// Records a frame that was sent or received.
+    /// Records a frame sent or received.
     pub(crate) fn frame(&mut self, record: &FrameRecord) {
         let spec = record.frame.standard_id().and_then(MessageSpec::by_id);
         self.recorder.frame(*record, spec.is_some_and(|spec| spec.sender != RIG_STATUS.sender));
     }
 
-    /// Takes an event: a fault freezes the recorder.
+    /// Takes an event: a fault freezes the flight recorder.
     pub(crate) fn event(&mut self, event: &Event) {
         if event.kind.is_fault() {
             self.recorder.fault(event.cycle, self.recorder.newest_done());
         }
     }
 
-    /// What is due at `now`, after everything was taken; `asked` when a signal asked for a dump.
+    /// Periodic work at `now`, after everything was taken; `asked` when a signal requested a dump.
     pub(crate) fn poll(&mut self, now: realtime::Instant, asked: bool) -> io::Result<()> {
         if asked {
             self.recorder.signal(now);
@@ -128,12 +128,12 @@ impl RigTiming {
         self.recorder.new_lines()
     }
 
-    /// Writes the table out.
+    /// Writes buffered rows.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.recorder.write_out()
     }
 
-    /// Writes what is left, and returns the figures, those of a failed file too.
+    /// Writes everything and returns the statistics, also after a failure.
     pub(crate) fn finish(mut self, now: realtime::Instant) -> (RigTimingReport, io::Result<()>) {
         self.record_trips(u64::MAX);
         let written = self.recorder.finish(now);

@@ -1,11 +1,11 @@
-//! The thread that empties the queues into the run's folder and tells events to a person.
+//! The thread that empties the queues into the run's folder and prints events.
 //!
-//! It polls, so that the rig loop never wakes it. Files grow by whole lines and reach the disk five times a second: a
-//! process that is killed leaves files that read to their last line. When a write fails (a full disk, a folder that
-//! went away), the run is asked to end, and what was written stays.
+//! It polls, so that the rig loop never wakes it. Files grow by whole lines and are written five times a second: a killed
+//! process leaves files that can be read to their last line. When a write fails (a full disk, a missing folder), the run is
+//! asked to end, and what was written stays.
 
 use super::rig_timing::{RigTiming, RigTimingReport};
-use super::{Records, a_turn};
+use super::{Records, batch};
 use crate::event::{Event, EventKind};
 use crate::faults::mark;
 use crate::pace::Shared;
@@ -23,41 +23,41 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Pause between two looks at the queues.
+/// Period of the polls of the queues.
 const POLL_PERIOD: Duration = Duration::from_millis(4);
-/// Longest time that a recorded line stays in memory.
+/// Longest time that a line stays in memory.
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
-/// Events of a kind that are reported on the terminal, and kept for the summary.
-const EVENTS_TOLD: usize = 100;
+/// Events of a kind that are printed, and that are kept for the summary.
+const EVENTS_REPORTED: usize = 100;
 const EVENTS_KEPT: usize = 1000;
-/// Late wake-ups that are reported, of which a bad machine makes thousands.
-const SKIPS_TOLD: usize = 10;
-/// How long a frame waits for those that were read later but arrived earlier: longer than any stall of note.
+/// Late wake-ups that are printed.
+const SKIPS_REPORTED: usize = 10;
+/// Time that a frame waits for frames that were read later but arrived earlier: longer than any usual stall.
 const FRAME_DELAY_NS: u64 = 250_000_000;
 
-/// What the writer has to know of the run.
+/// Properties of the run for the writer.
 pub(crate) struct WriterSetup {
-    /// The run's folder; it exists.
+    /// The run's folder, which exists.
     pub folder: PathBuf,
     /// Interface name in `bus.log`.
     pub interface: String,
-    /// What turns the run's clock into the time stamps of `bus.log`, in ns.
+    /// Offset from the run's clock to the time stamps of `bus.log`, ns.
     pub epoch_offset_ns: u64,
-    /// How the rig was set up, for the comment line of `measurement.csv`.
+    /// Whether the rods are linked at the start, for the comment line of `measurement.csv`.
     pub linked: bool,
-    /// Weights on the carriage, for the same line.
+    /// Added mass on the carriage, kg, for the same line.
     pub added_mass_kg: f64,
     /// Names of the plant's terms, the last columns of `truth.csv` and of no other file.
     pub terms: Vec<String>,
-    /// Whether there can be faults, which have a table of their own then.
+    /// Whether faults are possible; they have a table then.
     pub faults: bool,
-    /// How to record the timing; `None` in lockstep.
+    /// Set-up of the timing; `None` in lockstep.
     pub timing: Option<TimingSetup>,
-    /// Where rows and frames go for viewers, besides the files.
+    /// Stream of rows and frames to viewers.
     pub telemetry: Option<Telemetry>,
 }
 
-/// What the writer leaves behind.
+/// Results of the writer.
 #[derive(Debug, Default)]
 pub(crate) struct WriterReport {
     /// Rows in `measurement.csv` and `truth.csv`.
@@ -68,7 +68,7 @@ pub(crate) struct WriterReport {
     pub events: Vec<Event>,
     pub event_count: u64,
     pub timing: RigTimingReport,
-    /// Why writing stopped, if it did.
+    /// Why writing failed, if it did.
     pub failure: Option<String>,
 }
 
@@ -113,11 +113,11 @@ impl Writer {
         })
     }
 
-    /// Writes until the sending ends are gone and the queues are empty.
+    /// Writes until the senders are gone and the queues are empty.
     pub(crate) fn run(mut self, records: &Records, shared: &Shared) -> WriterReport {
         let mut last_flush = Instant::now();
         loop {
-            // Asked before draining: what was sent before the ends went is drained below, and in the next rounds.
+            // Checked before draining: what was sent before the senders ended is drained below, and in the next rounds.
             let gone = records.senders_gone();
             let mut drained = self.drain(records).and_then(|()| self.judge(records, shared));
             let finished = gone && records.are_taken();
@@ -149,7 +149,7 @@ impl Writer {
     }
 
     fn drain(&mut self, records: &Records) -> io::Result<()> {
-        for record in a_turn(&records.cycles) {
+        for record in batch(&records.cycles) {
             if let Some(telemetry) = &mut self.setup.telemetry {
                 telemetry.cycle(&record);
             }
@@ -159,33 +159,33 @@ impl Writer {
             self.measurement.write_when_full()?;
             self.truth.write_when_full()?;
         }
-        for record in a_turn(&records.frames) {
+        for record in batch(&records.frames) {
             if let Some(timing) = &mut self.timing {
                 timing.frame(&record);
             }
             self.pending.push(record);
         }
         self.write_frames(FRAME_DELAY_NS)?;
-        for event in a_turn(&records.events) {
-            self.tell(event)?;
+        for event in batch(&records.events) {
+            self.report_event(event)?;
         }
         Ok(())
     }
 
-    /// Takes what the loop measured, and does what follows from it.
+    /// Records the time stamps.
     fn judge(&mut self, records: &Records, shared: &Shared) -> io::Result<()> {
         let asked = shared.freeze.take();
         let Some(timing) = &mut self.timing else { return Ok(()) };
-        for record in a_turn(&records.timings) {
-            // Those of a cycle were handed over before its row.
-            a_turn(&records.round_trips).for_each(|round_trip| timing.round_trip(round_trip));
+        for record in batch(&records.timings) {
+            // Those of a cycle were queued before its row.
+            batch(&records.round_trips).for_each(|round_trip| timing.round_trip(round_trip));
             timing.timing(&record)?;
         }
-        a_turn(&records.round_trips).for_each(|round_trip| timing.round_trip(round_trip));
+        batch(&records.round_trips).for_each(|round_trip| timing.round_trip(round_trip));
         timing.poll(MonotonicClock.now(), asked)
     }
 
-    /// Lets viewers have what there is for them.
+    /// Serves the viewers of the telemetry.
     fn serve(&mut self) {
         let Some(telemetry) = &mut self.setup.telemetry else { return };
         if let Some(timing) = &mut self.timing {
@@ -201,10 +201,10 @@ impl Writer {
         written
     }
 
-    /// Writes the frames that are older than the newest by `delay_ns`, in the order of their stamps. A command is read a
-    /// cycle after it arrived, and later after a stall; players of the log want time to go forward.
+    /// Writes the frames that are older than the newest by `delay_ns`, in the order of their stamps. A command is read a cycle
+    /// after its arrival, and later after a stall, while a log must be in the order of time.
     fn write_frames(&mut self, delay_ns: u64) -> io::Result<()> {
-        // Stable: frames of one stamp keep the order in which they were handed over.
+        // Stable: frames of one stamp keep the order of the queue.
         self.pending.sort_by_key(|record| record.stamp_ns);
         let Some(newest) = self.pending.last() else { return Ok(()) };
         let until_ns = newest.stamp_ns.saturating_sub(delay_ns);
@@ -218,9 +218,9 @@ impl Writer {
         Ok(())
     }
 
-    /// Tells and keeps the event. Each kind has a quota of its own: on a bad machine late wake-ups and stale commands come by
-    /// thousands, and must hide nothing else.
-    fn tell(&mut self, event: Event) -> io::Result<()> {
+    /// Prints and keeps the event. Each kind has its own quota: on a bad machine thousands of late wake-ups and stale commands
+    /// must not hide other events.
+    fn report_event(&mut self, event: Event) -> io::Result<()> {
         self.report.event_count += 1;
         if let Some(telemetry) = &mut self.setup.telemetry {
             telemetry.event(&event);
@@ -232,7 +232,7 @@ impl Writer {
             timing.event(&event);
         }
         let late = matches!(event.kind, EventKind::Skipped { .. });
-        let most_told = if late { SKIPS_TOLD } else { EVENTS_TOLD };
+        let most_reported = if late { SKIPS_REPORTED } else { EVENTS_REPORTED };
         let reported = self.reported.entry(discriminant(&event.kind)).or_default();
         *reported += 1;
         if *reported <= EVENTS_KEPT {
@@ -241,9 +241,9 @@ impl Writer {
             self.dropped_events.overruns += 1;
             self.dropped_events.skipped += cycles;
         }
-        if *reported < most_told {
+        if *reported < most_reported {
             protocol::say!("emulator: {event}");
-        } else if *reported == most_told {
+        } else if *reported == most_reported {
             protocol::say!("emulator: {event}; further ones of this kind stand in summary.json only");
         }
         Ok(())
@@ -264,7 +264,7 @@ impl Writer {
         );
         protocol::say!("emulator: {message}");
         self.report.failure = Some(message);
-        // One file failed; what waits for the others may still find room.
+        // One file failed; the others may still be written.
         for file in
             [&mut self.bus_log, &mut self.measurement, &mut self.truth].into_iter().chain(&mut self.faults)
         {
@@ -341,11 +341,11 @@ mod tests {
         let often = EVENTS_KEPT as u64 + 10;
         for cycle in 0..often {
             for kind in [EventKind::Skipped { cycles: 3 }, EventKind::CommandStale(Axis::Drive)] {
-                writer.tell(Event { cycle, kind }).unwrap();
+                writer.report_event(Event { cycle, kind }).unwrap();
             }
         }
         let rare = Event { cycle: often, kind: EventKind::BusLost };
-        writer.tell(rare).unwrap();
+        writer.report_event(rare).unwrap();
         assert_eq!(writer.report.event_count, 2 * often + 1);
         assert_eq!(
             (writer.report.events.len(), writer.report.events.last()),

@@ -1,4 +1,4 @@
-//! What a viewer has to know before the first cycle: the run, the rig's numbers, the columns, what can be broken.
+//! Description of the run for viewers: the run, parameters of the rig, columns, possible faults.
 //!
 //! Its form is [`runlog::telemetry::Description`].
 
@@ -11,18 +11,18 @@ use runlog::telemetry::{Column, Description, DroppedEvents, Experiment, RigFigur
 use settings::unit_of;
 use std::path::Path;
 
-pub(crate) struct Described<'a> {
-    /// How the emulator was started.
+pub(crate) struct RunFacts<'a> {
+    /// Command line of the emulator.
     pub arguments: &'a RunArguments,
     pub inputs: &'a Inputs,
-    /// Columns of `truth.csv` after the baseline's.
+    /// Columns of `truth.csv` after those of the baseline.
     pub terms: &'a [String],
     /// Start of the run's clock, s since 1970; `None` in lockstep.
     pub started_unix_s: Option<f64>,
 }
 
-impl Described<'_> {
-    /// Whether viewers get what only a simulation knows. Of sealed effects nothing but `truth.csv` may tell.
+impl RunFacts<'_> {
+    /// Whether viewers get values of the truth. Sealed effects must appear in `truth.csv` alone.
     pub(crate) fn with_truth(&self) -> bool {
         !self.inputs.sealed
     }
@@ -36,8 +36,8 @@ impl Described<'_> {
     }
 }
 
-pub(crate) fn description(run: &Described<'_>) -> Description {
-    let Described { arguments, inputs, started_unix_s, .. } = run;
+pub(crate) fn description(run: &RunFacts<'_>) -> Description {
+    let RunFacts { arguments, inputs, started_unix_s, .. } = run;
     let (cylinder, supply, mass) = (inputs.rig.cylinder(), inputs.rig.supply(), inputs.rig.mass());
     let out = std::path::absolute(&arguments.out).unwrap_or_else(|_| arguments.out.clone());
     Description {
@@ -72,7 +72,7 @@ pub(crate) fn description(run: &Described<'_>) -> Description {
 }
 
 fn experiment(file: &Path, inputs: &Inputs) -> Experiment {
-    // Only `[rig]` of the file is the emulator's; what else is in it is the controllers' to check.
+    // The emulator uses `[rig]` alone; the controllers check the rest.
     let table: Option<toml::Table> = inputs.experiment_toml.as_deref().and_then(|text| text.parse().ok());
     let title = table.as_ref().and_then(|table| table.get("title")?.as_str());
     Experiment {
@@ -81,7 +81,7 @@ fn experiment(file: &Path, inputs: &Inputs) -> Experiment {
     }
 }
 
-/// Unit of a column of a run's tables, whose name ends with it; `1` for a plain number.
+/// Unit of a column, from the end of its name; `1` for a dimensionless number.
 fn unit(column: &str) -> &'static str {
     unit_of(column).unwrap_or("1")
 }

@@ -1,4 +1,4 @@
-//! A viewer: its socket, its bounded buffer, and the lines that it asks.
+//! A viewer: its socket, its bounded buffer, and its commands.
 
 use crate::console::{self, Console};
 use runlog::telemetry::{Answer, LONGEST_LINE, write_answer, write_loss};
@@ -6,34 +6,35 @@ use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 
-/// Bytes that wait for a viewer: more than a second of 1 kHz with every effect switched on, whose cycles have some 2 kB each.
+/// Capacity of the buffer of a viewer, bytes: more than a second of 1 kHz with all effects on, whose cycles have some 2 kB
+/// each.
 const BUFFER: usize = 4 << 20;
-/// Room for answers beside the records.
+/// Room for answers beside the records, bytes.
 const ANSWERS: usize = 64 << 10;
-/// Bytes that are taken of a viewer in one turn, so that one that floods does not keep the others waiting.
+/// Most bytes read from a viewer in one turn, so that a flood does not delay the others.
 const READ_A_TURN: usize = 4096;
 
 pub(super) struct Viewer {
     stream: UnixStream,
     outgoing: VecDeque<u8>,
-    /// It missed something, and its buffer is not half empty yet: one long hole tells more than many short ones.
+    /// It lost a record, and its buffer is more than half full: one long gap is better than many short ones.
     behind: bool,
     lost: u64,
-    lost_told: u64,
-    /// The line that has begun to come; too long already when it is longer than [`LONGEST_LINE`].
+    lost_reported: u64,
+    /// The current line, incomplete; too long when it exceeds [`LONGEST_LINE`].
     line: Vec<u8>,
     gone: bool,
 }
 
 impl Viewer {
-    /// One that came; its socket does not block.
+    /// A new viewer with a non-blocking socket.
     pub(super) fn new(stream: UnixStream) -> Self {
         Self {
             stream,
             outgoing: VecDeque::new(),
             behind: false,
             lost: 0,
-            lost_told: 0,
+            lost_reported: 0,
             line: Vec::new(),
             gone: false,
         }
@@ -47,17 +48,17 @@ impl Viewer {
             self.lost += 1;
             return;
         }
-        if self.lost > self.lost_told {
-            // What was lost is reported ahead of what comes after it.
+        if self.lost > self.lost_reported {
+            // The loss is reported before the next packet.
             let mut loss = Vec::new();
             write_loss(&mut loss, self.lost);
             self.outgoing.extend(loss);
-            self.lost_told = self.lost;
+            self.lost_reported = self.lost;
         }
         self.outgoing.extend(packet);
     }
 
-    /// Takes what the viewer asks, writes what its socket takes, and tells whether it is still there.
+    /// Reads commands, writes what the socket accepts, and returns whether it is still connected.
     pub(super) fn turn(&mut self, console: Option<&Console>) -> bool {
         self.read(console);
         while !self.gone && !self.outgoing.is_empty() {
@@ -94,14 +95,14 @@ impl Viewer {
         let said = match console {
             None => Err("this run takes no commands: the emulator was started without --console".to_owned()),
             Some(_) if line.len() > LONGEST_LINE => Err(console::too_long()),
-            Some(console) => console.obey(&String::from_utf8_lossy(&line)).map(str::to_owned),
+            Some(console) => console.execute(&String::from_utf8_lossy(&line)).map(str::to_owned),
         };
         let (ok, text) = match said {
             Ok(text) => (true, text),
             Err(text) => (false, text),
         };
         if self.outgoing.len() > BUFFER + ANSWERS {
-            // It asks and does not read.
+            // It sends commands and does not read the answers.
             self.gone = true;
             return;
         }

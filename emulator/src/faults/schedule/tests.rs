@@ -28,7 +28,7 @@ impl Bench {
         let mut reported = Vec::new();
         for cycle in from..end {
             let Self { schedule, plant, sensors, inputs } = self;
-            let broken = Broken { plant, sensors, inputs };
+            let broken = FaultTargets { plant, sensors, inputs };
             schedule.begin_cycle(cycle, broken, |mark| reported.push((cycle, mark.number, mark.what.name())));
             schedule.hands().put_into(&mut self.inputs);
             self.plant.step(&self.inputs);
@@ -38,11 +38,11 @@ impl Bench {
 
     fn by_hand(
         &mut self,
-        act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
+        act: impl FnOnce(&mut FaultSchedule, FaultTargets<'_>, &mut dyn FnMut(Mark)),
     ) -> Vec<FaultChange> {
         let mut reported = Vec::new();
         let Self { schedule, plant, sensors, inputs } = self;
-        act(schedule, Broken { plant, sensors, inputs }, &mut |mark| reported.push(mark.what));
+        act(schedule, FaultTargets { plant, sensors, inputs }, &mut |mark| reported.push(mark.what));
         reported
     }
 }
@@ -59,7 +59,7 @@ fn faults_begin_and_end_by_time_and_the_plant_is_whole_again() {
     assert_eq!(reported, [(10, 1, "begins"), (20, 2, "begins"), (30, 1, "ends"), (40, 2, "ends")]);
     assert_eq!(bench.schedule.overlay, Overlay::default());
     assert!(!bench.schedule.busy && bench.schedule.active() == 0);
-    let sent: Vec<_> = std::iter::from_fn(|| bench.schedule.next_to_tell()).collect();
+    let sent: Vec<_> = std::iter::from_fn(|| bench.schedule.next_mark()).collect();
     assert_eq!(sent, [(1, true), (2, true), (1, false), (2, false)]);
 }
 

@@ -33,7 +33,7 @@ const fn whole(
 const PROBABILITY: FaultKey = key("probability", "1", [0.0, 1.0], Some(1.0), "for each frame");
 const SELDOM: FaultKey = key("probability", "1", [0.0, 1.0], Some(0.1), "for each frame");
 
-/// The rows of a group: name, places, kind, what happens, numbers.
+/// The rows of a group: name, places, kind, effect, numbers.
 macro_rules! rows {
     ($group:ident { $($name:expr, $places:ident, $kind:expr, $about:literal, [$($key:expr),*];)* }) => {
         &[$(FaultSpec {
@@ -47,7 +47,8 @@ macro_rules! rows {
     };
 }
 
-/// The eight faults of a kind of sensor: its name, channel, places, unit, the unit in keys, the end of its range, a small error.
+/// The eight faults of a kind of sensor: its name, channel, places, unit, the unit in keys, the end of its range, a small
+/// error.
 macro_rules! sensor {
     ($quantity:literal, $channel:ident, $places:ident, $unit:literal, $suffix:literal, $most:literal, $small:literal) => {
         rows! { Sensor {
