@@ -1,4 +1,5 @@
-//! Commands that are another program: `airbench` becomes it, so that signals and the exit code are the program's own.
+//! Commands that are another program: `airbench` executes it in its place, so that signals and the exit code are those of the
+//! program.
 
 use crate::{Front, FrontError};
 use std::ffi::{OsStr, OsString};
@@ -6,7 +7,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A command that is a program, with what stands before the arguments.
+/// A command that is a program, with its first arguments.
 pub(crate) struct Program {
     command: &'static str,
     program: &'static str,
@@ -23,13 +24,13 @@ const PROGRAMS: [Program; 7] = [
     Program { command: "close", program: "discrepancy", first: &["close"] },
 ];
 
-/// The program of that command, if it is one.
+/// The program of a command, if it is one.
 pub(crate) fn named(command: &str) -> Option<&'static Program> {
     PROGRAMS.iter().find(|program| program.command == command)
 }
 
 impl Program {
-    /// Becomes the program; comes back when it cannot.
+    /// Executes the program in place of this one; returns only on failure.
     pub(crate) fn become_it(&self, front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontError> {
         let mut command = Command::new(front.places.program(self.program)?);
         command.args(self.first);
@@ -40,7 +41,7 @@ impl Program {
     }
 }
 
-/// Whether a rig file or a model file stands on the command line, or only help is asked for.
+/// Whether the command line names a rig file or a model file, or asks for help.
 fn names_a_model(arguments: &[OsString]) -> bool {
     arguments.iter().map(|argument| argument.to_string_lossy()).any(|word| {
         let option = word.split('=').next().unwrap_or(&word);
@@ -53,7 +54,7 @@ fn replaced_by(command: &mut Command) -> FrontError {
     FrontError::Start { program, reason: command.exec() }
 }
 
-/// `airbench test`: becomes pytest, whose plugin starts the programs from where this command finds them.
+/// `airbench test`: executes pytest, whose plugin starts the programs that this command finds.
 pub(crate) fn test(front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontError> {
     let emulator = front.places.program("emulator")?;
     let python = interpreter();
@@ -75,7 +76,7 @@ pub(crate) fn test(front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontE
     Err(replaced_by(&mut command))
 }
 
-/// The interpreter that was named, that of the virtual environment, or that of the system.
+/// The named interpreter, that of the virtual environment, or that of the system.
 fn interpreter() -> PathBuf {
     let set = |name| std::env::var_os(name).filter(|value| !value.is_empty());
     let of_environment = || set("VIRTUAL_ENV").map(|folder| PathBuf::from(folder).join("bin/python"));

@@ -1,8 +1,8 @@
-//! Child processes, and the signals that end them: whoever waits for one hears of both.
+//! Child processes and signals: a wait ends on either.
 //!
-//! Ctrl-C reaches the whole group of processes, a signal to `airbench` only `airbench`, which passes it on as SIGTERM. Children
-//! save what they have and end by themselves. A child is reaped by its owner alone: its number is nobody else's until then. When
-//! this process is killed, the kernel sends them SIGTERM (`PR_SET_PDEATHSIG`).
+//! Ctrl-C reaches the whole process group, a signal to `airbench` only `airbench`, which passes it on as SIGTERM. Children save
+//! their files and end by themselves. A child is reaped by its owner alone, so that its process number is not reused before.
+//! When this process is killed, the kernel sends the children SIGTERM (`PR_SET_PDEATHSIG`).
 
 #![allow(unsafe_code)] // what a new process does before exec, nothing else
 
@@ -21,15 +21,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-/// Children that do not end on SIGTERM are killed after this time.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Time between SIGTERM and SIGKILL.
+const TERMINATION_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// What happened while waiting.
+/// Result of a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Event {
-    /// A child ended, and is no child any more.
+    /// A child ended and was reaped.
     Ended(Pid, ExitStatus),
-    /// A person or a supervisor wants the end.
+    /// A signal asked for the end.
     Interrupted,
     TimeUp,
 }
@@ -39,22 +39,22 @@ enum Message {
     Signal,
 }
 
-struct Running {
+struct RunningChild {
     number: Pid,
     child: Child,
     leads_group: bool,
 }
 
-/// The children of this process; those that run end with it.
+/// The children of this process; dropping it ends those that run.
 pub(crate) struct Children {
-    running: Vec<Running>,
+    running: Vec<RunningChild>,
     interrupted: Arc<AtomicBool>,
     messages: Receiver<Message>,
     sender: Sender<Message>,
 }
 
 impl Children {
-    /// Starts watching for signals, other than those ignored when this process began, as `nohup` has it.
+    /// Watches for signals, except those ignored when this process started, as by `nohup`.
     pub(crate) fn watch() -> Result<Self, FrontError> {
         let (sender, messages) = channel();
         let interrupted = Arc::new(AtomicBool::new(false));
@@ -65,8 +65,8 @@ impl Children {
         let signals = watching.and_then(|()| Signals::new(&watched));
         let mut signals =
             signals.map_err(|error| FrontError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
-        let told = sender.clone();
-        std::thread::spawn(move || signals.forever().try_for_each(|_| told.send(Message::Signal)));
+        let signalled = sender.clone();
+        std::thread::spawn(move || signals.forever().try_for_each(|_| signalled.send(Message::Signal)));
         Ok(Self { running: Vec::new(), interrupted, messages, sender })
     }
 
@@ -85,7 +85,7 @@ impl Children {
         self.spawn(command, true)
     }
 
-    /// One that leads a process group of its own takes the group along when it ends.
+    /// A child that leads a process group takes the group along when it ends.
     fn spawn(&mut self, command: &mut Command, leads_group: bool) -> Result<Pid, FrontError> {
         if leads_group {
             command.process_group(0);
@@ -94,20 +94,20 @@ impl Children {
         let owner = getpid();
         let end_with_owner = move || {
             set_parent_process_death_signal(Some(Signal::TERM))?;
-            // It may have ended before.
+            // The parent may have ended before.
             if getppid() == Some(owner) { Ok(()) } else { Err(Errno::SRCH.into()) }
         };
         // SAFETY: between fork and exec it makes two system calls, and takes no lock and no memory.
         let child = unsafe { command.stdin(Stdio::null()).pre_exec(end_with_owner) }.spawn();
         let child = child.map_err(|reason| FrontError::Start { program, reason })?;
         let number = Pid::from_child(&child);
-        let told = self.sender.clone();
+        let ended = self.sender.clone();
         std::thread::spawn(move || {
             let look = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
             while matches!(waitid(WaitId::Pid(number), look), Err(Errno::INTR)) {}
-            told.send(Message::Ended(number))
+            ended.send(Message::Ended(number))
         });
-        self.running.push(Running { number, child, leads_group });
+        self.running.push(RunningChild { number, child, leads_group });
         Ok(number)
     }
 
@@ -131,7 +131,7 @@ impl Children {
         }
     }
 
-    /// Waits until a child has ended; a signal ends all. Its exit code, as [`code`] has it.
+    /// Waits until a child has ended; a signal ends all. Returns its exit code, as of [`code`].
     pub(crate) fn finish(&mut self, child: Pid) -> u8 {
         loop {
             match self.next(None) {
@@ -148,7 +148,7 @@ impl Children {
         Ok(self.finish(child))
     }
 
-    /// How many of these run.
+    /// Number of these that run.
     pub(crate) fn count(&self, of: &[Pid]) -> usize {
         self.running.iter().filter(|one| of.contains(&one.number)).count()
     }
@@ -165,7 +165,7 @@ impl Children {
 impl Drop for Children {
     fn drop(&mut self) {
         self.stop_all();
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + TERMINATION_TIMEOUT;
         while !self.running.is_empty() {
             if self.next(Some(deadline)) == Event::TimeUp {
                 self.running.drain(..).for_each(|mut one| {
@@ -177,9 +177,9 @@ impl Drop for Children {
     }
 }
 
-impl Running {
+impl RunningChild {
     fn signal(&self, signal: Signal) {
-        // One that has just ended needs none.
+        // Fails where the child has just ended.
         let _ = if self.leads_group {
             kill_process_group(self.number, signal)
         } else {
@@ -188,7 +188,7 @@ impl Running {
     }
 }
 
-/// The exit code as a shell has it: 128 and the number of the signal that ended a process.
+/// The exit code as in a shell: 128 and the number of the signal that ended a process.
 pub(crate) fn code(status: ExitStatus) -> u8 {
     let code = status.code().or_else(|| status.signal().map(|signal| 128 + signal));
     code.and_then(|code| code.try_into().ok()).unwrap_or(u8::MAX)

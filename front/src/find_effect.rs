@@ -1,5 +1,5 @@
-//! `airbench find-effect`: hides an effect in the rig, measures over the bus, has it found, adds it to the model, shows the gap
-//! shrink, and opens the seal.
+//! `airbench find-effect`: hides an effect in the rig, measures over the bus, runs the workflow, adds the named effect to the
+//! model, compares the gaps, and opens the seal.
 //!
 //! ```text
 //!   emulator seal ──► measured: fitted, held-out ──► discrepancy close ──► baseline and extended: fitted, held-out
@@ -22,7 +22,7 @@ use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// The rigs that are searched, one after the other.
+/// The searches of a command, one rig after the other.
 struct Search<'a> {
     arguments: &'a FindEffectArguments,
     children: Children,
@@ -33,14 +33,14 @@ struct Search<'a> {
     controller: PathBuf,
     discrepancy: PathBuf,
     rig: PathBuf,
-    /// What is hidden in place of a draw.
+    /// Content of --hidden, in place of a draw.
     hidden: Option<String>,
     programs: PathBuf,
-    /// Experiments of the fit and of the comparison, by the names of their folders.
+    /// Experiments of the fit and of the comparison, with the names of their folders.
     experiments: [(&'static str, PathBuf); 2],
 }
 
-/// Searches. Returns the exit code.
+/// Runs the searches. Returns the exit code.
 pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Result<u8, FrontError> {
     if arguments.lockstep && arguments.bus.as_ref().is_some_and(|bus| bus.starts_with("can://")) {
         let bus = arguments.bus.as_deref().unwrap_or_default();
@@ -105,9 +105,9 @@ fn is_program(path: &Path) -> bool {
     path.metadata().is_ok_and(|found| found.is_file() && found.permissions().mode() & 0o111 != 0)
 }
 
-/// An experiment begins when the initial positioning is over, whatever a hidden effect does to standstill and error: all runs of
-/// an experiment are driven at the same times. An axis that it does not drive has no settling to set.
-fn unsettled(experiment: &str) -> Vec<String> {
+/// Options that end the initial positioning by time, whatever a hidden effect does to standstill and error, so that all runs of
+/// an experiment have the same times. An axis without set-points has no settling.
+fn without_settling(experiment: &str) -> Vec<String> {
     let driven = Axis::NAMES
         .into_iter()
         .filter(|axis| experiment.lines().any(|line| line.starts_with(&format!("[{axis}]"))));
@@ -116,7 +116,7 @@ fn unsettled(experiment: &str) -> Vec<String> {
 }
 
 impl Search<'_> {
-    /// The whole way for one rig; whether what was hidden was named.
+    /// The search of one rig; returns whether the hidden effects were named.
     fn one(&mut self, seed: u64) -> Result<bool, FrontError> {
         let folder = self.out.join(format!("seed-{seed}"));
         let hidden = folder.join("hidden");
@@ -128,7 +128,7 @@ impl Search<'_> {
             Some(text) => {
                 fs::write(&sealed, text).map_err(|error| FrontError::output(&sealed, &error))?;
             }
-            // Nothing is measured: the folder is free for another try, but for what somebody else put there.
+            // Nothing was measured: the folder is removed for another try, unless it has other files.
             None => self.draw(seed, &sealed).inspect_err(|_| {
                 drop(fs::remove_dir_all(&hidden));
                 drop(fs::remove_dir(&folder));
@@ -136,7 +136,7 @@ impl Search<'_> {
         }
         for ((name, file), noise) in self.experiments.clone().iter().zip([1000, 2000]) {
             say(&format!("measuring {name} on the sealed rig …"));
-            // Each with noise of its own, as two measurements have.
+            // With independent noise, as of two measurements.
             self.sealed(&folder, &format!("{name}/measured"), file, noise + seed)?;
         }
         say("asking what is missing …");
@@ -150,7 +150,7 @@ impl Search<'_> {
                 let workflow = workflow.display();
                 return Err(FrontError::Process(format!("discrepancy close left no rig.toml in {workflow}")));
             }
-            // With the noise that the baseline had: the models differ by what was added alone.
+            // With the noise of the baseline, so that the models differ by the added effect alone.
             self.drive(&folder.join(name).join("extended"), &file, &extended, 1, &[])?;
         }
         say("measuring held-out on the sealed rig once more …");
@@ -159,7 +159,7 @@ impl Search<'_> {
         let mut compare = Command::new(&self.bench);
         compare.args(["compare", "--differences"]);
         compare.args(["measured", "baseline", "extended", "repeated"].map(|run| folder.join(name).join(run)));
-        self.called(compare.arg("--out").arg(folder.join("gap.html")), "no picture of the gap")?;
+        self.call(compare.arg("--out").arg(folder.join("gap.html")), "no picture of the gap")?;
 
         let report = judge::read(&workflow.join("report.json"))?;
         let sealed = fs::read_to_string(&sealed).map_err(|error| FrontError::input(&sealed, &error))?;
@@ -172,22 +172,22 @@ impl Search<'_> {
         Ok(judgement.right)
     }
 
-    /// Draws what is hidden.
+    /// Draws the hidden effects.
     fn draw(&mut self, seed: u64, sealed: &Path) -> Result<(), FrontError> {
         let mut seal = Command::new(&self.emulator);
         seal.args(["seal", "--seed", &seed.to_string(), "--effects", &self.arguments.effects.to_string()]);
         seal.args(["--axis", &self.arguments.axis, "--out"]).arg(sealed).stdout(Stdio::null());
         let code = self.children.call(&mut seal)?;
-        self.expect_going_on()?;
+        self.check_interrupt()?;
         match code {
             0 => Ok(()),
-            // It knows the catalogue, and has said what there is.
+            // It knows the catalogue and has reported the reason.
             2 => Err(FrontError::Input(format!("--effects {}: cannot be drawn", self.arguments.effects))),
             _ => Err(FrontError::Process("emulator seal failed".into())),
         }
     }
 
-    /// A run of the rig that the folder's seal hides something in.
+    /// A run of the rig with the hidden effects of the folder's sealed file.
     fn sealed(&mut self, folder: &Path, name: &str, file: &Path, noise: u64) -> Result<(), FrontError> {
         let (run, hidden) = (folder.join(name), folder.join("hidden"));
         let rig = self.rig.clone();
@@ -198,12 +198,12 @@ impl Search<'_> {
             noise,
             &[OsStr::new("--sealed"), hidden.join("sealed.toml").as_os_str()],
         )?;
-        // It names the terms of what is hidden.
+        // Its names are the terms of the hidden effects.
         let truth = hidden.join(format!("truth-{}.csv", name.replace('/', "-")));
         fs::rename(run.join(TRUTH_CSV), &truth).map_err(|error| FrontError::output(&truth, &error))
     }
 
-    /// Without the effect all rigs are the same one: run once, and copied for the following.
+    /// Without the effect all rigs are equal: run once, and copied for the others.
     fn baseline(&mut self, run: &Path, name: &str, file: &Path) -> Result<(), FrontError> {
         let kept = self.out.join("baseline").join(name);
         if kept.is_dir() {
@@ -214,7 +214,7 @@ impl Search<'_> {
         if self.arguments.count > 1 { copy_folder(run, &kept) } else { Ok(()) }
     }
 
-    /// A run into a folder. The controllers have the shipped rig's numbers in every run.
+    /// Makes a run in a folder. The controllers have the parameters of the shipped rig in every run.
     fn drive(
         &mut self,
         run: &Path,
@@ -228,7 +228,7 @@ impl Search<'_> {
         let mut pair = Pair::new([&self.emulator, &self.controller], [rig, &self.rig], file, run, &self.bus);
         pair.emulator.args(["--seed", &noise.to_string()]).args(pace).args(more);
         pair.controller.arg("--programs").arg(&self.programs).args(pace);
-        pair.controller.args(unsettled(&experiment).iter().flat_map(|variable| ["--set", variable]));
+        pair.controller.args(without_settling(&experiment).iter().flat_map(|variable| ["--set", variable]));
         let console = pair.run(&mut self.children).map_err(|error| match error {
             PairError::Failed { code, console } => {
                 eprintln!("{}", last_lines(&console, 5));
@@ -236,19 +236,19 @@ impl Search<'_> {
             }
             PairError::Other(error) => error,
         })?;
-        self.expect_going_on()?;
+        self.check_interrupt()?;
         let failed = |error| FrontError::output(&console, &error);
         let log = File::options().append(true).open(&console).map_err(failed)?;
         let mut summary = Command::new(&self.bench);
         summary.arg("summary").arg(run).stdout(log.try_clone().map_err(failed)?).stderr(log);
-        // Bounds of an experiment are the baseline's, and no matter here.
+        // Bounds of an experiment are for the baseline and do not matter here.
         match self.children.call(&mut summary)? {
-            0 | 1 => self.expect_going_on(),
+            0 | 1 => self.check_interrupt(),
             _ => Err(FrontError::Process(format!("no summary of {}", run.display()))),
         }
     }
 
-    /// Asks what is missing.
+    /// Runs the workflow.
     fn close(&mut self, folder: &Path, workflow: &Path) -> Result<(), FrontError> {
         make_folder(workflow)?;
         let console = workflow.join("console.log");
@@ -262,7 +262,7 @@ impl Search<'_> {
         }
         close.stdout(log.try_clone().map_err(|error| FrontError::output(&console, &error))?).stderr(log);
         let code = self.children.call(&mut close)?;
-        self.expect_going_on()?;
+        self.check_interrupt()?;
         if code != 0 {
             eprintln!("{}", last_lines(&console, 5));
             return Err(FrontError::Process(format!("discrepancy close failed; see {}", console.display())));
@@ -270,13 +270,13 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn called(&mut self, command: &mut Command, otherwise: &str) -> Result<(), FrontError> {
+    fn call(&mut self, command: &mut Command, otherwise: &str) -> Result<(), FrontError> {
         let code = self.children.call(command)?;
-        self.expect_going_on()?;
+        self.check_interrupt()?;
         if code == 0 { Ok(()) } else { Err(FrontError::Process(otherwise.into())) }
     }
 
-    fn expect_going_on(&self) -> Result<(), FrontError> {
+    fn check_interrupt(&self) -> Result<(), FrontError> {
         if self.children.interrupted() { Err(FrontError::Interrupted) } else { Ok(()) }
     }
 }

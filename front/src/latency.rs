@@ -1,5 +1,5 @@
-//! `airbench latency`: measures latency beside its references. cyclictest, airbench and ping-pongs alternate, and a report
-//! compares them.
+//! `airbench latency`: measures latency beside references. cyclictest, airbench and ping-pongs alternate, and a report compares
+//! them.
 //!
 //! ```text
 //!   pair 1: cyclictest, run, bus, socketpair, spin │ pair 2: the same in reverse │ … ──► bench report, bench latency-table
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-/// Measures. Returns the exit code.
+/// Measures and reports. Returns the exit code.
 pub(crate) fn latency(arguments: &LatencyArguments, front: &Front) -> Result<u8, FrontError> {
     let plan = Plan::of(arguments, front)?;
     let out = front.results(arguments.out.as_deref(), "latency")?;
@@ -75,10 +75,10 @@ pub(crate) fn latency(arguments: &LatencyArguments, front: &Front) -> Result<u8,
     measurement.report(&plan)
 }
 
-/// What the command line asks for, checked.
+/// The checked command line.
 struct Plan {
     experiment: PathBuf,
-    /// Of the rig and of the controller.
+    /// CPUs of the rig and of the controller.
     cpus: [usize; 2],
     bounds: Option<PathBuf>,
     spin_bounds: Option<PathBuf>,
@@ -90,7 +90,7 @@ impl Plan {
         let cpus = allowed_cpus();
         let last = cpus.last().copied().unwrap_or(0);
         let cpu = arguments.cpu.unwrap_or(last);
-        // The one before it, and for the first the one after it.
+        // The CPU before it, or the one after the first.
         let other = cpus.iter().copied().rfind(|other| *other != cpu).unwrap_or(cpu);
         let cpus_asked = [cpu, arguments.controller_cpu.unwrap_or(other)];
         if let Some(missing) = cpus_asked.iter().find(|cpu| !cpus.contains(cpu)) {
@@ -128,14 +128,14 @@ fn allowed_cpus() -> Vec<usize> {
     (0..CpuSet::MAX_CPU).filter(|cpu| allowed.is_set(*cpu)).collect()
 }
 
-/// Whether a command is there, by its path or on `PATH`.
+/// Whether a command exists, by its path or on `PATH`.
 fn on_path(program: &str) -> bool {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     let found = std::env::split_paths(&folders).any(|folder| folder.join(program).is_file());
     found || (program.contains('/') && Path::new(program).is_file())
 }
 
-/// Why a program of Debian is not there; none when it is. In a checkout it is installed first, as `scripts/tools.sh` does it.
+/// Why a program of Debian is missing; `None` when it exists. In a checkout it is installed first, by `scripts/tools.sh`.
 fn get(
     program: &str,
     package: &str,
@@ -173,11 +173,11 @@ impl Measurement<'_> {
         self.out.join(format!("pair-{pair:02}"))
     }
 
-    /// All pairs, until the last or a signal.
+    /// Measures all pairs, until the last or a signal.
     fn measure(&mut self) -> Result<(), FrontError> {
         let mut slices = vec![Slice::Cyclictest, Slice::Run, Slice::Bus, Slice::Socketpair];
         slices.extend((self.arguments.spin_us != 0).then_some(Slice::Spin));
-        // On a real CAN the claim is about that bus; the embedded one stands beside it.
+        // On a real CAN bus the claim is about that bus; an embedded bus is measured beside it.
         slices.extend(self.runner.bus.starts_with("can://").then_some(Slice::Embedded));
         let (pairs, seconds) = (self.arguments.pairs, self.arguments.seconds);
         let total = pairs * slices.len() as u64;
@@ -192,7 +192,7 @@ impl Measurement<'_> {
         for pair in 1..=pairs {
             let folder = self.pair_folder(pair);
             fs::create_dir(&folder).map_err(|error| FrontError::output(&folder, &error))?;
-            // What drifts over minutes, such as heat or a neighbour, must not always meet the same slice first.
+            // Alternating order, so that slow drifts (heat, other load) do not always affect the same slice.
             let mut order = slices.clone();
             if pair % 2 == 0 {
                 order.reverse();
@@ -201,7 +201,7 @@ impl Measurement<'_> {
                 if self.runner.children.interrupted() {
                     break;
                 }
-                // By what the slices took until now; by their length before there are any.
+                // Estimated from the slices so far; from their length before the first.
                 let left = match done {
                     0 => total * (seconds + 1),
                     done => began.elapsed().as_secs() * (total - done) / done,
@@ -224,7 +224,7 @@ impl Measurement<'_> {
         Ok(())
     }
 
-    /// Puts what was measured beside the run into the run's folder.
+    /// Copies the measurements beside a run into the run's folder.
     fn gather(&self, folder: &Path, pair: u64) -> Result<(), FrontError> {
         let (run, spin) = (folder.join("run"), folder.join("run-spin"));
         if !run.is_dir() {
@@ -263,7 +263,7 @@ impl Measurement<'_> {
         if !spin.is_dir() {
             return Ok(());
         }
-        // The one reference of the pair stands beside both of its runs.
+        // The one reference of the pair belongs to both of its runs.
         if reference.is_file() {
             let copy = spin.join(CYCLICTEST_JSON);
             fs::copy(&reference, &copy).map_err(|error| FrontError::output(&copy, &error))?;
@@ -271,10 +271,10 @@ impl Measurement<'_> {
         write(&spin, format!("spin {} us", self.arguments.spin_us))
     }
 
-    /// Reports of what was measured, and the table of ratios.
+    /// Makes the reports and the table of ratios.
     fn report(&mut self, plan: &Plan) -> Result<u8, FrontError> {
         let pairs: Vec<_> = (1..=self.arguments.pairs).map(|pair| self.pair_folder(pair)).collect();
-        // What a killed slice left is no run: the emulator tells of itself at its end.
+        // The files of a killed slice are no run: the emulator writes its report at its end.
         let runs = |name: &str| -> Vec<PathBuf> {
             let runs = pairs.iter().map(|pair| pair.join(name));
             runs.filter(|run| run.join(SUMMARY_JSON).is_file()).collect()
@@ -332,7 +332,7 @@ impl Measurement<'_> {
         let interrupted = self.runner.children.interrupted();
         if let Some(checkout) = self.front.places.checkout().filter(|_| self.arguments.write && !interrupted)
         {
-            // The marks of all pages are the scripts' affair.
+            // The marks in pages are replaced by the scripts.
             let put =
                 "root=$1; . \"$root/scripts/tables.sh\"; put_table latency \"$2\" bench/docs/latency.md";
             let put = self
@@ -345,7 +345,7 @@ impl Measurement<'_> {
     }
 }
 
-/// Changed files of a source tree; none where git knows of none.
+/// Number of changed files of a source tree; `None` outside git.
 fn uncommitted_files(checkout: &Path) -> Option<u64> {
     let listed = Command::new("git").arg("-C").arg(checkout).args(["status", "--porcelain"]).output().ok()?;
     listed.status.success().then(|| listed.stdout.iter().filter(|byte| **byte == b'\n').count() as u64)

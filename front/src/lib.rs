@@ -1,24 +1,26 @@
-//! The command `airbench`: what takes several programs of the set, and a way to each of them.
+//! The command `airbench`: commands that use several programs, and a way to each program.
 //!
 //! ```text
 //!   airbench run, latency, find-effect ──► children: emulator, controller, bench, discrepancy, load generators …
-//!   airbench can, close, test, bench … ──► becomes the program, whose exit code is then its own
+//!   airbench can, close, test, bench … ──► executes the program, whose exit code is then its own
 //! ```
 //!
 //! | file | holds |
 //! |---|---|
 //! | [`cli`] | the command line |
 //! | `places` | where the programs and the rig's files are: installed, in a wheel, in a checkout |
-//! | `children` | processes that it starts, and signals, which it passes on |
+//! | `children` | child processes, and signals, which are passed on |
 //! | `private` | a folder for sockets |
 //! | `run` | `airbench run` |
-//! | `find_effect` | `airbench find-effect`; `find_effect::judge` opens the seal |
-//! | `latency` | `airbench latency`; `latency::slices` what runs alone for its time |
-//! | `pair` | emulator and controller for one run, what both say in one file |
+//! | `find_effect` | `airbench find-effect`; `find_effect::judge` compares with the sealed file |
+//! | `latency` | `airbench latency`; `latency::slices` has the single measurements |
+//! | `pair` | emulator and controller for one run, with their output in one file |
 //! | `become_program` | the commands that are another program |
 //!
-//! It knows the programs by their command lines, files and exit codes alone. Started as `scripts/NAME`, which the scripts of a
-//! checkout do, it calls itself so.
+//! It knows the programs by their command lines, files and exit codes alone. Started as `scripts/NAME`, as by the scripts of a
+//! checkout, it uses that name in its messages.
+
+#![warn(missing_docs)] // an interface of other crates
 
 mod become_program;
 mod children;
@@ -40,7 +42,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-/// Why a command could not do its work.
+/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum FrontError {
     /// Usage, bad input, or an output that cannot be written.
@@ -49,10 +51,10 @@ pub(crate) enum FrontError {
     /// A process that cannot be started.
     #[error("cannot start {program}: {reason}")]
     Start { program: String, reason: io::Error },
-    /// A process that failed, or left less than it should.
+    /// A process that failed, or left too few files.
     #[error("{0}")]
     Process(String),
-    /// A signal; every process has saved what it had.
+    /// A signal; every process has saved its files.
     #[error("interrupted")]
     Interrupted,
 }
@@ -75,17 +77,17 @@ impl FrontError {
     }
 }
 
-/// What every command needs: where things are, and by which name a person started it.
+/// Context of every command: places of files, and the name by which it was started.
 pub(crate) struct Front {
     pub(crate) places: Places,
     /// `scripts/run` or `airbench run`.
     pub(crate) name: String,
-    /// The whole command line, as it was typed.
+    /// The whole command line as typed.
     pub(crate) typed: String,
 }
 
 impl Front {
-    /// What a person types to list the experiments.
+    /// The command that lists the experiments.
     pub(crate) fn list_command(&self) -> &'static str {
         if self.name.starts_with("scripts/") { "scripts/run --list" } else { "airbench run --list" }
     }
@@ -100,14 +102,14 @@ impl Front {
         Ok(Some(self.places.data("experiments")?.join(file)).filter(|file| file.is_file()))
     }
 
-    /// The folder of a new run, named by the time of day and what it is; `runs/latest` of a plain run is its caller's.
+    /// The folder of a new run, named by the time of day and `what`; `runs/latest` is up to the caller.
     pub(crate) fn run_folder(&self, what: &str) -> Result<PathBuf, FrontError> {
         let failed = |reason| FrontError::Start { program: "date".into(), reason };
         let time = Command::new("date").arg("+%Y%m%d-%H%M%S").output().map_err(failed)?.stdout;
         Ok(self.places.runs().join(format!("{}-{what}", String::from_utf8_lossy(&time).trim_end())))
     }
 
-    /// The folder of a command's results, made: the one that was asked for, or a new one; without links, and from the root.
+    /// Creates the folder of a command's results, the requested or a new one; returns its absolute path without links.
     pub(crate) fn results(&self, asked: Option<&Path>, what: &str) -> Result<PathBuf, FrontError> {
         let out = asked.map_or_else(|| self.run_folder(what), |out| Ok(out.into()))?;
         make_folder(&out)?;
@@ -119,7 +121,7 @@ impl Front {
     }
 }
 
-/// A line to standard output. A reader that has gone, as `| head` does, has seen enough.
+/// Prints a line; a closed pipe, as of `| head`, is no error.
 pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stdout(), "{line}");
 }
@@ -130,7 +132,7 @@ pub(crate) fn last_lines(file: &Path, count: usize) -> String {
     lines[lines.len().saturating_sub(count)..].join("\n")
 }
 
-/// A folder that results go to, made if missing.
+/// Creates a folder of results if it is missing.
 pub(crate) fn make_folder(out: &Path) -> Result<(), FrontError> {
     std::fs::create_dir_all(out).map_err(|reason| {
         let out = out.display();
@@ -138,7 +140,8 @@ pub(crate) fn make_folder(out: &Path) -> Result<(), FrontError> {
     })
 }
 
-/// Does what the command line says.
+/// Runs the command of the command line. `arguments` are those of the process, with its name first; returns the exit code of
+/// the process.
 #[must_use]
 pub fn main(mut arguments: Vec<OsString>) -> ExitCode {
     let called = arguments.first().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -167,12 +170,12 @@ fn dispatch(cli: cli::Cli, front: &Front) -> Result<u8, FrontError> {
         cli::Command::Latency(arguments) => latency::latency(&arguments, front),
         cli::Command::FindEffect(arguments) => find_effect::find_effect(&arguments, front),
         cli::Command::Test(arguments) => become_program::test(front, arguments.arguments),
-        // Taken by its name, before the command line is looked at.
+        // Executed by name before the command line is parsed.
         _ => unreachable!("a command that is another program"),
     }
 }
 
-/// The command line, or the exit code after help was given or the line was refused. Help names the command as it was typed.
+/// The parsed command line, or the exit code after help or a refusal. Help names the command as typed.
 fn parse(arguments: &[OsString], name: &str) -> Result<cli::Cli, u8> {
     let mut command = cli::command();
     let typed =
@@ -202,7 +205,7 @@ fn refusal(error: &clap::Error, name: &str, command: &clap::Command) -> String {
         Some(ContextValue::String(text)) => text.as_str(),
         _ => "",
     };
-    // An option as it is typed, without the name of its value.
+    // An option as typed, without the name of its value.
     let (argument, value) = (context(ContextKind::InvalidArg), context(ContextKind::InvalidValue));
     let option = argument.split(' ').next().unwrap_or_default();
     let reason = match error.kind() {

@@ -1,4 +1,4 @@
-//! Emulator and controller as two processes on one bus, what both say in one file.
+//! Emulator and controller as two processes on one bus, with their output in one file.
 
 use crate::children::{Children, Event, code};
 use crate::{FrontError, make_folder};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// Time in which the other notices a failure by itself.
+/// Time for the other to notice a failure by itself.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// Emulator and controller before they start.
+/// Emulator and controller before their start.
 pub(crate) struct Pair {
     pub(crate) emulator: Command,
     pub(crate) controller: Command,
@@ -19,7 +19,7 @@ pub(crate) struct Pair {
 
 /// Why there is no run.
 pub(crate) enum PairError {
-    /// One of them ended with this code; the file has what they said.
+    /// One of them ended with this code; the file has their output.
     Failed { code: u8, console: PathBuf },
     /// They could not be started.
     Other(FrontError),
@@ -43,8 +43,8 @@ impl Pair {
         Self { emulator, controller, run: run.into() }
     }
 
-    /// Runs them to their end; whoever fails takes the other along. Returns the file of what they said, `console.log` of the run,
-    /// also when a signal ended them.
+    /// Runs them to their end; a failure of one ends the other. Returns the file of their output, `console.log` of the run,
+    /// also after a signal.
     pub(crate) fn run(mut self, children: &mut Children) -> Result<PathBuf, PairError> {
         // Beside the folder, which the emulator clears.
         let log = self.run.with_extension("log");
@@ -62,7 +62,7 @@ impl Pair {
         make_folder(&self.run)?;
         let unwritable = |error| FrontError::output(log, &error);
         let _ = fs::remove_file(log);
-        // Both append: neither writes over what the other said.
+        // Both append, so that neither overwrites the output of the other.
         let file = File::options().create(true).append(true).open(log).map_err(unwritable)?;
         let mut members = Vec::new();
         for command in [&mut self.emulator, &mut self.controller] {

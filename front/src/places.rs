@@ -1,8 +1,8 @@
-//! Where the programs and the files of the rig are.
+//! Paths of the programs and of the files of the rig.
 //!
 //! | | programs | files of the rig |
 //! |---|---|---|
-//! | asked for | `$AIRBENCH_BIN`, or `$AIRBENCH_BIN_DIR` of scripts | `$AIRBENCH_SHARE` |
+//! | requested | `$AIRBENCH_BIN`, or `$AIRBENCH_BIN_DIR` of scripts | `$AIRBENCH_SHARE` |
 //! | checkout | beside `airbench` | the checkout above `airbench` |
 //! | package of Debian | beside it, or `PREFIX/lib/airbench` | `PREFIX/share/airbench` |
 //! | wheel | beside it | `data`, beside the folder of `airbench` |
@@ -11,7 +11,7 @@ use crate::FrontError;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// Files of the rig: the name, which is that in an installed folder, and the place in a checkout.
+/// Files of the rig: the name in an installed folder, and the path in a checkout.
 const FILES: [(&str, &str); 7] = [
     ("rig.toml", "plant/rig.toml"),
     ("rig.dbc", "protocol/rig.dbc"),
@@ -22,7 +22,7 @@ const FILES: [(&str, &str); 7] = [
     ("latency-bounds-spin.toml", "latency/bounds-spin.toml"),
 ];
 
-/// Folders, in the order in which they are looked into.
+/// Folders in the order of the search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Places {
     programs: Vec<PathBuf>,
@@ -30,14 +30,15 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// The places for the program that runs, by where it lies and by the variables AIRBENCH_BIN and AIRBENCH_SHARE.
+    /// Places by the path of the running program and the variables AIRBENCH_BIN and AIRBENCH_SHARE.
     pub(crate) fn find() -> Result<Self, String> {
-        let own = std::env::current_exe().map_err(|error| format!("cannot find where it lies: {error}"))?;
-        Ok(Self::of(&own, |name| std::env::var_os(name).filter(|value| !value.is_empty())))
+        let program_path =
+            std::env::current_exe().map_err(|error| format!("cannot find where it lies: {error}"))?;
+        Ok(Self::of(&program_path, |name| std::env::var_os(name).filter(|value| !value.is_empty())))
     }
 
-    fn of(own: &Path, variable: impl Fn(&str) -> Option<OsString>) -> Self {
-        let folder = own.parent().unwrap_or(own);
+    fn of(program_path: &Path, variable: impl Fn(&str) -> Option<OsString>) -> Self {
+        let folder = program_path.parent().unwrap_or(program_path);
         let prefix = folder.parent().unwrap_or(folder);
         let asked = variable("AIRBENCH_BIN").or_else(|| variable("AIRBENCH_BIN_DIR"));
         let programs = match asked {
@@ -77,12 +78,12 @@ impl Places {
         })
     }
 
-    /// The source tree that the files are of; none where airbench is installed.
+    /// The source tree of the files; `None` where airbench is installed.
     pub(crate) fn checkout(&self) -> Option<&Path> {
         self.data.iter().map(PathBuf::as_path).find(|folder| is_checkout(folder))
     }
 
-    /// Where the folders of runs go that nobody named: into the checkout, else below the working directory.
+    /// Parent of new run folders: in the checkout, else below the working directory.
     pub(crate) fn runs(&self) -> PathBuf {
         self.checkout().unwrap_or(Path::new("")).join("runs")
     }

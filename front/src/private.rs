@@ -1,4 +1,4 @@
-//! A folder for the sockets of a run that only this user can read, and the buses that take its place.
+//! A folder for the sockets of a run that only this user can read, and buses outside it.
 
 use crate::FrontError;
 use protocol::bus::BusUrl;
@@ -49,19 +49,19 @@ impl Drop for PrivateFolder {
     }
 }
 
-/// The bus of a run, and what goes with it.
+/// The bus of a run, with its folder and its reservation.
 #[derive(Default)]
 pub(crate) struct RunBus {
     /// URL of the bus, `can://…` or `unix://…`.
     pub(crate) url: String,
-    /// A folder for sockets, where the run has one of its own.
+    /// A folder for sockets, if the run has its own.
     pub(crate) private: Option<PrivateFolder>,
-    /// So that no other run takes the same bus by itself.
+    /// Keeps other runs from taking the same bus by default.
     pub(crate) reservation: Option<Reservation>,
 }
 
 impl RunBus {
-    /// The bus that was asked for; else vcan0, when it is up and this is real time; else an embedded bus in a private folder.
+    /// The requested bus; else vcan0, when it is up and this is real time; else an embedded bus in a private folder.
     pub(crate) fn of_its_own(asked: Option<&str>, simulated_time: bool) -> Result<Self, FrontError> {
         match asked {
             Some(bus) => Ok(Self { url: bus.into(), ..Self::default() }),
@@ -75,7 +75,8 @@ impl RunBus {
         }
     }
 
-    /// The same, but in real time the embedded bus where other programs of the user look for it, unless somebody has it already.
+    /// As [`RunBus::of_its_own`], but in real time the default embedded bus of the user, where other programs expect it, unless
+    /// it is taken.
     pub(crate) fn for_others(asked: Option<&str>, simulated_time: bool) -> Result<Self, FrontError> {
         let bus = BusUrl::default_embedded();
         let reservation = match &bus {
@@ -91,7 +92,7 @@ impl RunBus {
     }
 }
 
-/// A vcan0 (or any CAN interface of that name) that is up: `/sys` tells its type, 280 being CAN, and its flags, bit 0 being up.
+/// Whether vcan0 (or any CAN interface of that name) is up: `/sys` has its type, 280 for CAN, and its flags, bit 0 for up.
 fn vcan_usable() -> bool {
     let read = |file: &str| fs::read_to_string(format!("/sys/class/net/vcan0/{file}")).unwrap_or_default();
     let flags = u32::from_str_radix(read("flags").trim().trim_start_matches("0x"), 16).unwrap_or(0);

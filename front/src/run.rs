@@ -1,12 +1,12 @@
-//! `airbench run`: an experiment with emulator and controllers as processes on one bus, and what beside them belongs to it.
+//! `airbench run`: an experiment with emulator and controllers as processes on one bus, and its companion programs.
 //!
 //! ```text
 //!   bench check-experiment ──► emulator, controller (one or one for each axis) ──► bench summary
 //!                              bench gateway, bench watch: end with the run
 //! ```
 //!
-//! A process that fails takes the others along, after [`GRACE`], in which they notice by themselves, say so and trip the
-//! emergency stop. The exit code is that of the first that failed: what the others say later is not the cause.
+//! A process that fails ends the others, after [`GRACE`], in which they notice the failure, report it and trip the emergency
+//! stop. The exit code is that of the first failure, which is the cause of the later ones.
 
 use crate::children::{Children, Event, code};
 use crate::cli::RunArguments;
@@ -19,14 +19,14 @@ use rustix::process::Pid;
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::os::unix::process::ExitStatusExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// Time in which the others may notice a failure.
+/// Time for the others to notice a failure.
 const GRACE: Duration = Duration::from_secs(3);
 
-/// Runs it. Returns the exit code.
+/// Runs an experiment. Returns the exit code.
 pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontError> {
     if arguments.list {
         return list(front).map(|()| Exit::Good as u8);
@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     let (rig, programs) = (front.places.data("rig.toml")?, front.places.data("programs")?);
     let mut children = Children::watch()?;
 
-    // A typo in the bounds is told before the run, not after it.
+    // A typo in the bounds is reported before the run, not after it.
     let checked = children.call(Command::new(&bench).arg("check-experiment").arg(&file))?;
     if checked != 0 {
         return Ok(checked);
@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
         None => newest(front, &name)?,
     };
     make_folder(&out)?;
-    // The emulator clears the folder of an earlier run; should it not get that far, no old figures may be told as this run's.
+    // The emulator clears the folder of an earlier run; if it fails before, old results must not be taken for this run's.
     let _ = fs::remove_file(out.join(SUMMARY_JSON));
 
     let RunBus { url: bus, mut private, reservation: _reservation } =
@@ -96,17 +96,13 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
             let _ = run.children.start(&mut gateway)?;
         }
         if arguments.watch {
-            // Beside the socket of a bus of the run's own, or in a folder that only this user can read.
+            // Beside the socket of a private bus, or in a folder that only this user can read.
             let folder = match &private {
                 Some(folder) => folder,
                 None => private.insert(PrivateFolder::make()?),
             };
             let telemetry = folder.path().join("telemetry");
-            let mut watch = Command::new(&bench);
-            watch
-                .args(["watch", "--bus", &bus, "--http", &arguments.http, "--control", "--telemetry"])
-                .arg(&telemetry);
-            let _ = run.children.start(&mut watch)?;
+            start_page(&mut run.children, &bench, [&bus, &arguments.http], &telemetry)?;
             emulate.arg("--console").arg("--telemetry").arg(telemetry);
         }
         run.join(&mut emulate)?;
@@ -118,25 +114,41 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     }
     let first_code = run.wait(front);
     let interrupted = run.children.interrupted();
-    // Gateway and page outlive the run by nothing.
+    // Ends gateway and page.
     drop(run);
 
-    // A run that never began has nothing to sum up.
+    // A run that did not start has no results.
     if first_code == Exit::BadInput as u8 {
         return Ok(first_code);
     }
-    let mut summary_code = 0;
-    if out.join(SUMMARY_JSON).is_file() {
-        let summary = Command::new(&bench).arg("summary").arg(&out).status();
-        summary_code = code(
-            summary.map_err(|reason| FrontError::Start { program: bench.display().to_string(), reason })?,
-        );
-    }
+    let summary_code = sum_up(&bench, &out)?;
     Ok(match (first_code, interrupted) {
         (0, false) => summary_code,
         (0, true) => Exit::Interrupted as u8,
         (failed, _) => failed,
     })
+}
+
+/// Starts the live page of a run on `bus`, served at `http`; the emulator publishes its telemetry at `telemetry`.
+fn start_page(
+    children: &mut Children,
+    bench: &Path,
+    [bus, http]: [&str; 2],
+    telemetry: &Path,
+) -> Result<(), FrontError> {
+    let mut watch = Command::new(bench);
+    watch.args(["watch", "--bus", bus, "--http", http, "--control", "--telemetry"]).arg(telemetry);
+    let _ = children.start(&mut watch)?;
+    Ok(())
+}
+
+/// Judges and draws the run in `out`; returns the exit code of `bench summary`, 0 where the run left no results.
+fn sum_up(bench: &Path, out: &Path) -> Result<u8, FrontError> {
+    if !out.join(SUMMARY_JSON).is_file() {
+        return Ok(0);
+    }
+    let summary = Command::new(bench).arg("summary").arg(out).status();
+    summary.map(code).map_err(|reason| FrontError::Start { program: bench.display().to_string(), reason })
 }
 
 /// Prints name and subject of each shipped experiment.
@@ -195,7 +207,7 @@ fn newest(front: &Front, name: &str) -> Result<PathBuf, FrontError> {
     Ok(out)
 }
 
-/// `--NAME VALUE`, where there is a value.
+/// Appends `--NAME VALUE`, if there is a value.
 fn add(command: &mut Command, name: &str, value: Option<impl AsRef<OsStr>>) {
     if let Some(value) = value {
         command.arg(name).arg(value);
@@ -220,7 +232,7 @@ fn for_controller(command: &mut Command, arguments: &RunArguments) {
     arguments.set.iter().for_each(|variable| add(command, "--set", Some(variable)));
     add(command, "--parameters", arguments.parameters.as_ref());
     command.args(arguments.seconds.is_some().then_some("--repeat"));
-    // With a page the way back from a stop is a click too.
+    // With a page the way back from a stop needs a click.
     let with_page = arguments.watch.then_some("on-start");
     add(command, "--after-emergency-stop", arguments.after_emergency_stop.as_deref().or(with_page));
     if !arguments.rehearse {
@@ -232,7 +244,7 @@ fn for_controller(command: &mut Command, arguments: &RunArguments) {
     }
 }
 
-/// The processes while they run.
+/// The processes of a run.
 struct Run {
     children: Children,
     members: Vec<Pid>,
@@ -245,18 +257,18 @@ impl Run {
         Ok(())
     }
 
-    /// Asks the members to end, once: a second signal adds nothing.
+    /// Asks the members to end, once.
     fn pass_on(&mut self) {
         if !std::mem::replace(&mut self.stopped, true) {
             self.members.iter().for_each(|member| self.children.stop(*member));
         }
     }
 
-    /// Waits until all members have ended. The exit code of the first that failed before anybody was asked to end.
+    /// Waits until all members have ended. Returns the exit code of the first that failed before any was asked to end.
     fn wait(&mut self, front: &Front) -> u8 {
         let (mut first_code, mut deadline) = (0, None);
         while self.children.count(&self.members) > 0 {
-            // A signal that came before the first process was there found nobody to pass it on to.
+            // A signal before the first process was not passed on.
             if self.children.interrupted() {
                 self.pass_on();
             }
@@ -266,7 +278,7 @@ impl Run {
                         first_code = self.failed(front, status);
                         deadline = Some(Instant::now() + GRACE);
                     }
-                    // The emulator alone waits for nobody.
+                    // The emulator alone waits for no partner.
                     if deadline.is_some() && self.children.count(&self.members) <= 1 {
                         self.pass_on();
                     }
@@ -278,7 +290,7 @@ impl Run {
         first_code
     }
 
-    /// The exit code for a member that failed. One that a signal ended is a partner that failed; bad input is nobody's partner.
+    /// The exit code for a failed member: a signal counts as a failed partner; after bad input the others are ended at once.
     fn failed(&mut self, front: &Front, status: std::process::ExitStatus) -> u8 {
         if let Some(signal) = status.signal() {
             front.warn(&format!("a process was ended by signal {signal}"));

@@ -1,7 +1,7 @@
-//! What the workflow named, held against the seal.
+//! Compares the effects that the workflow named with the sealed file.
 //!
-//! Right is: every hidden effect is named, or is one of at most two that the report calls indistinguishable from a named one; no
-//! more is named than is hidden; and where nothing is hidden, nothing outside the catalogue is reported.
+//! The result is right if every hidden effect is named, or is one of at most two that the report calls indistinguishable from a
+//! named one; if no more are named than are hidden; and if, without a hidden effect, nothing outside the catalogue is reported.
 
 use crate::FrontError;
 use runlog::discrepancy_report::{NamedEffect, Quantity, Report, Verdict, Where};
@@ -10,10 +10,10 @@ use serde::Deserialize;
 use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 
-/// The most effects that a named one may stand for.
+/// Most effects that a named one may stand for.
 const MOST_ALTERNATIVES: usize = 2;
 
-/// The lines that are printed and written, and whether all was right.
+/// The lines to print and to write, and whether the result is right.
 #[derive(Debug, PartialEq)]
 pub(super) struct Judgement {
     pub(super) lines: Vec<String>,
@@ -25,12 +25,12 @@ pub(super) fn read(file: &Path) -> Result<Report, FrontError> {
         .map_err(|error| FrontError::Process(format!("discrepancy close left no usable report: {error}")))
 }
 
-/// Opens the seal.
+/// Compares the sealed file with the report.
 ///
 /// # Errors
-/// [`FrontError::Input`] if the sealed file cannot be read as one.
+/// [`FrontError::Input`] if the sealed file cannot be parsed.
 pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judgement, FrontError> {
-    let hidden = Hidden::of(sealed)?;
+    let hidden = HiddenItem::of(sealed)?;
     let mut lines: Vec<String> =
         hidden.iter().map(|hidden| line("hidden", &hidden.to_string(), &hidden.written)).collect();
     if hidden.is_empty() {
@@ -47,7 +47,7 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judgement, FrontErr
         lines.push(format!("indistinguishable in this record: {}", names.join(", ")));
     }
     let is_named =
-        |hidden: &&Hidden| report.named.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
+        |hidden: &&HiddenItem| report.named.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
     let mut verdict = "right";
     let mut right = true;
     for hidden in hidden.iter().filter(|hidden| !is_named(hidden)) {
@@ -82,19 +82,19 @@ fn line(what: &str, name: &str, numbers: &str) -> String {
     if numbers.is_empty() { format!("{what}: {name}") } else { format!("{what}: {name} ({numbers})") }
 }
 
-/// What a sealed file hides.
+/// An effect or term of a sealed file.
 #[derive(Debug, PartialEq)]
-struct Hidden {
+struct HiddenItem {
     name: String,
     /// `drive` or `drive.force`: axis, and element or the target of a declared term.
     place: String,
-    /// Numbers or expression as they are written.
+    /// Numbers or expression in the notation of the file.
     written: String,
     is_term: bool,
 }
 
-impl Hidden {
-    /// All of a file, effects first.
+impl HiddenItem {
+    /// All effects and terms of a file, effects first.
     fn of(sealed: &str) -> Result<Vec<Self>, FrontError> {
         #[derive(Deserialize)]
         struct Term {
@@ -116,7 +116,7 @@ impl Hidden {
             let parts = places.as_table().into_iter().flatten();
             parts.for_each(|(part, numbers)| Self::add_effect(&mut all, name, part.clone(), numbers));
         }
-        let term = |Term { name, place, add }| Hidden { name, place, written: add, is_term: true };
+        let term = |Term { name, place, add }| HiddenItem { name, place, written: add, is_term: true };
         all.extend(file.terms.into_iter().map(term));
         Ok(all)
     }
@@ -132,11 +132,11 @@ impl Hidden {
         if elements.is_empty() {
             let written: Vec<String> = numbers.iter().map(|(key, value)| format!("{key} {value}")).collect();
             let (name, written) = (name.to_owned(), written.join(", "));
-            all.push(Hidden { name, place, written, is_term: false });
+            all.push(HiddenItem { name, place, written, is_term: false });
         }
     }
 
-    /// Whether it is this effect of a report, which gives the axis of a term, and the element of a reading or a flow.
+    /// Whether it is this effect of a report, which has the axis of a term, and the element of a reading or a flow.
     fn is(&self, effect: &str, place: &Where) -> bool {
         let is_there = match self.is_term {
             true => self.place.split('.').next() == Some(&place.axis),
@@ -146,7 +146,7 @@ impl Hidden {
     }
 }
 
-impl Display for Hidden {
+impl Display for HiddenItem {
     fn fmt(&self, to: &mut Formatter<'_>) -> fmt::Result {
         write!(to, "{} at {}", self.name, self.place)
     }
@@ -166,7 +166,7 @@ fn numbers(effect: &NamedEffect) -> String {
     effect.parameters.iter().map(written).collect::<Vec<_>>().join(", ")
 }
 
-/// A number with so many significant digits, without zeros at its end; with an exponent where it is far from 1.
+/// A number with so many significant digits, without trailing zeros; with an exponent far from 1.
 fn significant(value: f64, digits: usize) -> String {
     let scientific = format!("{value:.*e}", digits - 1);
     let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific };
@@ -206,7 +206,7 @@ mod tests {
     fn effects_and_terms_of_a_sealed_file_are_told_with_what_is_written() {
         let sealed = "[effects.piston-leakage.load]\nleakage_nl_per_min = 5.89\nshare = 0.5\n\n[effects.a.drive.x]\n\
                       [[terms]]\nname = 'brake'\nplace = 'drive.force'\nadd = '-(30[N s/m])*v'\n";
-        let read: Vec<(String, String)> = Hidden::of(sealed)
+        let read: Vec<(String, String)> = HiddenItem::of(sealed)
             .expect("a sealed file")
             .iter()
             .map(|hidden| (hidden.to_string(), hidden.written.clone()))
@@ -217,6 +217,6 @@ mod tests {
             ("brake at drive.force", "-(30[N s/m])*v"),
         ];
         assert_eq!(read, expected.map(|(name, written)| (name.to_owned(), written.to_owned())));
-        assert!(Hidden::of("effects = 3").is_err());
+        assert!(HiddenItem::of("effects = 3").is_err());
     }
 }

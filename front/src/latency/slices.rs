@@ -1,4 +1,4 @@
-//! One slice of a measurement: what runs alone for its time.
+//! One slice of a measurement, which has the machine for itself.
 
 use crate::children::{Children, Event};
 use crate::pair::{Pair, PairError};
@@ -10,17 +10,17 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// A load generator that ends before this is none.
+/// A load generator that ends within this time has failed.
 const LOAD_STARTS: Duration = Duration::from_millis(500);
 
-/// What a slice measures.
+/// Subject of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Slice {
     /// The reference of wake-ups.
     Cyclictest,
     /// Emulator and controller.
     Run,
-    /// The same, with a rig that wakes early and spins.
+    /// Emulator and controller, with a rig that wakes early and spins.
     Spin,
     /// Round trips on the same bus.
     Bus,
@@ -31,7 +31,7 @@ pub(super) enum Slice {
 }
 
 impl Slice {
-    /// As the progress tells it, and the ping-pong's own name.
+    /// Its name in progress lines, and that of the ping-pong.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Cyclictest => "cyclictest",
@@ -44,7 +44,7 @@ impl Slice {
     }
 }
 
-/// Measures slices: the programs, and the conditions that are the same in all slices.
+/// Programs and conditions common to all slices.
 pub(super) struct SliceRunner {
     pub(super) children: Children,
     pub(super) emulator: PathBuf,
@@ -53,11 +53,11 @@ pub(super) struct SliceRunner {
     pub(super) rig: PathBuf,
     pub(super) programs: PathBuf,
     pub(super) experiment: PathBuf,
-    /// URL of the bus on which runs and its round trips are measured.
+    /// URL of the bus of the runs and their round trips.
     pub(super) bus: String,
-    /// URL of an embedded bus, for the round trips beside a real one.
+    /// URL of an embedded bus, for round trips beside a real one.
     pub(super) embedded: String,
-    /// Numbers of the CPUs of the rig and of the controller.
+    /// CPUs of the rig and of the controller.
     pub(super) cpus: [usize; 2],
     pub(super) seconds: u64,
     pub(super) priority: u64,
@@ -79,7 +79,7 @@ impl SliceRunner {
         }
     }
 
-    /// Starts the load generator in a group of its own, so that its children end with it.
+    /// Starts the load generator in a process group of its own, so that its children end with it.
     pub(super) fn start_load(&mut self, words: &[String], log: &Path) -> Result<Option<Pid>, FrontError> {
         let [program, arguments @ ..] = words else { return Ok(None) };
         let (out, error) = logs(File::options().create(true).append(true).open(log), log)?;
@@ -98,7 +98,7 @@ impl SliceRunner {
         }
     }
 
-    /// Ends a process that would go on, and waits for its end.
+    /// Ends a process that would not end by itself, and waits for its end.
     pub(super) fn end(&mut self, child: Pid) {
         self.children.stop(child);
         if self.children.count(&[child]) > 0 {
@@ -106,8 +106,8 @@ impl SliceRunner {
         }
     }
 
-    /// Nanoseconds, and a histogram up to 1 ms in steps of 1 ns: what is beyond is counted by cyclictest's own cycles and
-    /// maximum.
+    /// Options for nanoseconds, and for a histogram up to 1 ms in steps of 1 ns; cyclictest's counters of cycles and its
+    /// maximum cover larger values.
     pub(super) fn cyclictest_words(&self) -> Vec<String> {
         let (priority, cpu, seconds) = (self.priority, self.cpus[0], self.seconds);
         let words =
@@ -128,7 +128,7 @@ impl SliceRunner {
         if self.children.interrupted() {
             return Ok(());
         }
-        // Its log is the histogram once more, one line for each nanosecond.
+        // Its log repeats the histogram, one line for each nanosecond.
         let is_bin =
             |line: &str| line.bytes().all(|byte| byte.is_ascii_digit() || byte == b' ') && line.contains(' ');
         let said = fs::read_to_string(&log).unwrap_or_default();
@@ -184,7 +184,7 @@ impl SliceRunner {
         }
     }
 
-    /// Gaps of the machine, recorded until the run is over.
+    /// Starts the probe, which records gaps until the run is over.
     fn start_probe(&mut self, run: &Path) -> Result<Pid, FrontError> {
         let log = run.with_extension("probe.log");
         let (out, error) = logs(File::create(&log), &log)?;
