@@ -1,9 +1,9 @@
-//! The C interface of FMI 2.0: pointers become values here and nowhere else, and no panic crosses.
+//! The C interface of FMI 2.0: the only place with foreign pointers; no panic crosses it.
 //!
-//! Each function is a few lines around [`Simulation`]: it turns pointers into slices, catches a panic, tells a refusal by the
-//! importer's logger and gives a status. After a panic the instance is dead: every further call gives `fmi2Fatal`.
+//! Each function is a few lines around [`Simulation`]: it turns pointers into slices, catches a panic, writes a refusal to the
+//! importer's log and returns a status. After a panic the instance is dead: every further call returns `fmi2Fatal`.
 //!
-//! What the `// SAFETY:` comments lean on, and what cannot be proved here:
+//! Premises of the `// SAFETY:` comments, which cannot be proved here:
 //! - *The standard.* An importer promises that a component came from `fmi2Instantiate` and was not freed, that it is used by one
 //!   thread at a time, that arrays are as long as it says, and that strings end in a zero. Null is checked.
 //! - *The logger* is C with variable arguments; a `%` of a message is doubled, since it is a format.
@@ -48,22 +48,22 @@ pub(crate) struct Callbacks {
 /// `fmi2CoSimulation` of `fmi2Type`.
 const CO_SIMULATION: c_int = 1;
 
-/// What an importer holds.
+/// An instance, as the importer holds it.
 struct Component {
     simulation: Simulation,
-    teller: Teller,
+    log: ImporterLog,
     dead: bool,
 }
 
-/// The way to the importer's log.
-struct Teller {
+/// The importer's log.
+struct ImporterLog {
     name: CString,
     logger: Option<Logger>,
     environment: *mut c_void,
 }
 
-impl Teller {
-    fn tell(&self, status: Status, text: &str) {
+impl ImporterLog {
+    fn write(&self, status: Status, text: &str) {
         let Some(logger) = self.logger else { return };
         let category = match status {
             Status::Ok | Status::Warning => c"logStatusWarning",
@@ -79,7 +79,7 @@ impl Teller {
     }
 }
 
-/// Does `work` on a component, if it is one and alive.
+/// Runs `work` on a component, if it exists and is alive.
 fn on(component: *mut c_void, work: impl FnOnce(&mut Component) -> Result<Status, Refusal>) -> Status {
     // SAFETY: an importer hands in what `fmi2Instantiate` gave, to one thread at a time (see the head).
     let Some(component) = (unsafe { component.cast::<Component>().as_mut() }) else { return Status::Error };
@@ -89,14 +89,14 @@ fn on(component: *mut c_void, work: impl FnOnce(&mut Component) -> Result<Status
     match catch_unwind(AssertUnwindSafe(|| work(component))) {
         Ok(Ok(status)) => status,
         Ok(Err(refusal)) => {
-            component.teller.tell(Status::Error, &refusal.to_string());
+            component.log.write(Status::Error, &refusal.to_string());
             Status::Error
         }
         Err(_) => {
             component.dead = true;
             component
-                .teller
-                .tell(Status::Fatal, "a bug of the FMU: the instance cannot be used any more; free it");
+                .log
+                .write(Status::Fatal, "a bug of the FMU: the instance cannot be used any more; free it");
             Status::Fatal
         }
     }
@@ -119,7 +119,7 @@ fn slice_mut<'a, T>(start: *mut T, count: usize) -> &'a mut [T] {
     unsafe { std::slice::from_raw_parts_mut(start, count) }
 }
 
-/// Hands the references and the places for their values of a `fmi2Get…` to `work`, when both are there.
+/// Passes the references and the destination of a `fmi2Get…` to `work`, if both are given.
 fn get<V>(
     component: *mut c_void,
     (references, values, count): (*const c_uint, *mut V, usize),
@@ -149,7 +149,7 @@ fn on_arrays(
     on(component, |instance| {
         if !is_there {
             let why = "a null pointer in place of value references or values";
-            instance.teller.tell(Status::Error, why);
+            instance.log.write(Status::Error, why);
             return Ok(Status::Error);
         }
         work(&mut instance.simulation).map(|()| Status::Ok)
@@ -178,7 +178,7 @@ extern "C" fn fmi2SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> Status {
-    // Warnings and errors are reported in any case, and there is nothing below them.
+    // Warnings and errors are always logged, and there are no lower levels.
     on(component, |_| Ok(Status::Ok))
 }
 
@@ -195,16 +195,16 @@ extern "C" fn fmi2Instantiate(
     // SAFETY: the importer's structure, which it keeps for the life of the instance.
     let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return null_mut() };
     let name = text(name).and_then(|name| CString::new(name).ok()).unwrap_or_default();
-    let teller = Teller { name, logger: callbacks.logger, environment: callbacks.environment };
+    let log = ImporterLog { name, logger: callbacks.logger, environment: callbacks.environment };
     let made = catch_unwind(AssertUnwindSafe(|| instantiate(kind, text(guid), text(resources))));
     match made {
-        Ok(Ok(simulation)) => Box::into_raw(Box::new(Component { simulation, teller, dead: false })).cast(),
+        Ok(Ok(simulation)) => Box::into_raw(Box::new(Component { simulation, log, dead: false })).cast(),
         Ok(Err(reason)) => {
-            teller.tell(Status::Error, &reason);
+            log.write(Status::Error, &reason);
             null_mut()
         }
         Err(_) => {
-            teller.tell(Status::Fatal, "a bug of the FMU: there is no instance");
+            log.write(Status::Fatal, "a bug of the FMU: there is no instance");
             null_mut()
         }
     }
@@ -235,7 +235,7 @@ fn instantiate(kind: c_int, guid: Option<String>, resources: Option<String>) -> 
     Simulation::new(rig).map_err(|error| error.to_string())
 }
 
-/// The folder that a file URI names [RFC 8089], with or without an authority.
+/// The folder of a file URI [RFC 8089], with or without an authority.
 fn folder_of(uri: &str) -> Option<PathBuf> {
     let rest = uri.strip_prefix("file:")?;
     let path = match rest.strip_prefix("//") {
@@ -360,7 +360,7 @@ extern "C" fn fmi2DoStep(
     on(component, |instance| {
         let stepped = instance.simulation.step(at_s, step_s)?;
         Ok(stepped.warning.map_or(Status::Ok, |warning| {
-            instance.teller.tell(Status::Warning, &warning);
+            instance.log.write(Status::Warning, &warning);
             Status::Warning
         }))
     })
@@ -408,7 +408,7 @@ extern "C" fn fmi2FreeFMUstate(component: *mut c_void, state: *mut *mut c_void) 
 }
 
 fn null_state(instance: &Component) -> Status {
-    instance.teller.tell(Status::Error, "a null pointer in place of an FMU state");
+    instance.log.write(Status::Error, "a null pointer in place of an FMU state");
     Status::Error
 }
 

@@ -1,6 +1,6 @@
 //! `modelDescription.xml` of a rig, from its variables.
 //!
-//! Source: FMI 2.0.4, section 2.2, and 4.3.1 for what is said of co-simulation.
+//! Source: FMI 2.0.4, section 2.2, and 4.3.1 on co-simulation.
 
 use crate::MODEL_IDENTIFIER;
 use crate::variables::{self, Causality, Kind, Variable};
@@ -12,20 +12,20 @@ use std::fmt::Write;
 
 const IDENTITY: Crc<u64> = Crc::<u64>::new(&CRC_64_XZ);
 
-/// A description and what identifies it.
+/// A model description and its identifier.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Description {
     /// The text of `modelDescription.xml`.
     pub xml: String,
-    /// `guid`: of this rig file, these tables and this version.
+    /// `guid`: a checksum of rig file, tables and version.
     pub guid: String,
 }
 
 /// The description of a rig whose file is `rig_toml`.
 ///
 /// # Errors
-/// [`SetupError`]: the rig does not take the default set-up.
-pub fn of(rig: &RigParameters, rig_toml: &str) -> Result<Description, SetupError> {
+/// [`SetupError`]: the rig does not allow the default set-up.
+pub(crate) fn of(rig: &RigParameters, rig_toml: &str) -> Result<Description, SetupError> {
     let list = variables::of(rig)?;
     let mut digest = IDENTITY.digest();
     digest.update(rig_toml.as_bytes());
@@ -34,10 +34,10 @@ pub fn of(rig: &RigParameters, rig_toml: &str) -> Result<Description, SetupError
     Ok(Description { xml: text(&list, &guid), guid })
 }
 
-/// The description of the rig in a file's text; `file` is only its name for messages.
+/// The description of the rig of a rig file; `rig_toml` is its text, `file` its name in messages.
 ///
 /// # Errors
-/// The words of the rig file's reader, or why the plant cannot be set up.
+/// Message of the rig file's reader, or why the plant cannot be set up.
 pub fn of_file(rig_toml: &str, file: &str) -> Result<Description, String> {
     let rig = RigParameters::from_toml(rig_toml, file).map_err(|error| error.to_string())?;
     of(&rig, rig_toml).map_err(|error| format!("{file}: {error}"))

@@ -1,4 +1,4 @@
-//! The FMU behind its C interface: modes, time, inputs and what they do to the plant. Safe, and without a clock of its own.
+//! The FMU behind its C interface: modes, time, inputs and their effect on the plant. No unsafe code, and no clock.
 //!
 //! ```text
 //!   Instantiated ──enter──► Initialising ──exit──► Stepping ──terminate──► Terminated
@@ -17,17 +17,17 @@ use plant::{AxisReadings, Inputs, PERIOD_S, Plant, RigParameters, Sensors, Setup
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-pub use refusal::Refusal;
+pub(crate) use refusal::Refusal;
 
-/// How far a communication point may be off by its importer's rounding, s.
+/// Largest rounding error of an importer's communication point, s.
 const TOLERANCE_S: f64 = 1e-6;
 /// Most periods of one step, some 11 days.
 const MOST_PERIODS: f64 = 1e9;
 
-/// What a step has to tell although it was done.
+/// Result of a step.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Stepped {
-    /// The rods could not be linked: why not.
+pub(crate) struct StepResult {
+    /// Why the rods could not be linked.
     pub warning: Option<String>,
 }
 
@@ -42,19 +42,19 @@ enum Mode {
 
 /// The plant while it runs.
 #[derive(Clone, Debug)]
-struct Running {
+struct RunningPlant {
     plant: Plant,
     sensors: Sensors,
     readings: [AxisReadings; 2],
-    /// Acting valve commands.
+    /// Valve commands in effect.
     acting: [f64; 2],
     /// Periods since the start.
     period: u64,
-    /// The linkage was asked for and refused, and that was reported.
+    /// The linkage was requested and refused, and the warning was given.
     reported: bool,
 }
 
-/// What an importer may set, except the numbers of the rig.
+/// Values that an importer may set, except the parameters of the rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Settings {
     valve: [f64; 2],
@@ -65,26 +65,26 @@ struct Settings {
     seed: i32,
 }
 
-/// One instance; its clone is its state.
+/// One instance; a clone is a saved state.
 #[derive(Clone, Debug)]
-pub struct Simulation {
+pub(crate) struct Simulation {
     variables: Arc<Vec<Variable>>,
     rig: Arc<RigParameters>,
-    /// Keys of the rig that were set, in the rig file's units.
+    /// Parameters of the rig that were set, by key, in the units of the rig file.
     numbers: BTreeMap<usize, Vec<f64>>,
     settings: Settings,
     start_s: f64,
     mode: Mode,
-    /// There from the initialisation on.
-    running: Option<Box<Running>>,
+    /// `Some` from the initialisation on.
+    running: Option<Box<RunningPlant>>,
 }
 
 impl Simulation {
     /// An instance of a rig, with all parameters at their start values.
     ///
     /// # Errors
-    /// [`SetupError`]: the rig does not take the default set-up.
-    pub fn new(rig: RigParameters) -> Result<Self, SetupError> {
+    /// [`SetupError`]: the rig does not allow the default set-up.
+    pub(crate) fn new(rig: RigParameters) -> Result<Self, SetupError> {
         let variables = Arc::new(variables::of(&rig)?);
         let settings = Settings { setup: variables::start_setup(&rig), seed: 1, ..Settings::default() };
         let (rig, numbers) = (Arc::new(rig), BTreeMap::new());
@@ -92,21 +92,21 @@ impl Simulation {
         Ok(Self { variables, rig, numbers, settings, start_s: 0.0, mode, running })
     }
 
-    /// Back to where it was instantiated, all values at their start.
+    /// Resets to the state after instantiation, with all values at their start.
     ///
     /// # Errors
-    /// [`SetupError`]: never, since the rig was taken once.
-    pub fn reset(&mut self) -> Result<(), SetupError> {
+    /// [`SetupError`]: never, since the same rig was set up before.
+    pub(crate) fn reset(&mut self) -> Result<(), SetupError> {
         *self = Self::new(self.rig.as_ref().clone())?;
         Ok(())
     }
 
-    /// Says where time begins, s.
+    /// Sets the start time, s.
     ///
     /// # Errors
     /// [`Refusal::Mode`], and [`Refusal::Time`] for a start that is not finite.
-    pub fn set_start(&mut self, start_s: f64) -> Result<(), Refusal> {
-        self.expect(&[Mode::Instantiated], "fmi2SetupExperiment", "fmi2Instantiate or fmi2Reset")?;
+    pub(crate) fn set_start(&mut self, start_s: f64) -> Result<(), Refusal> {
+        self.check_mode(&[Mode::Instantiated], "fmi2SetupExperiment", "fmi2Instantiate or fmi2Reset")?;
         if !start_s.is_finite() {
             return Err(Refusal::Time(format!("startTime = {start_s}: give a finite number of seconds")));
         }
@@ -118,18 +118,22 @@ impl Simulation {
     ///
     /// # Errors
     /// [`Refusal::Mode`].
-    pub fn enter_initialisation(&mut self) -> Result<(), Refusal> {
-        self.expect(&[Mode::Instantiated], "fmi2EnterInitializationMode", "fmi2Instantiate or fmi2Reset")?;
+    pub(crate) fn enter_initialisation(&mut self) -> Result<(), Refusal> {
+        self.check_mode(
+            &[Mode::Instantiated],
+            "fmi2EnterInitializationMode",
+            "fmi2Instantiate or fmi2Reset",
+        )?;
         self.mode = Mode::Initialising;
         Ok(())
     }
 
-    /// Sets the plant up and leaves the initialisation.
+    /// Sets up the plant and leaves the initialisation.
     ///
     /// # Errors
     /// [`Refusal::Mode`], [`Refusal::Parameters`], [`Refusal::Setup`].
-    pub fn exit_initialisation(&mut self) -> Result<(), Refusal> {
-        self.expect(&[Mode::Initialising], "fmi2ExitInitializationMode", "fmi2EnterInitializationMode")?;
+    pub(crate) fn exit_initialisation(&mut self) -> Result<(), Refusal> {
+        self.check_mode(&[Mode::Initialising], "fmi2ExitInitializationMode", "fmi2EnterInitializationMode")?;
         self.set_up()?;
         self.mode = Mode::Stepping;
         Ok(())
@@ -139,23 +143,23 @@ impl Simulation {
     ///
     /// # Errors
     /// [`Refusal::Mode`].
-    pub fn terminate(&mut self) -> Result<(), Refusal> {
-        self.expect(&[Mode::Stepping, Mode::Failed], "fmi2Terminate", "fmi2ExitInitializationMode")?;
+    pub(crate) fn terminate(&mut self) -> Result<(), Refusal> {
+        self.check_mode(&[Mode::Stepping, Mode::Failed], "fmi2Terminate", "fmi2ExitInitializationMode")?;
         self.mode = Mode::Terminated;
         Ok(())
     }
 
-    /// Moves from the communication point `at_s` on by `step_s`.
+    /// Steps from the communication point `at_s` by `step_s`.
     ///
     /// # Errors
     /// [`Refusal::Mode`], [`Refusal::Time`], [`Refusal::NotFinite`].
-    pub fn step(&mut self, at_s: f64, step_s: f64) -> Result<Stepped, Refusal> {
+    pub(crate) fn step(&mut self, at_s: f64, step_s: f64) -> Result<StepResult, Refusal> {
         if self.mode == Mode::Failed {
             return Err(Refusal::NotFinite { at_s: self.time_s() });
         }
-        self.expect(&[Mode::Stepping], "fmi2DoStep", "fmi2ExitInitializationMode")?;
+        self.check_mode(&[Mode::Stepping], "fmi2DoStep", "fmi2ExitInitializationMode")?;
         let stands_s = self.time_s();
-        // Asked this way round, NaN is refused, too.
+        // In this form NaN is refused too.
         let follows = (at_s - stands_s).abs() <= TOLERANCE_S;
         if !follows {
             let text = format!("a step from {at_s} s, but the plant stands at {stands_s} s");
@@ -178,25 +182,25 @@ impl Simulation {
             self.mode = Mode::Failed;
             return Err(Refusal::NotFinite { at_s: self.time_s() });
         }
-        Ok(Stepped { warning })
+        Ok(StepResult { warning })
     }
 
-    /// Where the plant stands, s.
+    /// Time of the plant, s.
     #[must_use]
-    pub fn time_s(&self) -> f64 {
+    pub(crate) fn time_s(&self) -> f64 {
         self.start_s + self.running.as_ref().map_or(0, |running| running.period) as f64 * PERIOD_S
     }
 
     /// The values of Real variables, in the units of the description.
     ///
     /// # Errors
-    /// [`Refusal::Reference`], and what keeps the plant from being set up while it is initialised.
-    pub fn reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
+    /// [`Refusal::Reference`], and errors of the set-up during the initialisation.
+    pub(crate) fn reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Real", |kind| matches!(kind, Kind::Real(_)))?;
         let outputs = list.iter().any(|instance| instance.causality == Causality::Output);
         if outputs {
-            self.ready()?;
+            self.ensure_set_up()?;
         }
         let running = self.running.as_deref();
         let inputs = inputs(&self.settings, running.map_or([0.0; 2], |running| running.acting));
@@ -214,7 +218,7 @@ impl Simulation {
                 Role::Truth(place) => truth.map_or(0.0, |truth| truth[place]),
                 Role::Term(place) => terms.map_or(0.0, |terms| terms.values()[place]),
                 Role::Measured(axis, channel) => {
-                    running.map_or(0.0, |running| shown(&running.readings[axis], channel))
+                    running.map_or(0.0, |running| reading(&running.readings[axis], channel))
                 }
                 Role::Acting(axis) => inputs.valve[axis],
                 Role::EmergencyStop | Role::Link | Role::Linked | Role::Seed => 0.0,
@@ -227,11 +231,11 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Simulation::reals`].
-    pub fn booleans(&mut self, references: &[u32], values: &mut [bool]) -> Result<(), Refusal> {
+    pub(crate) fn booleans(&mut self, references: &[u32], values: &mut [bool]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
         if list.iter().any(|instance| instance.causality == Causality::Output) {
-            self.ready()?;
+            self.ensure_set_up()?;
         }
         let plant = self.running.as_ref().map(|running| &running.plant);
         for (instance, value) in list.iter().zip(values) {
@@ -249,7 +253,7 @@ impl Simulation {
     ///
     /// # Errors
     /// [`Refusal::Reference`].
-    pub fn integers(&self, references: &[u32], values: &mut [i32]) -> Result<(), Refusal> {
+    pub(crate) fn integers(&self, references: &[u32], values: &mut [i32]) -> Result<(), Refusal> {
         find(&self.variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
         values.fill(self.settings.seed);
         Ok(())
@@ -259,7 +263,7 @@ impl Simulation {
     ///
     /// # Errors
     /// [`Refusal::Reference`], [`Refusal::NotSettable`], [`Refusal::OutOfRange`].
-    pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refusal> {
+    pub(crate) fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Real", |kind| matches!(kind, Kind::Real(_)))?;
         for (instance, value) in list.iter().zip(values) {
@@ -280,7 +284,7 @@ impl Simulation {
                 _ => {}
             }
         }
-        self.changed();
+        self.discard_start();
         Ok(())
     }
 
@@ -288,7 +292,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Simulation::set_reals`].
-    pub fn set_booleans(&mut self, references: &[u32], values: &[bool]) -> Result<(), Refusal> {
+    pub(crate) fn set_booleans(&mut self, references: &[u32], values: &[bool]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
         list.iter().try_for_each(|instance| self.settable(instance))?;
@@ -298,7 +302,7 @@ impl Simulation {
                 _ => self.settings.link = *value,
             }
         }
-        self.changed();
+        self.discard_start();
         Ok(())
     }
 
@@ -306,7 +310,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Simulation::set_reals`].
-    pub fn set_integers(&mut self, references: &[u32], values: &[i32]) -> Result<(), Refusal> {
+    pub(crate) fn set_integers(&mut self, references: &[u32], values: &[i32]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
         for (instance, value) in list.iter().zip(values) {
@@ -316,11 +320,11 @@ impl Simulation {
         if let Some(value) = values.last() {
             self.settings.seed = *value;
         }
-        self.changed();
+        self.discard_start();
         Ok(())
     }
 
-    fn expect(&self, modes: &[Mode], call: &'static str, after: &'static str) -> Result<(), Refusal> {
+    fn check_mode(&self, modes: &[Mode], call: &'static str, after: &'static str) -> Result<(), Refusal> {
         if modes.contains(&self.mode) { Ok(()) } else { Err(Refusal::Mode { call, after }) }
     }
 
@@ -334,20 +338,20 @@ impl Simulation {
         }
     }
 
-    /// What was set before the start makes another start.
-    fn changed(&mut self) {
+    /// Discards the plant of the initialisation, since a start value has changed.
+    fn discard_start(&mut self) {
         if self.mode == Mode::Initialising {
             self.running = None;
         }
     }
 
-    /// The numbers of a key, set or of the rig file.
+    /// The values of a key, as set or as in the rig file.
     fn number(&self, key: usize) -> &[f64] {
         self.numbers.get(&key).map_or_else(|| self.rig.numbers(&KEYS[key].path()), Vec::as_slice)
     }
 
-    /// Outputs are known from the initialisation on.
-    fn ready(&mut self) -> Result<(), Refusal> {
+    /// Sets up the plant if necessary: outputs are defined from the initialisation on.
+    fn ensure_set_up(&mut self) -> Result<(), Refusal> {
         if self.mode == Mode::Instantiated {
             return Err(Refusal::Mode { call: "reading an output", after: "fmi2EnterInitializationMode" });
         }
@@ -372,13 +376,13 @@ impl Simulation {
         sensors.sample(&plant, &inputs);
         let readings = sensors.sample(&plant, &inputs);
         let (acting, period, reported) = ([0.0; 2], 0, false);
-        self.running = Some(Box::new(Running { plant, sensors, readings, acting, period, reported }));
+        self.running = Some(Box::new(RunningPlant { plant, sensors, readings, acting, period, reported }));
         Ok(())
     }
 }
 
-impl Running {
-    /// What people do at the begin of a step.
+impl RunningPlant {
+    /// Applies the actions of people at the start of a step.
     fn act(&mut self, settings: &Settings) -> Option<String> {
         if settings.emergency_stop && !self.plant.emergency_stop() {
             self.plant.trip_emergency_stop();
@@ -395,7 +399,8 @@ impl Running {
         first.then(|| format!("{refused}; the rods stay apart until it does"))
     }
 
-    /// One period: what acts acts, the command is latched for the next one, the sensors are sampled at its begin.
+    /// One period: steps the plant with the inputs in effect, latches the command for the next period, and samples the sensors
+    /// at its start.
     fn period(&mut self, settings: &Settings) {
         self.plant.step(&inputs(settings, self.acting));
         self.acting = settings.valve.map(plant::quantise_valve);
@@ -409,7 +414,7 @@ fn inputs(settings: &Settings, valve: [f64; 2]) -> Inputs {
     Inputs { valve, hand_force_carriage_n, hand_force_load_n }
 }
 
-fn shown(readings: &AxisReadings, channel: usize) -> f64 {
+fn reading(readings: &AxisReadings, channel: usize) -> f64 {
     [readings.position, readings.force, readings.pressure_a, readings.pressure_b][channel].value
 }
 
@@ -429,7 +434,7 @@ fn find<'v>(
 
 fn in_range(instance: &Variable, value: f64) -> Result<(), Refusal> {
     let (least, most) = instance.range.unwrap_or((f64::MIN, f64::MAX));
-    // NaN lies in no range.
+    // NaN is in no range.
     if (least..=most).contains(&value) {
         return Ok(());
     }

@@ -9,51 +9,51 @@
 //! | terms of switched-on effects | [`plant::Plant::term_names`] |
 //! | `drive_position_measured_m` … | the sensors |
 //!
-//! A value reference is the place in the list, from 0, whatever the type.
+//! A value reference is the index in the list, from 0, for all types.
 
 use plant::parameters::table::KEYS;
 use plant::{Axis, Plant, RigParameters, Setup, SetupError, Truth};
 use settings::unit_of;
 
-/// What a variable stands for.
+/// Meaning of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub(crate) enum Role {
     Valve(usize),
-    /// A hand's push on the carriage (0) or on the load's eye (1).
+    /// Force of a hand on the carriage (0) or on the load's eye (1).
     Hand(usize),
     EmergencyStop,
-    /// Linkage asked for.
+    /// Whether linkage is requested.
     Link,
-    /// Where the carriage stands at the start.
+    /// Position of the carriage at the start.
     CarriagePosition,
     AddedMass,
     /// Seed of the sensors' noise.
     Seed,
-    /// A number of the rig: key and place in it.
+    /// A parameter of the rig: key, and index in its values.
     Rig(usize, usize),
     /// A column of [`Truth`].
     Truth(usize),
     Term(usize),
-    /// What a sensor shows: axis and channel (position, force, pressure a, pressure b).
+    /// Sensor value: axis and channel (position, force, pressure a, pressure b).
     Measured(usize, usize),
-    /// The valve command that acts in this cycle.
+    /// The valve command in effect in this cycle.
     Acting(usize),
     /// Whether the rods are linked.
     Linked,
 }
 
-/// The type of a variable, with its start value where it has one.
+/// Type of a variable, with its start value if it has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub(crate) enum Kind {
     Real(Option<f64>),
     Integer(Option<i32>),
     Boolean(Option<bool>),
 }
 
-/// What the importer does with a variable.
+/// Use of a variable by the importer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Causality {
-    /// Set before the start, and not again.
+pub(crate) enum Causality {
+    /// Set before the start only.
     Parameter,
     /// Set between steps.
     Input,
@@ -62,17 +62,17 @@ pub enum Causality {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Variable {
-    /// Name, unique.
+pub(crate) struct Variable {
+    /// Unique name.
     pub name: String,
     pub role: Role,
     pub kind: Kind,
     pub causality: Causality,
-    /// Whether it changes at instants only.
+    /// Whether it changes only at instants.
     pub discrete: bool,
     /// Unit, empty for none.
     pub unit: &'static str,
-    /// Allowed values, in the variable's unit.
+    /// Range of the values, in the unit of the variable.
     pub range: Option<(f64, f64)>,
     pub about: String,
 }
@@ -80,15 +80,15 @@ pub struct Variable {
 /// All variables of a rig.
 ///
 /// # Errors
-/// [`SetupError`]: the rig does not take the default set-up, so that nothing can be asked of it.
-pub fn of(rig: &RigParameters) -> Result<Vec<Variable>, SetupError> {
+/// [`SetupError`]: the rig does not allow the default set-up.
+pub(crate) fn of(rig: &RigParameters) -> Result<Vec<Variable>, SetupError> {
     let plant = Plant::new(rig, &start_setup(rig))?;
     Ok([inputs(), setup(rig), numbers(rig), truths(), terms(&plant), measured()].concat())
 }
 
-/// The default set-up: that of the plant, save where the rig is shorter.
+/// The default set-up of the plant, adapted to a shorter rig.
 #[must_use]
-pub fn start_setup(rig: &RigParameters) -> Setup {
+pub(crate) fn start_setup(rig: &RigParameters) -> Setup {
     let setup = Setup::default();
     Setup { carriage_position_m: setup.carriage_position_m.min(rig.cylinder().stroke_m), ..setup }
 }

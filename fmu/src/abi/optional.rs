@@ -1,4 +1,5 @@
-//! What the standard leaves to an FMU, and this one does not offer; and the status of steps, which are done when they return.
+//! Optional functions of the standard that this FMU does not offer; and the status of steps, which are complete when they
+//! return.
 
 use super::{Status, on};
 use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
@@ -7,7 +8,7 @@ use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 const TERMINATED: c_int = 3;
 
-/// Functions that tell which attribute of modelDescription.xml is not set, from `name(further arguments) attribute`.
+/// Functions that report the unset attribute of modelDescription.xml, from `name(further arguments) attribute`.
 macro_rules! not_offered {
     ($($name:ident($($argument:ident: $kind:ty),*) $attribute:literal;)*) => {$(
         #[unsafe(no_mangle)]
@@ -37,8 +38,8 @@ not_offered! {
 fn unsupported(component: *mut c_void, attribute: &str) -> Status {
     on(component, |instance| {
         instance
-            .teller
-            .tell(Status::Error, &format!("not supported: modelDescription.xml does not set {attribute}"));
+            .log
+            .write(Status::Error, &format!("not supported: modelDescription.xml does not set {attribute}"));
         Ok(Status::Error)
     })
 }

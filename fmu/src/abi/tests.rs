@@ -35,8 +35,8 @@ fn callbacks() -> Callbacks {
 fn component() -> *mut c_void {
     let simulation = Simulation::new(RigParameters::baseline()).unwrap();
     let Callbacks { logger, environment, .. } = callbacks();
-    let teller = Teller { name: c"own".into(), logger, environment };
-    Box::into_raw(Box::new(Component { simulation, teller, dead: false })).cast()
+    let log = ImporterLog { name: c"own".into(), logger, environment };
+    Box::into_raw(Box::new(Component { simulation, log, dead: false })).cast()
 }
 
 #[test]
