@@ -11,7 +11,7 @@ use protocol::bus::host::Host;
 use protocol::bus::{BusError, BusUrl};
 use protocol::exit::Exit;
 use realtime::{Interrupt, Request};
-use socketcan_guest::{Guest, GuestError, Named};
+use socketcan_guest::{Guest, GuestError, NamedInterface};
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -103,7 +103,7 @@ fn try_to_run(arguments: &CanArguments) -> Result<i32, CanError> {
     ran
 }
 
-fn run_program(arguments: &CanArguments, named: &[Named]) -> Result<i32, CanError> {
+fn run_program(arguments: &CanArguments, named: &[NamedInterface]) -> Result<i32, CanError> {
     let guest = Guest {
         command: &arguments.command,
         patience: Duration::from_secs(arguments.wait_s.into()),
@@ -130,11 +130,11 @@ fn wait_for_the_end(bus: &BusUrl) -> Result<i32, CanError> {
 }
 
 /// The interfaces in order: those that are named, or the one of `--bus`.
-fn interfaces(arguments: &CanArguments) -> Result<Vec<Named>, CanError> {
+fn interfaces(arguments: &CanArguments) -> Result<Vec<NamedInterface>, CanError> {
     let first = InterfaceArgument { name: FIRST_INTERFACE.into(), bus: arguments.bus.clone() };
     let asked =
         if arguments.interfaces.is_empty() { std::slice::from_ref(&first) } else { &arguments.interfaces };
-    let mut named: Vec<Named> = Vec::new();
+    let mut named: Vec<NamedInterface> = Vec::new();
     for InterfaceArgument { name, bus } in asked {
         let path: PathBuf = match bus {
             BusUrl::Unix { path, .. } => path.clone(),
@@ -143,7 +143,7 @@ fn interfaces(arguments: &CanArguments) -> Result<Vec<Named>, CanError> {
         if named.iter().any(|other| other.name == *name) {
             return Err(CanError::Duplicate(name.clone()));
         }
-        named.push(Named { name: name.clone(), path });
+        named.push(NamedInterface { name: name.clone(), path });
     }
     Ok(named)
 }
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn the_first_interface_is_vcan0_unless_others_are_named() {
         let one = interfaces(&arguments("bench can --bus unix:///a -- x")).unwrap();
-        assert_eq!(one, [Named { name: "vcan0".into(), path: "/a".into() }]);
+        assert_eq!(one, [NamedInterface { name: "vcan0".into(), path: "/a".into() }]);
         let two = "bench can --interface can0=unix:///a --interface can1=unix:///b -- x";
         let two: Vec<_> = interfaces(&arguments(two)).unwrap().into_iter().map(|named| named.name).collect();
         assert_eq!(two, ["can0", "can1"]);

@@ -1,4 +1,4 @@
-//! Numbers and layouts of Linux' CAN interface, as programs have them compiled in.
+//! Numbers and layouts of Linux' CAN interface, as compiled into programs.
 //!
 //! Structures are read from and written to a guest's memory as bytes; their offsets are those of 64-bit Linux.
 //!
@@ -8,7 +8,7 @@ use protocol::can::CAN_FRAME_BYTES;
 
 /// `AF_CAN`.
 pub(crate) const AF_CAN: i32 = 29;
-/// Where a frame's data begin.
+/// Offset of the data in a frame.
 pub(crate) const CAN_FRAME_DATA_AT: usize = 8;
 /// Largest data length of a classic frame.
 pub(crate) const MOST_DATA: u8 = 8;
@@ -26,20 +26,20 @@ pub(crate) const SOL_CAN_ISOTP: i32 = 106;
 pub(crate) const CAN_RAW: i32 = 1;
 pub(crate) const CAN_BCM: i32 = 2;
 pub(crate) const CAN_ISOTP: i32 = 6;
-/// One more than the largest protocol that the kernel's table has room for.
+/// One more than the largest protocol of the kernel's table.
 pub(crate) const CAN_PROTOCOLS: i32 = 8;
 
 /// Flags of an identifier.
 pub(crate) const EXTENDED_FLAG: u32 = 0x8000_0000;
 pub(crate) const REMOTE_FLAG: u32 = 0x4000_0000;
 pub(crate) const ERROR_FLAG: u32 = 0x2000_0000;
-/// In a filter the bit of error frames says that it is inverted.
+/// Inverts a filter; in a filter the bit of error frames has this meaning.
 pub(crate) const INVERTED_FLAG: u32 = ERROR_FLAG;
 pub(crate) const STANDARD_MASK: u32 = 0x7FF;
 /// Bits of an error frame's class.
 pub(crate) const ERROR_MASK: u32 = 0x1FFF_FFFF;
 
-/// Bytes of `struct sockaddr_can` that the kernel asks for and gives: family, two of padding, the interface's index.
+/// Bytes of `struct sockaddr_can` that the kernel requires and returns: family, two of padding, index of the interface.
 pub(crate) const ADDRESS_BYTES: usize = 8;
 
 /// The address of an interface.
@@ -50,7 +50,7 @@ pub(crate) fn address(interface: u32) -> [u8; ADDRESS_BYTES] {
     bytes
 }
 
-/// The interface's index in an address; `None` when it is too short, or of another family.
+/// Index of the interface in an address; `None` when it is too short or of another family.
 pub(crate) fn interface_of(address: &[u8]) -> Option<u32> {
     let address: &[u8; ADDRESS_BYTES] = address.get(..ADDRESS_BYTES)?.try_into().ok()?;
     let [f0, f1, _, _, index @ ..] = *address;

@@ -1,4 +1,4 @@
-//! The broadcast manager, `CAN_BCM`: a socket that sends cyclically and reports changes and time-outs, on the guest's behalf.
+//! The broadcast manager, `CAN_BCM`: a socket that sends cyclically and reports changes and time-outs for the guest.
 //!
 //! ```text
 //!   guest ── TX_SETUP, TX_SEND, TX_DELETE, TX_READ ──► jobs that send (transmit.rs)  ── frames ──► the interface
@@ -6,9 +6,9 @@
 //!         ◄── TX_EXPIRED, TX_STATUS, RX_CHANGED, RX_TIMEOUT, RX_STATUS ── both
 //! ```
 //!
-//! It knows no socket and no clock: commands, frames and the time come in, [`Action`]s go out. It differs from the kernel's in
-//! one thing: the next cycle is counted from when the last was due, not from when it was sent, so that a cyclic frame does not
-//! drift.
+//! It has no socket and no clock: commands, frames and the time are inputs, [`Action`]s are outputs. It differs from the
+//! kernel's in one respect: the next cycle counts from the due time of the last, not from its sending, so that a cyclic frame
+//! does not drift.
 //!
 //! Source: Linux 6.1 `net/can/bcm.c`, `include/uapi/linux/can/bcm.h`.
 
@@ -26,15 +26,15 @@ use transmit::Transmission;
 /// `MAX_NFRAMES`.
 const MOST_FRAMES: u32 = 256;
 
-/// What the manager wants done.
+/// An action of the manager.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     /// A frame goes to the interface of this index, and to the guests on it.
     Send(u32, FrameBytes),
-    /// The frame of `TX_SEND`, whose sender is told what becomes of it.
+    /// The frame of `TX_SEND`, whose sender gets its result.
     SendOnce(u32, FrameBytes),
-    /// A message goes to the guest; the index is that of the interface on which a frame came, 0 for a job that sends.
-    Tell(u32, Vec<u8>),
+    /// A message goes to the guest; the index is that of the interface of a received frame, 0 for a job that sends.
+    Notify(u32, Vec<u8>),
 }
 
 /// The jobs of one socket.
@@ -45,11 +45,11 @@ pub(crate) struct BroadcastManager {
 }
 
 impl BroadcastManager {
-    /// Carries out a command for the interface of this index, 0 for any; gives the bytes that it took.
+    /// Executes a command for the interface of this index, 0 for any; returns the number of bytes used.
     ///
     /// # Errors
-    /// What the kernel says: `EINVAL` for malformed commands and unknown jobs, `EFAULT` for fewer frames than announced, `E2BIG`
-    /// for more frames than the job has room for, `ENODEV` to send on no interface.
+    /// The kernel's errors: `EINVAL` for malformed commands and unknown jobs, `EFAULT` for fewer frames than announced, `E2BIG`
+    /// for more frames than the job can hold, `ENODEV` to send on no interface.
     pub(crate) fn command(
         &mut self,
         bytes: &[u8],
@@ -66,13 +66,13 @@ impl BroadcastManager {
             opcode::TX_READ => {
                 let job =
                     self.transmissions.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
-                actions.push(Action::Tell(0, job.status()));
+                actions.push(Action::Notify(0, job.status()));
                 Ok(message::HEAD_BYTES)
             }
             opcode::RX_READ => {
                 let job =
                     self.subscriptions.iter().find(|job| job.is(&head, interface)).ok_or(Errno::INVAL)?;
-                actions.push(Action::Tell(interface, job.status()));
+                actions.push(Action::Notify(interface, job.status()));
                 Ok(message::HEAD_BYTES)
             }
             opcode::TX_SEND => {
@@ -136,7 +136,7 @@ impl BroadcastManager {
         }
     }
 
-    /// Processes a frame that came on an interface.
+    /// Processes a frame received on an interface.
     pub(crate) fn take_frame(
         &mut self,
         interface: u32,
@@ -147,13 +147,13 @@ impl BroadcastManager {
         self.subscriptions.iter_mut().for_each(|job| job.take_frame(interface, frame, now, actions));
     }
 
-    /// When the next job has something to do.
+    /// Due time of the next job.
     pub(crate) fn due(&self) -> Option<Instant> {
         let sending = self.transmissions.iter().filter_map(Transmission::due);
         sending.chain(self.subscriptions.iter().filter_map(Subscription::due)).min()
     }
 
-    /// Does what is due.
+    /// Executes the jobs that are due.
     pub(crate) fn advance(&mut self, now: Instant, actions: &mut Vec<Action>) {
         self.transmissions.iter_mut().for_each(|job| job.advance(now, actions));
         self.subscriptions.iter_mut().for_each(|job| job.advance(now, actions));

@@ -1,10 +1,10 @@
-//! The thread that makes a call: its memory and its descriptors.
+//! The thread of a call: its memory and its descriptors.
 //!
-//! A descriptor is a number that `dup`, `fork` and `SCM_RIGHTS` give others of; what it stands for is found by a copy of it and
-//! the inode behind. The copy is closed again when the call is answered, so that the last close of the guest's is the last close.
+//! `dup`, `fork` and `SCM_RIGHTS` give a socket several descriptors; a copy of the descriptor and its inode identify the
+//! socket. The copy is closed after the answer, so that the guest's last close is the last close.
 //!
-//! Both need the right to trace the guest, which the parent of a process has unless a container or the Yama module forbids it, or
-//! the guest's file may be executed but not read.
+//! Both need the permission to trace the guest, which the parent of a process has unless a container or the Yama module denies
+//! it, or the guest's file is executable but not readable.
 
 #![allow(unsafe_code)] // process_vm_readv and process_vm_writev, nothing else
 
@@ -27,19 +27,19 @@ impl Caller {
     /// Copies from its memory.
     ///
     /// # Errors
-    /// `EFAULT` when not all of it is there, `EPERM` when it may not be read.
+    /// `EFAULT` when not all of it is mapped, `EPERM` without permission.
     pub(crate) fn read(self, address: u64, bytes: &mut [u8]) -> Result<(), Errno> {
         if bytes.is_empty() {
             return Ok(());
         }
         let here = libc::iovec { iov_base: bytes.as_mut_ptr().cast(), iov_len: bytes.len() };
         let there = libc::iovec { iov_base: address as *mut _, iov_len: bytes.len() };
-        // SAFETY: `here` is a buffer of ours; `there` is of another process and only the kernel follows it.
+        // SAFETY: `here` is a buffer of ours; `there` belongs to another process and only the kernel follows it.
         let copied = unsafe { libc::process_vm_readv(self.0, &raw const here, 1, &raw const there, 1, 0) };
         moved(copied, bytes.len())
     }
 
-    /// As many bytes as an array holds.
+    /// Reads an array.
     pub(crate) fn read_array<const N: usize>(self, address: u64) -> Result<[u8; N], Errno> {
         let mut bytes = [0; N];
         self.read(address, &mut bytes)?;
@@ -64,7 +64,7 @@ impl Caller {
     /// A copy of one of its descriptors.
     ///
     /// # Errors
-    /// `EBADF` when there is none of that number, `EPERM` when it may not be had.
+    /// `EBADF` for an unknown number, `EPERM` without permission.
     pub(crate) fn descriptor(self, number: i32) -> Result<OwnedFd, Errno> {
         let thread = Pid::from_raw(self.0).ok_or(Errno::SRCH)?;
         let process = match pidfd_open(thread, ANY_THREAD) {
@@ -84,7 +84,7 @@ fn moved(copied: isize, wanted: usize) -> Result<(), Errno> {
     }
 }
 
-/// The process of a thread, by its first thread. Threads of one process share their descriptors, save for a rare `unshare`.
+/// The process of a thread, by its first thread. Threads of a process share their descriptors, except after a rare `unshare`.
 fn first_thread(thread: i32) -> Option<Pid> {
     let status = std::fs::read_to_string(format!("/proc/{thread}/status")).ok()?;
     let number = status.lines().find_map(|line| line.strip_prefix("Tgid:"))?;

@@ -1,22 +1,22 @@
-//! The system calls that are answered here, as a seccomp filter: everything else runs natively.
+//! The seccomp filter that selects the system calls to answer here; all others run natively.
 //!
-//! The filter sees the call's number and its six arguments, never memory, and no list of descriptors. So calls that can be told
-//! from others by their arguments are (`socket` by its family, `setsockopt` by its level); those that cannot (`recvmsg`) are
-//! notified for every descriptor, and continue natively when the descriptor is none of ours. What runs at data rate stays
-//! native: `read`, `recv`, `poll`, `select`, `epoll_wait`, and `write` and `send` of 16 bytes.
+//! The filter sees the call's number and its six arguments, but neither memory nor descriptors. Calls are selected by their
+//! arguments where possible (`socket` by its family, `setsockopt` by its level); others (`recvmsg`) are notified for every
+//! descriptor, and continue natively when the descriptor is no CAN socket. Calls at data rate stay native: `read`, `recv`,
+//! `poll`, `select`, `epoll_wait`, and `write` and `send` of 16 bytes.
 //!
 //! | call | notified when |
 //! |---|---|
 //! | `socket` | the family is `AF_CAN` |
 //! | `bind`, `connect`, `listen`, `accept`, `shutdown`, `getsockname`, `getpeername` | always |
 //! | `recvmsg`, `recvmmsg`, `sendmsg`, `sendmmsg` | always: address, flags and control messages are in memory |
-//! | `recvfrom`, `sendto` | there is an address; a sent length is not that of a frame |
+//! | `recvfrom`, `sendto` | there is an address; or the length sent is not that of a frame |
 //! | `write` | the length is neither a frame's nor an eventfd's |
 //! | `ioctl` | the request is one of sockets and interfaces, 0x89xx |
 //! | `setsockopt`, `getsockopt` | the level is one of CAN, or the option is one that a Unix socket answers differently |
 //!
 //! Written by hand: `seccompiler` 0.5 builds filters but has no notification, `libseccomp` needs a system library, and the
-//! program is one screen.
+//! program is short.
 //!
 //! Source: `seccomp(2)`, `seccomp_unotify(2)`; Linux `include/uapi/linux/filter.h`.
 
@@ -28,10 +28,10 @@ use protocol::can::CAN_FRAME_BYTES;
 use std::io;
 use std::os::fd::{FromRawFd, OwnedFd};
 
-/// What an eventfd is written with; programs wake their threads so at a high rate.
+/// Length of a write to an eventfd, by which programs wake their threads at a high rate.
 const EVENTFD_BYTES: u32 = 8;
 
-/// Options of `SOL_SOCKET` to set that concern more than the guest's end of the socket pair.
+/// Options of `SOL_SOCKET` to set that affect more than the guest's end of the socket pair.
 const SET_OPTIONS: [i32; 8] = [
     libc::SO_RCVBUF,
     libc::SO_RCVBUFFORCE,
@@ -42,11 +42,11 @@ const SET_OPTIONS: [i32; 8] = [
     libc::SO_TIMESTAMPING,
     libc::SO_PASSCRED,
 ];
-/// Options of `SOL_SOCKET` that a Unix socket would answer with its own nature.
-const ASKED_OPTIONS: [i32; 5] =
+/// Options of `SOL_SOCKET` to get that a Unix socket answers with its own type.
+const GET_OPTIONS: [i32; 5] =
     [libc::SO_TYPE, libc::SO_DOMAIN, libc::SO_PROTOCOL, libc::SO_RXQ_OVFL, libc::SO_ERROR];
 
-/// Calls that are notified whatever their arguments are.
+/// Calls that are always notified.
 const ALWAYS: [libc::c_long; 12] = [
     libc::SYS_bind,
     libc::SYS_connect,
@@ -92,12 +92,12 @@ const fn step(code: u32, value: u32) -> sock_filter {
 const ALLOW: sock_filter = step(RETURN, libc::SECCOMP_RET_ALLOW);
 const NOTIFY: sock_filter = step(RETURN, libc::SECCOMP_RET_USER_NOTIF);
 
-/// A condition that decides the call when it holds, and else passes on to the next.
+/// A condition that decides the call when it holds, and otherwise falls through to the next.
 const fn when(test: u32, value: u32, decision: sock_filter) -> [sock_filter; 2] {
     [sock_filter { code: test as u16, jt: 0, jf: 1, k: value }, decision]
 }
 
-/// What decides a call once its number is known; ends with a decision.
+/// Instructions that decide a call of this number; the last is a decision.
 fn conditions_of(call: libc::c_long) -> Vec<sock_filter> {
     let load = |index: u32| step(LOAD, argument(index).0);
     let frame = CAN_FRAME_BYTES as u32;
@@ -113,12 +113,12 @@ fn conditions_of(call: libc::c_long) -> Vec<sock_filter> {
         }
         libc::SYS_setsockopt | libc::SYS_getsockopt => {
             steps.push(load(1));
-            // The levels of CAN, which are next to each other.
+            // The levels of CAN, which are contiguous.
             steps.extend(when(ABOVE, SOL_CAN_LAST as u32, ALLOW));
             steps.extend(when(AT_LEAST, SOL_CAN_FIRST as u32, NOTIFY));
             steps.push(sock_filter { code: EQUAL as u16, jt: 1, jf: 0, k: libc::SOL_SOCKET as u32 });
             steps.extend([ALLOW, load(2)]);
-            let options = if call == libc::SYS_setsockopt { &SET_OPTIONS[..] } else { &ASKED_OPTIONS[..] };
+            let options = if call == libc::SYS_setsockopt { &SET_OPTIONS[..] } else { &GET_OPTIONS[..] };
             options.iter().for_each(|option| steps.extend(when(EQUAL, *option as u32, NOTIFY)));
         }
         libc::SYS_recvfrom => steps.extend(notify_with_address()),
@@ -140,7 +140,7 @@ fn conditions_of(call: libc::c_long) -> Vec<sock_filter> {
     steps
 }
 
-/// Notifies `recvfrom` and `sendto` when their fifth argument, the address, is there.
+/// Notifies `recvfrom` and `sendto` with an address, the fifth argument.
 fn notify_with_address() -> Vec<sock_filter> {
     let (low, high) = argument(4);
     let not_zero =
@@ -148,7 +148,7 @@ fn notify_with_address() -> Vec<sock_filter> {
     [not_zero(low), not_zero(high)].concat()
 }
 
-/// The whole filter. Calls of another architecture, as a 32-bit program makes them, are allowed: to them there is no CAN.
+/// The whole filter. Calls of another architecture, as of a 32-bit program, are allowed and see no CAN.
 pub(crate) fn program() -> Vec<sock_filter> {
     let mut steps = vec![step(LOAD, OFFSET_ARCHITECTURE)];
     steps.push(sock_filter { code: EQUAL as u16, jt: 1, jf: 0, k: ARCHITECTURE });
@@ -175,13 +175,13 @@ pub(crate) fn program() -> Vec<sock_filter> {
     steps
 }
 
-/// Puts the filter onto this thread, and what it starts, and gives the descriptor at which notifications arrive.
+/// Installs the filter for this thread and what it starts; returns the descriptor for notifications.
 ///
-/// `no_new_privs` is set first, which lets an ordinary user install a filter and takes their effect from setuid programs.
+/// `no_new_privs` is set first: it allows an unprivileged user to install a filter, and disables setuid programs.
 ///
 /// # Errors
-/// What `prctl` or `seccomp` says: `EBUSY` below another listener, `ENOSYS` or `EINVAL` without user notification, `EPERM` where
-/// a container forbids the call.
+/// The error of `prctl` or `seccomp`: `EBUSY` below another listener, `ENOSYS` or `EINVAL` without user notification, `EPERM`
+/// where a container forbids the call.
 pub(crate) fn install() -> io::Result<OwnedFd> {
     let mut steps = program();
     let program = libc::sock_fprog { len: steps.len() as u16, filter: steps.as_mut_ptr() };
@@ -201,7 +201,7 @@ pub(crate) fn install() -> io::Result<OwnedFd> {
     if listener < 0 {
         return Err(io::Error::last_os_error());
     }
-    // SAFETY: the kernel has just given us this descriptor.
+    // SAFETY: the kernel has just returned this descriptor.
     Ok(unsafe { OwnedFd::from_raw_fd(listener as i32) })
 }
 

@@ -1,7 +1,6 @@
-//! An interface as a guest sees it: its name, its index, what ioctls say of it, and the bus behind it.
+//! An interface as a guest sees it: its name, its index, answers to ioctls, and the bus behind it.
 //!
-//! It answers as a classic CAN interface does that a vcan would be after `ip link set vcan0 mtu 16`: no CAN FD. It is up while
-//! its bus has a host.
+//! It behaves as a vcan after `ip link set vcan0 mtu 16`: classic CAN without CAN FD. It is up while its bus has a host.
 
 use crate::bus_peer::BusPeer;
 use rustix::io::Errno;
@@ -12,7 +11,7 @@ pub(crate) const REQUEST_BYTES: usize = 40;
 /// `IFNAMSIZ`.
 const NAME_BYTES: usize = 16;
 
-/// Requests of `ioctl` on an interface by its name, save for the first, which asks for the name.
+/// Requests of `ioctl` on an interface by its name; the first one asks for the name.
 pub(crate) const SIOCGIFNAME: u32 = 0x8910;
 const SIOCGIFFLAGS: u32 = 0x8913;
 const SIOCGIFMETRIC: u32 = 0x891D;
@@ -27,7 +26,7 @@ const SIOCSIFNAME: u32 = 0x8923;
 const SIOCSIFHWADDR: u32 = 0x8924;
 const SIOCSIFTXQLEN: u32 = 0x8943;
 
-/// `IFF_NOARP`, which vcan has; and what an interface has that is up.
+/// `IFF_NOARP`, which vcan has; and the flags of an interface that is up.
 const NO_ARP: u16 = 0x80;
 const UP_AND_RUNNING: u16 = 0x41;
 /// `ARPHRD_CAN`, the type of the interface.
@@ -37,7 +36,7 @@ pub(crate) const MTU: u32 = 16;
 /// Length of vcan's transmit queue.
 pub(crate) const TRANSMIT_QUEUE: u32 = 1000;
 
-/// The index of the first interface, if no other has it: above those that a machine usually has.
+/// Lowest index of an interface, if it is free: above the usual indices of a machine.
 const FIRST_INDEX: u32 = 100;
 
 /// An interface of the guests.
@@ -45,9 +44,9 @@ pub(crate) struct Interface {
     pub(crate) name: String,
     pub(crate) index: u32,
     pub(crate) bus: BusPeer,
-    /// Whether the guests have been told that it is up.
+    /// Whether the guests were notified that it is up.
     pub(crate) is_up: bool,
-    /// Guests' sockets that have a frame for the bus whose queue is full.
+    /// Sockets of guests with a frame that waits for room at the bus.
     pub(crate) waiting: Vec<u64>,
 }
 
@@ -57,10 +56,10 @@ impl Interface {
         Self { name: name.into(), index, is_up: false, bus, waiting: Vec::new() }
     }
 
-    /// The answer to a request that names it: the 24 bytes after the name; `None` when it is none that is answered.
+    /// The answer to a request with its name: the 24 bytes after the name; `None` for an unknown request.
     ///
     /// # Errors
-    /// `EPERM` for requests that would change it, `EOPNOTSUPP` for what a vcan lacks as well.
+    /// `EPERM` for requests that would change it, `EOPNOTSUPP` for those that a vcan lacks too.
     pub(crate) fn answer(&self, request: u32) -> Option<Result<Vec<u8>, Errno>> {
         let flags = if self.is_up { NO_ARP | UP_AND_RUNNING } else { NO_ARP };
         Some(Ok(match request {
@@ -79,7 +78,7 @@ impl Interface {
         }))
     }
 
-    /// Its name as it stands in a request.
+    /// Its name in the form of a request.
     pub(crate) fn name_field(&self) -> [u8; NAME_BYTES] {
         let mut field = [0; NAME_BYTES];
         field[..self.name.len()].copy_from_slice(self.name.as_bytes());
@@ -94,7 +93,7 @@ pub(crate) fn named<'a>(interfaces: &'a [Interface], request: &[u8; REQUEST_BYTE
     interfaces.iter().find(|interface| interface.name.as_bytes() == &field[..end])
 }
 
-/// Indices that no interface of this machine has, rising.
+/// Indices that no interface of this machine has, ascending.
 pub(crate) fn free_indices() -> impl Iterator<Item = u32> {
     let socket =
         rustix::net::socket(rustix::net::AddressFamily::UNIX, rustix::net::SocketType::DGRAM, None).ok();

@@ -1,4 +1,4 @@
-//! `ioctl` of sockets: what a program asks of an interface by its name, on whatever socket, and the stamp of the last frame.
+//! `ioctl` of sockets: requests about an interface by its name, on any socket, and the stamp of the last frame.
 
 use crate::caller::Caller;
 use crate::interface::{self, REQUEST_BYTES, SIOCGIFNAME};
@@ -6,13 +6,13 @@ use crate::notification::{Answer, Notification};
 use crate::supervisor::Supervisor;
 use rustix::io::Errno;
 
-/// The stamp of the frame that was read last, in us and in ns, and the same with 64-bit times for 32-bit programs.
+/// The stamp of the last frame read, in us and in ns, and the same with 64-bit times for 32-bit programs.
 const SIOCGSTAMP: u32 = 0x8906;
 const SIOCGSTAMPNS: u32 = 0x8907;
 const SIOCGSTAMP_NEW: u32 = 0x8010_8906;
 const SIOCGSTAMPNS_NEW: u32 = 0x8010_8907;
 
-/// Where the answer stands in a request, behind the name.
+/// Offset of the answer in a request, after the name.
 const ANSWER: u64 = 16;
 
 impl Supervisor {
@@ -29,7 +29,7 @@ impl Supervisor {
     fn ask_interface(&mut self, notification: &Notification, request: u32) -> Answer {
         let caller = Caller::new(notification.thread);
         let at = notification.arguments[2];
-        // A request with another argument than `struct ifreq` is none that is answered.
+        // A request with another argument than `struct ifreq` is not answered here.
         let Ok(asked) = caller.read_array::<REQUEST_BYTES>(at) else { return Answer::Continue };
         let alive = self.listener.check_alive(notification.id);
         let written = if request == SIOCGIFNAME {
@@ -45,7 +45,7 @@ impl Supervisor {
         written.map_or_else(Answer::Error, |()| Answer::Value(0))
     }
 
-    /// `ENOENT` before the first frame, as the kernel says, which keeps stamps from the first question on.
+    /// `ENOENT` before the first frame, as from the kernel, which keeps stamps from the first request on.
     fn last_stamp(&mut self, notification: &Notification, request: u32) -> Answer {
         let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
         let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };

@@ -1,4 +1,4 @@
-//! The transport protocol of ISO 15765-2, `CAN_ISOTP`: messages of up to 66000 bytes in frames of 8, on the guest's behalf.
+//! The transport protocol of ISO 15765-2, `CAN_ISOTP`: messages of up to 66000 bytes in frames of 8, for the guest.
 //!
 //! ```text
 //!   message of at most 7 bytes   single frame
@@ -13,7 +13,8 @@
 //!   receiver  idle ── first frame ──► awaits consecutive frames ── last ──► idle      none for 1 s: ETIMEDOUT
 //! ```
 //!
-//! It knows no socket and no clock: frames, messages and the time come in, [`Event`]s and frames go out. Frames are classic.
+//! It has no socket and no clock: frames, messages and the time are inputs, [`Event`]s and frames are outputs. Frames are
+//! classic.
 //!
 //! Source: ISO 15765-2:2016; Linux 6.1 `net/can/isotp.c`, `include/uapi/linux/can/isotp.h`.
 
@@ -34,10 +35,10 @@ use std::time::{Duration, Instant};
 pub(crate) const LONGEST_PDU: usize = 66000;
 /// Bytes of a classic frame's data.
 const DATA_BYTES: usize = 8;
-/// `ISOTP_FC_TIMEOUT`: the other side's next frame is waited for so long.
-const OTHER_SIDE: Duration = Duration::from_secs(1);
-/// `ISOTP_ECHO_TIMEOUT`: and so long for the interface to take one of ours.
-const INTERFACE: Duration = Duration::from_secs(2);
+/// `ISOTP_FC_TIMEOUT`: longest wait for the peer's next frame.
+const PEER_TIMEOUT: Duration = Duration::from_secs(1);
+/// `ISOTP_ECHO_TIMEOUT`: longest wait for the interface to accept a frame.
+const INTERFACE_TIMEOUT: Duration = Duration::from_secs(2);
 
 const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
 
@@ -49,16 +50,16 @@ mod kind {
     pub(super) const FLOW_CONTROL: u8 = 0x30;
 }
 
-/// What came of a frame or of the time.
+/// Result of a frame or of the passage of time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Event {
     /// A flow control frame goes to the interface.
     Reply(FrameBytes),
     /// A message is complete.
     Received(Vec<u8>),
-    /// A message was not received.
+    /// The reception of a message failed.
     ReceivingFailed(Errno),
-    /// The message that was sent was not received by the other side.
+    /// The transmission of a message failed.
     SendingFailed(Errno),
 }
 
@@ -69,7 +70,7 @@ pub(crate) struct Identifiers {
     pub(crate) received: u32,
 }
 
-/// A frame of the channel, and what the socket wants of it.
+/// A frame of the channel, with the settings of the socket.
 #[derive(Clone, Copy)]
 struct Incoming<'a> {
     data: &'a [u8],
@@ -78,7 +79,7 @@ struct Incoming<'a> {
     now: Instant,
 }
 
-/// One socket's end of a transport channel.
+/// One end of a transport channel.
 #[derive(Debug, Default)]
 pub(crate) struct IsoTp {
     settings: Settings,
@@ -88,12 +89,12 @@ pub(crate) struct IsoTp {
 }
 
 impl IsoTp {
-    /// Which frames are its own, once it is bound.
+    /// Identifiers of its frames, once it is bound.
     pub(crate) fn identifiers(&self) -> Option<Identifiers> {
         self.identifiers
     }
 
-    /// Checks the identifiers of `bind`, before the interface is looked at.
+    /// Checks the identifiers of `bind`, before the interface is checked.
     ///
     /// # Errors
     /// `EINVAL` for bits beyond an identifier.
@@ -106,10 +107,10 @@ impl IsoTp {
         if is_one(wanted.sent) && (!listens || is_one(wanted.received)) { Ok(()) } else { Err(Errno::INVAL) }
     }
 
-    /// Binds it to identifiers that were checked.
+    /// Binds it to checked identifiers.
     ///
     /// # Errors
-    /// `EINVAL` when it is bound, or wants CAN FD, which the interface has not; `EADDRNOTAVAIL` for one identifier in both
+    /// `EINVAL` when it is bound, or for CAN FD, which the interface lacks; `EADDRNOTAVAIL` for one identifier in both
     /// directions.
     pub(crate) fn bind(&mut self, wanted: Identifiers, is_interface: bool) -> Result<(), Errno> {
         if self.identifiers.is_some() {
@@ -131,7 +132,7 @@ impl IsoTp {
     /// `setsockopt`.
     ///
     /// # Errors
-    /// `EISCONN` once it is bound; else as [`Settings::set`].
+    /// `EISCONN` once it is bound; otherwise as [`Settings::set`].
     pub(crate) fn set(&mut self, option: i32, value: &[u8]) -> Result<(), Errno> {
         if self.identifiers.is_some() { Err(Errno::ISCONN) } else { self.settings.set(option, value) }
     }
@@ -144,7 +145,7 @@ impl IsoTp {
         self.settings.get(option)
     }
 
-    /// Whether who sends waits until the other side has it all.
+    /// Whether a sender waits until the peer has received the whole message.
     pub(crate) fn waits_for_the_end(&self) -> bool {
         self.settings.has(flag::WAIT_TX_DONE)
     }
@@ -154,30 +155,31 @@ impl IsoTp {
         self.sender.is_busy()
     }
 
-    /// Begins to send a message; gives its first frame. If the interface does not take that, [`IsoTp::give_up`] takes it back.
+    /// Starts to send a message; returns its first frame. If the interface does not accept that, [`IsoTp::give_up`] cancels the
+    /// message.
     ///
     /// # Errors
-    /// `EADDRNOTAVAIL` before `bind`; `EINVAL` for a length of 0, above [`LONGEST_PDU`], or above one frame's for a broadcast of
-    /// single frames.
+    /// `EADDRNOTAVAIL` before `bind`; `EINVAL` for a length of 0, above [`LONGEST_PDU`], or above that of one frame for a
+    /// broadcast of single frames.
     pub(crate) fn start(&mut self, message: &[u8], now: Instant) -> Result<FrameBytes, Errno> {
         let id = self.identifiers.ok_or(Errno::ADDRNOTAVAIL)?.sent;
         let data = self.sender.start(message, &self.settings, now)?;
         Ok(frame(id, &data))
     }
 
-    /// Forgets the message that is being sent.
+    /// Cancels the message that is being sent.
     pub(crate) fn give_up(&mut self) {
         self.sender = Sender::default();
     }
 
-    /// The consecutive frame that is due, which counts as sent: the other side may answer it before the interface has
-    /// returned. What comes with it takes it back by [`IsoTp::put_back`].
+    /// The consecutive frame that is due. It counts as sent, since the peer may answer it before the interface has returned;
+    /// the returned progress undoes that by [`IsoTp::put_back`].
     pub(crate) fn take_due(&mut self, now: Instant) -> Option<(FrameBytes, Progress)> {
         let id = self.identifiers?.sent;
         self.sender.take_due(&self.settings, now).map(|(data, before)| (frame(id, &data), before))
     }
 
-    /// The interface has no room for it: it is tried again.
+    /// The interface is full: the frame will be sent again.
     pub(crate) fn put_back(&mut self, before: Progress, now: Instant, events: &mut Vec<Event>) {
         self.sender.put_back(before, now, events);
     }
@@ -195,7 +197,7 @@ impl IsoTp {
         if identifier(frame) & mask != received || at == 1 && data[0] != self.settings.received_address() {
             return;
         }
-        // Bytes beyond the length are what the sender left there, and count as the kernel lets them count.
+        // Bytes beyond the length are accepted with their content, as by the kernel.
         let length = usize::from(frame[4]).min(DATA_BYTES);
         let kind = data[at] & 0xF0;
         if self.settings.has(flag::HALF_DUPLEX)
@@ -216,12 +218,12 @@ impl IsoTp {
         events.extend(replies.iter().map(|data| Event::Reply(self::frame(sent, data))));
     }
 
-    /// When something is to be done without a frame.
+    /// Time of the next action without a frame.
     pub(crate) fn due(&self) -> Option<Instant> {
         [self.sender.due(), self.receiver.due()].into_iter().flatten().min()
     }
 
-    /// Ends what has waited too long.
+    /// Ends expired transfers.
     pub(crate) fn advance(&mut self, now: Instant, events: &mut Vec<Event>) {
         self.sender.advance(now, events);
         self.receiver.advance(now, events);

@@ -1,18 +1,18 @@
 //! Starts a program under the filter and serves it until it ends.
 //!
-//! A thread of this process takes the filter upon itself, and starts the program, which inherits it. What the thread itself
-//! does while it starts the program is answered like a guest's calls. So the listener needs no way from one process to the other.
+//! A thread of this process installs the filter and starts the program, which inherits it. The calls of the thread itself are
+//! answered like those of a guest, so that the listener's descriptor need not be passed between processes.
 //!
-//! The program does not outlive this process: the kernel kills it when the thread ends that started it (`PR_SET_PDEATHSIG`), so
-//! the thread waits for the end of [`run`]. The program's own children are not reached so: without a listener their notified
-//! calls get `ENOSYS`, and their sockets are at their end.
+//! The program does not outlive this process: the kernel kills it at the end of the thread that started it
+//! (`PR_SET_PDEATHSIG`), so the thread waits for the end of [`run`]. This does not reach the program's children: without a
+//! listener their notified calls return `ENOSYS`, and their sockets are closed.
 
 #![allow(unsafe_code)] // what the new process does before exec, nothing else
 
 use crate::caller::Caller;
 use crate::interface::{Interface, free_indices};
 use crate::supervisor::{MOST_INTERFACES, Supervisor};
-use crate::{Guest, GuestError, Named, filter};
+use crate::{Guest, GuestError, NamedInterface, filter};
 use rustix::io::Errno;
 use rustix::process::{
     Pid, PidfdFlags, Resource, Signal, getpid, getppid, getrlimit, kill_process, pidfd_open,
@@ -31,15 +31,15 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How often a bus is looked for before the program starts.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Period of the attempts to connect to a bus before the program starts.
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 
-/// Code of a program that a signal ended, above the signal's number, as shells have it.
+/// Base of the exit code of a program that a signal ended, as in a shell.
 const SIGNALLED: i32 = 128;
 
-/// Signals that a person sends to this process and means for the program.
+/// Signals to this process that are meant for the program.
 struct Signals {
-    /// Of the keyboard: the program has had it too.
+    /// From the keyboard: the program has received it too.
     interrupted: Arc<AtomicBool>,
     terminated: Arc<AtomicBool>,
 }
@@ -57,22 +57,23 @@ impl Signals {
     }
 }
 
-/// What the starting thread reports.
-enum Started {
-    /// The filter is in place; here its calls arrive.
+/// Reports of the starting thread.
+enum StartReport {
+    /// The filter is installed; its notifications arrive here.
     Listening(OwnedFd),
     /// The program runs, or could not be started.
     Program(io::Result<Child>),
 }
 
-/// Runs the guest so that its CAN sockets meet `interfaces`, each an embedded bus. `started` is called in the thread that answers
-/// once the program runs: what it changes of the thread is not inherited. Gives the program's exit code, 128 and the signal's
+/// Runs the guest with `interfaces`, each an embedded bus, as its CAN interfaces. `started` is called in the answering thread
+/// once the program runs: the program does not inherit what it changes of the thread. Returns the program's exit code, 128 and
+/// the signal's number if a signal ended it; `None` when the user interrupted the wait for a host.
 /// number if a signal ended it; `None` when a person ended the waiting.
 ///
-/// # Errors
+/// [`GuestError`] when the program cannot be run with this filter.
 /// [`GuestError`].
 pub fn run(
-    interfaces: &[Named],
+    interfaces: &[NamedInterface],
     guest: &Guest<'_>,
     started: impl FnOnce(),
 ) -> Result<Option<i32>, GuestError> {
@@ -87,7 +88,7 @@ pub fn run(
         return Ok(None);
     }
     let here = rustix::thread::gettid().as_raw_nonzero().get();
-    // What is refused here is refused for every guest: it is said now and not when the first of them opens a socket.
+    // A missing permission affects every guest: it is detected now and not at the first socket.
     let looked = Caller::new(here)
         .descriptor(0)
         .and_then(|_| Caller::new(here).read_array::<4>(&raw const here as u64));
@@ -95,14 +96,14 @@ pub fn run(
         return Err(GuestError::Looking(error.into()));
     }
     let (report, reports) = channel();
-    // Dropped when this function returns, whichever way.
+    // Dropped when this function returns.
     let (_still_here, end) = channel();
     let (command, name) = (guest.command.to_vec(), guest.command[0].clone());
     let starter = thread::spawn(move || start(&command, &report, &end)).thread().clone();
     let listener = match reports.recv() {
-        Ok(Started::Listening(listener)) => listener,
-        Ok(Started::Program(Err(error))) => return Err(GuestError::Filter(error)),
-        Ok(Started::Program(Ok(_))) | Err(_) => {
+        Ok(StartReport::Listening(listener)) => listener,
+        Ok(StartReport::Program(Err(error))) => return Err(GuestError::Filter(error)),
+        Ok(StartReport::Program(Ok(_))) | Err(_) => {
             unreachable!("the filter comes first, and {starter:?} reports")
         }
     };
@@ -116,17 +117,17 @@ pub fn run(
     Ok(Some(status.code().unwrap_or_else(|| SIGNALLED + status.signal().unwrap_or(0))))
 }
 
-/// True when all buses have a host; false when a person ended the waiting.
+/// True when all buses have a host; false when the user interrupted the wait.
 fn wait_for_hosts(
     interfaces: &mut [Interface],
     patience: Duration,
     signals: &Signals,
 ) -> Result<bool, GuestError> {
     let until = Instant::now() + patience;
-    let mut told = false;
+    let mut announced = false;
     loop {
         for interface in &mut *interfaces {
-            interface.bus.look_for_host();
+            interface.bus.try_to_connect();
         }
         let Some(missing) = interfaces.iter().find(|interface| interface.bus.socket().is_none()) else {
             return Ok(true);
@@ -139,33 +140,33 @@ fn wait_for_hosts(
         if signals.is_over() {
             return Ok(false);
         }
-        if !std::mem::replace(&mut told, true) {
+        if !std::mem::replace(&mut announced, true) {
             eprintln!("bench can: {} has no host yet at unix://{path}; waiting for it", missing.name);
         }
-        thread::sleep(LOOK_EVERY);
+        thread::sleep(POLL_PERIOD);
     }
 }
 
-/// In a thread of its own, which the filter holds from then on, until the `end`.
-fn start(command: &[OsString], report: &Sender<Started>, end: &Receiver<()>) {
-    // Whoever waits for the reports is there until the last one.
+/// In a thread of its own, which keeps the filter until the `end`.
+fn start(command: &[OsString], report: &Sender<StartReport>, end: &Receiver<()>) {
+    // The receiver of the reports lives until the last one.
     let _ = match filter::install() {
         Ok(listener) => {
-            let _ = report.send(Started::Listening(listener));
-            report.send(Started::Program(spawn(command)))
+            let _ = report.send(StartReport::Listening(listener));
+            report.send(StartReport::Program(spawn(command)))
         }
-        Err(error) => report.send(Started::Program(Err(error))),
+        Err(error) => report.send(StartReport::Program(Err(error))),
     };
     // Returns when the sender is dropped: nothing is ever sent.
     let _ = end.recv();
 }
 
-/// Starts the program, which the kernel kills when the calling thread ends.
+/// Starts the program, which the kernel kills at the end of the calling thread.
 fn spawn(command: &[OsString]) -> io::Result<Child> {
     let parent = getpid();
     let end_with_parent = move || {
         set_parent_process_death_signal(Some(Signal::KILL))?;
-        // It may have ended before.
+        // The parent may have ended before.
         if getppid() == Some(parent) { Ok(()) } else { Err(Errno::SRCH.into()) }
     };
     let mut program = Command::new(&command[0]);
@@ -176,16 +177,16 @@ fn spawn(command: &[OsString]) -> io::Result<Child> {
 /// Answers the starting thread until the program runs.
 fn serve_the_start(
     supervisor: &mut Supervisor,
-    reports: &Receiver<Started>,
+    reports: &Receiver<StartReport>,
     name: &OsStr,
 ) -> Result<Child, GuestError> {
     let failed = |error| GuestError::Command { name: name.into(), error };
     loop {
-        supervisor.turn_for(LOOK_EVERY).map_err(GuestError::System)?;
+        supervisor.turn_for(POLL_PERIOD).map_err(GuestError::System)?;
         match reports.try_recv() {
-            Ok(Started::Program(Ok(child))) => return Ok(child),
-            Ok(Started::Program(Err(error))) => return Err(failed(error)),
-            Ok(Started::Listening(_)) => {}
+            Ok(StartReport::Program(Ok(child))) => return Ok(child),
+            Ok(StartReport::Program(Err(error))) => return Err(failed(error)),
+            Ok(StartReport::Listening(_)) => {}
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => {
                 return Err(failed(io::Error::other("the thread that starts it has ended")));
@@ -194,11 +195,11 @@ fn serve_the_start(
     }
 }
 
-/// Each socket of a guest costs a descriptor here. The program has been started with the limit as it was.
+/// Each socket of a guest needs a descriptor here. The program has the original limit.
 fn raise_limit_of_files() {
     let mut limit = getrlimit(Resource::Nofile);
     limit.current = limit.maximum;
-    // Without it, `socket` fails earlier.
+    // Without it `socket` fails earlier.
     let _ = setrlimit(Resource::Nofile, limit);
 }
 
@@ -214,14 +215,14 @@ fn serve(
     loop {
         if supervisor.turn()? {
             let status = child.wait()?;
-            // What a person had to say to the program is done with; Ctrl-C now means this process.
+            // The signals for the program were handled; from now on Ctrl-C means this process.
             signals.interrupted.store(false, Ordering::Relaxed);
             supervisor.finish(|| signals.is_over())?;
             return Ok(status);
         }
-        let a_bus_went = std::mem::take(&mut supervisor.a_bus_went);
-        if signals.terminated.swap(false, Ordering::Relaxed) || (ends_with_bus && a_bus_went) {
-            // It may have ended meanwhile.
+        let bus_lost = std::mem::take(&mut supervisor.bus_lost);
+        if signals.terminated.swap(false, Ordering::Relaxed) || (ends_with_bus && bus_lost) {
+            // The program may have ended meanwhile.
             let _ = kill_process(pid, Signal::TERM);
         }
     }

@@ -1,4 +1,4 @@
-//! SocketCAN for unmodified programs on a machine without CAN in the kernel: their CAN sockets meet embedded buses.
+//! SocketCAN for unmodified programs on a machine without CAN in the kernel: their CAN sockets are connected to embedded buses.
 //!
 //! ```text
 //!   program, its threads and children                this process
@@ -8,13 +8,13 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `launch` | the program's start and end |
-//! | `filter` | which system calls are answered here |
-//! | `notification` | a call that waits, and its answer |
+//! | `launch` | start and end of the program |
+//! | `filter` | the system calls that are answered here |
+//! | `notification` | a pending call, and its answer |
 //! | `caller` | the calling thread's memory and descriptors |
 //! | `supervisor` | the loop over calls, sockets and buses |
 //! | `interface`, `bus_peer` | an interface as guests see it, and the bus behind it |
-//! | `socket` | a guest's socket: its queue, and what is known of each frame in it |
+//! | `socket` | a guest's socket: its queue, and the metadata of each frame in it |
 //! | `raw` | filters and options of `CAN_RAW` |
 //! | `bcm` | `CAN_BCM`: cyclic sending, changes, time-outs |
 //! | `isotp`, `transport` | `CAN_ISOTP`: the protocol, and its sockets |
@@ -22,8 +22,10 @@
 //! | `netlink` | the interfaces in the kernel's list of links |
 //! | `abi` | numbers and layouts |
 //!
-//! Preloading a library would be simpler, and would not reach a statically linked program or one of Go; a kernel module needs a
-//! kernel that loads it. What is served, what is not, and the cost: `docs/socketcan-without-kernel.md`.
+//! A preloaded library would be simpler, but would not reach a statically linked program or one in Go; a kernel module needs a
+//! kernel that loads it. What is supported, what is not, and the cost: `docs/socketcan-without-kernel.md`.
+
+#![warn(missing_docs)] // an interface of other crates
 
 mod abi;
 mod bcm;
@@ -51,9 +53,9 @@ use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// An interface for the programs: its name, and the socket of the embedded bus that it stands for.
+/// A CAN interface of the guest: its name, and the embedded bus behind it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Named {
+pub struct NamedInterface {
     /// Name of the CAN interface, 1 to 15 bytes.
     pub name: String,
     /// Path of the bus's socket.
@@ -65,19 +67,19 @@ pub struct Named {
 pub struct Guest<'a> {
     /// The program and its arguments.
     pub command: &'a [OsString],
-    /// How long to wait for the hosts of the buses before it starts.
+    /// Longest wait for the hosts of the buses before it starts.
     pub patience: Duration,
-    /// Ends it by SIGTERM when the host of a bus ends, for programs that do not notice.
+    /// Whether it gets SIGTERM when the host of a bus ends, for programs that do not notice.
     pub ends_with_bus: bool,
 }
 
-/// Why a program cannot be run so.
+/// Why a program cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum GuestError {
-    /// More interfaces than there is room for.
+    /// More interfaces than [`run`] supports.
     #[error("at most {0} interfaces")]
     TooMany(usize),
-    /// Nobody hosts the bus.
+    /// The bus has no host.
     #[error(
         "{name}: no host at unix://{path} for {waited_s} s (--wait-s); 'scripts/run --bus unix://{path}' hosts it, as do \
          'emulator run' and 'emulator bus'; --pair opens one without a rig"
@@ -87,13 +89,13 @@ pub enum GuestError {
         name: String,
         /// Path of the bus's socket.
         path: String,
-        /// How long a host was waited for, s.
+        /// Time that was waited for a host, s.
         waited_s: u64,
     },
     /// The kernel or a container refuses the filter.
     #[error("{}", refused(.0))]
     Filter(io::Error),
-    /// The descriptors and the memory of other processes may not be looked at.
+    /// Descriptors and memory of other processes are not accessible.
     #[error(
         "the CAN sockets of a program cannot be found: pidfd_getfd(2) or process_vm_readv(2): {0}; a container forbids it: allow \
          it, as docker run --cap-add SYS_PTRACE does, or --security-opt seccomp=unconfined, or systemd-nspawn \
@@ -105,7 +107,7 @@ pub enum GuestError {
     Command {
         /// The program, the first word of the command.
         name: OsString,
-        /// What the system says.
+        /// Error of the system.
         error: io::Error,
     },
     /// The system refuses a thread, a descriptor or another resource.
@@ -113,7 +115,7 @@ pub enum GuestError {
     System(io::Error),
 }
 
-/// What to do when the filter is refused.
+/// Message with the remedy for a refused filter.
 fn refused(error: &io::Error) -> String {
     let advice = match error.raw_os_error() {
         Some(libc::EBUSY) => {

@@ -1,4 +1,4 @@
-//! `socket`, `bind`, `connect`, `getsockname`, and the calls that CAN sockets do not have.
+//! `socket`, `bind`, `connect`, `getsockname`, and the calls that CAN sockets do not support.
 //!
 //! Source: Linux 6.1 `net/can/af_can.c` (`can_create`), `net/can/raw.c` (`raw_bind`, `raw_getname`, `raw_ops`), `net/can/bcm.c`
 //! (`bcm_connect`, `bcm_ops`).
@@ -15,8 +15,9 @@ use rustix::io::Errno;
 use std::io;
 use std::os::fd::AsFd;
 
-/// Names of the protocols that are not served.
-const OTHERS: [(i32, &str); 4] = [(3, "CAN_TP16"), (4, "CAN_TP20"), (5, "CAN_MCNET"), (7, "CAN_J1939")];
+/// Names of unsupported protocols.
+const UNSUPPORTED_PROTOCOLS: [(i32, &str); 4] =
+    [(3, "CAN_TP16"), (4, "CAN_TP20"), (5, "CAN_MCNET"), (7, "CAN_J1939")];
 
 impl Supervisor {
     /// `socket(AF_CAN, type, protocol)`.
@@ -32,8 +33,10 @@ impl Supervisor {
             CAN_BCM => (libc::SOCK_DGRAM, Kind::Bcm(Box::<BroadcastManager>::default())),
             CAN_ISOTP => (libc::SOCK_DGRAM, Kind::Transport(Box::<Transport>::default())),
             other => {
-                if let Some((_, name)) = OTHERS.iter().find(|(number, _)| *number == other) {
-                    self.tell(&format!("socket: {name} is not served; the call fails with EPROTONOSUPPORT"));
+                if let Some((_, name)) = UNSUPPORTED_PROTOCOLS.iter().find(|(number, _)| *number == other) {
+                    self.warn_once(&format!(
+                        "socket: {name} is not served; the call fails with EPROTONOSUPPORT"
+                    ));
                 }
                 return Errno::PROTONOSUPPORT.into();
             }
@@ -52,7 +55,7 @@ impl Supervisor {
         let (made, theirs) = socket::make(kind, non_blocking, &self.accounts)?;
         let inode = inode_of(theirs.as_fd()).ok_or_else(|| io::Error::from(io::ErrorKind::OutOfMemory))?;
         self.add_socket(inode, made)?;
-        // The guest may use it as soon as it has it, so it is known before.
+        // The guest may use it at once, so it is registered before.
         let injected = self.listener.inject(notification.id, theirs.as_fd(), flags & libc::SOCK_CLOEXEC != 0);
         if injected.is_err() {
             self.remove_socket(inode);
@@ -84,12 +87,12 @@ impl Supervisor {
         };
         socket.interface = Some(interface);
         if is_down {
-            self.tell_error(inode, interface, Errno::NETDOWN);
+            self.deliver_error(inode, interface, Errno::NETDOWN);
         }
         Answer::Value(0)
     }
 
-    /// `connect`, which binds a broadcast manager and no raw socket.
+    /// `connect`, which binds a broadcast manager; raw sockets do not support it.
     pub(crate) fn connect(&mut self, notification: &Notification) -> Answer {
         let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
         let interface = self.read_interface(notification);
@@ -123,7 +126,7 @@ impl Supervisor {
     }
 
     /// `getsockname(fd, address, length)`.
-    pub(crate) fn own_name(&mut self, notification: &Notification) -> Answer {
+    pub(crate) fn get_name(&mut self, notification: &Notification) -> Answer {
         let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
         let Some(socket) = self.sockets.get(&inode) else { return Answer::Continue };
         let interface = socket.interface.unwrap_or(0);
@@ -143,8 +146,8 @@ impl Supervisor {
         written.map_or_else(Answer::Error, |()| Answer::Value(0))
     }
 
-    /// Calls of sockets that have connections.
-    pub(crate) fn not_of_can(&mut self, notification: &Notification) -> Answer {
+    /// Calls of connected sockets.
+    pub(crate) fn unsupported(&mut self, notification: &Notification) -> Answer {
         match self.guest_socket(notification) {
             Some(_) => Errno::OPNOTSUPP.into(),
             None => Answer::Continue,

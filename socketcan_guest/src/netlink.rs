@@ -1,8 +1,8 @@
-//! The list of interfaces by rtnetlink, as `ip link`, `getifaddrs`, `if_nameindex` and Go's `net` ask for it.
+//! The list of interfaces by rtnetlink, as requested by `ip link`, `getifaddrs`, `if_nameindex` and Go's `net`.
 //!
-//! Such a request goes to the kernel; its answer is read by the supervisor, which puts the interfaces of the guests before the
-//! end of a list, and in place of the error that says that an interface of that name is not there. Each message that is looked
-//! at is a whole one, `struct nlmsghdr` and what follows, in a datagram of several.
+//! Such a request goes to the kernel; the supervisor reads its answer, inserts the interfaces of the guests before the end of a
+//! list, and replaces the error about an unknown interface. A datagram has several complete messages, each a `struct nlmsghdr`
+//! and its payload.
 //!
 //! ```text
 //!   offset  0       4     6      8         12    16
@@ -58,11 +58,11 @@ const UP: u32 = 0x1;
 
 /// `sizeof(struct sockaddr_nl)`.
 const ADDRESS_BYTES: u32 = 12;
-/// Longest datagram of the kernel's in answer to such a request, with room for the guests' interfaces.
+/// Longest datagram of the kernel's answer, with room for the guests' interfaces.
 const LONGEST_DATAGRAM: usize = 1 << 16;
-/// Requests whose answers are awaited; one that nobody reads is forgotten for the next.
+/// Most requests with pending answers; the oldest is dropped for a new one.
 const MOST_REQUESTS: usize = 64;
-/// Longest request that is looked at.
+/// Longest request that is parsed.
 const LONGEST_REQUEST: usize = 1024;
 
 /// A request for links that a guest has sent.
@@ -71,12 +71,12 @@ pub(crate) struct LinkRequest {
     /// Inode of the guest's socket.
     inode: u64,
     sequence: u32,
-    /// The place of the one interface that it asks for; `None` for the whole list.
+    /// Index of the one interface requested; `None` for the whole list.
     asks_for: Option<usize>,
 }
 
 impl Supervisor {
-    /// Notes a request for links in what a guest sends on a socket that is none of ours.
+    /// Records a request for links that a guest sends on another socket.
     pub(crate) fn note_link_request(&mut self, notification: &Notification) {
         let caller = Caller::new(notification.thread);
         let [_, buffer, length, ..] = notification.arguments;
@@ -101,7 +101,7 @@ impl Supervisor {
         self.link_requests.push(LinkRequest { inode, sequence, asks_for });
     }
 
-    /// Sequence number and interface of a request that concerns us.
+    /// Sequence number and interface of a request that concerns the guests' interfaces.
     fn read_request(&self, bytes: &[u8]) -> Option<(u32, Option<usize>)> {
         let (kind, flags) = kind_and_flags(bytes.get(..HEADER)?);
         if kind != GET_LINK {
@@ -130,7 +130,7 @@ impl Supervisor {
         self.interfaces.iter().position(is_meant).map(|place| (sequence, Some(place)))
     }
 
-    /// Reads the kernel's answer for a guest whose request was noted; `None` when it is none of those.
+    /// Reads the kernel's answer to a recorded request; `None` for other messages.
     pub(crate) fn receive_links(&mut self, notification: &Notification) -> Option<Answer> {
         let caller = Caller::new(notification.thread);
         let end = caller.descriptor(notification.int(0)).ok()?;
@@ -144,11 +144,11 @@ impl Supervisor {
         }
         let (datagram, address) = match receive(end.as_fd(), flags & libc::MSG_PEEK) {
             Ok(received) => received,
-            // The kernel answers at once, so there is nothing, and the guest may wait for it.
+            // The kernel answers at once, so there is no answer, and the guest may wait for it.
             Err(Errno::AGAIN) => return None,
             Err(error) => return Some(error.into()),
         };
-        let (datagram, is_over) = with_ours(&datagram, &request, &self.interfaces);
+        let (datagram, is_over) = with_guest_interfaces(&datagram, &request, &self.interfaces);
         if is_over && flags & libc::MSG_PEEK == 0 {
             self.link_requests.remove(place);
         }
@@ -170,7 +170,11 @@ fn kind_and_flags(message: &[u8]) -> (u16, u16) {
 }
 
 /// A datagram with the guests' interfaces, and whether it ends the answer.
-fn with_ours(datagram: &[u8], request: &LinkRequest, interfaces: &[Interface]) -> (Vec<u8>, bool) {
+fn with_guest_interfaces(
+    datagram: &[u8],
+    request: &LinkRequest,
+    interfaces: &[Interface],
+) -> (Vec<u8>, bool) {
     let (mut bytes, mut rest, mut is_over) = (Vec::with_capacity(datagram.len() + 1024), datagram, false);
     while rest.len() >= HEADER {
         let length = (u32_at(rest, 0) as usize).clamp(HEADER, rest.len());
@@ -196,7 +200,7 @@ fn with_ours(datagram: &[u8], request: &LinkRequest, interfaces: &[Interface]) -
     (bytes, is_over)
 }
 
-/// RTM_NEWLINK of an interface, as the kernel describes a vcan.
+/// RTM_NEWLINK of an interface, in the form of a vcan.
 fn link(interface: &Interface, flags: u16, sequence: u32, port: u32) -> Vec<u8> {
     let state = if interface.is_up { NO_ARP | RUNNING | UP | LOWER_UP } else { NO_ARP };
     let mut message = vec![0; HEADER];
@@ -215,7 +219,7 @@ fn link(interface: &Interface, flags: u16, sequence: u32, port: u32) -> Vec<u8> 
     let text = |text: &str| [text.as_bytes(), &[0]].concat();
     message.extend(attribute(NAME, &text(&interface.name)));
     message.extend(attribute(QUEUE_LENGTH, &crate::interface::TRANSMIT_QUEUE.to_ne_bytes()));
-    // IF_OPER_UNKNOWN: vcan never says more; IF_OPER_DOWN.
+    // IF_OPER_UNKNOWN, as for every vcan; IF_OPER_DOWN.
     message.extend(attribute(STATE, &[if interface.is_up { 0 } else { 2 }]));
     message.extend(attribute(LINK_MODE, &[0]));
     message.extend(attribute(MTU, &crate::interface::MTU.to_ne_bytes()));
@@ -231,7 +235,7 @@ fn link(interface: &Interface, flags: u16, sequence: u32, port: u32) -> Vec<u8> 
     message
 }
 
-/// A datagram and its sender's address, without waiting.
+/// A datagram and its sender's address, without blocking.
 fn receive(end: BorrowedFd<'_>, peek: i32) -> Result<(Vec<u8>, Vec<u8>), Errno> {
     let (mut bytes, mut address) = (vec![0_u8; LONGEST_DATAGRAM], vec![0_u8; ADDRESS_BYTES as usize]);
     let (into, from, mut length) = (bytes.as_mut_ptr().cast(), address.as_mut_ptr().cast(), ADDRESS_BYTES);
@@ -246,7 +250,7 @@ fn receive(end: BorrowedFd<'_>, peek: i32) -> Result<(Vec<u8>, Vec<u8>), Errno> 
     Ok((bytes, address))
 }
 
-/// Into a `struct msghdr`; gives the length that it had room for.
+/// Writes into a `struct msghdr`; returns the number of bytes that fit.
 fn write_message(caller: Caller, at: u64, datagram: &[u8], address: &[u8]) -> Result<usize, Errno> {
     let header = Header::read(caller, at)?;
     let length = datagram.len().min(header.room());
@@ -256,13 +260,13 @@ fn write_message(caller: Caller, at: u64, datagram: &[u8], address: &[u8]) -> Re
         caller.write(header.name, &address[..address.len().min(room)])?;
         caller.write(at + 8, &(address.len() as u32).to_ne_bytes())?;
     }
-    let told = if length < datagram.len() { libc::MSG_TRUNC } else { 0 };
+    let out_flags = if length < datagram.len() { libc::MSG_TRUNC } else { 0 };
     caller.write(at + 40, &0_u64.to_ne_bytes())?;
-    caller.write(at + 48, &told.to_ne_bytes())?;
+    caller.write(at + 48, &out_flags.to_ne_bytes())?;
     Ok(length)
 }
 
-/// For `recvfrom(fd, buffer, length, flags, address, address length)`.
+/// Writes for `recvfrom(fd, buffer, length, flags, address, address length)`.
 fn write_from(
     caller: Caller,
     notification: &Notification,
@@ -307,11 +311,11 @@ mod tests {
             .map(|(name, index)| Interface::new(name, Path::new("/nowhere"), index));
         let request = LinkRequest { inode: 1, sequence: 7, asks_for: None };
         let more = [message(NEW_LINK, 7), message(NEW_LINK, 7)].concat();
-        assert_eq!(with_ours(&more, &request, &interfaces), (more, false));
+        assert_eq!(with_guest_interfaces(&more, &request, &interfaces), (more, false));
         let end = [message(NEW_LINK, 7), message(DONE, 7)].concat();
-        let (list, is_over) = with_ours(&end, &request, &interfaces);
+        let (list, is_over) = with_guest_interfaces(&end, &request, &interfaces);
         assert_eq!((kinds(&list), is_over), (vec![NEW_LINK, NEW_LINK, NEW_LINK, DONE], true));
-        let (other, is_over) = with_ours(&message(DONE, 8), &request, &interfaces);
+        let (other, is_over) = with_guest_interfaces(&message(DONE, 8), &request, &interfaces);
         assert_eq!((kinds(&other), is_over), (vec![DONE], false));
     }
 
@@ -319,7 +323,7 @@ mod tests {
     fn an_interface_that_the_kernel_does_not_have_is_described() {
         let interfaces = [Interface::new("vcan0", Path::new("/nowhere"), 100)];
         let request = LinkRequest { inode: 1, sequence: 7, asks_for: Some(0) };
-        let (answer, is_over) = with_ours(&message(ERROR, 7), &request, &interfaces);
+        let (answer, is_over) = with_guest_interfaces(&message(ERROR, 7), &request, &interfaces);
         assert_eq!((kinds(&answer), is_over), (vec![NEW_LINK], true));
         assert_eq!(u32_at(&answer, HEADER + 4), 100);
         assert_eq!(answer.len(), u32_at(&answer, 0) as usize);

@@ -1,7 +1,7 @@
-//! Notifications of the kernel: a call that waits, and its answer.
+//! Notifications of the kernel: a pending call, and its answer.
 //!
-//! A notification dies when its caller does, or when a signal interrupts the call; the number of a dead one is never used again.
-//! What was read from the caller's memory counts only when its notification is alive afterwards.
+//! A notification ends with its caller, or when a signal interrupts the call; its number is never reused. Data read from the
+//! caller's memory are valid only if the notification is alive afterwards.
 //!
 //! Source: `seccomp_unotify(2)`.
 
@@ -12,12 +12,12 @@ use rustix::io::Errno;
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 
-/// A system call that waits for its answer.
+/// A pending system call.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Notification {
     /// Number of the notification.
     pub(crate) id: u64,
-    /// The thread that calls.
+    /// The calling thread.
     pub(crate) thread: i32,
     /// Number of the call.
     pub(crate) call: i64,
@@ -31,16 +31,16 @@ impl Notification {
     }
 }
 
-/// How a call ends.
+/// End of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Answer {
-    /// It returns this.
+    /// It returns this value.
     Value(i64),
     /// It fails.
     Error(Errno),
-    /// The kernel carries it out as if nobody had looked.
+    /// The kernel executes it.
     Continue,
-    /// Later: whoever answers keeps the notification.
+    /// Answered later by the holder of the notification.
     Deferred,
 }
 
@@ -50,7 +50,7 @@ impl From<Errno> for Answer {
     }
 }
 
-/// Where notifications arrive.
+/// Descriptor for notifications.
 pub(crate) struct Listener(OwnedFd);
 
 impl AsFd for Listener {
@@ -64,7 +64,7 @@ impl Listener {
         Self(descriptor)
     }
 
-    /// The next notification, without waiting; `None` when none is there, or it died meanwhile.
+    /// The next notification, without blocking; `None` when there is none, or its caller has gone.
     pub(crate) fn next(&self) -> Option<Notification> {
         // Receiving blocks when there is none.
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };
@@ -72,9 +72,9 @@ impl Listener {
         if poll(&mut set, Some(&now)) != Ok(1) || !set[0].revents().contains(PollFlags::IN) {
             return None;
         }
-        // SAFETY: all zeros is a valid value, and what the kernel wants to find.
+        // SAFETY: all zeros is a valid value, and required by the kernel.
         let mut notification: libc::seccomp_notif = unsafe { std::mem::zeroed() };
-        // SAFETY: the kernel fills the structure, which is its own.
+        // SAFETY: the kernel fills the structure of its own type.
         let received =
             unsafe { libc::ioctl(self.0.as_raw_fd(), libc::SECCOMP_IOCTL_NOTIF_RECV, &raw mut notification) };
         (received == 0).then(|| Notification {
@@ -91,7 +91,7 @@ impl Listener {
         unsafe { libc::ioctl(self.0.as_raw_fd(), libc::SECCOMP_IOCTL_NOTIF_ID_VALID, &raw const id) == 0 }
     }
 
-    /// The same before an answer: what was read of the memory of a caller that has gone is somebody else's.
+    /// Checks the same before an answer: memory of a caller that has gone may belong to another process.
     ///
     /// # Errors
     /// `EINTR`.
@@ -99,7 +99,7 @@ impl Listener {
         if self.is_alive(id) { Ok(()) } else { Err(Errno::INTR) }
     }
 
-    /// Answers; false when the caller waits no more. [`Answer::Deferred`] answers nothing.
+    /// Answers; false when the caller waits no more. [`Answer::Deferred`] does nothing.
     pub(crate) fn answer(&self, id: u64, answer: Answer) -> bool {
         let mut response = libc::seccomp_notif_resp { id, val: 0, error: 0, flags: 0 };
         match answer {
@@ -108,15 +108,15 @@ impl Listener {
             Answer::Continue => response.flags = libc::SECCOMP_USER_NOTIF_FLAG_CONTINUE as u32,
             Answer::Deferred => return true,
         }
-        // SAFETY: the kernel reads the structure, which is its own.
+        // SAFETY: the kernel reads the structure of its own type.
         unsafe { libc::ioctl(self.0.as_raw_fd(), libc::SECCOMP_IOCTL_NOTIF_SEND, &raw mut response) == 0 }
     }
 
-    /// Gives the caller a descriptor of this file at its lowest free number, and answers with the number, at once, so that a
-    /// signal cannot come between.
+    /// Installs a descriptor of this file at the lowest free number of the caller, and answers with the number in one step, so
+    /// that no signal comes between.
     ///
     /// # Errors
-    /// `EMFILE` when the caller has no number left; `ENOENT` when it waits no more. The call is not answered then.
+    /// `EMFILE` when the caller has no free number; `ENOENT` when it waits no more. The call is not answered then.
     pub(crate) fn inject(&self, id: u64, file: BorrowedFd<'_>, close_on_exec: bool) -> io::Result<()> {
         let request = libc::seccomp_notif_addfd {
             id,
@@ -125,7 +125,7 @@ impl Listener {
             newfd: 0,
             newfd_flags: if close_on_exec { libc::O_CLOEXEC as u32 } else { 0 },
         };
-        // SAFETY: the kernel reads the structure, which is its own.
+        // SAFETY: the kernel reads the structure of its own type.
         let number =
             unsafe { libc::ioctl(self.0.as_raw_fd(), libc::SECCOMP_IOCTL_NOTIF_ADDFD, &raw const request) };
         if number < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }

@@ -25,14 +25,14 @@ impl Supervisor {
             match (option, number) {
                 (libc::SO_RCVBUF | libc::SO_RCVBUFFORCE, Some(bytes)) => {
                     socket.resize_queue(bytes as usize);
-                    // The guest's own end remembers it, for `getsockopt`.
+                    // The guest's end stores it, for `getsockopt`.
                     return Answer::Continue;
                 }
                 (libc::SO_RXQ_OVFL, Some(wanted)) => {
                     socket.tells_dropped = wanted != 0;
                     return Answer::Value(0);
                 }
-                // Raw CAN sockets are bound by `bind`; the kernel accepts the option and it has no effect.
+                // Raw CAN sockets are bound by `bind`; the kernel accepts the option without effect.
                 (libc::SO_BINDTODEVICE, _) => {
                     let end = value.iter().position(|byte| *byte == 0).unwrap_or(value.len());
                     let is_ours = self.interfaces.iter().any(|known| known.name.as_bytes() == &value[..end]);
@@ -50,7 +50,7 @@ impl Supervisor {
         set.map_or_else(Answer::Error, |()| Answer::Value(0))
     }
 
-    /// The value of `setsockopt`. One that is longer than any may be is refused unread, as the kernel does: it may not be there.
+    /// The value of `setsockopt`. A value longer than allowed is refused unread, as by the kernel, since it may not be mapped.
     fn read_value(&self, notification: &Notification) -> Result<Vec<u8>, Errno> {
         let length = usize::try_from(notification.int(4)).ok();
         let length = length.filter(|length| *length <= RawOptions::LONGEST_VALUE).ok_or(Errno::INVAL)?;
@@ -71,7 +71,7 @@ impl Supervisor {
                 number(if is_raw { libc::SOCK_RAW } else { libc::SOCK_DGRAM })
             }
             (libc::SOL_SOCKET, libc::SO_DOMAIN) => number(crate::abi::AF_CAN),
-            // The kernel does not keep it for CAN.
+            // The kernel does not store it for CAN.
             (libc::SOL_SOCKET, libc::SO_PROTOCOL) => number(0),
             (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => number(socket.tells_dropped.into()),
             (libc::SOL_SOCKET, libc::SO_ERROR) => {
@@ -95,7 +95,7 @@ impl Supervisor {
     /// Writes a value and its length.
     ///
     /// # Errors
-    /// `ERANGE` with the length that is needed, for a value that may not be cut.
+    /// `ERANGE` with the required length, for a value that may not be truncated.
     fn write_value(&self, notification: &Notification, value: &[u8], may_be_cut: bool) -> Result<(), Errno> {
         let caller = Caller::new(notification.thread);
         let [_, _, _, value_at, length_at, _] = notification.arguments;

@@ -1,4 +1,4 @@
-//! What a `CAN_RAW` socket was told: filters and options, and which frames pass.
+//! State of a `CAN_RAW` socket: filters and options, and which frames pass.
 //!
 //! ```text
 //!   error frame    passes where (class & mask) != 0: of CAN_RAW_ERR_FILTER, or of a filter whose mask has the error flag
@@ -26,7 +26,7 @@ const FILTER_BYTES: usize = 8;
 /// `CAN_RAW_FILTER_MAX`.
 const MOST_FILTERS: usize = 512;
 
-/// A filter as the guest gave it.
+/// A filter of the guest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Filter {
     id: u32,
@@ -56,7 +56,7 @@ impl Filter {
 pub(crate) struct RawOptions {
     filters: Vec<Filter>,
     error_mask: u32,
-    /// Numbers as they were set; any but 0 switches on.
+    /// Numbers as set; any but 0 switches on.
     loopback: i32,
     receive_own: i32,
     fd_frames: i32,
@@ -80,12 +80,12 @@ impl Default for RawOptions {
 }
 
 impl RawOptions {
-    /// Whether the other guests on the interface get what this socket sends.
+    /// Whether the other guests on the interface receive the frames of this socket.
     pub(crate) fn loops_back(&self) -> bool {
         self.loopback != 0
     }
 
-    /// Whether it gets what it sends.
+    /// Whether it receives its own frames.
     pub(crate) fn receives_own(&self) -> bool {
         self.receive_own != 0
     }
@@ -95,7 +95,7 @@ impl RawOptions {
         let passed = self.filters.iter().filter(|filter| filter.is_passed_by(id)).count();
         let by_error_filter = id & ERROR_FLAG != 0 && id & self.error_mask != 0;
         let count = passed + usize::from(by_error_filter);
-        // The kernel counts the matches of an entry of its lists, whichever option made it.
+        // The kernel counts the matches of an entry of its lists, whichever option created it.
         if self.join_filters != 0 && self.filters.len() > 1 { count >= self.filters.len() } else { count > 0 }
     }
 
@@ -132,7 +132,7 @@ impl RawOptions {
         Ok(())
     }
 
-    /// `getsockopt`: the whole value, and whether it may be cut to the room that there is.
+    /// `getsockopt`: the whole value, and whether it may be truncated.
     ///
     /// # Errors
     /// `ENOPROTOOPT`.
@@ -153,7 +153,7 @@ impl RawOptions {
         Ok((number.to_ne_bytes().to_vec(), true))
     }
 
-    /// Longest value that `setsockopt` may read.
+    /// Longest value of `setsockopt`.
     pub(crate) const LONGEST_VALUE: usize = MOST_FILTERS * FILTER_BYTES;
 }
 

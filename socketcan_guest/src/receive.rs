@@ -1,9 +1,9 @@
-//! `recvmsg`, `recvmmsg` and `recvfrom` with an address: what a guest reads together with what the kernel would tell of it.
+//! `recvmsg`, `recvmmsg` and `recvfrom` with an address: a message with the metadata that the kernel would return.
 //!
-//! The message is taken from the guest's own end by a copy of its descriptor, so that the order with what it reads natively is
-//! kept, and written into its memory with the address of the interface, the flags, the control messages of the kernel (time
-//! stamps) and the count of lost frames. A call that would block is kept and tried again when something was delivered; a message
-//! whose call a signal ended meanwhile goes to the next one.
+//! The message is taken from the guest's end by a copy of its descriptor, so that the order with native reads is kept, and
+//! written into the guest's memory with the address of the interface, the flags, the control messages of the kernel (time
+//! stamps) and the count of lost frames. A call that would block is kept and tried again after a delivery; a message whose call
+//! a signal ended goes to the next call.
 
 #![allow(unsafe_code)] // recvmsg, nothing else
 
@@ -21,23 +21,23 @@ use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
 use std::time::Instant;
 
-/// `sizeof(struct msghdr)` and `sizeof(struct mmsghdr)`, and where the second has the length.
+/// `sizeof(struct msghdr)` and `sizeof(struct mmsghdr)`, and the offset of the length in the latter.
 const HEADER_BYTES: usize = 56;
 const LONG_HEADER_BYTES: u64 = 64;
-/// Room for the longest message of a guest, one of the transport protocol, and some bytes more: a longer one is none.
+/// Longest message of a guest, one of the transport protocol, and some bytes more to detect longer ones.
 pub(crate) const LONGEST_MESSAGE: usize = LONGEST_PDU + 48;
-/// The same of sockets of other protocols: one of the broadcast manager.
+/// The same for other protocols: a message of the broadcast manager.
 pub(crate) const LONGEST_OTHER: usize = 8192;
-/// What a transport socket lets its reader ask for.
+/// Flags that a transport socket accepts.
 const TRANSPORT_FLAGS: i32 = libc::MSG_DONTWAIT | libc::MSG_TRUNC | libc::MSG_PEEK;
-/// Room for the kernel's control messages.
+/// Capacity for the kernel's control messages.
 const CONTROL_WORDS: usize = 32;
 /// `sizeof(struct cmsghdr)`.
 const CONTROL_HEADER_BYTES: usize = 16;
-/// Parts of a buffer that are looked at, and messages of one call: the kernel's own limits.
+/// Most parts of a buffer, and most messages of a call: the kernel's limits.
 const MOST_PARTS: u64 = 1024;
 
-/// A message that was taken from a guest's queue.
+/// A message taken from a guest's queue.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
     bytes: Vec<u8>,
@@ -50,7 +50,7 @@ pub(crate) struct Message {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WaitingCall {
     pub(crate) notification: Notification,
-    /// When its socket's time-out ends it.
+    /// Deadline by its socket's time-out.
     pub(crate) deadline: Option<Instant>,
 }
 
@@ -86,7 +86,7 @@ impl Header {
         })
     }
 
-    /// What the parts hold together, up to a length that no message has.
+    /// The joined content of the parts, up to the longest message.
     ///
     /// # Errors
     /// `EFAULT`.
@@ -101,7 +101,7 @@ impl Header {
         Ok(bytes)
     }
 
-    /// Spreads bytes over the parts; what does not fit is left.
+    /// Distributes bytes over the parts; the excess is dropped.
     ///
     /// # Errors
     /// `EFAULT`.
@@ -114,14 +114,14 @@ impl Header {
         Ok(())
     }
 
-    /// Bytes that the parts hold.
+    /// Capacity of the parts, bytes.
     pub(crate) fn room(&self) -> usize {
         self.parts.iter().fold(0, |sum, (_, length)| sum.saturating_add(*length))
     }
 }
 
 impl Supervisor {
-    /// A call that receives from a guest's socket, if the descriptor is one.
+    /// Answers a receiving call on a guest's socket.
     pub(crate) fn receive(&mut self, notification: &Notification) -> Answer {
         let Some((inode, end)) = self.guest_socket(notification) else {
             let links = !self.link_requests.is_empty();
@@ -140,15 +140,15 @@ impl Supervisor {
         }
     }
 
-    /// Calls that wait for a message of this socket are tried again, in their order.
+    /// Retries the calls that wait for a message of this socket, in order.
     pub(crate) fn serve_waiting(&mut self, inode: u64) {
         while let Some(call) = self.sockets.get_mut(&inode).and_then(|socket| socket.waiting.pop_front()) {
             self.waiting_calls -= 1;
-            // One that a signal ended comes again by itself.
+            // A call that a signal ended is repeated by its caller.
             if !self.listener.is_alive(call.notification.id) {
                 continue;
             }
-            // The number may stand for something else by now, as after a close by another thread.
+            // The number may stand for another descriptor by now, as after a close by another thread.
             let answer = match self.find_socket(&call.notification) {
                 Some((found, end)) if found == inode => {
                     self.try_to_receive(&call.notification, inode, end.as_fd())
@@ -164,12 +164,12 @@ impl Supervisor {
         }
     }
 
-    /// Answers the call when there is a message; `EAGAIN` when there is none.
+    /// Answers the call when there is a message; `EAGAIN` otherwise.
     fn try_to_receive(&mut self, notification: &Notification, inode: u64, end: BorrowedFd<'_>) -> Answer {
         let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
         let mut flags = notification.int(flags_at(notification));
         if notification.call == libc::SYS_recvmmsg {
-            // The kernel keeps it to itself: `do_recvmmsg`.
+            // The kernel clears it in `do_recvmmsg`.
             flags &= !libc::MSG_WAITFORONE;
         }
         if let Some(transport) = socket.transport() {
@@ -242,7 +242,7 @@ fn receive_from(
     Ok(length)
 }
 
-/// The address that a message is said to come from: its interface, and for the transport protocol an empty rest.
+/// The source address of a message: its interface, and for the transport protocol zeros.
 fn sender(socket: &GuestSocket, message: &Message) -> Vec<u8> {
     let mut address = abi::address(message.note.interface).to_vec();
     if socket.transport().is_some() {
@@ -251,14 +251,14 @@ fn sender(socket: &GuestSocket, message: &Message) -> Vec<u8> {
     address
 }
 
-/// What a call returns that has put so many bytes into the guest's buffer; with `MSG_TRUNC` the transport protocol tells the
-/// whole.
+/// Return value of a call that put `length` bytes into the buffer; with `MSG_TRUNC` the transport protocol returns the whole
+/// length.
 fn reported_length(socket: &GuestSocket, flags: i32, length: usize, message: &Message) -> usize {
     let whole = flags & libc::MSG_TRUNC != 0 && socket.transport().is_some();
     if whole { message.bytes.len() } else { length }
 }
 
-/// One message into the `struct msghdr` at an address.
+/// Writes one message into the `struct msghdr` at an address.
 fn receive_one(
     socket: &mut GuestSocket,
     caller: Caller,
@@ -271,9 +271,9 @@ fn receive_one(
     let message = take(socket, end, flags)?;
     let length = message.bytes.len().min(header.room());
     header.scatter(caller, &message.bytes[..length])?;
-    let mut told = message.note.flags as i32 | flags & libc::MSG_CMSG_CLOEXEC;
+    let mut out_flags = message.note.flags as i32 | flags & libc::MSG_CMSG_CLOEXEC;
     if length < message.bytes.len() {
-        told |= libc::MSG_TRUNC;
+        out_flags |= libc::MSG_TRUNC;
     }
     if header.name != 0 {
         let address = sender(socket, &message);
@@ -287,18 +287,18 @@ fn receive_one(
     }
     if control.len() > header.control_bytes {
         control.truncate(header.control_bytes);
-        told |= libc::MSG_CTRUNC;
+        out_flags |= libc::MSG_CTRUNC;
     }
     caller.write(header.control, &control)?;
     caller.write(header_at + 40, &(control.len() as u64).to_ne_bytes())?;
-    caller.write(header_at + 48, &told.to_ne_bytes())?;
+    caller.write(header_at + 48, &out_flags.to_ne_bytes())?;
     let length = reported_length(socket, flags, length, &message);
     taken.push(message);
     Ok(length)
 }
 
-/// As many messages as are there into the `struct mmsghdr`s at an address; gives their number. It does not wait for more of them
-/// when it has one, as if `MSG_WAITFORONE` was given.
+/// Writes the available messages into the `struct mmsghdr`s at an address; returns their number. It does not wait for more when
+/// it has one, as with `MSG_WAITFORONE`.
 fn receive_many(
     socket: &mut GuestSocket,
     caller: Caller,
@@ -323,7 +323,7 @@ fn receive_many(
     Ok(received)
 }
 
-/// `SO_RXQ_OVFL` as the kernel writes it.
+/// `SO_RXQ_OVFL` in the form of the kernel.
 fn overflow_message(dropped: u32) -> Vec<u8> {
     let mut message = Vec::with_capacity(24);
     message.extend((CONTROL_HEADER_BYTES + 4).to_ne_bytes());
@@ -334,7 +334,7 @@ fn overflow_message(dropped: u32) -> Vec<u8> {
     message
 }
 
-/// The next message of a guest's queue, without waiting.
+/// The next message of a guest's queue, without blocking.
 fn take(socket: &mut GuestSocket, end: BorrowedFd<'_>, flags: i32) -> Result<Message, Errno> {
     let peeks = flags & libc::MSG_PEEK != 0;
     let returned = if peeks { socket.returned.front().cloned() } else { socket.returned.pop_front() };
@@ -346,7 +346,7 @@ fn take(socket: &mut GuestSocket, end: BorrowedFd<'_>, flags: i32) -> Result<Mes
     let (bytes, control) = take_bytes(end, room, flags & libc::MSG_PEEK)?;
     if bytes.is_empty() {
         if peeks {
-            // An error is told once.
+            // An error is reported once.
             let _ = take_bytes(end, room, 0);
         }
         return Err(note.and_then(|note| note.error).unwrap_or(Errno::NETDOWN));
@@ -355,7 +355,7 @@ fn take(socket: &mut GuestSocket, end: BorrowedFd<'_>, flags: i32) -> Result<Mes
     Ok(Message { bytes, control, note: note.unwrap_or(unknown) })
 }
 
-/// A message and the kernel's control messages with it.
+/// A message with its control messages of the kernel.
 fn take_bytes(end: BorrowedFd<'_>, room: usize, peek: i32) -> Result<(Vec<u8>, Vec<u8>), Errno> {
     let mut bytes = vec![0_u8; room];
     let mut control = [0_u64; CONTROL_WORDS];

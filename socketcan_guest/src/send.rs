@@ -1,11 +1,11 @@
-//! What a guest sends: natively, or by a call that has an address or a length that no frame has.
+//! Messages from a guest: written natively, or by a call with an address or with a length other than that of a frame.
 //!
-//! A frame goes to the bus, and then, unless the socket said otherwise, to every other guest's socket on the interface. What a
-//! guest has written natively has been accepted already; if the kernel would have refused it, that is told on standard error.
+//! A frame goes to the bus, and then, unless the socket has switched that off, to all other sockets of guests on the interface.
+//! A native write has already been accepted; if the kernel would have refused it, a warning goes to standard error.
 
 use crate::abi::{self, MOST_DATA, identifier};
 use crate::bcm::Action;
-use crate::bus_peer::{FrameBytes, Sent};
+use crate::bus_peer::{FrameBytes, SendResult};
 use crate::caller::Caller;
 use crate::notification::{Answer, Notification};
 use crate::receive::{Header, LONGEST_MESSAGE, LONGEST_OTHER};
@@ -19,22 +19,22 @@ use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::Instant;
 
-/// Messages that are taken from a guest before the next one has its turn.
+/// Most messages taken from a guest in one turn.
 const BATCH: usize = 16;
-/// Batches that are taken before a call is answered: more than a queue holds, and an end to it.
+/// Most batches taken before a call is answered: more than a queue holds.
 const BATCHES: usize = 64;
 
-/// Which of the frames that pass an interface is meant.
+/// Origin of a frame on an interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum From {
-    /// A frame that came over the bus.
+pub(crate) enum FrameOrigin {
+    /// Received from the bus.
     Bus,
-    /// A frame that the guest's socket with this inode sent.
+    /// Sent by the socket of a guest with this inode.
     Guest(u64),
 }
 
 impl Supervisor {
-    /// `write` of a length that is no frame's. The kernel looks at the interface before the length.
+    /// `write` of a length other than a frame's. The kernel checks the interface before the length.
     pub(crate) fn write(&mut self, notification: &Notification) -> Answer {
         let Some((inode, end)) = self.guest_socket(notification) else { return Answer::Continue };
         self.send_bytes_at(notification, inode, end.as_fd(), None)
@@ -68,7 +68,7 @@ impl Supervisor {
         let value = bytes.len() as i64;
         match read {
             Err(error) => error.into(),
-            // Where a message goes is a matter of `bind`, whatever address is given.
+            // The destination is set by `bind`, whatever address is given.
             Ok(_) if self.is_transport(inode) => {
                 self.send_transport(inode, end, bytes, sending_call(notification, end, value))
             }
@@ -127,7 +127,7 @@ impl Supervisor {
         Ok(bytes.len())
     }
 
-    /// The first of several, which is what a call that was interrupted would have sent.
+    /// Sends the first of several, as a call does that was interrupted.
     fn send_transport_message(
         &mut self,
         notification: &Notification,
@@ -156,12 +156,12 @@ impl Supervisor {
         }
     }
 
-    /// Sends for a guest; `name` is the address that it gave.
+    /// Sends for a guest; `name` is the given address.
     fn send(&mut self, inode: u64, name: Option<&[u8]>, bytes: &[u8]) -> Result<(), Errno> {
         let Some(socket) = self.sockets.get_mut(&inode) else { return Err(Errno::BADF) };
         let bound = socket.interface;
         match &mut socket.kind {
-            // It has written a frame before that the bus does not take yet.
+            // A frame written before still waits for the bus.
             Kind::Raw(_) if socket.held.is_some() => Err(Errno::NOBUFS),
             Kind::Raw(_) => {
                 let interface = match name {
@@ -194,8 +194,8 @@ impl Supervisor {
     /// Sends a frame of a guest on an interface.
     ///
     /// # Errors
-    /// `ENXIO` without an interface, `EINVAL` for what is no classic frame, `ENETDOWN` without a bus, `ENOBUFS` when the bus
-    /// takes no more for now.
+    /// `ENXIO` without an interface, `EINVAL` for anything but a classic frame, `ENETDOWN` without a bus, `ENOBUFS` when the
+    /// bus is full.
     pub(crate) fn send_frame(&mut self, inode: u64, interface: u32, bytes: &[u8]) -> Result<(), Errno> {
         let known = self.interfaces.iter_mut().find(|known| known.index == interface);
         let interface = known.ok_or(Errno::NXIO)?;
@@ -204,33 +204,33 @@ impl Supervisor {
             return Err(Errno::INVAL);
         }
         match interface.bus.send(frame) {
-            Sent::Taken => {}
-            Sent::Full => return Err(Errno::NOBUFS),
-            Sent::Down => return Err(Errno::NETDOWN),
+            SendResult::Taken => {}
+            SendResult::Full => return Err(Errno::NOBUFS),
+            SendResult::Down => return Err(Errno::NETDOWN),
         }
         let index = interface.index;
         self.sent += 1;
         let loops_back =
             self.sockets.get(&inode).is_none_or(|socket| socket.raw().is_none_or(|raw| raw.loops_back()));
         if loops_back {
-            self.spread(index, frame, From::Guest(inode));
+            self.distribute(index, frame, FrameOrigin::Guest(inode));
         }
         Ok(())
     }
 
-    /// Gives a frame to every guest's socket on the interface whose filters it passes.
-    pub(crate) fn spread(&mut self, interface: u32, frame: &FrameBytes, from: From) {
+    /// Delivers a frame to every guest's socket on the interface whose filters it passes.
+    pub(crate) fn distribute(&mut self, interface: u32, frame: &FrameBytes, from: FrameOrigin) {
         let (id, stamp_ns, now) = (identifier(frame), wall_clock_ns(), Instant::now());
         let (mut wanted, mut transported) = (Vec::new(), Vec::new());
         for (inode, socket) in self.sockets.iter_mut().filter(|(_, socket)| socket.listens_on(interface)) {
-            let is_own = from == From::Guest(*inode);
+            let is_own = from == FrameOrigin::Guest(*inode);
             let mut actions = Vec::new();
             match &mut socket.kind {
                 Kind::Raw(raw) => {
                     if !raw.passes(id) || is_own && !raw.receives_own() {
                         continue;
                     }
-                    let local = if from == From::Bus { 0 } else { libc::MSG_DONTROUTE };
+                    let local = if from == FrameOrigin::Bus { 0 } else { libc::MSG_DONTROUTE };
                     let flags = (local | if is_own { libc::MSG_CONFIRM } else { 0 }) as u32;
                     socket.deliver(frame, Note { interface, flags, dropped: 0, stamp_ns, error: None });
                 }
@@ -258,15 +258,15 @@ impl Supervisor {
         }
     }
 
-    /// Does what a broadcast manager wants.
+    /// Executes the actions of a broadcast manager.
     pub(crate) fn carry_out(&mut self, inode: u64, actions: Vec<Action>) {
         for action in actions {
             match action {
-                // As the kernel's: what the interface does not take is lost.
+                // As in the kernel: frames that the interface does not accept are lost.
                 Action::Send(interface, frame) | Action::SendOnce(interface, frame) => {
                     let _ = self.send_frame(inode, interface, &frame);
                 }
-                Action::Tell(interface, message) => {
+                Action::Notify(interface, message) => {
                     let stamp_ns = wall_clock_ns();
                     if let Some(socket) = self.sockets.get_mut(&inode) {
                         socket.deliver(&message, Note::new(interface, stamp_ns));
@@ -277,13 +277,13 @@ impl Supervisor {
         }
     }
 
-    /// Takes what a guest has written natively, all of it; true when it writes on and on.
+    /// Takes all native writes of a guest; true when there is no end of them.
     pub(crate) fn take_all_from(&mut self, inode: u64) -> bool {
         (0..BATCHES).all(|_| self.take_from(inode))
     }
 
-    /// Takes what a guest has written natively, a few messages, so that others have their turn; true when there may be more. A
-    /// frame for which the bus has no room is held, and with it the guest, whose queue to us fills.
+    /// Takes a few native writes of a guest, so that others have their turn; true when there may be more. A frame that the bus
+    /// does not accept is held, which fills the queue of the guest.
     pub(crate) fn take_from(&mut self, inode: u64) -> bool {
         for _ in 0..BATCH {
             let Some(socket) = self.sockets.get(&inode).filter(|socket| socket.takes_more()) else {
@@ -297,10 +297,10 @@ impl Supervisor {
                 &mut short[..]
             };
             match recv(socket.as_fd(), &mut *bytes, RecvFlags::DONTWAIT) {
-                // A guest that closes it with frames unread is told of first, and once.
+                // A guest that closes the socket with unread frames is reported first, and once.
                 Err(Errno::INTR | Errno::CONNRESET) => {}
                 Err(Errno::AGAIN) => return false,
-                // The end of a message that is being sent is awaited, as the kernel lets `close` wait for it.
+                // The end of a message in transfer is awaited, as `close` does in the kernel.
                 Ok((_, 0)) | Err(_) if socket.has_more_to_send() => return false,
                 Ok((_, 0)) | Err(_) => {
                     self.remove_socket(inode);
@@ -317,7 +317,7 @@ impl Supervisor {
         self.note_native(inode, bytes, sent);
     }
 
-    /// What came of a message that was written natively: it is held where the bus has no room.
+    /// Processes the result of a native write: it is held where the bus is full.
     pub(crate) fn note_native(&mut self, inode: u64, bytes: &[u8], sent: Result<(), Errno>) {
         match sent {
             Err(Errno::NOBUFS) => {
@@ -338,7 +338,7 @@ impl Supervisor {
             }
             Err(error) => {
                 self.refused_late += 1;
-                self.tell(&format!(
+                self.warn_once(&format!(
                     "a write of {} bytes was accepted and dropped; the kernel answers: {}",
                     bytes.len(),
                     io::Error::from(error)
@@ -348,7 +348,7 @@ impl Supervisor {
         }
     }
 
-    /// The bus has room again: what was held goes on.
+    /// The bus has room again: held frames are sent.
     pub(crate) fn release_held(&mut self, place: usize) {
         for inode in std::mem::take(&mut self.interfaces[place].waiting) {
             let Some(socket) = self.sockets.get_mut(&inode) else { continue };
@@ -365,7 +365,7 @@ impl Supervisor {
     }
 }
 
-/// A call that sends a message and returns `value` when all is well.
+/// A call that sends a message and returns `value` on success.
 fn sending_call(notification: &Notification, end: BorrowedFd<'_>, value: i64) -> SendingCall {
     let flags = match notification.call {
         libc::SYS_sendto | libc::SYS_sendmmsg => notification.int(3),
@@ -377,10 +377,10 @@ fn sending_call(notification: &Notification, end: BorrowedFd<'_>, value: i64) ->
     SendingCall { id: notification.id, value, may_wait }
 }
 
-/// The address that a call has, as bytes.
+/// The address of a call, as bytes.
 fn read_name(caller: Caller, name: Option<(u64, i32)>) -> Result<Option<Vec<u8>>, Errno> {
     let Some((address, length)) = name else { return Ok(None) };
-    // As long as `struct sockaddr_storage` at most.
+    // At most as long as `struct sockaddr_storage`.
     let length = usize::try_from(length).ok().filter(|length| *length <= 128).ok_or(Errno::INVAL)?;
     let mut bytes = vec![0; length];
     caller.read(address, &mut bytes)?;

@@ -5,9 +5,9 @@
 //!   guest: write, send      ──► its end ══► the queue ──► here: to the bus, and to the other guests
 //! ```
 //!
-//! What the kernel knows of a frame in a queue and 16 bytes cannot hold (interface, whose it is, frames lost before it) is noted
-//! here, a [`Note`] for each frame, in the queue's order. The guest reads without asking, so how many notes are still of use is
-//! computed from the bytes that the kernel accounts to what we sent and the guest has not read.
+//! Metadata of a queued frame (interface, sender, frames lost before it) do not fit its 16 bytes and are kept here, a [`Note`]
+//! for each frame, in the order of the queue. Native reads are not observed, so the number of valid notes is computed from the
+//! bytes that the kernel accounts as sent and unread.
 
 #![allow(unsafe_code)] // the ioctl SIOCOUTQ, nothing else
 
@@ -25,34 +25,34 @@ use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 use std::rc::Rc;
 
-/// Notes that are kept without looking at how many are still of use.
+/// Number of notes that are kept without checking their validity.
 const FEW_NOTES: usize = 64;
-/// Messages of a queue that are counted when they are dropped; whoever writes on and on is not counted for ever.
+/// Most dropped messages of a queue that are counted.
 const MOST_UNREAD: usize = 10_000;
 
-/// What is known of a message in a guest's queue.
+/// Metadata of a message in a guest's queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Note {
-    /// Index of the interface on which it came.
+    /// Index of the interface on which it was received.
     pub(crate) interface: u32,
     /// `MSG_DONTROUTE` for a frame of a guest, `MSG_CONFIRM` too for the reader's own.
     pub(crate) flags: u32,
-    /// Frames that the queue had not taken before it, modulo 2^32.
+    /// Frames lost before it, modulo 2^32.
     pub(crate) dropped: u32,
-    /// When it came, ns of the wall clock.
+    /// Time of reception, ns of the wall clock.
     pub(crate) stamp_ns: u64,
-    /// A message of length 0 is none: it tells of this error.
+    /// An error in place of a message, which has length 0 then.
     pub(crate) error: Option<Errno>,
 }
 
 impl Note {
-    /// That of a message about which there is no more to know.
+    /// A note without flags and losses.
     pub(crate) fn new(interface: u32, stamp_ns: u64) -> Self {
         Self { interface, flags: 0, dropped: 0, stamp_ns, error: None }
     }
 }
 
-/// What a socket is.
+/// Type of a socket.
 pub(crate) enum Kind {
     Raw(RawOptions),
     Bcm(Box<BroadcastManager>),
@@ -71,15 +71,15 @@ pub(crate) struct GuestSocket {
     noted_bytes: usize,
     accounts: Rc<Accounts>,
     dropped: u32,
-    /// Whether `SO_RXQ_OVFL` was asked for.
+    /// Whether `SO_RXQ_OVFL` is on.
     pub(crate) tells_dropped: bool,
-    /// When the message came that was read last, as far as it is known; ns.
+    /// Time of the last message read, ns, as far as it is known.
     last_stamp_ns: Option<u64>,
     /// Calls that wait for a message.
     pub(crate) waiting: VecDeque<WaitingCall>,
-    /// Messages that were received for a call which a signal then ended.
+    /// Messages received for a call that a signal then ended.
     pub(crate) returned: VecDeque<Message>,
-    /// A frame of the guest's that waits for room at the bus.
+    /// A frame of the guest that waits for room at the bus.
     pub(crate) held: Option<FrameBytes>,
 }
 
@@ -109,7 +109,7 @@ pub(crate) fn make(
     Ok((socket, theirs))
 }
 
-/// How many bytes this kernel accounts to a message in a queue of Unix sockets: data, head, rounding. Tried out once for each
+/// Bytes that this kernel accounts to a message in a queue of Unix sockets: data, head, rounding. Measured once for each
 /// length.
 pub(crate) struct Accounts {
     pair: (OwnedFd, OwnedFd),
@@ -135,7 +135,7 @@ impl Accounts {
     }
 }
 
-/// Bytes that the kernel accounts to what was sent here and not yet read.
+/// Bytes that the kernel accounts as sent here and unread.
 fn unread_bytes(end: BorrowedFd<'_>) -> usize {
     let mut bytes: libc::c_int = 0;
     // SAFETY: the kernel writes one int.
@@ -150,7 +150,7 @@ impl AsFd for GuestSocket {
 }
 
 impl GuestSocket {
-    /// Puts a message into the guest's queue. One for which there is no room is dropped and counted, as the kernel does.
+    /// Puts a message into the guest's queue. Without room it is dropped and counted, as in the kernel.
     pub(crate) fn deliver(&mut self, message: &[u8], note: Note) {
         let note = Note { dropped: self.dropped, ..note };
         match send(&self.end, message, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
@@ -168,7 +168,7 @@ impl GuestSocket {
         }
     }
 
-    /// Forgets the notes of messages that the guest has read.
+    /// Drops the notes of messages that the guest has read.
     pub(crate) fn forget_read_notes(&mut self) {
         let unread = unread_bytes(self.end.as_fd());
         while self.noted_bytes > unread {
@@ -184,7 +184,7 @@ impl GuestSocket {
         self.notes.front().map(|(note, _)| *note)
     }
 
-    /// Takes an error out of the guest's queue, by a copy of the guest's end, if it is what the guest reads next.
+    /// Takes an error out of the guest's queue, by a copy of the guest's end, if it is the next to be read.
     pub(crate) fn take_error(&mut self, end: BorrowedFd<'_>) -> Option<Errno> {
         let error = self.next_note()?.error?;
         let mut byte = [0_u8; 1];
@@ -194,15 +194,15 @@ impl GuestSocket {
         }
     }
 
-    /// When the message came that was read last, ns of the wall clock.
+    /// Time of the last message read, ns of the wall clock.
     pub(crate) fn last_stamp_ns(&mut self) -> Option<u64> {
         self.forget_read_notes();
         self.last_stamp_ns
     }
 
-    /// Lets the guest's queue grow or shrink with the receive buffer that it asked for: what bounds it is our send buffer.
+    /// Resizes the guest's queue to the requested receive buffer; our send buffer bounds it.
     pub(crate) fn resize_queue(&self, bytes: usize) {
-        // The kernel bounds it as it bounds the guest's, and doubles both.
+        // The kernel limits and doubles it as it does for the guest.
         let _ = rustix::net::sockopt::set_socket_send_buffer_size(&self.end, bytes);
     }
 
@@ -214,12 +214,12 @@ impl GuestSocket {
         }
     }
 
-    /// Whether what its guest writes is taken now.
+    /// Whether native writes are taken now.
     pub(crate) fn takes_more(&self) -> bool {
         self.held.is_none() && !self.transport().is_some_and(Transport::is_full)
     }
 
-    /// Forgets what its guest has written and no bus has taken; gives how many messages that are, up to some ten thousand.
+    /// Drops native writes that no bus has taken; returns their number, up to some ten thousand.
     pub(crate) fn forget_unsent(&mut self) -> u64 {
         let mut forgotten = u64::from(self.held.take().is_some());
         if let Some(transport) = self.transport_mut() {
@@ -233,7 +233,7 @@ impl GuestSocket {
         forgotten + unread.count() as u64
     }
 
-    /// Whether the guests have closed it.
+    /// Whether all guests have closed it.
     pub(crate) fn has_hung_up(&self) -> bool {
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };
         let mut set = [PollFd::new(self, PollFlags::empty())];

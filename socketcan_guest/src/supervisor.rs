@@ -1,7 +1,7 @@
-//! The loop: answers the guests' calls, and carries frames between their sockets and the buses. One thread, one epoll.
+//! The loop: answers the guests' calls, and transfers frames between their sockets and the buses. One thread, one epoll.
 //!
-//! Nothing in it waits for a guest: what a guest's queue does not take is dropped and counted there, a call that would block is
-//! kept, and a guest that writes faster than its bus takes is held back by its own queue. Each turn takes a few messages of each
+//! It never blocks on a guest: messages that do not fit a guest's queue are dropped and counted, a call that would block is
+//! kept, and a guest that writes faster than its bus is throttled by its own queue. Each turn takes a few messages of each
 //! source.
 
 use crate::caller::Caller;
@@ -9,7 +9,7 @@ use crate::interface::Interface;
 use crate::netlink::LinkRequest;
 use crate::notification::{Answer, Listener, Notification};
 use crate::receive::WaitingCall;
-use crate::send::From;
+use crate::send::FrameOrigin;
 use crate::socket::{Accounts, GuestSocket, Kind, Note};
 use crate::transport::Transport;
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
@@ -22,48 +22,48 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-/// Calls that are answered in one turn, and frames that are taken from a bus.
-const A_TURN: usize = 32;
-/// Sources of events that are looked at in one turn; epoll brings the others in the next.
+/// Most calls answered in a turn, and most frames taken from a bus.
+const EVENTS_A_SOURCE: usize = 32;
+/// Most event sources of a turn; epoll returns the others in the next.
 const EVENTS_A_TURN: usize = 64;
-/// Longest sleep: a bus that has gone is looked for, and calls that died while they waited are forgotten.
+/// Longest sleep: bounds the time to detect buses and dead calls.
 const LONGEST_SLEEP: Duration = Duration::from_millis(100);
-/// How long a bus that takes nothing is waited for when the program has ended.
-const LAST_PATIENCE: Duration = Duration::from_secs(1);
-/// And how long messages of the transport protocol that have not begun.
-const QUEUE_PATIENCE: Duration = Duration::from_secs(10);
-/// Different texts that are told; a guest must not be able to fill a disk.
+/// Longest wait for a stalled bus after the end of the program.
+const BUS_DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
+/// Longest wait for messages of the transport protocol that have not started.
+const QUEUE_DRAIN_TIMEOUT: Duration = Duration::from_secs(10);
+/// Most different warnings, so that a guest cannot fill a disk.
 const MOST_TEXTS: usize = 200;
 
 const LISTENER: u64 = u64::MAX;
 const CHILD: u64 = u64::MAX - 1;
-/// The bus of the interface in the first place; the others are below it.
+/// The bus of the first interface; the others have lower numbers.
 const FIRST_BUS: u64 = u64::MAX - 16;
-/// Interfaces that there may be.
+/// Most interfaces.
 pub(crate) const MOST_INTERFACES: usize = 64;
 
-/// What there is to answer with.
+/// State of the loop.
 pub(crate) struct Supervisor {
     pub(crate) listener: Listener,
     epoll: OwnedFd,
     pub(crate) interfaces: Vec<Interface>,
     /// Guests' sockets by the inode of the guest's end.
     pub(crate) sockets: BTreeMap<u64, GuestSocket>,
-    /// Those that do things by time: broadcast managers and transport protocols.
+    /// Sockets with timers: broadcast managers and transport protocols.
     pub(crate) timed: BTreeSet<u64>,
-    /// Calls that wait for a message, of all sockets.
+    /// Number of calls that wait for a message, of all sockets.
     pub(crate) waiting_calls: usize,
     pub(crate) accounts: Rc<Accounts>,
-    /// Frames of guests that a bus took.
+    /// Frames of guests that a bus accepted.
     pub(crate) sent: u64,
-    /// Messages that were accepted natively and that the kernel would have refused.
+    /// Native writes that the kernel would have refused.
     pub(crate) refused_late: u64,
     /// Whether the host of a bus has ended.
-    pub(crate) a_bus_went: bool,
-    /// Requests for links that the kernel has answered, and whose answers are not read yet.
+    pub(crate) bus_lost: bool,
+    /// Requests for links with pending answers.
     pub(crate) link_requests: Vec<LinkRequest>,
-    told: BTreeSet<String>,
-    last_look: Instant,
+    warned: BTreeSet<String>,
+    last_check: Instant,
 }
 
 impl Supervisor {
@@ -80,40 +80,40 @@ impl Supervisor {
             accounts: Rc::new(Accounts::new()?),
             sent: 0,
             refused_late: 0,
-            a_bus_went: false,
+            bus_lost: false,
             link_requests: Vec::new(),
-            told: BTreeSet::new(),
-            last_look: Instant::now(),
+            warned: BTreeSet::new(),
+            last_check: Instant::now(),
         };
         for place in 0..supervisor.interfaces.len() {
             if supervisor.interfaces[place].bus.socket().is_some() {
-                supervisor.bus_came(place);
+                supervisor.bus_up(place);
             }
         }
         Ok(supervisor)
     }
 
-    /// Wakes the loop when this process has ended.
+    /// Makes the end of this process wake the loop.
     pub(crate) fn watch_child(&self, child: BorrowedFd<'_>) -> io::Result<()> {
         let data = epoll::EventData::new_u64(CHILD);
-        // Once: the descriptor of a process that has ended stays readable.
+        // Once: the descriptor of an ended process stays readable.
         Ok(epoll::add(&self.epoll, child, data, epoll::EventFlags::IN | epoll::EventFlags::ONESHOT)?)
     }
 
-    /// Waits for something to do, and does it. True when the child has ended.
+    /// Waits for events and processes them. True when the child has ended.
     ///
     /// # Errors
-    /// What epoll says when the system is out of memory.
+    /// Error of epoll when the system is out of memory.
     pub(crate) fn turn(&mut self) -> io::Result<bool> {
         self.turn_for(LONGEST_SLEEP)
     }
 
-    /// The same, and sleeps no longer than so.
+    /// The same, with a bound on the wait.
     pub(crate) fn turn_for(&mut self, longest: Duration) -> io::Result<bool> {
         let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
         let patience = self.patience().min(longest);
         let mut patience = Timespec { tv_sec: 0, tv_nsec: patience.subsec_nanos().into() };
-        // epoll_wait counts in ms, which is coarse for the gaps of the transport protocol; poll waits to the ns.
+        // epoll_wait counts in ms, which is too coarse for the gaps of the transport protocol; poll waits in ns.
         if patience.tv_nsec % 1_000_000 != 0 {
             match poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(&patience)) {
                 Ok(_) | Err(Errno::INTR) => patience.tv_nsec = 0,
@@ -142,7 +142,7 @@ impl Supervisor {
             }
         }
         self.advance_timed();
-        self.look_around();
+        self.check_periodically();
         Ok(has_ended)
     }
 
@@ -162,7 +162,7 @@ impl Supervisor {
     }
 
     fn answer_some(&mut self) {
-        for _ in 0..A_TURN {
+        for _ in 0..EVENTS_A_SOURCE {
             let Some(notification) = self.listener.next() else { return };
             let answer = self.answer_to(&notification);
             self.listener.answer(notification.id, answer);
@@ -174,12 +174,12 @@ impl Supervisor {
             libc::SYS_socket => self.make_socket(notification),
             libc::SYS_bind => self.bind(notification),
             libc::SYS_connect => self.connect(notification),
-            libc::SYS_getsockname => self.own_name(notification),
+            libc::SYS_getsockname => self.get_name(notification),
             libc::SYS_listen
             | libc::SYS_accept
             | libc::SYS_accept4
             | libc::SYS_shutdown
-            | libc::SYS_getpeername => self.not_of_can(notification),
+            | libc::SYS_getpeername => self.unsupported(notification),
             libc::SYS_ioctl => self.ioctl(notification),
             libc::SYS_setsockopt => self.set_option(notification),
             libc::SYS_getsockopt => self.get_option(notification),
@@ -191,17 +191,17 @@ impl Supervisor {
         }
     }
 
-    /// The guest's socket that a call's first argument stands for, and a copy of the descriptor; `None` when it is none of
-    /// ours. What the guest wrote natively before the call goes first.
+    /// The guest's socket of a call's first argument, and a copy of the descriptor; `None` for any other descriptor. Native
+    /// writes before the call are processed first.
     pub(crate) fn guest_socket(&mut self, notification: &Notification) -> Option<(u64, OwnedFd)> {
         let found = self.find_socket(notification)?;
         self.take_all_from(found.0);
         Some(found)
     }
 
-    /// The same, and leaves what the guest wrote where it is.
+    /// The same, without processing native writes.
     pub(crate) fn find_socket(&mut self, notification: &Notification) -> Option<(u64, OwnedFd)> {
-        // Without a socket there is nothing to look for, and most programs make most of these calls on other descriptors.
+        // Shortcut without sockets: most programs make most of these calls on other descriptors.
         if self.sockets.is_empty() {
             return None;
         }
@@ -210,10 +210,10 @@ impl Supervisor {
                 let inode = inode_of(copy.as_fd())?;
                 self.sockets.contains_key(&inode).then_some((inode, copy))
             }
-            // None of that number, or the caller has gone: the kernel says so.
+            // No such number, or the caller has gone: the kernel reports it.
             Err(Errno::BADF | Errno::SRCH) => None,
             Err(error) => {
-                self.tell(&format!(
+                self.warn_once(&format!(
                     "process {}: its descriptors cannot be looked at ({}), so its CAN sockets do not work: it is a \
                      program that may be executed but not read, or a container allows no pidfd_getfd (docker run \
                      --cap-add SYS_PTRACE, or --security-opt seccomp=unconfined)",
@@ -225,7 +225,7 @@ impl Supervisor {
         }
     }
 
-    /// Takes a new socket into the loop.
+    /// Adds a socket to the loop.
     pub(crate) fn add_socket(&mut self, inode: u64, socket: GuestSocket) -> io::Result<()> {
         epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(inode), epoll::EventFlags::IN)?;
         if socket.raw().is_none() {
@@ -235,9 +235,9 @@ impl Supervisor {
         Ok(())
     }
 
-    /// The guests have closed it: what it was, its cyclic frames included, is over.
+    /// Removes a socket that all guests have closed, with its cyclic frames.
     pub(crate) fn remove_socket(&mut self, inode: u64) {
-        // Closing the descriptor takes it out of the epoll set.
+        // Closing the descriptor removes it from the epoll set.
         if let Some(socket) = self.sockets.remove(&inode) {
             self.waiting_calls -= socket.waiting.len();
             for call in socket.waiting {
@@ -247,10 +247,10 @@ impl Supervisor {
         self.timed.remove(&inode);
     }
 
-    /// Whether what the guest writes is taken from now on.
+    /// Sets whether native writes are taken.
     pub(crate) fn watch_socket(&self, inode: u64, takes: bool) {
         let Some(socket) = self.sockets.get(&inode) else { return };
-        // Out of the set while its frame is held: epoll would tell of its end again and again, and the frame goes first.
+        // Out of the set while its frame is held: epoll would report its end again and again, and the frame goes first.
         let _ = if takes {
             epoll::add(&self.epoll, socket, epoll::EventData::new_u64(inode), epoll::EventFlags::IN)
         } else {
@@ -270,20 +270,20 @@ impl Supervisor {
     }
 
     fn take_from_bus(&mut self, place: usize) {
-        for _ in 0..A_TURN {
+        for _ in 0..EVENTS_A_SOURCE {
             let interface = &mut self.interfaces[place];
             let index = interface.index;
             match interface.bus.receive() {
-                Some(frame) => self.spread(index, &frame, From::Bus),
+                Some(frame) => self.distribute(index, &frame, FrameOrigin::Bus),
                 None => break,
             }
         }
         if self.interfaces[place].bus.socket().is_none() {
-            self.bus_went(place);
+            self.bus_down(place);
         }
     }
 
-    fn bus_came(&mut self, place: usize) {
+    fn bus_up(&mut self, place: usize) {
         let interface = &mut self.interfaces[place];
         interface.is_up = true;
         if let Some(socket) = interface.bus.socket() {
@@ -293,14 +293,14 @@ impl Supervisor {
         }
     }
 
-    /// The interface goes down: sockets that are bound to it are told, those of any interface are not, as the kernel does.
-    fn bus_went(&mut self, place: usize) {
+    /// The interface goes down: sockets bound to it are notified, those of any interface are not, as in the kernel.
+    fn bus_down(&mut self, place: usize) {
         let interface = &mut self.interfaces[place];
         if !std::mem::replace(&mut interface.is_up, false) {
             return;
         }
         let (index, name) = (interface.index, interface.name.clone());
-        self.a_bus_went = true;
+        self.bus_lost = true;
         eprintln!("bench can: {name} is down: its bus has gone; looking for it");
         self.release_held(place);
         let bound: Vec<u64> = self
@@ -310,12 +310,12 @@ impl Supervisor {
             .map(|(inode, _)| *inode)
             .collect();
         for inode in bound {
-            self.tell_error(inode, index, Errno::NETDOWN);
+            self.deliver_error(inode, index, Errno::NETDOWN);
         }
     }
 
-    /// Lets the next call that receives fail with this error; natively it reads a message of length 0.
-    pub(crate) fn tell_error(&mut self, inode: u64, interface: u32, error: Errno) {
+    /// Lets the next receiving call fail with this error; a native read returns length 0.
+    pub(crate) fn deliver_error(&mut self, inode: u64, interface: u32, error: Errno) {
         let note = Note { error: Some(error), ..Note::new(interface, wall_clock_ns()) };
         if let Some(socket) = self.sockets.get_mut(&inode) {
             socket.deliver(&[], note);
@@ -335,8 +335,8 @@ impl Supervisor {
         }
     }
 
-    /// Looks for buses that are not there, and for waiting calls that are over or have died.
-    fn look_around(&mut self) {
+    /// Connects to missing buses, and ends waiting calls that are expired or dead.
+    fn check_periodically(&mut self) {
         let now = Instant::now();
         if self.waiting_calls > 0 {
             self.end_waiting(|listener, call| {
@@ -344,14 +344,14 @@ impl Supervisor {
                 is_over && listener.answer(call.notification.id, Answer::Error(Errno::AGAIN))
             });
         }
-        if now - self.last_look < LONGEST_SLEEP {
+        if now - self.last_check < LONGEST_SLEEP {
             return;
         }
-        self.last_look = now;
+        self.last_check = now;
         for place in 0..self.interfaces.len() {
-            if self.interfaces[place].bus.look_for_host() {
+            if self.interfaces[place].bus.try_to_connect() {
                 eprintln!("bench can: {} is up", self.interfaces[place].name);
-                self.bus_came(place);
+                self.bus_up(place);
             }
         }
         if self.waiting_calls > 0 {
@@ -360,7 +360,7 @@ impl Supervisor {
         self.forget_dead_senders();
     }
 
-    /// Forgets the waiting calls that are over.
+    /// Drops waiting calls that have ended.
     fn end_waiting(&mut self, is_over: impl Fn(&Listener, &WaitingCall) -> bool) {
         let mut left = 0;
         for socket in self.sockets.values_mut() {
@@ -370,8 +370,9 @@ impl Supervisor {
         self.waiting_calls = left;
     }
 
-    /// The child has ended: what the guests wrote goes out first, and messages whose guests have ended. The transport protocol
-    /// has an end for the one that is being sent; those behind it have [`QUEUE_PATIENCE`]. What is dropped is counted and told.
+    /// After the end of the child: sends what the guests wrote, including messages of guests that have ended. A transport
+    /// message in transfer is completed; those behind it have [`QUEUE_DRAIN_TIMEOUT`]. Dropped messages are counted and
+    /// reported.
     ///
     /// # Errors
     /// As [`Supervisor::turn`].
@@ -391,12 +392,12 @@ impl Supervisor {
                 return Ok(());
             }
             let waited = began.elapsed();
-            let is_late = waited >= QUEUE_PATIENCE || is_held && waited >= LAST_PATIENCE;
+            let is_late = waited >= QUEUE_DRAIN_TIMEOUT || is_held && waited >= BUS_DRAIN_TIMEOUT;
             if is_over() || is_late && !is_sending {
                 self.drop_unsent();
                 return Ok(());
             }
-            if waited >= QUEUE_PATIENCE {
+            if waited >= QUEUE_DRAIN_TIMEOUT {
                 let transports = self.sockets.values_mut().filter_map(GuestSocket::transport_mut);
                 let dropped = transports.map(Transport::forget_native).sum::<usize>();
                 self.count_dropped(dropped as u64);
@@ -413,11 +414,13 @@ impl Supervisor {
     fn count_dropped(&mut self, messages: u64) {
         if messages > 0 {
             self.refused_late += messages;
-            self.tell("the program has ended and a bus does not take what was written last; it is dropped");
+            self.warn_once(
+                "the program has ended and a bus does not take what was written last; it is dropped",
+            );
         }
     }
 
-    /// What is to be said at the end: nothing when all went as the kernel's interface would.
+    /// Reports deviations from the kernel's behaviour at the end.
     pub(crate) fn account(&self) {
         if self.refused_late > 0 {
             eprintln!(
@@ -427,15 +430,15 @@ impl Supervisor {
         }
     }
 
-    /// Tells something on standard error, each text once.
-    pub(crate) fn tell(&mut self, text: &str) {
-        if self.told.len() < MOST_TEXTS && self.told.insert(text.to_owned()) {
+    /// Prints a warning, each text once.
+    pub(crate) fn warn_once(&mut self, text: &str) {
+        if self.warned.len() < MOST_TEXTS && self.warned.insert(text.to_owned()) {
             eprintln!("bench can: {text}");
         }
     }
 }
 
-/// The inode behind a descriptor, which is one socket's as long as it is open anywhere.
+/// The inode of a descriptor, unique as long as a socket is open.
 pub(crate) fn inode_of(descriptor: BorrowedFd<'_>) -> Option<u64> {
     rustix::fs::fstat(descriptor).ok().map(|found| found.st_ino)
 }

@@ -1,9 +1,9 @@
 //! Sockets of the transport protocol, `CAN_ISOTP`: their addresses, and the calls that send and wait.
 //!
-//! One message is sent at a time. A call that comes meanwhile waits, as does one that wants to know how it ended
-//! (`CAN_ISOTP_WAIT_TX_DONE`); messages that are written natively, those of 8 and 16 bytes, wait in the guest's queue and, some
-//! hundred of them, here. A guest that closes the socket or ends does not cut a message off. The kernel lets `close` wait for
-//! it; here the next socket of the same channel waits instead. What waits behind it is sent as long as somebody answers.
+//! One message is sent at a time. A further call waits, as does one that requests the result (`CAN_ISOTP_WAIT_TX_DONE`); native
+//! writes, of 8 and 16 bytes, wait in the guest's queue and, some hundred of them, here. A guest that closes the socket or ends
+//! does not truncate a message. The kernel makes `close` wait; here the next socket of the same channel waits instead. Queued
+//! messages are sent as long as the peer answers.
 //!
 //! Source: Linux 6.1 `net/can/isotp.c` (`isotp_bind`, `isotp_sendmsg`, `isotp_release`).
 
@@ -20,12 +20,12 @@ use std::time::Instant;
 
 /// Bytes of an address with both identifiers: `CAN_REQUIRED_SIZE(struct sockaddr_can, can_addr.tp)`.
 pub(crate) const ADDRESS_BYTES: usize = 16;
-/// Frames that are sent one after the other where there is no gap between them, so that others have their turn.
+/// Most frames sent in a row without a gap, so that others have their turn.
 const BURST: usize = 16;
-/// Messages of a socket that wait here, about as many as its own queue holds; what is written beyond them stays in that queue.
+/// Most messages of a socket that wait here, about as many as its queue holds; further ones stay in that queue.
 const MOST_WAITING: usize = 300;
 
-/// A call that sends: which one, and what it returns when all is well.
+/// A sending call: its notification, and its return value on success.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SendingCall {
     pub(crate) id: u64,
@@ -34,46 +34,46 @@ pub(crate) struct SendingCall {
     pub(crate) may_wait: bool,
 }
 
-/// What a transport socket has beside its protocol.
+/// State of a transport socket besides its protocol.
 #[derive(Debug, Default)]
 pub(crate) struct Transport {
     pub(crate) protocol: IsoTp,
-    /// Messages that wait for the one that is being sent, and whose calls wait with them; native ones have none.
+    /// Messages that wait for the one in transfer, with their calls; native ones have none.
     waiting: VecDeque<(Option<SendingCall>, Vec<u8>)>,
-    /// The call that waits for the end of the message that is being sent.
-    at_the_end: Option<SendingCall>,
+    /// The call that waits for the end of the message in transfer.
+    awaiting_end: Option<SendingCall>,
 }
 
 impl Transport {
-    /// Whether it is in the middle of a message, or has one that waits.
+    /// Whether a message is in transfer or waits.
     fn has_more_to_send(&self) -> bool {
         self.protocol.is_sending() || !self.waiting.is_empty()
     }
 
-    /// Whether no more messages may wait.
+    /// Whether no further message may wait.
     pub(crate) fn is_full(&self) -> bool {
         self.waiting.len() >= MOST_WAITING
     }
 
-    /// Forgets the messages that wait and were written natively; gives their number.
+    /// Drops waiting native messages; returns their number.
     pub(crate) fn forget_native(&mut self) -> usize {
         let before = self.waiting.len();
         self.waiting.retain(|(call, _)| call.is_some());
         before - self.waiting.len()
     }
 
-    /// A message for which the bus had no room is the next one again.
+    /// Puts a message back that the bus did not accept, as the next one.
     pub(crate) fn put_back(&mut self, message: &[u8]) {
         self.waiting.push_front((None, message.to_vec()));
     }
 
-    /// The call that is told of an error: the one that waits for the end, or the next, whose message is not sent then.
+    /// The call that gets an error: the one that waits for the end, or the next, whose message is not sent then.
     fn take_call_for_an_error(&mut self) -> Option<SendingCall> {
-        let next = self.waiting.front().and_then(|(call, _)| *call).filter(|_| self.at_the_end.is_none());
+        let next = self.waiting.front().and_then(|(call, _)| *call).filter(|_| self.awaiting_end.is_none());
         if next.is_some() {
             self.waiting.pop_front();
         }
-        self.at_the_end.take().or(next)
+        self.awaiting_end.take().or(next)
     }
 
     /// The address of the channel: family, interface, both identifiers.
@@ -120,7 +120,7 @@ impl Supervisor {
             socket.interface = Some(interface);
         }
         if is_down {
-            self.tell_error(inode, interface, Errno::NETDOWN);
+            self.deliver_error(inode, interface, Errno::NETDOWN);
         }
         Answer::Value(0)
     }
@@ -133,7 +133,7 @@ impl Supervisor {
         message: Vec<u8>,
         call: SendingCall,
     ) -> Answer {
-        // A call that a signal ended comes again by itself; the message that it took back must not be sent as well.
+        // A call that a signal ended is repeated by its caller; its message was withdrawn and must not be sent too.
         self.forget_dead_senders();
         let Some(transport) = self.transport(inode) else { return Errno::BADF.into() };
         if transport.protocol.identifiers().is_none() {
@@ -146,14 +146,14 @@ impl Supervisor {
             self.wait_to_send(inode, Some(call), message);
             return Answer::Deferred;
         }
-        // An error that nobody has read is told to whoever sends next.
+        // An unread error is reported to the next sender.
         let has_length = (1..=LONGEST_PDU).contains(&message.len());
         let error =
             self.sockets.get_mut(&inode).filter(|_| has_length).and_then(|socket| socket.take_error(end));
         error.map_or_else(|| self.start_for(inode, &message, call), Answer::Error)
     }
 
-    /// Sends a message that was written natively, after those that wait.
+    /// Sends a native message, after those that wait.
     pub(crate) fn send_transport_natively(&mut self, inode: u64, message: &[u8]) -> Result<(), Errno> {
         let transport = self.transport(inode).ok_or(Errno::BADF)?;
         if transport.has_more_to_send() || self.is_behind_another(inode) {
@@ -182,7 +182,7 @@ impl Supervisor {
         others.filter_map(|(inode, socket)| Some((*inode, socket, socket.transport()?)))
     }
 
-    /// Whether a socket of the same channel that its guest has closed is in the middle of a message.
+    /// Whether a closed socket of the same channel has a message in transfer.
     fn is_behind_another(&self, inode: u64) -> bool {
         self.others_of_channel(inode)
             .any(|(_, socket, transport)| transport.protocol.is_sending() && socket.has_hung_up())
@@ -194,14 +194,14 @@ impl Supervisor {
         }
         match self.transport(inode) {
             Some(transport) if transport.protocol.is_sending() && transport.protocol.waits_for_the_end() => {
-                transport.at_the_end = Some(call);
+                transport.awaiting_end = Some(call);
                 Answer::Deferred
             }
             _ => Answer::Value(call.value),
         }
     }
 
-    /// Sends the first or only frame of a message. What the guest writes natively is left in its queue until the last is sent.
+    /// Sends the first or only frame of a message. Native writes stay in the queue until the last frame.
     pub(crate) fn start_transport(&mut self, inode: u64, message: &[u8]) -> Result<(), Errno> {
         let interface = self.sockets.get(&inode).and_then(|socket| socket.interface).unwrap_or(0);
         let transport = self.transport(inode).ok_or(Errno::BADF)?;
@@ -219,7 +219,7 @@ impl Supervisor {
         sent
     }
 
-    /// Sends the consecutive frames that are due, and ends what has waited too long.
+    /// Sends the consecutive frames that are due, and ends expired transfers.
     pub(crate) fn advance_transport(&mut self, inode: u64, now: Instant) {
         let Some(socket) = self.sockets.get(&inode) else { return };
         let (Some(interface), Kind::Transport(_)) = (socket.interface, &socket.kind) else { return };
@@ -241,12 +241,12 @@ impl Supervisor {
         }
     }
 
-    /// Does what a frame or the time has brought about, and goes on with what waited for it.
+    /// Processes events of the protocol, and continues with what waited for them.
     pub(crate) fn carry_out_transport(&mut self, inode: u64, events: Vec<Event>) {
         let interface = self.sockets.get(&inode).and_then(|socket| socket.interface).unwrap_or(0);
         for event in events {
             match event {
-                // As the kernel's: what the interface does not take is lost.
+                // As in the kernel: frames that the interface does not accept are lost.
                 Event::Reply(frame) => {
                     let _ = self.send_frame(inode, interface, &frame);
                 }
@@ -257,12 +257,12 @@ impl Supervisor {
                     }
                     self.serve_waiting(inode);
                 }
-                Event::ReceivingFailed(error) => self.tell_error(inode, interface, error),
+                Event::ReceivingFailed(error) => self.deliver_error(inode, interface, error),
                 Event::SendingFailed(error) => {
-                    let told = self.transport(inode).and_then(Transport::take_call_for_an_error);
-                    match told {
+                    let call = self.transport(inode).and_then(Transport::take_call_for_an_error);
+                    match call {
                         Some(call) => _ = self.listener.answer(call.id, Answer::Error(error)),
-                        None => self.tell_error(inode, interface, error),
+                        None => self.deliver_error(inode, interface, error),
                     }
                     if error == Errno::COMM {
                         self.forget_what_nobody_answers(inode);
@@ -273,17 +273,20 @@ impl Supervisor {
         self.go_on_transport(inode);
     }
 
-    /// Behind a closed socket each message to nobody would hold up the channel, and the end of this process, for a second.
+    /// On a closed socket each message without an answer would block the channel, and the end of this process, for a second.
     fn forget_what_nobody_answers(&mut self, inode: u64) {
         let Some(socket) = self.sockets.get_mut(&inode).filter(|socket| socket.has_hung_up()) else { return };
         let forgotten = socket.forget_unsent();
         if forgotten > 0 {
             self.refused_late += forgotten;
-            self.tell("nobody answers an ISO-TP message of a closed socket; those behind it are dropped");
+            self.warn_once(
+                "nobody answers an ISO-TP message of a closed socket; those behind it are dropped",
+            );
         }
     }
 
-    /// Answers who waited for the end of a message, and sends the next one; when there is none, of another socket of the channel.
+    /// Answers the call that waited for the end of a message, and sends the next one; without one, of another socket of the
+    /// channel.
     pub(crate) fn go_on_transport(&mut self, inode: u64) {
         let mut left = BTreeSet::from([inode]);
         while let Some(inode) = left.pop_first() {
@@ -302,7 +305,7 @@ impl Supervisor {
     fn send_next(&mut self, inode: u64) {
         while let Some(transport) = self.transport(inode).filter(|transport| !transport.protocol.is_sending())
         {
-            let done = transport.at_the_end.take();
+            let done = transport.awaiting_end.take();
             if let Some(call) = done {
                 self.listener.answer(call.id, Answer::Value(call.value));
             }
@@ -329,7 +332,7 @@ impl Supervisor {
         }
     }
 
-    /// A signal has ended calls: who waits for the end of a message takes the message back with it, as the kernel has it.
+    /// After a signal, a call that waited for the end of a message withdraws the message, as in the kernel.
     pub(crate) fn forget_dead_senders(&mut self) {
         let mut ended = Vec::new();
         for (inode, socket) in &mut self.sockets {
@@ -337,12 +340,12 @@ impl Supervisor {
             let waited = transport.waiting.len();
             transport.waiting.retain(|(call, _)| call.is_none_or(|call| self.listener.is_alive(call.id)));
             let mut has_ended = transport.waiting.len() < waited;
-            if transport.at_the_end.is_some_and(|call| !self.listener.is_alive(call.id)) {
-                transport.at_the_end = None;
+            if transport.awaiting_end.is_some_and(|call| !self.listener.is_alive(call.id)) {
+                transport.awaiting_end = None;
                 transport.protocol.give_up();
                 has_ended = true;
             }
-            // Also one that only waited: its socket may be closed by now, and is looked at again.
+            // Also one that only waited: its socket may be closed by now, and is checked again.
             if has_ended {
                 ended.push(*inode);
             }
@@ -367,7 +370,7 @@ impl GuestSocket {
         }
     }
 
-    /// Whether it is in the middle of a message, or has one that waits.
+    /// Whether a message is in transfer or waits.
     pub(crate) fn has_more_to_send(&self) -> bool {
         self.transport().is_some_and(Transport::has_more_to_send)
     }

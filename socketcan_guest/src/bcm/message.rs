@@ -1,4 +1,4 @@
-//! Messages of the broadcast manager: a head of 56 bytes, and frames behind it.
+//! Messages of the broadcast manager: a head of 56 bytes, then frames.
 //!
 //! ```text
 //!   offset  0       4      8      16           32           48      52           56
@@ -63,10 +63,10 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// The head and the whole frames behind it.
+    /// Parses the head and the complete frames after it.
     ///
     /// # Errors
-    /// `EINVAL` for a length that fits no message, for frames of CAN FD, and for a time that is none.
+    /// `EINVAL` for a length that fits no message, for frames of CAN FD, and for an invalid time.
     pub(super) fn read(bytes: &[u8]) -> Result<(Self, Vec<FrameBytes>), Errno> {
         if bytes.len() < HEAD_BYTES || !(bytes.len() - HEAD_BYTES).is_multiple_of(CAN_FRAME_BYTES) {
             return Err(Errno::INVAL);
@@ -93,10 +93,10 @@ impl Head {
         Ok((head, frames.map(|frame| frame.try_into().expect("16 bytes")).collect()))
     }
 
-    /// As many frames as the head announces.
+    /// The frames that the head announces.
     ///
     /// # Errors
-    /// `EFAULT` when there are fewer, as the kernel says when it reads behind the message; `EINVAL` for one of more than 8 bytes.
+    /// `EFAULT` when there are fewer, as when the kernel reads beyond the message; `EINVAL` for one of more than 8 bytes.
     pub(super) fn announced(&self, mut frames: Vec<FrameBytes>) -> Result<Vec<FrameBytes>, Errno> {
         let count = self.frame_count as usize;
         if frames.len() < count {
@@ -111,7 +111,7 @@ impl Head {
         HEAD_BYTES + self.frame_count as usize * CAN_FRAME_BYTES
     }
 
-    /// A message for the guest.
+    /// A message to the guest.
     pub(super) fn with(&self, opcode: u32, frames: &[FrameBytes]) -> Vec<u8> {
         let mut bytes = vec![0; HEAD_BYTES];
         let mut put =

@@ -1,7 +1,7 @@
-//! A subscription to an identifier: tells of frames whose content changed, at most every `ival2`, and of silence after `ival1`.
+//! A subscription to an identifier: reports frames with changed content, at most every `ival2`, and silence after `ival1`.
 //!
-//! With one frame in its list, that frame is the mask of the bits that count. With more, the first is the mask of a multiplexer:
-//! each other one tells by its bits under that mask which of them a frame is compared with.
+//! A single frame in its list is the mask of the relevant bits. With more frames the first is the mask of a multiplexer: the
+//! bits of a received frame under that mask select the frame that it is compared with.
 
 use super::Action;
 use super::message::{Head, flag, opcode};
@@ -10,14 +10,14 @@ use crate::bus_peer::FrameBytes;
 use rustix::io::Errno;
 use std::time::Instant;
 
-/// The frames of a list with the mask of a multiplexer before them.
+/// Most frames of a list, with the mask of a multiplexer.
 const MOST_FRAMES: u32 = super::MOST_FRAMES + 1;
 
-/// The last frame that was received for an entry of the list.
+/// The last frame received for an entry of the list.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     frame: FrameBytes,
-    /// It waits for the end of `ival2`.
+    /// Whether its report waits for the end of `ival2`.
     is_held_back: bool,
 }
 
@@ -54,7 +54,7 @@ impl Subscription {
     pub(super) fn new(head: &Head, interface: u32, frames: &[FrameBytes]) -> Self {
         Self {
             interface,
-            // A subscription has no count; its times are taken over where they are set.
+            // A subscription has no count; times are taken from the command where it sets them.
             head: Head { count: 0, interval_1: Default::default(), interval_2: Default::default(), ..*head },
             frames: frames.to_vec(),
             last: vec![None; frames.len().max(1)],
@@ -106,7 +106,7 @@ impl Subscription {
                 self.silent_at = None;
             }
             (self.reported_at, self.held_back_until) = (None, None);
-            self.tell_held_back(actions);
+            self.report_held_back(actions);
         }
         if head.flags & flag::STARTTIMER != 0 && !self.head.interval_1.is_zero() {
             self.silent_at = Some(now + self.head.interval_1);
@@ -121,7 +121,7 @@ impl Subscription {
         now: Instant,
         actions: &mut Vec<Action>,
     ) {
-        // Exactly this identifier; that of a standard frame says nothing of an extended one.
+        // Exactly this identifier; a standard one does not match an extended one.
         debug_assert!(self.head.id & EXTENDED_FLAG != 0 || self.head.id & !REMOTE_FLAG < EXTENDED_FLAG);
         if identifier(frame) != self.head.id || self.interface != 0 && self.interface != interface {
             return;
@@ -157,14 +157,14 @@ impl Subscription {
         let Some(last) = &self.last[entry] else { return true };
         let mask = u64_at(mask, 8);
         let by_length = self.head.flags & flag::RX_CHECK_DLC != 0 && frame[4] != last.frame[4];
-        // A frame without data has nothing to compare.
+        // Frames without data have nothing to compare.
         frame[4] > 0 && mask & u64_at(frame, 8) != mask & u64_at(&last.frame, 8) || by_length
     }
 
     fn note_change(&mut self, entry: usize, frame: &FrameBytes, now: Instant, actions: &mut Vec<Action>) {
         self.last[entry] = Some(Last { frame: *frame, is_held_back: true });
         if self.head.interval_2.is_zero() {
-            self.tell_held_back(actions);
+            self.report_held_back(actions);
             return;
         }
         if self.held_back_until.is_some() {
@@ -177,18 +177,18 @@ impl Subscription {
         {
             Some(until) => self.held_back_until = Some(until),
             None => {
-                self.tell_held_back(actions);
+                self.report_held_back(actions);
                 self.reported_at = Some(now);
             }
         }
     }
 
-    /// RX_CHANGED for each frame that was held back; true when there was one.
-    fn tell_held_back(&mut self, actions: &mut Vec<Action>) -> bool {
+    /// Reports RX_CHANGED for each frame whose report waits; true when there was one.
+    fn report_held_back(&mut self, actions: &mut Vec<Action>) -> bool {
         let mut reported = false;
         for last in self.last.iter_mut().flatten().filter(|last| last.is_held_back) {
             last.is_held_back = false;
-            actions.push(Action::Tell(self.interface, self.head.with(opcode::RX_CHANGED, &[last.frame])));
+            actions.push(Action::Notify(self.interface, self.head.with(opcode::RX_CHANGED, &[last.frame])));
             reported = true;
         }
         reported
@@ -200,10 +200,10 @@ impl Subscription {
             if self.head.flags & flag::RX_ANNOUNCE_RESUME != 0 {
                 self.last.fill(None);
             }
-            actions.push(Action::Tell(self.interface, self.head.with(opcode::RX_TIMEOUT, &[])));
+            actions.push(Action::Notify(self.interface, self.head.with(opcode::RX_TIMEOUT, &[])));
         }
         if self.held_back_until.is_some_and(|until| until <= now) {
-            let reported = self.tell_held_back(actions);
+            let reported = self.report_held_back(actions);
             self.held_back_until = reported.then_some(now + self.head.interval_2);
             if !reported {
                 self.reported_at = None;

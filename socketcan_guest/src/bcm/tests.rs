@@ -82,7 +82,7 @@ fn sent(at: u128, data: &[u8]) -> (u128, Action) {
 /// Opcode and frames of what was told.
 fn told(actions: &[Action]) -> Vec<(u32, Vec<FrameBytes>)> {
     let read = |action: &Action| match action {
-        Action::Tell(_, bytes) => Head::read(bytes).map(|(head, frames)| (head.opcode, frames)).ok(),
+        Action::Notify(_, bytes) => Head::read(bytes).map(|(head, frames)| (head.opcode, frames)).ok(),
         Action::Send(..) | Action::SendOnce(..) => None,
     };
     actions.iter().filter_map(read).collect()
@@ -118,7 +118,7 @@ fn a_count_at_the_first_interval_ends_with_an_event_and_the_second_goes_on() {
         all.iter().filter(|(_, action)| matches!(action, Action::Send(..))).map(|(at, _)| *at).collect();
     assert_eq!(times, [10, 20, 70, 120]);
     let expired: Vec<_> =
-        all.iter().filter(|(_, action)| matches!(action, Action::Tell(..))).cloned().collect();
+        all.iter().filter(|(_, action)| matches!(action, Action::Notify(..))).cloned().collect();
     assert_eq!(expired.len(), 1);
     assert_eq!((expired[0].0, told(&[expired[0].1.clone()])), (20, vec![(opcode::TX_EXPIRED, vec![])]));
 }

@@ -10,17 +10,18 @@ use std::time::Instant;
 #[derive(Debug)]
 pub(super) struct Transmission {
     interface: u32,
-    /// As it was set up last; `count` is how often it is still sent every `ival1`.
+    /// Head of the last set-up; `count` is the remaining number of frames every `ival1`.
     head: Head,
+    /// The list; a further set-up may not have more frames.
     frames: Vec<FrameBytes>,
-    /// Frames that there is room for: as many as the first set-up had.
+    /// Index of the frame that is sent next.
     next_frame: usize,
     due: Option<Instant>,
 }
 
 impl Transmission {
     pub(super) fn new(head: &Head, interface: u32, frames: &[FrameBytes]) -> Result<Self, Errno> {
-        // Times and count are taken over where they are set.
+        // Times and count are taken from the command where it sets them.
         let head = Head { count: 0, interval_1: Default::default(), interval_2: Default::default(), ..*head };
         Ok(Self { interface, head, frames: frames.to_vec(), next_frame: 0, due: None })
     }
@@ -80,7 +81,7 @@ impl Transmission {
         Ok(head.message_bytes())
     }
 
-    /// Sets the next moment after the last one.
+    /// Sets the next due time from the last one.
     fn arm(&mut self, last: Instant, now: Instant) {
         let interval = if !self.head.interval_1.is_zero() && self.head.count > 0 {
             self.head.interval_1
@@ -88,7 +89,7 @@ impl Transmission {
             self.head.interval_2
         };
         let next = last + interval;
-        // After a pause of the machine the missed cycles are not made up for.
+        // After a pause of the machine missed cycles are skipped.
         let next = if next < now { now + interval } else { next };
         self.due = (!interval.is_zero()).then_some(next);
     }
@@ -103,7 +104,7 @@ impl Transmission {
         if !self.head.interval_1.is_zero() && self.head.count > 0 {
             self.head.count -= 1;
             if self.head.count == 0 && self.head.flags & flag::TX_COUNTEVT != 0 {
-                actions.push(Action::Tell(0, self.head.with(opcode::TX_EXPIRED, &[])));
+                actions.push(Action::Notify(0, self.head.with(opcode::TX_EXPIRED, &[])));
             }
         }
         self.send(actions);

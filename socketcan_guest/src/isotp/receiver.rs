@@ -1,7 +1,7 @@
-//! The side that receives a message.
+//! The receiving side.
 
 use super::settings::flag;
-use super::{DATA_BYTES, Event, Incoming, LONGEST_PDU, OTHER_SIDE};
+use super::{DATA_BYTES, Event, Incoming, LONGEST_PDU, PEER_TIMEOUT};
 use rustix::io::Errno;
 use std::time::Instant;
 
@@ -9,7 +9,7 @@ use std::time::Instant;
 const CONTINUE_TO_SEND: u8 = 0;
 const OVERFLOW: u8 = 2;
 
-/// A message of which the first frame is there.
+/// A message after its first frame.
 #[derive(Debug)]
 struct Reception {
     length: usize,
@@ -17,12 +17,12 @@ struct Reception {
     /// Number of the next frame, modulo 16.
     sequence: u8,
     received_in_block: u8,
-    /// When the next frame must be there; a mere listener does not wait for the second.
+    /// Deadline of the next frame; a listener does not wait for the second.
     until: Option<Instant>,
     last: Option<Instant>,
 }
 
-/// The receiving side of a socket, with the message that is being received, if any.
+/// The receiving side of a socket, with the message in progress, if any.
 #[derive(Debug, Default)]
 pub(super) struct Receiver(Option<Reception>);
 
@@ -42,7 +42,7 @@ impl Receiver {
         }
     }
 
-    /// A single frame ends whatever was being received.
+    /// A single frame ends a reception in progress.
     pub(super) fn take_single(&mut self, incoming: Incoming<'_>, events: &mut Vec<Event>) {
         let Incoming { data, length, settings, .. } = incoming;
         self.0 = None;
@@ -60,11 +60,11 @@ impl Receiver {
         });
     }
 
-    /// Gives the data of a flow control frame.
+    /// Returns the data of a flow control frame.
     pub(super) fn take_first(&mut self, incoming: Incoming<'_>) -> Option<Vec<u8>> {
         let Incoming { data, length, settings, now } = incoming;
         self.0 = None;
-        // It fills its frame.
+        // A first frame has the full length.
         if length != DATA_BYTES {
             return None;
         }
@@ -77,7 +77,7 @@ impl Receiver {
             }
             count => (count, at + 2),
         };
-        // It would have fitted a single frame.
+        // The message would fit a single frame.
         if count + begin < DATA_BYTES {
             return None;
         }
@@ -90,13 +90,13 @@ impl Receiver {
             bytes: data[begin..DATA_BYTES].to_vec(),
             sequence: 1,
             received_in_block: 0,
-            until: answers.then(|| now + OTHER_SIDE),
+            until: answers.then(|| now + PEER_TIMEOUT),
             last: None,
         });
         answers.then(|| settings.flow_control_of(CONTINUE_TO_SEND))
     }
 
-    /// Gives the data of a flow control frame at the end of a block.
+    /// Returns the data of a flow control frame at the end of a block.
     pub(super) fn take_consecutive(
         &mut self,
         incoming: Incoming<'_>,
@@ -113,7 +113,7 @@ impl Receiver {
         reception.until = None;
         let begin = settings.address_bytes() + 1;
         let left = reception.length - reception.bytes.len();
-        // Only the last may be shorter than 8 bytes.
+        // Only the last frame may be shorter than 8 bytes.
         if length < DATA_BYTES && left > DATA_BYTES - begin {
             return None;
         }
@@ -137,14 +137,14 @@ impl Receiver {
         reception.received_in_block = reception.received_in_block.wrapping_add(1);
         let block_size = settings.block_size();
         if block_size == 0 || reception.received_in_block < block_size {
-            reception.until = Some(now + OTHER_SIDE);
+            reception.until = Some(now + PEER_TIMEOUT);
             return None;
         }
         if settings.has(flag::LISTEN_MODE) {
             return None;
         }
         (reception.received_in_block, reception.last) = (0, None);
-        reception.until = Some(now + OTHER_SIDE);
+        reception.until = Some(now + PEER_TIMEOUT);
         Some(settings.flow_control_of(CONTINUE_TO_SEND))
     }
 }

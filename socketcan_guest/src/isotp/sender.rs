@@ -1,13 +1,13 @@
-//! The side that sends a message.
+//! The sending side.
 
 use super::settings::{Settings, flag};
-use super::{DATA_BYTES, Event, INTERFACE, Incoming, LONGEST_PDU, OTHER_SIDE, kind};
+use super::{DATA_BYTES, Event, INTERFACE_TIMEOUT, Incoming, LONGEST_PDU, PEER_TIMEOUT, kind};
 use rustix::io::Errno;
 use std::time::{Duration, Instant};
 
-/// Longest message whose length a first frame has in 12 bits.
+/// Longest message whose length fits the 12 bits of a first frame.
 const LONGEST_IN_12_BITS: usize = 4095;
-/// An interface without room is tried again after so long.
+/// Time until the next attempt at a full interface.
 const RETRY: Duration = Duration::from_millis(1);
 /// Bytes of a flow control frame.
 const FLOW_CONTROL_BYTES: usize = 3;
@@ -16,13 +16,13 @@ const FLOW_CONTROL_BYTES: usize = 3;
 enum State {
     #[default]
     Idle,
-    /// For a flow control frame, until then; the first one says how big blocks are, and STmin.
+    /// Waits for a flow control frame, until a deadline; the first one sets block size and STmin.
     Awaits { is_first: bool, until: Instant },
-    /// The next consecutive frame is due, and must be taken until then.
+    /// The next consecutive frame is due, and must be accepted before a deadline.
     Sends { due: Instant, until: Instant },
 }
 
-/// How much of a message has been sent.
+/// Progress of a message.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
     state: State,
@@ -33,7 +33,7 @@ pub(crate) struct Progress {
     sent_in_block: u8,
 }
 
-/// The sending side of a socket, with the message that is being sent.
+/// The sending side of a socket, with the message in progress, if any.
 #[derive(Debug, Default)]
 pub(super) struct Sender {
     message: Vec<u8>,
@@ -76,15 +76,15 @@ impl Sender {
         self.message = message.to_vec();
         let state = if settings.has(flag::CF_BROADCAST) {
             self.st_min = settings.st_min_of_a_broadcast();
-            State::Sends { due: now + self.st_min, until: now + self.st_min + INTERFACE }
+            State::Sends { due: now + self.st_min, until: now + self.st_min + INTERFACE_TIMEOUT }
         } else {
-            State::Awaits { is_first: true, until: now + OTHER_SIDE }
+            State::Awaits { is_first: true, until: now + PEER_TIMEOUT }
         };
         self.progress = Progress { state, sent, sequence: 1, sent_in_block: 0 };
         Ok(settings.data_of(&head, &message[..sent]))
     }
 
-    /// The data of the consecutive frame that is due, which counts as sent, and how far the message was before.
+    /// The data of the consecutive frame that is due, which counts as sent, and the progress before it.
     pub(super) fn take_due(&mut self, settings: &Settings, now: Instant) -> Option<(Vec<u8>, Progress)> {
         let before @ Progress { state, sent, sequence, sent_in_block } = self.progress;
         if !matches!(state, State::Sends { due, .. } if due <= now) {
@@ -97,9 +97,9 @@ impl Sender {
         let state = if sent >= self.message.len() {
             State::Idle
         } else if self.block_size > 0 && sent_in_block >= self.block_size {
-            State::Awaits { is_first: false, until: now + OTHER_SIDE }
+            State::Awaits { is_first: false, until: now + PEER_TIMEOUT }
         } else {
-            State::Sends { due: now + self.st_min, until: now + self.st_min + INTERFACE }
+            State::Sends { due: now + self.st_min, until: now + self.st_min + INTERFACE_TIMEOUT }
         };
         self.progress = Progress { state, sent, sequence: (sequence + 1) % 16, sent_in_block };
         Some((settings.data_of(&[kind::CONSECUTIVE | sequence], payload), before))
@@ -129,11 +129,11 @@ impl Sender {
         match data[at] & 0x0F {
             0 => {
                 self.progress.sent_in_block = 0;
-                self.progress.state = State::Sends { due: now, until: now + INTERFACE };
+                self.progress.state = State::Sends { due: now, until: now + INTERFACE_TIMEOUT };
             }
-            1 => self.progress.state = State::Awaits { is_first: false, until: now + OTHER_SIDE },
+            1 => self.progress.state = State::Awaits { is_first: false, until: now + PEER_TIMEOUT },
             2 => self.fail(Errno::MSGSIZE, events),
-            // No status that there is: the kernel ends the message without a word.
+            // An unknown status: the kernel ends the message silently.
             _ => self.progress.state = State::Idle,
         }
     }

@@ -1,4 +1,4 @@
-//! Options of a transport socket, and what follows from them for a frame.
+//! Options of a transport socket, and their effect on frames.
 
 use super::DATA_BYTES;
 use rustix::io::Errno;
@@ -37,14 +37,14 @@ const FD_MTU: u8 = 72;
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
     flags: u32,
-    /// As it was set, ns; what counts is `frame_time_ns`.
+    /// As set, ns; the effective value is `frame_time_ns`.
     given_frame_time_ns: u32,
     address: u8,
     sent_padding: u8,
     received_padding: u8,
     received_address: u8,
     frame_time_ns: u32,
-    /// Block size, STmin and number of waits, as our flow control frames carry them.
+    /// Block size, STmin and number of waits of our flow control frames.
     flow_control: [u8; 3],
     sent_gap_ns: u32,
     received_gap_ns: u32,
@@ -74,7 +74,7 @@ impl Settings {
     /// `setsockopt`.
     ///
     /// # Errors
-    /// `EINVAL` for a wrong length, both kinds of broadcast at once, or a link layer that no interface has; `ENOPROTOOPT`.
+    /// `EINVAL` for a wrong length, both kinds of broadcast at once, or an unsupported link layer; `ENOPROTOOPT`.
     pub(super) fn set(&mut self, option: i32, value: &[u8]) -> Result<(), Errno> {
         let number = || value.try_into().map(u32::from_ne_bytes).map_err(|_| Errno::INVAL);
         let three = || <[u8; 3]>::try_from(value).map_err(|_| Errno::INVAL);
@@ -138,7 +138,7 @@ impl Settings {
         self.flags & flag != 0
     }
 
-    /// It sends to many, and listens to nobody.
+    /// Whether it sends without flow control.
     pub(super) fn broadcasts(&self) -> bool {
         self.has(flag::SF_BROADCAST | flag::CF_BROADCAST)
     }
@@ -147,7 +147,7 @@ impl Settings {
         self.link_layer[0] == FD_MTU
     }
 
-    /// Bytes of the extended address, ahead of everything else.
+    /// Bytes of the extended address at the start of the data.
     pub(super) fn address_bytes(&self) -> usize {
         usize::from(self.has(flag::EXTEND_ADDR))
     }
@@ -156,12 +156,12 @@ impl Settings {
         self.received_address
     }
 
-    /// Frames of a block that we ask for; 0: there are no blocks.
+    /// Frames of a block in our flow control; 0: no blocks.
     pub(super) fn block_size(&self) -> u8 {
         self.flow_control[0]
     }
 
-    /// The time before each consecutive frame, by the other side's STmin.
+    /// The time before each consecutive frame, by the peer's STmin.
     pub(super) fn st_min(&self, stmin: u8) -> Duration {
         let asked = match stmin {
             _ if self.has(flag::FORCE_TXSTMIN) => Duration::from_nanos(self.sent_gap_ns.into()),
@@ -172,18 +172,18 @@ impl Settings {
         asked + Duration::from_nanos(self.frame_time_ns.into())
     }
 
-    /// The same of a broadcast, to which nobody answers.
+    /// The same for a broadcast, which has no flow control.
     pub(super) fn st_min_of_a_broadcast(&self) -> Duration {
         let forced = self.has(flag::FORCE_TXSTMIN);
         Duration::from_nanos(if forced { self.sent_gap_ns } else { self.frame_time_ns }.into())
     }
 
-    /// Received consecutive frames nearer to each other than this do not count.
+    /// Consecutive frames closer together than this are ignored.
     pub(super) fn least_received_gap(&self) -> Option<Duration> {
         self.has(flag::FORCE_RXSTMIN).then(|| Duration::from_nanos(self.received_gap_ns.into()))
     }
 
-    /// The data of a frame: extended address, head, payload, padding to 8 bytes if there is any.
+    /// The data of a frame: extended address, head, payload, padding to 8 bytes if enabled.
     pub(super) fn data_of(&self, head: &[u8], payload: &[u8]) -> Vec<u8> {
         let address = [self.address];
         let mut data = [&address[..self.address_bytes()], head, payload].concat();
@@ -193,7 +193,7 @@ impl Settings {
         data
     }
 
-    /// A flow control frame's data.
+    /// The data of a flow control frame.
     pub(super) fn flow_control_of(&self, status: u8) -> Vec<u8> {
         let [block_size, stmin, _] = self.flow_control;
         self.data_of(&[super::kind::FLOW_CONTROL | status, block_size, stmin], &[])
@@ -204,11 +204,11 @@ impl Settings {
         self.has(flag::CHK_PAD_LEN | flag::CHK_PAD_DATA)
     }
 
-    /// Whether what follows after `end` in a frame is the padding that was asked for, if any was.
+    /// Whether the bytes after `end` are the requested padding, if any.
     pub(super) fn is_padded_right(&self, data: &[u8], length: usize, end: usize) -> bool {
         let (by_length, by_content) = (self.has(flag::CHK_PAD_LEN), self.has(flag::CHK_PAD_DATA));
         if !self.has(flag::RX_PADDING) {
-            // Without padding a frame is as short as it can be; content cannot be compared with nothing.
+            // Without padding a frame has its least length, and there is no content to compare.
             return if by_length { length == end } else { !by_content };
         }
         let padding = &data[end.min(length)..length];

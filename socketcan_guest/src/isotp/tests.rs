@@ -78,16 +78,16 @@ fn silence_of_the_other_side_ends_a_message_on_both_sides() {
     let mut one = end(ONE, 0, 0, [0, 0]);
     let first = one.start(&[1; 20], now).unwrap();
     let mut events = Vec::new();
-    one.advance(now + OTHER_SIDE - Duration::from_nanos(1), &mut events);
+    one.advance(now + PEER_TIMEOUT - Duration::from_nanos(1), &mut events);
     assert!(events.is_empty() && one.is_sending());
-    one.advance(now + OTHER_SIDE, &mut events);
+    one.advance(now + PEER_TIMEOUT, &mut events);
     assert_eq!(events, [Event::SendingFailed(Errno::COMM)]);
     assert!(!one.is_sending());
 
     let mut other = end(OTHER, 0, 0, [0, 0]);
     assert_eq!(take(&mut other, &first, now).len(), 1);
     let mut events = Vec::new();
-    other.advance(now + OTHER_SIDE, &mut events);
+    other.advance(now + PEER_TIMEOUT, &mut events);
     assert_eq!(events, [Event::ReceivingFailed(Errno::TIMEDOUT)]);
 }
 
@@ -105,7 +105,7 @@ fn an_interface_without_room_is_tried_again_until_two_seconds_are_over() {
         tries += 1;
     }
     assert_eq!(events, [Event::SendingFailed(Errno::COMM)]);
-    assert!(tries > 1900 && at - now >= INTERFACE, "{tries}");
+    assert!(tries > 1900 && at - now >= INTERFACE_TIMEOUT, "{tries}");
 }
 
 #[test]
