@@ -1,23 +1,23 @@
-//! One axis of the record maker: its state, and the rates of it.
+//! One axis of the record maker: its state and the rates of change.
 //!
 //! ```text
 //!   spool ─► edges ─► flow at the valve ─► (line) ─► lagged flow q ─► air M = p V ─► pressures ─► force ─► motion
 //! ```
 //!
-//! The air of a chamber is M = p V and N, its normal volume times p_N: what M would be at the temperature of the rig. Both move
-//! alike while the gas is isothermal; their ratio is T / T_0 when it is not.
+//! The air of a chamber has two states: M = p V, and N, its normal volume times p_N, which is M at the temperature of the rig.
+//! Both change alike while the gas is isothermal; otherwise their ratio is T / T_0.
 
 use super::Form;
-use super::motion::{At, Motion};
+use super::motion::{FrictionState, Motion};
 use super::numbers::Numbers;
 use super::port::{Node, Ports};
 use super::valve::Valve;
 
-/// Places in [`Y`].
+/// Indices into [`Y`].
 pub(super) const X: usize = 0;
 pub(super) const V: usize = 1;
 pub(super) const SPOOL: usize = 2;
-/// M of chamber a; that of b follows, and so for the next ones.
+/// M of chamber a; chamber b follows. The same holds for the next three.
 pub(super) const AIR: usize = 5;
 pub(super) const NORMAL: usize = 7;
 pub(super) const FLOW: usize = 9;
@@ -37,7 +37,7 @@ pub(super) struct AirLaws {
     /// Normal flow past the piston from 6 to 1 bar, m^3/s.
     pub(super) piston_leakage: f64,
     pub(super) rod_leakage: [f64; 2],
-    /// In place of the baseline's.
+    /// Replaces the baseline's dead volume, m^3.
     pub(super) dead_volume_m3: Option<f64>,
     /// Travel time of the line, s.
     pub(super) line_delay_s: f64,
@@ -72,18 +72,18 @@ const GAS_PER_HEAT: f64 = 287.0 / 718.0;
 const GAMMA: f64 = 1005.0 / 718.0;
 const GAS_CONSTANT: f64 = 287.0;
 const HEAT_CAPACITY: f64 = 718.0;
-/// Polytropic exponent of both foreign forms: between isothermal and adiabatic, as measured ones are.
+/// Polytropic exponent of the near and far forms: measured exponents lie between isothermal and adiabatic.
 const POLYTROPE: f64 = 1.28;
-/// Leakages are given from 6 bar to 1 bar absolute, Pa.
+/// Leakages are stated for flow from 6 bar to 1 bar absolute, Pa.
 const LEAKS_FROM_PA: f64 = 6e5;
 const LEAKS_TO_PA: f64 = 1e5;
-/// Share of the near form's time of a line that is a lag and no delay.
+/// Share of the near form's line delay that is a first-order lag.
 pub(super) const LINE_LAG_SHARE: f64 = 0.25;
-/// By how much longer the line to chamber a is in the far form, and the one to b shorter.
+/// Share by which the far form's line to chamber a is longer, and that to b shorter.
 pub(super) const LINES_DIFFER: f64 = 0.5;
-/// What the forms' dead volume has more of its change in chamber a, and less in b.
+/// Share by which the forms make the change of dead volume larger in chamber a, and smaller in b.
 const DEAD_SHIFT: [f64; 3] = [0.0, 0.2, 0.75];
-/// The far forms' leaks of piston and rod are wider by this share in the middle of the stroke, and narrower at its ends.
+/// The far forms' leaks of piston and rod are larger by this share at mid-stroke, and smaller at the ends.
 const PISTON_WORN: f64 = 0.45;
 const ROD_WORN: f64 = 0.52;
 
@@ -97,14 +97,14 @@ impl Axis {
         motion: Motion,
     ) -> Self {
         let file_m3 = numbers.dead_volume_m3;
-        let more_m3 = laws.dead_volume_m3.map_or(0.0, |own_m3| own_m3 - file_m3);
+        let more_m3 = laws.dead_volume_m3.map_or(0.0, |changed_m3| changed_m3 - file_m3);
         let shift = laws.form.of(DEAD_SHIFT);
-        // A shift may not empty a chamber of a rig whose dead volume is nearly none.
+        // Where the dead volume is close to zero, a shift must not make a chamber's volume negative.
         let dead_m3 = [1.0 + shift, 1.0 - shift].map(|share| (file_m3 + share * more_m3).max(2e-6));
         Axis { numbers: numbers.clone(), valve, ports, silencer, laws, motion, dead_m3 }
     }
 
-    /// At rest at an extension, with the pressures of the start.
+    /// State at rest at an extension, m, with the initial pressures.
     pub(super) fn start(&self, extension_m: f64) -> Y {
         let mut y = [0.0; 14];
         y[X] = extension_m;
@@ -122,7 +122,7 @@ impl Axis {
         [self.numbers.piston_m2, self.numbers.annulus_m2]
     }
 
-    /// Both volumes, m^3, kept within the stroke for a trial step beyond its ends.
+    /// Both volumes, m^3; a trial step beyond the ends of the stroke is clamped to it.
     #[inline(always)]
     pub(super) fn volumes(&self, extension_m: f64) -> [f64; 2] {
         let x = extension_m.clamp(0.0, self.numbers.stroke_m);
@@ -169,15 +169,15 @@ impl Axis {
         air
     }
 
-    /// Friction's place at a state.
+    /// What friction depends on at a state.
     #[inline(always)]
-    pub(super) fn at(&self, y: &Y, air: &Air, rest_s: f64, torn_off: [f64; 2]) -> At {
+    pub(super) fn at(&self, y: &Y, air: &Air, rest_s: f64, last_break_away: [f64; 2]) -> FrictionState {
         let gauge_pa = air.pressure_pa[0] + air.pressure_pa[1] - 2.0 * self.numbers.atmospheric_pa;
         let across_pa = air.pressure_pa[0] - air.pressure_pa[1];
-        At { extension_m: y[X], gauge_pa, across_pa, rest_s, torn_off }
+        FrictionState { extension_m: y[X], gauge_pa, across_pa, rest_s, last_break_away }
     }
 
-    /// Rates of everything but x and v: `line` is what leaves the lines towards the chambers, m^3/s.
+    /// Rates of everything but x and v. `line` is the flow out of the lines towards the chambers, m^3/s.
     #[inline(always)]
     pub(super) fn rates(&self, y: &Y, air: &Air, supply_pa: f64, target: f64, line: [f64; 2]) -> Y {
         let numbers = &self.numbers;
@@ -218,7 +218,7 @@ impl Axis {
             if !laws.form.is_far() {
                 return 1.0;
             }
-            // Scored where the piston is most of its time.
+            // The bore is worn most where the piston runs most.
             let turns = extension_m / self.numbers.stroke_m;
             1.0 - share * libm::cos(std::f64::consts::TAU * turns)
         };
@@ -231,13 +231,13 @@ impl Axis {
         [-across - out[0], across - out[1]]
     }
 
-    /// A seal's leakage from one pressure to another, m^3/s.
+    /// Leakage of a seal from one pressure to another, m^3/s.
     #[inline(always)]
     fn leak(&self, given: f64, from_pa: f64, to_pa: f64) -> f64 {
         if given == 0.0 {
             0.0
         } else if self.laws.form.is_foreign() {
-            // A scratch is an orifice: choked from 6 to 1 bar, where c p / 2 flows.
+            // A scratch is an orifice: choked from 6 to 1 bar, where the flow is c p / 2.
             super::valve::flow(given / (LEAKS_FROM_PA / 2.0), from_pa, to_pa)
                 * if from_pa == to_pa { 0.0 } else { 1.0 }
         } else {
@@ -246,14 +246,14 @@ impl Axis {
         }
     }
 
-    /// dM/dt of gas with a temperature of its own, W.
+    /// dM/dt of gas whose temperature varies, W.
     fn warm(&self, h: f64, y: &Y, air: &Air, (chamber, net, swept): (usize, f64, f64)) -> f64 {
         let numbers = &self.numbers;
         let (pressure, volume) = (air.pressure_pa[chamber], air.volume_m3[chamber]);
         let (gas, normal) = (y[AIR + chamber], y[NORMAL + chamber]);
         let work = GAS_PER_HEAT * pressure * swept;
         if self.laws.form.is_foreign() {
-            // Polytropic changes that relax in a fixed time: that of half a stroke at the start's pressure.
+            // Polytropic changes that relax with a fixed time constant: that of half a stroke at the initial pressure.
             let area = self.areas()[chamber];
             let mid_m3 = self.dead_m3[chamber] + area * numbers.stroke_m / 2.0;
             let mass_kg = numbers.start_b_pa * mid_m3 / (GAS_CONSTANT * numbers.temperature_k);

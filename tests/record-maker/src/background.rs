@@ -1,9 +1,9 @@
-//! Errors of the whole model, each small: what every real rig has beside the one effect that is looked for.
+//! Model errors of the whole rig, each small: what every real rig has beside the effect in question.
 //!
 //! ```text
-//!   effects of the catalogue below its smallest amplitudes       friction that fades near rest
-//!   points of both K_V tables, dead volume, temperature          slow noise beside the sensors' own
-//!   steps of first order in place of the midpoint's
+//!   effects of the catalogue below their smallest drawn sizes    friction that fades near rest
+//!   points of both K_V tables, dead volume, temperature          slow noise added to the sensors' white noise
+//!   first-order steps instead of the midpoint's
 //! ```
 //!
 //! Source: discrepancy-notes.md, Second reading, 8.
@@ -12,10 +12,10 @@ use super::Hidden;
 use plant::parameters::VALVE_POINTS;
 use serde_json::{Value, json};
 
-/// Nobody is asked to name any of it.
+/// The model errors of one rig; no report is expected to name any of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Background {
-    /// Below the smallest amplitudes of their sheets.
+    /// Effects below the smallest amplitudes of their sheets.
     pub effects: Vec<Hidden>,
     /// Factors on K_V of supply and exhaust edge at each opening of the table.
     pub valve_point_factors: [[f64; VALVE_POINTS]; 2],
@@ -23,16 +23,16 @@ pub struct Background {
     pub dead_volume_ratio: f64,
     /// T / T_0 of all air.
     pub temperature_ratio: f64,
-    /// Share of the sliding friction that is missing near rest.
+    /// Share by which the sliding friction is reduced near rest.
     pub fading_ratio: f64,
-    /// Speed over which it comes.
+    /// Speed over which the full friction returns, m/s.
     pub fading_below_m_per_s: f64,
     /// Share of the noise's variance with a correlation of [`SLOW_NOISE_SAMPLES`].
     pub slow_noise_ratio: f64,
 }
 
 impl Background {
-    /// As `truth.json` and `draws.json` hold it; each writes effects its own way.
+    /// JSON of `truth.json` and `draws.json`, with the effects as the caller formats them.
     #[must_use]
     pub fn as_json(&self, effects: Vec<Value>) -> Value {
         json!({

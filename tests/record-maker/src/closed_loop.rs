@@ -1,4 +1,4 @@
-//! The rig of a recipe under the real controllers, and the record that comes of it.
+//! The rig of a recipe under the real controllers, and the record of the run.
 
 use super::axis::{AIR, FLOW, NORMAL, SPOOL, V, X};
 use super::noise::Stream;
@@ -18,32 +18,32 @@ use std::path::{Path, PathBuf};
 /// Rms and largest error of a sampling instant, s.
 const JITTER_S: f64 = 1e-4;
 const MOST_JITTER_S: f64 = 4e-4;
-/// The experiment begins when the initial positioning is over, whatever a hidden effect does to standstill and error: all records
-/// of an experiment are driven at the same times.
-const UNSETTLED: [&str; 3] = ["still_m=0.1", "position_error_m=0.5", "force_error_n=2000"];
-/// Longest run of an experiment that somebody proposes: six repetitions of half a minute.
+/// Limits of standstill and error wide enough for the experiment to begin right after the initial positioning, whatever the
+/// hidden effect: all records of an experiment then have the same timing.
+const EARLY_START: [&str; 3] = ["still_m=0.1", "position_error_m=0.5", "force_error_n=2000"];
+/// Longest run of a proposed experiment, rows of 1 ms: six repetitions of half a minute.
 const MOST_ROWS: usize = 180_000;
-/// Streams of random numbers: 0 to 7 are the sensors'.
+/// Stream of random numbers; streams 0 to 7 are those of the sensors.
 const JITTER_STREAM: u64 = 8;
 
-/// Makes a record in memory: the recipe's rig under the controllers of its experiment, [`ROWS`] rows.
+/// Simulates a record: the recipe's rig under the controllers of its experiment, [`ROWS`] rows.
 ///
-/// `rig` is what the controllers, and whoever gets the record, take the rig for; effects in it are left out.
+/// `rig` holds the numbers that the controllers and the reader of the record assume; effects in it are ignored.
 ///
 /// # Errors
-/// [`MakeError`] when the recipe is none, or the run does not last.
+/// [`MakeError`] when the recipe is not valid, or the run fails.
 pub fn simulate(recipe: &Recipe, rig: &RigParameters) -> Result<Record, MakeError> {
     run(recipe, rig, [ROWS, STEPS_PER_MS])
 }
 
-/// The first rows of a record, with so many steps in a millisecond.
+/// The first `rows` of a record, simulated with `steps_per_ms`.
 pub(super) fn run(
     recipe: &Recipe,
     rig: &RigParameters,
     [rows, steps_per_ms]: [usize; 2],
 ) -> Result<Record, MakeError> {
     let (inputs, scene) = read(recipe, rig)?;
-    let made = Made::new(recipe, rig, &scene, steps_per_ms)?;
+    let made = RecordedRig::new(recipe, rig, &scene, steps_per_ms)?;
     let mut rehearsal = Rehearsal::with_rig(made, controllers(&inputs)?);
     let mut record = record(recipe, &scene, rows);
     for _ in 0..rows {
@@ -52,13 +52,13 @@ pub(super) fn run(
     Ok(record)
 }
 
-/// Makes a record under an experiment that somebody proposes, given as its file's name and its text, from its start to its end.
+/// Simulates a record of a proposed experiment, given as the name and text of its file, from start to end.
 ///
-/// Both axes move as the experiment says, linked or not. Recorded are the recipe's axes, and both where the rods are linked:
-/// there one axis alone tells nothing. The recipe's own experiment is not driven.
+/// Both axes move as the experiment says, linked or not. The recipe's axes are recorded, and both where the rods are linked,
+/// since one axis alone does not determine the motion. The experiment of the recipe is ignored.
 ///
 /// # Errors
-/// [`MakeError`] when recipe or experiment are none, or the run does not come to its end.
+/// [`MakeError`] when recipe or experiment are not valid, or the run does not reach its end.
 pub fn simulate_proposed(
     recipe: &Recipe,
     rig: &RigParameters,
@@ -67,12 +67,12 @@ pub fn simulate_proposed(
     let nominal = rig.without_effects();
     let experiment = Inputs::of_texts(&nominal, (file, toml), program, &[])?.experiment;
     let driven = [experiment.drive.is_some(), experiment.load.is_some()];
-    let set = unsettled(Axis::ALL.into_iter().filter(|axis| driven[axis.index()]));
+    let set = early_start(Axis::ALL.into_iter().filter(|axis| driven[axis.index()]));
     let set: Vec<&str> = set.iter().map(String::as_str).collect();
     let inputs = Inputs::of_texts(&nominal, (file, toml), program, &set)?;
     let scene = scene(toml, file, rig)?;
     let moved = Recipe { both_axes: true, unlinked: false, ..recipe.clone() };
-    let made = Made::new(&moved, rig, &scene, STEPS_PER_MS)?;
+    let made = RecordedRig::new(&moved, rig, &scene, STEPS_PER_MS)?;
     let mut rehearsal = Rehearsal::with_rig(made, controllers(&inputs)?);
     let recorded = Recipe { both_axes: recipe.both_axes || scene.linked, ..recipe.clone() };
     let mut record = record(&recorded, &scene, ROWS);
@@ -91,7 +91,7 @@ fn controllers(inputs: &Inputs) -> Result<Vec<AxisController>, MakeError> {
     Ok(Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?)
 }
 
-fn next_row(rehearsal: &mut Rehearsal<Made>) -> Result<Row, MakeError> {
+fn next_row(rehearsal: &mut Rehearsal<RecordedRig>) -> Result<Row, MakeError> {
     let row = rehearsal.step(|_, _| {}).cycle;
     if rehearsal.rig().stopped {
         return Err(MakeError::Stopped { at_s: row.time_s });
@@ -100,13 +100,16 @@ fn next_row(rehearsal: &mut Rehearsal<Made>) -> Result<Row, MakeError> {
     Ok(row)
 }
 
-/// The recipe's rig under given valve commands of drive and load, one pair for each row: what the record would have been with
-/// other hidden effects under the same inputs. The valve of an axis that rests stays shut.
+/// Simulates the recipe's rig under given valve commands of drive and load, one pair for each row: the record of other hidden
+/// effects under the same inputs. The valve of a resting axis stays closed.
+///
+/// # Errors
+/// [`MakeError`] when the recipe is not valid, or a state is not finite.
 pub fn replay(recipe: &Recipe, rig: &RigParameters, valves: &[[f64; 2]]) -> Result<Record, MakeError> {
     replay_with(recipe, rig, valves, STEPS_PER_MS)
 }
 
-/// The same with another number of steps in a millisecond.
+/// [`replay`] with another number of steps in a millisecond.
 pub(super) fn replay_with(
     recipe: &Recipe,
     rig: &RigParameters,
@@ -114,7 +117,7 @@ pub(super) fn replay_with(
     steps_per_ms: usize,
 ) -> Result<Record, MakeError> {
     let (_, scene) = read(recipe, rig)?;
-    let mut made = Made::new(recipe, rig, &scene, steps_per_ms)?;
+    let mut made = RecordedRig::new(recipe, rig, &scene, steps_per_ms)?;
     let mut record = record(recipe, &scene, valves.len());
     for (cycle, valve) in valves.iter().enumerate() {
         let valve = [0, 1].map(|i| if made.rig.active[i] { valve[i] } else { 0.0 });
@@ -127,15 +130,15 @@ pub(super) fn replay_with(
     Ok(record)
 }
 
-/// The commands of a null record again with another number of steps in a millisecond, in windows of so many rows that each begin
-/// with the true state.
+/// Replays the commands of a null record with another number of steps in a millisecond, in windows of so many rows; each window
+/// starts from the true state.
 pub(super) fn replay_windows(
     record: &Record,
     rig: &RigParameters,
     [window, steps_per_ms]: [usize; 2],
 ) -> Result<Vec<Row>, MakeError> {
     let (_, scene) = read(&record.recipe, rig)?;
-    let mut made = Made::new(&record.recipe, rig, &scene, steps_per_ms)?;
+    let mut made = RecordedRig::new(&record.recipe, rig, &scene, steps_per_ms)?;
     let mut rows = Vec::with_capacity(record.rows.len());
     for (cycle, row) in record.rows.iter().enumerate() {
         if cycle % window == 0 {
@@ -164,7 +167,7 @@ fn check(row: &Row) -> Result<(), MakeError> {
     Ok(())
 }
 
-/// The checkout, whose experiments and programs are driven.
+/// The checkout with the experiments and programs.
 fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("two folders below the checkout")
 }
@@ -182,7 +185,7 @@ fn experiment_file(recipe: &Recipe, axes: &str) -> Result<PathBuf, MakeError> {
 
 fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeError> {
     let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
-    let set = unsettled(moved);
+    let set = early_start(moved);
     if recipe.both_axes && recipe.unlinked {
         return read_apart(recipe, rig, &set);
     }
@@ -201,7 +204,7 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
     Ok((inputs, scene))
 }
 
-/// Each axis under its own experiment, at the same time.
+/// Both axes, each under its experiment, at the same time.
 fn read_apart(recipe: &Recipe, rig: &RigParameters, set: &[String]) -> Result<(Inputs, Scene), MakeError> {
     let [drive, load] = Axis::ALL.map(|axis| experiment_file(recipe, axis.name()));
     let (drive, load) = (drive?, load?);
@@ -224,8 +227,8 @@ fn program(name: &str) -> Option<String> {
     std::fs::read_to_string(workspace().join(format!("controller/programs/{name}.toml"))).ok()
 }
 
-fn unsettled(axes: impl Iterator<Item = Axis>) -> Vec<String> {
-    axes.flat_map(|axis| UNSETTLED.map(|what| format!("{}.settled.{what}", axis.name()))).collect()
+fn early_start(axes: impl Iterator<Item = Axis>) -> Vec<String> {
+    axes.flat_map(|axis| EARLY_START.map(|what| format!("{}.settled.{what}", axis.name()))).collect()
 }
 
 fn scene(experiment_toml: &str, file: &str, rig: &RigParameters) -> Result<Scene, MakeError> {
@@ -237,19 +240,19 @@ fn scene(experiment_toml: &str, file: &str, rig: &RigParameters) -> Result<Scene
     }
 }
 
-pub(super) struct Made {
+pub(super) struct RecordedRig {
     pub(super) rig: Rig,
     pub(super) state: State,
     pub(super) sensing: [Sensing; 2],
     jitter: Option<Stream>,
     linked: bool,
-    /// Valve openings over the cycle that is sampled.
+    /// Valve openings of the cycle that is sampled.
     expected: [f64; 2],
     row: Option<Row>,
     stopped: bool,
 }
 
-impl Made {
+impl RecordedRig {
     pub(super) fn new(
         recipe: &Recipe,
         rig: &RigParameters,
@@ -283,12 +286,12 @@ impl Made {
         let state = made.start(extension_m);
         let mut sensing: [Sensing; 2] = sensing;
         for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| !made.active[*i]) {
-            // An axis that rests is seen once.
+            // A resting axis is sampled once.
             let mut evaluated = Evaluated::NONE;
             evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
             sensing.see(made.sensed(&state, &evaluated, i));
         }
-        Ok(Made {
+        Ok(RecordedRig {
             rig: made,
             state,
             sensing,
@@ -328,7 +331,7 @@ fn truth(rig: &Rig, state: &State, evaluated: &Evaluated) -> [TrueAxis; 2] {
     })
 }
 
-impl SimulatedRig for Made {
+impl SimulatedRig for RecordedRig {
     type Cycle = Row;
     type Event = Outcome;
 
@@ -365,7 +368,7 @@ impl SimulatedRig for Made {
         None
     }
 
-    /// The record maker has no emergency stop: the record is refused.
+    /// The record maker has no emergency stop: a trip makes the record fail.
     fn emergency_stop(&mut self, _holder: Holder, release: bool) -> Option<Outcome> {
         self.stopped |= !release;
         None
@@ -380,7 +383,7 @@ impl SimulatedRig for Made {
         }
     }
 
-    /// The rig has moved on the commands that were sent, when its sensors were sampled.
+    /// The rig has already moved under the commands when its sensors were sampled.
     fn step(&mut self, _cycle: u64, _valve: [f64; 2]) -> Row {
         self.row.take().expect("sampled before")
     }

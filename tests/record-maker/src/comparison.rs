@@ -1,18 +1,19 @@
-//! A null record against the plant at the same inputs: the record's own valve commands, in windows of equal start and in one run.
+//! A null record against the plant under the valve commands of the record, in windows of equal start and in one free run.
 //!
 //! ```text
 //!   window    plant set to the record's true state, 100 ms under the record's commands      difference / noise at each ms
 //!   free run  plant set once, at the first row                                              the same, for information
 //! ```
 //!
-//! As rig-model.md has it (Accuracy), single samples of the force at stick and contact events are left out of its figure: those
-//! in which one of both holds the piston and the other does not, or before which the piston was caught or let go, or the contact
-//! made or lost. They are counted.
+//! Following rig-model.md (Accuracy), single samples of the force at stick and contact events are excluded and counted: samples
+//! at which only one of the two simulations has the piston stuck, or before which the piston stuck or broke away, or the
+//! contact closed or opened.
 
 use super::closed_loop::{replay_windows, run};
 use super::{MakeError, Recipe, Record, Row};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, SetupError, State};
 
+/// Length of a window, rows of 1 ms.
 pub const WINDOW: usize = 100;
 
 /// Names of the signals of an axis, in the order of [`Row::without_noise`].
@@ -21,22 +22,23 @@ pub const SIGNALS: [&str; 4] = ["position", "force", "pressure a", "pressure b"]
 /// Differences of one signal in units of its sensor's noise.
 #[derive(Debug, Clone, Default)]
 pub struct Difference {
-    pub windows: Vec<f64>,
-    /// Number of samples left out, number of all samples.
+    windows: Vec<f64>,
+    /// Number of excluded samples, number of all samples.
     pub left_out: [usize; 2],
     squares: f64,
     samples: usize,
 }
 
-/// Of both axes and their signals; empty for an axis that rests.
+/// Differences of both axes and their [`SIGNALS`]; empty for a resting axis.
 pub type Differences = [[Difference; 4]; 2];
 
 impl Difference {
+    /// Rms over all windows, in units of the noise; 0 without samples.
     pub fn rms(&self) -> f64 {
         (self.squares / self.samples.max(1) as f64).sqrt()
     }
 
-    /// The window's rms that so many per cent of the windows do not exceed.
+    /// Percentile of the rms of the windows, `percent` from 0 to 100; 0 without windows.
     pub fn percentile(&self, percent: f64) -> f64 {
         let mut sorted = self.windows.clone();
         sorted.sort_by(f64::total_cmp);
@@ -62,10 +64,10 @@ struct Window {
     left_out: usize,
 }
 
-/// Compares a record with the plant of `rig` in windows of `rows`, each from the record's true state.
+/// Compares a record with the plant of `rig` in windows of `rows`, each started from the record's true state.
 ///
 /// # Errors
-/// [`SetupError`] when a true state is none that the plant can be in.
+/// [`SetupError`] when the plant cannot be set to a true state.
 pub fn against_plant(record: &Record, rig: &RigParameters, rows: usize) -> Result<Differences, SetupError> {
     let mut differences = Differences::default();
     let recorded = |i: usize| record.recipe.both_axes || record.recipe.axis.index() == i;
@@ -116,7 +118,8 @@ pub fn against_plant(record: &Record, rig: &RigParameters, rows: usize) -> Resul
     Ok(differences)
 }
 
-/// Rms of two differences from a null, and their cosine, over the signals of the first `axes` in units of the noise.
+/// Rms of the differences of two records from a null record, in units of the noise, and the cosine between them, over the
+/// signals of the first `axes`.
 pub fn from_null(null: &Record, one: &Record, other: &Record, axes: usize) -> [f64; 3] {
     const NOISE: [f64; 4] = [20e-6, 0.5, 400.0, 400.0];
     let [mut one_one, mut other_other, mut product] = [0.0; 3];
@@ -140,7 +143,7 @@ fn noises(rig: &RigParameters) -> [f64; 4] {
     [sensors.position_noise_m, sensors.force_noise_n, sensors.pressure_noise_pa, sensors.pressure_noise_pa]
 }
 
-/// The plant's state at a row; what a record does not hold is that of a start.
+/// The plant's state at a row; states that a record does not hold have their initial values.
 fn state(record: &Record, rig: &RigParameters, row: &Row) -> Result<State, SetupError> {
     let setup = Setup { linked: record.linked, added_mass_kg: record.added_mass_kg, ..Setup::default() };
     let mut state = *Plant::new(rig, &setup)?.state();
@@ -155,12 +158,12 @@ fn state(record: &Record, rig: &RigParameters, row: &Row) -> Result<State, Setup
     Ok(state)
 }
 
-/// What the plant of a rig with the record's effects shows beside what the record's sensors show, from row 0 on: rms of the
-/// first `rows` in units of the noise, for drive and load and their signals. One free run, since a record does not hold what
-/// effects remember; rounding of the sensors is in it, some 0.1 of the noise in position and 0.04 in force and pressure.
+/// Rms difference between the plant of a rig with the record's effects and the record's sensors, over the first `rows`, in
+/// units of the noise, for drive and load and their signals. One free run, since a record does not hold the memory of effects.
+/// Includes the rounding of the sensors: some 0.1 of the noise in position, 0.04 in force and pressure.
 ///
 /// # Errors
-/// When the first state is none that the plant can be in, or the rig's noise cannot be left out.
+/// When the plant cannot be set to the first state, or the rig's noise cannot be switched off.
 pub fn with_effects(
     record: &Record,
     rig: &RigParameters,
@@ -190,8 +193,11 @@ pub fn with_effects(
     Ok(squares.map(|axis| axis.map(|sum| (sum / rows as f64).sqrt())))
 }
 
-/// What halving the step changes: rms of the null record with so many steps in a millisecond against twice as many, in windows of
-/// equal start, in units of the noise; for drive and load and their signals.
+/// Change by halving the step: rms difference between the null record simulated with `steps_per_ms` and with twice as many, in
+/// windows of equal start, in units of the noise; for drive and load and their signals.
+///
+/// # Errors
+/// [`MakeError`] when the recipe is not valid, or a run fails.
 pub fn of_halved_step(
     recipe: &Recipe,
     rig: &RigParameters,

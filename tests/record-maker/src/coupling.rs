@@ -1,12 +1,12 @@
-//! What the load's eye and the carriage pass to each other in the record maker.
+//! Contact between the rod eye of the load and the carriage in the record maker.
 //!
 //! ```text
-//!   F_c = k e + c dd/dt beyond the gap, never pulling against its contact; d = x_load - x_drive
+//!   F_c = k e + c dd/dt beyond the gap, clamped so that the contact never pulls; d = x_load - x_drive
 //! ```
 
 use super::Form;
 
-/// Gap and contact, SI; what of it differs from the file is already in the numbers.
+/// Gap and contact, SI; changed parameters are already in the numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Coupling {
     pub(super) gap_m: f64,
@@ -19,9 +19,9 @@ pub(super) struct Coupling {
     pub(super) form: Form,
 }
 
-/// Width of a worn edge, of the gap, of the forms.
+/// Half-width of a worn edge as a share of the gap, for the three forms.
 const WORN: [f64; 3] = [0.0, 0.05, 0.5];
-/// Force at which all forms of the contact agree, N, and the exponents of the forms.
+/// Force at which all forms of the contact have the same deflection, N, and the exponents of the forms.
 const AGREES_N: f64 = 200.0;
 const HERTZ: [f64; 3] = [1.0, 1.15, 1.5];
 

@@ -1,6 +1,7 @@
-//! Files of a record: `measurement.csv` for whoever names the effect, `truth.csv` and `truth.json` for the judge, in two folders.
+//! Files of a record, in two folders: `measurement.csv` for the program under study, `truth.csv` and `truth.json` for the
+//! judge.
 //!
-//! The measurement holds time and the columns of the recorded axes, no others [rig-model.md, Measurement file]. Numbers have the
+//! The measurement holds time and the columns of the recorded axes only [rig-model.md, Measurement file]. Numbers have the
 //! fewest digits that read back to the same bits.
 
 use super::{Experiment, MakeError, Recipe, Record, Row, hidden, simulate};
@@ -10,7 +11,7 @@ use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::Path;
 
-/// A column: its name, and its value in a row of an axis.
+/// Name of a column, and its value in a row for an axis.
 type Column = (&'static str, fn(&Row, usize) -> f64);
 
 const TRUE: [Column; 21] = [
@@ -37,15 +38,18 @@ const TRUE: [Column; 21] = [
     ("pressure_b_without_noise_Pa", |row, i| row.without_noise[i][3]),
 ];
 
-/// Makes a record and writes it: `measurement.csv` into one folder, `truth.csv` and `truth.json` into another.
+/// Simulates a record and writes it: `measurement.csv` into one folder, `truth.csv` and `truth.json` into another.
 ///
 /// # Errors
-/// As [`simulate`], and when a file cannot be written.
+/// As [`simulate`], and [`MakeError::File`] when a file cannot be written.
 pub fn make(recipe: &Recipe, rig: &RigParameters, measurement: &Path, truth: &Path) -> Result<(), MakeError> {
     write(&simulate(recipe, rig)?, measurement, truth)
 }
 
-/// Writes a record's files into both folders, which are made if missing.
+/// Writes the files of a record into both folders, which are created if missing.
+///
+/// # Errors
+/// [`MakeError::File`] when a file cannot be written.
 pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), MakeError> {
     save(measurement, "measurement.csv", &measurement_csv(record))?;
     save(truth, "truth.csv", &truth_csv(record))?;
@@ -54,7 +58,10 @@ pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), Ma
     save(truth, "truth.json", text.as_bytes())
 }
 
-/// Writes what the sensors read alone into a folder, which is made if missing.
+/// Writes only what the sensors read, as file `name` of a folder, which is created if missing.
+///
+/// # Errors
+/// [`MakeError::File`] when the file cannot be written.
 pub fn write_measurement(record: &Record, folder: &Path, name: &str) -> Result<(), MakeError> {
     save(folder, name, &measurement_csv(record))
 }
@@ -100,7 +107,7 @@ fn truth_csv(record: &Record) -> Vec<u8> {
     for (cycle, row) in record.rows.iter().enumerate() {
         put(&mut out, format_args!("\n{}.{:03}", cycle / 1000, cycle % 1000));
         for axis in recorded(record) {
-            // Debug, for tiny numbers with an exponent: Display would spell out their zeros.
+            // Debug formatting for tiny numbers, which has an exponent: Display would write their zeros.
             TRUE.iter().for_each(|(_, of)| put(&mut out, format_args!(",{:?}", of(row, axis.index()))));
         }
         put(&mut out, format_args!(",{:?},{:?}", row.supply_pressure_pa, row.contact_force_n));
@@ -109,7 +116,7 @@ fn truth_csv(record: &Record) -> Vec<u8> {
     out
 }
 
-/// The recipe, complete: effects with their place and numbers as reports name them.
+/// The complete recipe: effects with place and numbers as reports name them.
 fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
     let effect = |hidden: &super::Hidden| {
         let keys = hidden::sheet(hidden)?.keys.iter().zip(&hidden.numbers);
@@ -151,7 +158,7 @@ fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
         "background": background,
         "experiment": experiment,
     });
-    // Written where it is so: the truth of other records stays what it was.
+    // Written only when set, so that the truth of older records keeps its bytes.
     if recipe.form.is_far() {
         truth["far_form"] = json!(true);
     }

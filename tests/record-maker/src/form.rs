@@ -1,24 +1,26 @@
-//! Which functional form the hidden effects of a recipe have: the catalogue's, or one of two others that mean the same.
+//! Functional form of the hidden effects of a recipe: that of the catalogue, or one of two others for the same phenomenon.
 
-/// The law's own form, one that lies near it, and one that its best fit explains only in part.
+/// The form of the catalogue, one close to it, and one that the catalogue's best fit explains only in part.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Form {
     #[default]
+    /// The law of the catalogue, which the plant has too.
     Catalogue,
     /// The best fit of the catalogue's law leaves about a hundredth of the squared signature.
     Near,
-    /// It leaves 10 to 40 %, where `docs/record-maker.md` says nothing else.
+    /// The best fit of the catalogue's law leaves 10 to 40 % of it, where `docs/record-maker.md` states no other share.
     Far,
 }
 
-/// Drift of an offset: its period, s, and the near form's share.
+/// Drift of an offset: its period, s, and the relative amplitude in the near form.
 const DRIFT_S: f64 = 13.0;
 const NEAR_DRIFT: f64 = 0.15;
 
 impl Form {
+    /// All forms.
     pub const ALL: [Form; 3] = [Form::Catalogue, Form::Near, Form::Far];
 
-    /// As the command line and `truth.json` name it.
+    /// Name on the command line and in `truth.json`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -28,7 +30,7 @@ impl Form {
         }
     }
 
-    /// Whether it is another form than the catalogue's.
+    /// Whether it is not the form of the catalogue.
     #[must_use]
     pub const fn is_foreign(self) -> bool {
         !matches!(self, Form::Catalogue)
@@ -38,7 +40,7 @@ impl Form {
         matches!(self, Form::Far)
     }
 
-    /// The number of this form, of those of all forms.
+    /// Selects the number of this form.
     #[inline(always)]
     pub(super) const fn of(self, [catalogue, near, far]: [f64; 3]) -> f64 {
         match self {
@@ -48,7 +50,8 @@ impl Form {
         }
     }
 
-    /// What one of two sides (chambers, directions) has of the catalogue's number: 1, or `share` more or less in the far form.
+    /// Factor on the catalogue's number for one of two sides (chambers, directions): 1, or in the far form `share` more on the
+    /// first and less on the second.
     #[inline(always)]
     pub(super) const fn side(self, is_first: bool, share: f64) -> f64 {
         match self {
@@ -57,7 +60,7 @@ impl Form {
         }
     }
 
-    /// Slow drift of an offset at a time, 1 on average, by `far` in the far form.
+    /// Factor of the slow drift of an offset at a time, 1 on average; relative amplitude `far` in the far form.
     pub(super) fn drift(self, time_s: f64, far: f64) -> f64 {
         let share = self.of([0.0, NEAR_DRIFT, far]);
         if share == 0.0 {

@@ -1,4 +1,4 @@
-//! From the effects of a recipe to the laws of a rig.
+//! Laws of a rig from the effects of a recipe.
 
 use super::axis::{AirLaws, Axis};
 use super::coupling::Coupling;
@@ -11,7 +11,7 @@ use super::valve::{Valve, ValveLaws};
 use super::{Hidden, MakeError, Recipe};
 use plant::effects::sheet::{Element, Part, PlaceKind, Sheet};
 
-/// Travel time of a line, s/m.
+/// Travel time per length of line, s/m.
 const LINE_S_PER_M: f64 = 2.9e-3;
 
 /// Laws of one axis while they are collected.
@@ -26,7 +26,7 @@ struct Laws {
     late_s: f64,
 }
 
-/// The rig of a recipe, and the laws of both axes' sensors.
+/// The rig of a recipe, and the sensor laws of both axes.
 pub(super) fn rig(
     recipe: &Recipe,
     mut numbers: Numbers,
@@ -92,7 +92,7 @@ pub(super) fn sheet(hidden: &Hidden) -> Result<&'static Sheet, MakeError> {
     plant::effects::sheet(hidden.name).ok_or_else(unknown)
 }
 
-/// Its numbers in SI, checked against the sheet.
+/// The numbers of an effect in SI, checked against its sheet.
 fn si(hidden: &Hidden) -> Result<Vec<f64>, MakeError> {
     let sheet = sheet(hidden)?;
     let good = sheet.keys.len() == hidden.numbers.len()
@@ -129,7 +129,7 @@ fn check_place(recipe: &Recipe, hidden: &Hidden) -> Result<(), MakeError> {
 }
 
 impl Laws {
-    /// One effect of an axis, its numbers in SI in the order of the sheet.
+    /// Adds one effect of an axis; `n` are its numbers in SI in the order of the sheet.
     fn switch_on(&mut self, hidden: &Hidden, n: &[f64]) -> Result<(), MakeError> {
         let chamber = usize::from(hidden.place.element == Some(Element::B));
         let channel = match hidden.place.element {

@@ -1,22 +1,22 @@
-//! Blind records for the study of the workflow: a rig of its own, with hidden effects, under the real controllers.
+//! Blind records for the study of the workflow: a simulated rig with hidden effects under the real controllers.
 //!
 //! ```text
-//!   Recipe ─► true numbers, hidden laws ─► Rig (steps of 10 us) ◄── Rehearsal: frames, station, controllers, the bus' timing
+//!   Recipe ─► true numbers, hidden laws ─► Rig (steps of 10 us) ◄── Rehearsal: frames, controllers, the timing of the bus
 //!                                            │
 //!                                            └─► Record ─► measurement.csv | truth.csv, truth.json in another folder
 //! ```
 //!
-//! The one who names the effect must not be helped by the one who hides it: integrator, step, friction, random numbers and (on
-//! demand) the laws' own forms are other ones than the plant's. Of `plant` it takes the nominal numbers, the data sheets of
-//! the effects and the types of tables and scenes. What it is, and how far its null record lies from the plant:
+//! The simulation that hides an effect must not help the program that names it: integrator, step, friction, random numbers and
+//! (on demand) the functional forms of the laws differ from the plant's. From `plant` come the nominal numbers, the data sheets
+//! of the effects and the types of tables and scenes. Description, and how far the null record lies from the plant:
 //! `docs/record-maker.md`.
 //!
 //! | file | holds |
 //! |---|---|
-//! | `numbers.rs` | true numbers of the rig, some off by a few per cent |
-//! | `background.rs` | errors of the whole model, each small |
-//! | `form.rs` | which form a recipe's laws have |
-//! | `hidden.rs` | from a recipe's effects to laws |
+//! | `numbers.rs` | true numbers of the rig, some wrong by a few per cent |
+//! | `background.rs` | model errors of the whole rig, each small |
+//! | `form.rs` | functional form of the laws |
+//! | `hidden.rs` | laws of the effects of a recipe |
 //! | `valve.rs`, `port.rs`, `axis.rs`, `motion.rs`, `coupling.rs` | the laws, all forms of each |
 //! | `rig.rs` | steps, stick and slip, delays |
 //! | `sensing.rs`, `noise.rs` | sensors |
@@ -25,6 +25,8 @@
 //! | `comparison.rs` | a null record against the plant |
 //!
 //! Source: rig-model.md, effects.md; discrepancy-notes.md, Blind protocol.
+
+#![warn(missing_docs)] // an interface of other crates
 
 mod axis;
 mod background;
@@ -54,22 +56,23 @@ use axis_control::setup::InputError;
 use plant::effects::sheet::Place;
 use plant::{Axis, AxisReadings, SceneError};
 
-/// How long a record is, rows of 1 ms.
+/// Length of a record, rows of 1 ms.
 pub const ROWS: usize = 20_000;
 
-/// Everything that a record follows from: equal recipes give equal bytes.
+/// Everything that determines a record: equal recipes give equal bytes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recipe {
-    /// Of the noise and the sampling instants.
+    /// Seed of the noise and of the sampling instants.
     pub seed: u64,
-    /// The axis that is recorded and moves; both when `both_axes`.
+    /// The axis that moves and is recorded; ignored when `both_axes`.
     pub axis: Axis,
-    /// Both axes, linked: the drive positioned, the load pressing.
+    /// Both axes are linked: the drive is positioned, the load applies a force.
     pub both_axes: bool,
-    /// With `both_axes`: the rods are apart, and both axes positioned.
+    /// With `both_axes`: the rods are not linked, and both axes are positioned.
     pub unlinked: bool,
+    /// Hidden effects; none in a null record.
     pub hidden: Vec<Hidden>,
-    /// Functional form of all of them, and of what is in the background.
+    /// Functional form of all hidden effects, and of those of the background.
     pub form: Form,
     /// Names of [`PARAMETERS`] and the factors by which the true numbers differ from the rig file's, 0.5 to 2.
     pub wrong_parameters: Vec<(String, f64)>,
@@ -79,8 +82,9 @@ pub struct Recipe {
     pub jitter: bool,
     /// Rms of the noise in units of the rig file's; rounding stays.
     pub noise: f64,
-    /// Errors of the whole model beside what is hidden.
+    /// Model errors of the whole rig beside the hidden effects.
     pub background: Option<Background>,
+    /// The experiment that the controllers run.
     pub experiment: Experiment,
 }
 
@@ -104,27 +108,34 @@ impl Default for Recipe {
     }
 }
 
+/// A hidden effect: its place and its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hidden {
+    /// Name of its sheet in [`plant::effects::SHEETS`].
     pub name: &'static str,
+    /// One of the places of its sheet.
     pub place: Place,
-    /// One number for each key of its sheet, in the file's units.
+    /// One number for each key of its sheet, in the units of the rig file.
     pub numbers: Vec<f64>,
 }
 
 /// Experiments of 20 s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Experiment {
-    /// The shipped `identification` in 20 s.
+    /// The shipped `identification`, 20 s.
     Train,
     /// 0: point-to-point moves; 1: random steps with rests.
     HeldOut(u8),
 }
 
+/// A simulated record: what the sensors read, and the truth.
 #[derive(Debug, Clone)]
 pub struct Record {
+    /// The recipe that gave it.
     pub recipe: Recipe,
+    /// The rods of both axes are linked.
     pub linked: bool,
+    /// Mass of the weights on the carriage, kg.
     pub added_mass_kg: f64,
     /// A row for each millisecond.
     pub rows: Vec<Row>,
@@ -135,31 +146,37 @@ pub struct Record {
 pub struct Row {
     /// Nominal time of the sample, s.
     pub time_s: f64,
-    /// Valve commands acting over the millisecond that follows.
+    /// Valve commands of the following millisecond, -1 to 1.
     pub valve: [f64; 2],
+    /// What the sensors read.
     pub readings: [AxisReadings; 2],
-    /// The same at the nominal time without noise and rounding: position m, force N, pressures Pa. Sensor effects are in it.
+    /// Sensor values at the nominal time without noise and rounding, sensor effects included: position m, force N, pressures a
+    /// and b Pa.
     pub without_noise: [[f64; 4]; 2],
+    /// True states.
     pub axes: [TrueAxis; 2],
+    /// Absolute supply pressure at the valves, Pa.
     pub supply_pressure_pa: f64,
     /// Contact force F_c of the linkage, N, positive in +x on the carriage.
     pub contact_force_n: f64,
 }
 
-/// True state of one axis and what acts on it, in its own extension; flows into the chambers.
+/// True state of one axis and what acts on it, along its extension; flows into the chambers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TrueAxis {
+    /// Extension of the rod, m.
     pub extension_m: f64,
-    /// Its rate, m/s; exactly 0 while friction holds it.
+    /// Velocity of the rod, m/s; exactly 0 while friction holds the piston.
     pub rod_velocity_m_per_s: f64,
     /// Rate of the velocity, m/s^2.
     pub rod_acceleration_m_per_s2: f64,
+    /// Spool position, -1 to 1.
     pub spool: f64,
     /// Absolute pressures of a and b, Pa.
     pub pressure_pa: [f64; 2],
-    /// p V of a and b, J.
+    /// p V of chambers a and b, J.
     pub stored_air_j: [f64; 2],
-    /// T of a and b, K.
+    /// T of chambers a and b, K.
     pub temperature_k: [f64; 2],
     /// Lagged net normal flows, m^3/s.
     pub flow_m3_per_s: [f64; 2],
@@ -169,34 +186,93 @@ pub struct TrueAxis {
     pub exhaust_pressure_pa: f64,
     /// Pneumatic force F_pn, N.
     pub pneumatic_force_n: f64,
-    /// All friction, viscous included; what holds a resting piston, N.
+    /// Friction, viscous included; at rest the force that holds the piston, N.
     pub friction_n: f64,
 }
 
+/// Why no record was made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
+    /// No parameter of [`PARAMETERS`], or a factor outside 0.5 to 2.
     #[error("{name} = {factor}: allowed are the names {PARAMETERS:?}, with factors from 0.5 to 2")]
-    WrongParameter { name: String, factor: f64 },
+    WrongParameter {
+        /// Name as the recipe has it.
+        name: String,
+        /// Factor as the recipe has it.
+        factor: f64,
+    },
+    /// No effect of the catalogue.
     #[error("{name}: the catalogue has no such effect; see plant::effects::SHEETS")]
-    UnknownEffect { name: String },
+    UnknownEffect {
+        /// Name as the recipe has it.
+        name: String,
+    },
+    /// An effect at a place that its sheet or the record does not have.
     #[error("{name} at {place}: {rule}")]
-    Place { name: &'static str, place: Place, rule: &'static str },
+    Place {
+        /// Name of the effect.
+        name: &'static str,
+        /// Place as the recipe has it.
+        place: Place,
+        /// The rule that it breaks.
+        rule: &'static str,
+    },
+    /// Numbers of an effect that its sheet does not allow.
     #[error("{name}: {numbers:?}: allowed is {allowed}")]
-    Numbers { name: &'static str, numbers: Vec<f64>, allowed: String },
+    Numbers {
+        /// Name of the effect.
+        name: &'static str,
+        /// Numbers as the recipe has them, in the units of the rig file.
+        numbers: Vec<f64>,
+        /// Names and ranges of the keys.
+        allowed: String,
+    },
+    /// A held-out experiment that does not exist.
     #[error("held-out experiment {number}: allowed are 0 and 1")]
-    Experiment { number: u8 },
+    Experiment {
+        /// Number of the recipe.
+        number: u8,
+    },
+    /// The files of the experiment are not valid.
     #[error(transparent)]
     Run(#[from] InputError),
+    /// The scene of the experiment is not valid.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// An experiment with hands or events, which the record maker does not simulate.
     #[error("{file}: the record maker plays no [[rig.hand]] and no [[rig.event]]")]
-    People { file: String },
+    People {
+        /// The experiment file.
+        file: String,
+    },
+    /// A controller tripped the emergency stop.
     #[error("a controller tripped the emergency stop at {at_s} s")]
-    Stopped { at_s: f64 },
+    Stopped {
+        /// Time of the record, s.
+        at_s: f64,
+    },
+    /// A proposed experiment that does not end within the time that a record may last.
     #[error("{file}: is not done after {length_s} s")]
-    Unfinished { file: String, length_s: f64 },
+    Unfinished {
+        /// The experiment file.
+        file: String,
+        /// Simulated time, s.
+        length_s: f64,
+    },
+    /// A state with a number that is not finite, or a pressure that is not positive.
     #[error("the {axis} axis is in no state of a rig at {at_s} s")]
-    NoState { axis: &'static str, at_s: f64 },
+    NoState {
+        /// Name of the axis.
+        axis: &'static str,
+        /// Time of the record, s.
+        at_s: f64,
+    },
+    /// A file could not be read or written.
     #[error("{path}: {error}")]
-    File { path: String, error: std::io::Error },
+    File {
+        /// Path of the file.
+        path: String,
+        /// What the operating system says.
+        error: std::io::Error,
+    },
 }

@@ -1,4 +1,4 @@
-//! Makes one record of the study by hand, and the tables of docs/record-maker.md; without arguments it says how.
+//! Makes single records of the study, and the tables of docs/record-maker.md; without arguments it prints its usage.
 #![allow(clippy::print_stdout)] // This is what it is for.
 
 use plant::effects::SHEETS;
@@ -39,14 +39,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// An effect at its first place with each key at this end of the drawn range.
+/// An effect at its first place, each key at the lower (0) or upper (1) end of its drawn range.
 fn at_end(sheet: &Sheet, end: usize) -> Recipe {
     let numbers = sheet.keys.iter().map(|key| key.drawn[end]).collect();
     let hidden = vec![Hidden { name: sheet.name, place: sheet.place.places()[0], numbers }];
     Recipe { hidden, both_axes: sheet.name.starts_with("coupling"), ..Recipe::default() }
 }
 
-/// Each effect in the record maker against the same effect in the plant, as Markdown: free runs, in units of the noise.
+/// Prints each effect in the record maker against the same effect in the plant, as Markdown: free runs, in units of the noise.
 fn agree() -> Result<(), Box<dyn Error>> {
     const ROWS_COMPARED: [usize; 3] = [2000, 6000, 10_000];
     let rig = RigParameters::baseline();
@@ -89,7 +89,7 @@ fn steps() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// All forms of all effects at both ends of their range, as Markdown.
+/// Prints all forms of all effects at both ends of their ranges, as Markdown.
 fn forms() -> Result<(), Box<dyn Error>> {
     let rig = RigParameters::baseline();
     let null = [false, true]
@@ -114,7 +114,7 @@ fn forms() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Null records of all experiments against the plant, as Markdown.
+/// Prints null records of all experiments against the plant, as Markdown.
 fn compare() -> Result<(), Box<dyn Error>> {
     let rig = RigParameters::baseline();
     println!("| record | signal | rms | window 50 % | 90 % | 99 % | worst | left out | free run |");
@@ -124,7 +124,7 @@ fn compare() -> Result<(), Box<dyn Error>> {
             let record = simulate(&Recipe { axis, both_axes, experiment, ..Recipe::default() }, &rig)?;
             let windows = comparison::against_plant(&record, &rig, comparison::WINDOW)?;
             let free = comparison::against_plant(&record, &rig, record.rows.len())?;
-            for axis in Axis::ALL.into_iter().filter(|own| both_axes || *own == axis) {
+            for axis in Axis::ALL.into_iter().filter(|shown| both_axes || *shown == axis) {
                 let linked = if both_axes { "linked, " } else { "" };
                 for (signal, name) in comparison::SIGNALS.iter().enumerate() {
                     let difference = &windows[axis.index()][signal];
@@ -197,7 +197,7 @@ fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error
     Ok(())
 }
 
-/// An effect by its place's name; keys that are not given have their defaults.
+/// An effect at the named place; keys without a value have their defaults.
 fn hidden(name: &str, place: &str, values: &str) -> Result<Hidden, Box<dyn Error>> {
     let sheet = plant::effects::sheet(name).ok_or_else(|| format!("no effect {name}; see `list`"))?;
     let place = sheet.place_named(place).ok_or_else(|| format!("{name} is not at {place}; see `list`"))?;

@@ -1,8 +1,8 @@
-//! Forces on a piston: friction with its own stick logic, bristles, and what pushes over the way.
+//! Forces on a piston: friction with stick and slip, bristles, and forces that depend on position.
 //!
-//! A piston is caught when its velocity changes sign within a step (Karnopp's band, as wide as a step makes it) and is then held
-//! at v = 0 to the bit, until what pushes it exceeds the break-away force. With the step going to zero that is the baseline's
-//! stick and slip; at 10 us a caught piston loses less than 1e-4 m/s and 1 nm.
+//! A piston sticks when its velocity changes sign within a step (Karnopp's band, as wide as the step makes it). It is then held
+//! at v = 0 exactly, until the driving force exceeds the break-away force. As the step goes to zero this becomes the stick and
+//! slip of the baseline; at 10 us a piston that sticks loses less than 1e-4 m/s and 1 nm.
 //!
 //! Source: Karnopp 1985, ASME J. Dyn. Sys. 107(1); Canudas de Wit et al. 1995, IEEE TAC 40(3) (LuGre); Dupont et al. 2002,
 //! IEEE TAC 47(5) (elasto-plastic form); Olsson 1996 (fading micro-damping).
@@ -10,7 +10,7 @@
 use super::Form;
 use super::numbers::Numbers;
 
-/// What of the motion's effects is on; SI, in the axis' own extension unless said otherwise.
+/// Effects on the motion that are on; SI, along the extension of the axis unless said otherwise.
 #[derive(Debug, Clone, Default)]
 pub(super) struct MotionLaws {
     pub(super) form: Form,
@@ -48,18 +48,18 @@ pub(super) struct Motion {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct At {
+pub(super) struct FrictionState {
     pub(super) extension_m: f64,
     /// Sum of both gauge pressures, Pa.
     pub(super) gauge_pa: f64,
     /// Pressure of a less that of b, Pa.
     pub(super) across_pa: f64,
     pub(super) rest_s: f64,
-    /// Rest before the last break-away, s, and the extension at which it was, m.
-    pub(super) torn_off: [f64; 2],
+    /// Rest before the last break-away, s, and the extension at which it happened, m.
+    pub(super) last_break_away: [f64; 2],
 }
 
-/// Reach of the elastic stops, m.
+/// Depth of the elastic stops, m.
 const BUFFER_M: f64 = 1e-3;
 /// Speed over which the bristles' friction falls from break-away to sliding, and over which their damping fades, m/s.
 const BRISTLE_M_PER_S: f64 = 1e-3;
@@ -67,25 +67,26 @@ const BRISTLE_M_PER_S: f64 = 1e-3;
 const BRISTLE_DAMPING: f64 = 0.7;
 /// Share of the elasto-plastic bristles' largest deflection that is elastic.
 const ELASTIC_SHARE: f64 = 0.7;
-/// Bristles hold at least this much, N: without any they would have no deflection to relax to.
+/// Smallest force of the bristles, N: without a force they would have no steady deflection.
 const LEAST_N: f64 = 1e-3;
-/// The near form's asymmetry changes sides over this speed, m/s.
+/// The near form's asymmetry changes sign over this speed, m/s.
 const SIDES_M_PER_S: f64 = 2e-2;
-/// Sum of gauge pressures at which near form and catalogue's of pressure-dependent friction agree, Pa.
+/// Sum of gauge pressures at which the near form of pressure-dependent friction agrees with the catalogue's, Pa.
 const SEALS_AGREE_PA: f64 = 5e5;
 /// Rest after which all forms of the growth of break-away agree, s.
 const REST_S: f64 = 10.0;
-/// How much steeper than on average the forms' rail is at its end.
+/// Relative excess of the slope of the forms' rail at its end over the mean slope.
 const RAIL_BENDS: [f64; 3] = [0.0, 0.15, 1.0];
-/// How much larger than on average the far form's asymmetry is where the rod is out.
+/// Relative excess of the far form's asymmetry over its mean with the rod fully extended.
 const ROD_BENDS: f64 = 0.9;
 /// The far form's bristles are stiffer by this share as the rod extends, and softer as it retracts.
 const BRISTLES_DIFFER: f64 = 0.65;
-/// Way over which the growth of the break-away force fades in the far form, m.
+/// Distance over which the growth of the break-away force fades in the far form, m.
 const FILM_M: f64 = 1e-3;
-/// Third harmonic of the forms' cogging.
+/// Relative third harmonic of the forms' cogging.
 const THIRD_HARMONIC: [f64; 3] = [0.0, 0.2, 0.5];
-/// What a far form of friction has more as the rod extends, and less as it retracts: lips of seals do not face both ways.
+/// Share by which a far form of friction is larger as the rod extends and smaller as it retracts: the lips of a seal are not
+/// symmetric.
 const STRIBECK_DIFFERS: f64 = 0.52;
 const BORE_DIFFERS: f64 = 0.55;
 
@@ -106,13 +107,13 @@ impl Motion {
         }
     }
 
-    /// The nearest extension at which no stop pushes, m: where an axis can stand at the start.
+    /// Nearest extension at which no stop pushes, m: where an axis can be at rest initially.
     pub(super) fn beside_the_stops(&self, extension_m: f64) -> f64 {
         let reach_m = if self.laws.stop_n_per_m.is_some() { BUFFER_M } else { 0.0 };
         extension_m.clamp(reach_m, self.stroke_m - reach_m)
     }
 
-    /// Forces beside air, contact and friction, N, along the own extension.
+    /// Forces other than air, contact and friction, N, along the extension.
     #[inline(always)]
     pub(super) fn pushes(&self, extension_m: f64) -> f64 {
         let laws = &self.laws;
@@ -128,7 +129,7 @@ impl Motion {
             let hose = match laws.form {
                 Form::Catalogue => along,
                 Form::Near => 0.75 * along + 0.25 * along * along * along,
-                // It hangs loose in the middle of the way and is drawn straight at the ends.
+                // A cable hangs loose at mid-stroke and is taut at the ends.
                 Form::Far => along * along * along,
             };
             let phase = std::f64::consts::TAU * x / pitch;
@@ -138,28 +139,28 @@ impl Motion {
             }
             rig_n += ripple * wave - spring * hose;
         }
-        let mut own_n = self.to_rig * rig_n;
+        let mut rod_n = self.to_rig * rig_n;
         if let Some(stiffness) = laws.stop_n_per_m {
             let push = |depth_m: f64| {
                 let depth_m = depth_m.max(0.0);
-                // Rubber stiffens; as hard as the spring at half of its reach.
+                // Rubber stiffens; equal to the spring at half of its depth.
                 stiffness * depth_m * if laws.form.is_foreign() { depth_m / (BUFFER_M / 2.0) } else { 1.0 }
             };
-            own_n += push(BUFFER_M - extension_m) - push(extension_m - (self.stroke_m - BUFFER_M));
+            rod_n += push(BUFFER_M - extension_m) - push(extension_m - (self.stroke_m - BUFFER_M));
         }
-        own_n
+        rod_n
     }
 
-    /// Friction of a piston sliding in `direction` at a velocity, N along the own extension, viscous friction included.
+    /// Friction of a piston sliding in `direction` at a velocity, N along the extension, viscous friction included.
     #[inline(always)]
-    pub(super) fn sliding(&self, at: At, velocity: f64, direction: f64) -> f64 {
+    pub(super) fn sliding(&self, at: FrictionState, velocity: f64, direction: f64) -> f64 {
         let side = self.side(at.extension_m, velocity, direction);
         let viscous = self.viscous_n_s_per_m * (1.0 + side * self.laws.asymmetry) * velocity;
         let level = self.sliding_level(at, velocity.abs(), side, direction > 0.0) + self.still_grown(at);
         -direction * level - viscous
     }
 
-    /// -1 to 1: the direction as the asymmetry sees it.
+    /// Direction for the asymmetry, -1 to 1.
     #[inline(always)]
     fn side(&self, extension_m: f64, velocity: f64, direction: f64) -> f64 {
         if self.laws.asymmetry == 0.0 {
@@ -168,7 +169,7 @@ impl Motion {
         match self.laws.form {
             Form::Catalogue => direction,
             Form::Near => libm::tanh(velocity / SIDES_M_PER_S),
-            // A bent rod: it presses on its seal as far as it is out.
+            // A bent rod presses on its seal in proportion to its extension.
             Form::Far => {
                 let mid = self.stroke_m / 2.0;
                 direction * (1.0 + ROD_BENDS * (extension_m - mid) / mid)
@@ -177,7 +178,7 @@ impl Motion {
     }
 
     #[inline(always)]
-    fn sliding_level(&self, at: At, speed: f64, side: f64, extends: bool) -> f64 {
+    fn sliding_level(&self, at: FrictionState, speed: f64, side: f64, extends: bool) -> f64 {
         let laws = &self.laws;
         let mut level = self.sliding_n * (1.0 + side * laws.asymmetry) + self.on_both(at, extends);
         if let Some([velocity, exponent]) = laws.stribeck {
@@ -194,8 +195,8 @@ impl Motion {
         level.max(0.0)
     }
 
-    /// The largest force that a resting piston withstands in a direction, N.
-    pub(super) fn break_away(&self, at: At, direction: f64) -> f64 {
+    /// Largest force that holds a resting piston in a direction, N.
+    pub(super) fn break_away(&self, at: FrictionState, direction: f64) -> f64 {
         let laws = &self.laws;
         let side = if laws.form.is_far() { self.side(at.extension_m, 0.0, direction) } else { direction };
         let mut level = self.break_away_n * (1.0 + side * laws.asymmetry) + self.on_both(at, direction > 0.0);
@@ -217,18 +218,18 @@ impl Motion {
         self.break_away_n * growth * share
     }
 
-    /// What of it is left while the piston slides, N: in the far form the film of oil is built again over some way.
-    fn still_grown(&self, at: At) -> f64 {
+    /// Remainder of the growth while the piston slides, N: in the far form the oil film rebuilds over a distance.
+    fn still_grown(&self, at: FrictionState) -> f64 {
         if !self.laws.form.is_far() || self.laws.rest_growth.is_none() {
             return 0.0;
         }
-        let [rest_s, from_m] = at.torn_off;
+        let [rest_s, from_m] = at.last_break_away;
         self.grown(rest_s) * libm::exp(-(at.extension_m - from_m).abs() / FILM_M)
     }
 
-    /// What pressure and place add to sliding and break-away level alike, N.
+    /// What pressure and position add to both sliding and break-away level, N.
     #[inline(always)]
-    fn on_both(&self, at: At, extends: bool) -> f64 {
+    fn on_both(&self, at: FrictionState, extends: bool) -> f64 {
         let laws = &self.laws;
         let mut sum = 0.0;
         if laws.pressure_slope != 0.0 {
@@ -236,7 +237,7 @@ impl Motion {
             let grown = match laws.form {
                 Form::Catalogue => share,
                 Form::Near => libm::pow(share.max(0.0), 0.8),
-                // A lip is pressed on by what it seals against.
+                // The sealed pressure presses on the lip.
                 Form::Far => 0.2 * share + 1.8 * (at.across_pa / SEALS_AGREE_PA).abs(),
             };
             sum += laws.pressure_slope * SEALS_AGREE_PA * grown;
@@ -267,7 +268,7 @@ impl Motion {
 
     /// Largest deflection of the bristles at this velocity, m, with the sign of the direction.
     #[inline(always)]
-    fn full_deflection(&self, at: At, velocity: f64) -> f64 {
+    fn full_deflection(&self, at: FrictionState, velocity: f64) -> f64 {
         let direction = if velocity < 0.0 { -1.0 } else { 1.0 };
         let side = self.side(at.extension_m, velocity, direction);
         let level = self.sliding_level(at, velocity.abs(), side, direction > 0.0);
@@ -277,14 +278,14 @@ impl Motion {
         direction * (level + more * libm::exp(-share * share)).max(LEAST_N) / stiffness
     }
 
-    /// Of bristles deflected to this side, N/m.
+    /// Stiffness of bristles deflected to this side, N/m.
     #[inline(always)]
     fn stiffness(&self, extends: bool) -> f64 {
         let stiffness = self.laws.presliding.expect("asked for with bristles alone");
         self.laws.form.side(extends, BRISTLES_DIFFER) * stiffness
     }
 
-    /// How much of the bristles' way is slip, 0 to 1.
+    /// Share of the bristles' motion that is slip, 0 to 1.
     #[inline(always)]
     fn slip(&self, deflection: f64, full: f64) -> f64 {
         if self.laws.form != Form::Near {
@@ -301,9 +302,9 @@ impl Motion {
         }
     }
 
-    /// Friction of bristles deflected so, N along the own extension, viscous friction included.
+    /// Friction at a deflection of the bristles, N along the extension, viscous friction included.
     #[inline(always)]
-    pub(super) fn bristles(&self, at: At, velocity: f64, deflection: f64) -> f64 {
+    pub(super) fn bristles(&self, at: FrictionState, velocity: f64, deflection: f64) -> f64 {
         let full = self.full_deflection(at, velocity);
         let slip = self.slip(deflection, full);
         let rate = velocity * (1.0 - slip * deflection / full);
@@ -312,7 +313,7 @@ impl Motion {
             let share = velocity / BRISTLE_M_PER_S;
             self.micro_damping_n_s_per_m * libm::exp(-share * share)
         } else {
-            // Never more than the level at any speed.
+            // Never above the friction level of any speed.
             let level = stiffness * full.abs();
             self.micro_damping_n_s_per_m * level / (level + self.micro_damping_n_s_per_m * velocity.abs())
         };
@@ -322,9 +323,9 @@ impl Motion {
         -(stiffness * deflection + damping * rate + viscous * velocity)
     }
 
-    /// The deflection after a span at a held velocity, m: exact for a held slip.
+    /// The deflection after a span at constant velocity, m: exact for constant slip.
     #[inline(always)]
-    pub(super) fn deflect(&self, at: At, velocity: f64, deflection: f64, span_s: f64) -> f64 {
+    pub(super) fn deflect(&self, at: FrictionState, velocity: f64, deflection: f64, span_s: f64) -> f64 {
         if velocity == 0.0 {
             return deflection;
         }

@@ -1,8 +1,8 @@
 //! Random numbers of a record: one stream for each sensor and one for the sampling instants, all from the recipe's seed.
 //!
 //! Generator: xoshiro256++ [Blackman, Vigna 2021], its state filled by SplitMix64; normal numbers by Box and Muller's transform
-//! with libm's functions, so that a recipe gives the same bytes on every machine. The emulator's sensors draw from another
-//! generator: a record's noise cannot be had from theirs.
+//! with libm's functions, so that a recipe gives the same bytes on every machine. The generator differs from that of the
+//! emulator's sensors, so that the noise of a record cannot be predicted from theirs.
 //!
 //! Source: Blackman, Vigna, "Scrambled linear pseudorandom number generators", ACM Trans. Math. Softw. 47(4), 2021.
 
@@ -11,7 +11,7 @@ use super::background::SLOW_NOISE_SAMPLES;
 #[derive(Debug, Clone)]
 pub(super) struct Stream {
     state: [u64; 4],
-    /// The second of a pair of normal numbers.
+    /// The second of the last pair of normal numbers, if unused.
     spare: Option<f64>,
 }
 
@@ -65,15 +65,15 @@ impl Stream {
 pub(super) struct Noise {
     stream: Stream,
     rms: f64,
-    /// What of a sample is left in the next one.
+    /// Factor of the last sample in the next one.
     kept: f64,
     last: f64,
-    slow: Option<Slow>,
+    slow: Option<SlowNoise>,
 }
 
 /// A part of the noise with a correlation of [`SLOW_NOISE_SAMPLES`].
 #[derive(Debug, Clone)]
-struct Slow {
+struct SlowNoise {
     share: f64,
     last: f64,
 }
@@ -86,7 +86,7 @@ impl Noise {
         let kept = if coloured { libm::exp(-1.0 / CORRELATION_SAMPLES) } else { 0.0 };
         let mut noise = Noise { stream, rms, kept, last: 0.0, slow: None };
         noise.last = noise.stream.normal();
-        noise.slow = slow.map(|share| Slow { share, last: noise.stream.normal() });
+        noise.slow = slow.map(|share| SlowNoise { share, last: noise.stream.normal() });
         noise
     }
 

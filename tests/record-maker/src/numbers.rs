@@ -1,6 +1,6 @@
-//! The true numbers of the rig that a record is made on: those of the rig file, some of them off by a few per cent.
+//! True numbers of the rig of a record: those of the rig file, some of them wrong by a few per cent.
 //!
-//! The controllers and whoever reads the record keep the file's numbers; `parameter:` names are those of effects.md.
+//! The controllers and the reader of the record use the numbers of the file; `parameter:` names are those of effects.md.
 
 use super::{Background, MakeError};
 use plant::RigParameters;
@@ -9,7 +9,7 @@ use plant::parameters::VALVE_POINTS;
 /// From K_V in m^3/h to a conductance c in m^3/s per Pa, of Q = c sqrt((p_P - p_S) p_S) [Neugebauer 2011, eq. 4].
 pub(super) const CONDUCTANCE_PER_KV: f64 = 25.9 / 1e5 / 3600.0;
 
-/// Everything that may merely be wrong, by the names of effects.md.
+/// The parameters that may be wrong, by the names of effects.md.
 pub const PARAMETERS: [&str; 9] = [
     "parameter:mass",
     "parameter:viscous-friction",
@@ -46,18 +46,18 @@ pub(super) struct Numbers {
     pub(super) viscous_n_s_per_m: f64,
     /// Moving mass of drive (with weights) and load, kg.
     pub(super) mass_kg: [f64; 2],
-    /// What of it lies behind each force sensor, kg.
+    /// Part of it behind each force sensor, kg.
     pub(super) behind_kg: [f64; 2],
     pub(super) gap_m: f64,
     pub(super) stiffness_n_per_m: f64,
     pub(super) damping_n_s_per_m: f64,
     pub(super) start_b_pa: f64,
-    /// Share of the sliding friction that is missing near rest, and the speed over which it comes, m/s.
+    /// Share by which the sliding friction is reduced near rest, and the speed over which it returns, m/s.
     pub(super) fading_friction: Option<[f64; 2]>,
 }
 
 impl Numbers {
-    /// The numbers of a rig file with weights on the carriage, `wrong` factors and the background applied.
+    /// The numbers of a rig file with weights on the carriage, the factors `wrong` and the background applied.
     pub(super) fn new(
         rig: &RigParameters,
         added_mass_kg: f64,
@@ -101,7 +101,7 @@ impl Numbers {
         }
         numbers.mass_kg[0] += added_mass_kg;
         numbers.behind_kg[0] += added_mass_kg;
-        // A piston at rest holds at least what holds it while it slides.
+        // The break-away force is never below the sliding friction.
         numbers.break_away_n = numbers.break_away_n.max(numbers.sliding_n);
         Ok(numbers)
     }
@@ -112,7 +112,7 @@ impl Numbers {
             edge.iter_mut().zip(factors).for_each(|(conductance, factor)| *conductance *= factor);
         }
         self.dead_volume_m3 *= background.dead_volume_ratio;
-        // A normal flow brings p_N T / T_0 of energy.
+        // A normal flow brings the energy p_N T / T_0 per volume.
         self.normal_pa *= background.temperature_ratio;
     }
 
@@ -144,7 +144,7 @@ impl Numbers {
         self.supply_edge_m3_per_s_pa[VALVE_POINTS - 1] * self.supply_pa / 2.0
     }
 
-    /// p_a that balances the start's p_b on a resting piston, Pa.
+    /// p_a that balances the initial p_b on a resting piston, Pa.
     pub(super) fn start_a_pa(&self) -> f64 {
         let rod_m2 = self.piston_m2 - self.annulus_m2;
         (self.start_b_pa * self.annulus_m2 + self.atmospheric_pa * rod_m2) / self.piston_m2

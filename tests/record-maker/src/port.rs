@@ -1,4 +1,4 @@
-//! Between valve and chamber: line resistance, check valve and cushion in series, and the flow that fits them all.
+//! Between valve and chamber: line resistance, check valve and cushion in series, and the flow that satisfies all of them.
 //!
 //! ```text
 //!   far side ── edges ── p_port ── line ── check valve ── cushion ── p_chamber
@@ -13,7 +13,7 @@ use super::Form;
 use super::numbers::{CONDUCTANCE_PER_KV, Numbers};
 use super::valve::flow;
 
-/// What is on between valve and chamber; SI.
+/// Effects between valve and chamber that are on; SI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PortLaws {
     pub(super) form: Form,
@@ -34,18 +34,18 @@ pub(super) struct Ports {
 
 /// The near form's check valve opens over this share of the full flow.
 const OPENS_OVER: f64 = 0.03;
-/// The forms' cushion is this much wider at its beginning than at the end.
+/// Relative excess width of the forms' cushion at its beginning over its end.
 const TAPER: [f64; 3] = [0.0, 1.0, 1.0];
-/// The far form's lip does not lift quite: a chamber that fills goes through a cushion so many times as wide.
+/// The far form's lip seal lifts only in part: a chamber that fills sees a cushion so many times as wide.
 const LIP_LIFTS: f64 = 7.0;
-/// The far forms: what chamber a has more, and b less, of the cracking pressure of a check valve and of the drop of a line's
-/// filter.
+/// Shares by which the far forms' cracking pressure of a check valve and drop of a line's filter are larger in chamber a and
+/// smaller in b.
 const SPRINGS_DIFFER: f64 = 0.5;
 const FILTERS_DIFFER: f64 = 0.25;
-/// A flow is found when it is as close as this, of the full one, or after so many trials.
+/// Tolerance of a flow as a share of the full flow, and the largest number of iterations.
 const CLOSE: f64 = 1e-7;
 const MOST_TRIALS: usize = 60;
-/// Flows below are none, of the full one.
+/// Flows below this share of the full flow are taken as zero.
 const NEGLIGIBLE: f64 = 1e-9;
 
 impl Ports {
@@ -57,9 +57,9 @@ impl Ports {
         }
     }
 
-    /// The port's pressure, Pa, and the flow, m^3/s, for a chamber whose piston face is `to_end_m` from its end.
+    /// Port pressure, Pa, and flow, m^3/s, for a chamber whose piston face is `to_end_m` from its end.
     ///
-    /// `edges` is the flow of all edges into the chamber at a port pressure, m^3/s, falling.
+    /// `edges` is the flow of all edges into the chamber as a function of the port pressure, m^3/s, falling.
     #[inline(always)]
     pub(super) fn pressure(
         &self,
@@ -87,7 +87,7 @@ impl Ports {
             return (chamber_pa, free);
         }
         let direction = free.signum();
-        // Flows of orifices are roots of pressures: in their squares the miss is next to straight.
+        // Flows of orifices are square roots of pressures: in squared flows the residual is nearly linear.
         let miss = |square: f64| {
             let flow = square.sqrt();
             let port_pa = self.beyond(chamber, direction * flow, [chamber_pa, to_end_m]);
@@ -95,7 +95,7 @@ impl Ports {
             (square - passes * passes, flow - passes, port_pa)
         };
         let (mut low, mut high) = (0.0, free * free);
-        // The limit of a small flow: what the check valve needs to crack.
+        // The limit of a small flow: the cracking pressure of the check valve.
         let (mut miss_low, _, port_pa) = miss(least * least * 1e-6);
         if miss_low >= 0.0 {
             return (port_pa, 0.0);
@@ -135,7 +135,7 @@ impl Ports {
         }
         if let Some([cracking_pa, kv]) = laws.check_valve {
             let opened = flow.abs() / (OPENS_OVER * self.full_flow_m3_per_s);
-            // Near: the spring of the seat is pressed on as it opens.
+            // Near: the spring of the seat is compressed as it opens.
             let share = if laws.form == Form::Near {
                 0.7 + 0.3 * opened / (1.0 + opened * opened).sqrt()
             } else {
@@ -158,7 +158,7 @@ impl Ports {
     }
 }
 
-/// Pressure on the other side of an orifice with `pa` on the chamber's; 0 where it would have to pass more than it can.
+/// Pressure on the other side of an orifice with `pa` on the chamber side; 0 for a flow above the choked one.
 fn behind_orifice(c: f64, flow: f64, pa: f64) -> f64 {
     let throat = flow / c;
     if flow > 0.0 {
@@ -170,7 +170,7 @@ fn behind_orifice(c: f64, flow: f64, pa: f64) -> f64 {
     if root < 0.0 { 0.0 } else { pa / 2.0 + root.sqrt() }
 }
 
-/// A volume that both chambers' exhausts, or both axes' supplies, have in common; SI.
+/// A volume shared by the exhausts of both chambers or by the supplies of both axes; SI.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
     pub(super) volume_m3: f64,
@@ -184,22 +184,23 @@ pub(super) enum Passage {
     Orifice(f64),
     /// A flow in proportion to the difference, m^3/s per Pa.
     Linear(f64),
-    /// Sintered bronze: as much as the orifice of this conductance when choked, but choked below [`SINTERED_RATIO`] alone.
+    /// Sintered bronze: same choked flow as the orifice of this conductance, but choked only below [`SINTERED_RATIO`].
     Sintered(f64),
-    /// A flow with the square of the difference: this flow, m^3/s, at this one, Pa.
-    Stiff(f64, f64),
-    /// Darcy's law: a flow with the difference of the squares, as much as the orifice of this conductance at twice the outside.
+    /// A flow proportional to the square of the difference: this flow, m^3/s, at this difference, Pa.
+    Quadratic(f64, f64),
+    /// Darcy's law: a flow proportional to the difference of the squared pressures, equal to that of the orifice of this
+    /// conductance at twice the outside pressure.
     Porous(f64),
 }
 
 impl Node {
-    /// The supply node behind a regulator that falls by `droop_pa` when one full supply edge draws.
+    /// The supply node behind a regulator whose pressure falls by `droop_pa` at the flow of one full supply edge.
     pub(super) fn supply(numbers: &Numbers, [droop_pa, volume_m3]: [f64; 2], form: Form) -> Self {
         let (full, set_pa) = (numbers.full_flow_m3_per_s(), numbers.supply_pa);
         let passage = match form {
             Form::Catalogue => Passage::Orifice(full / (droop_pa * (set_pa - droop_pa)).sqrt()),
             Form::Near => Passage::Linear(full / (LINEAR_SHARE * droop_pa)),
-            Form::Far => Passage::Stiff(full, LINEAR_SHARE * droop_pa),
+            Form::Far => Passage::Quadratic(full, LINEAR_SHARE * droop_pa),
         };
         Node { volume_m3, outside_pa: set_pa, passage }
     }
@@ -222,7 +223,7 @@ impl Node {
         match self.passage {
             Passage::Orifice(c) => flow(c, self.outside_pa, node_pa),
             Passage::Linear(per_pa) => per_pa * (self.outside_pa - node_pa),
-            Passage::Stiff(flow, at_pa) => {
+            Passage::Quadratic(flow, at_pa) => {
                 let share = (self.outside_pa - node_pa) / at_pa;
                 flow * share * share.abs()
             }
@@ -242,6 +243,6 @@ impl Node {
 
 /// Critical pressure ratio of the near form's silencer.
 const SINTERED_RATIO: f64 = 0.2;
-/// The foreign forms' regulator falls by this share of the droop at full flow: as much on average as an orifice, whose drop
-/// grows with the square of the flow.
+/// The near and far forms' regulator falls by this share of the droop at full flow. On average it then equals an orifice, whose
+/// drop grows with the square of the flow.
 const LINEAR_SHARE: f64 = 0.6;

@@ -1,13 +1,14 @@
-//! Both axes of the record maker, moved by explicit midpoint steps that are short beside every time constant of the rig.
+//! Both axes of the record maker, integrated by explicit midpoint steps that are short beside every time constant of the rig.
 //!
 //! ```text
-//!   stage 1   rates at t          truth for the sensors, break-away decided here
+//!   stage 1   rates at t          true values for the sensors; break-away is decided here
 //!   stage 2   rates at t + h/2    from the state half a step on; bristles by their exact exponential
-//!   end       y + h rates         then: caught if the velocity changed sign, ends of the stroke, bounds of the lagged flow
+//!   end       y + h rates         then stick if the velocity changed sign, ends of the stroke, bounds of the lagged flow
 //! ```
 //!
-//! It shares no code and no scheme with the plant, which goes by exact exponentials of 100 us and locates corners; here corners
-//! cost the length of a step. What both must agree on is rig-model.md. How far they agree stands in `tests/docs/record-maker.md`.
+//! It shares neither code nor integration scheme with the plant, which uses exact exponentials over 100 us and locates events.
+//! Here an event costs an error of the length of a step. Both implement rig-model.md. Their difference:
+//! `tests/docs/record-maker.md`.
 
 use super::axis::{AIR, Air, Axis, EXHAUST, FLOW, LINE_LAG_SHARE, LINES_DIFFER, NORMAL, SPOOL, V, X, Y};
 use super::coupling::Coupling;
@@ -16,33 +17,33 @@ use super::sensing::{CHANNELS, Sensing};
 use super::valve::Play;
 use super::{Form, TrueAxis};
 
-/// Steps in a millisecond: 10 us, a tenth of the plant's substep. See the table of convergence in the docs.
+/// Steps in a millisecond: 10 us, a tenth of the plant's substep. The docs have a table of convergence.
 pub(super) const STEPS_PER_MS: usize = 100;
 
-/// Periods that a late command may be old, and one.
-const COMMANDS: usize = 16;
-/// Slower than this a piston on bristles is at rest, m/s.
+/// Commands kept for late execution: the current one, and those of as many periods as a command may be late.
+const KEPT_COMMANDS: usize = 16;
+/// Below this speed a piston on bristles is at rest, m/s.
 const CREEP_M_PER_S: f64 = 1e-5;
-/// Share of the near form's dead time that is a lag.
+/// Share of the near form's dead time that is a first-order lag.
 const LATE_LAG_SHARE: f64 = 0.2;
-/// The far form's dead time slides from a third to five thirds and jumps back, as that of two clocks does that are
-/// not synchronised: by which share, and how often, s.
+/// The far form's dead time is a sawtooth about its mean, as between two clocks that are not synchronised: relative amplitude,
+/// and period, s.
 const LATE_SLIDES: f64 = 0.66;
 const LATE_BEAT_S: f64 = 0.37;
-/// By how much the far form's null drifts as the valve warms up.
+/// Relative drift of the far form's null as the valve warms up.
 const NULL_DRIFTS: f64 = 0.7;
 
 #[derive(Debug, Clone)]
 pub(super) struct Rig {
     pub(super) axes: [Axis; 2],
-    /// Axes that are moved; the other one rests.
+    /// Axes that move; the other one rests.
     pub(super) active: [bool; 2],
     pub(super) coupling: Option<Coupling>,
     pub(super) supply: Option<Node>,
     /// Command dead time of each axis, s.
     pub(super) late_s: [f64; 2],
     pub(super) form: Form,
-    /// Steps by Euler's method in place of the midpoint's.
+    /// Euler's method instead of the midpoint's.
     pub(super) first_order: bool,
     pub(super) steps_per_ms: usize,
 }
@@ -52,20 +53,20 @@ pub(super) struct State {
     pub(super) y: [Y; 2],
     /// Deflection of the bristles, m.
     pub(super) bristles: [f64; 2],
-    /// Direction of sliding; 0 for a piston that is held.
+    /// Direction of sliding; 0 for a piston that sticks.
     pub(super) direction: [f64; 2],
     pub(super) rest_since_s: [f64; 2],
-    /// Rest before the last break-away, s, and the extension at which it was, m.
-    torn_off: [[f64; 2]; 2],
+    /// Rest before the last break-away, s, and the extension at which it happened, m.
+    last_break_away: [[f64; 2]; 2],
     pub(super) supply_pa: f64,
     play: [Play; 2],
     late: [f64; 2],
-    commands: [[f64; COMMANDS]; 2],
+    commands: [[f64; KEPT_COMMANDS]; 2],
     lines: [Line; 2],
     pub(super) steps: u64,
 }
 
-/// What flowed through the valve in the middle of each of the last steps.
+/// Flow through the valve at the middle of each of the last steps.
 #[derive(Debug, Clone, Default)]
 struct Line {
     ring: Vec<[f64; 2]>,
@@ -95,17 +96,17 @@ impl Rig {
             bristles: [0.0; 2],
             direction: [0.0; 2],
             rest_since_s: [0.0; 2],
-            torn_off: [[0.0; 2]; 2],
+            last_break_away: [[0.0; 2]; 2],
             supply_pa: self.axes[0].numbers.supply_pa,
             play: [Play::default(); 2],
             late: [0.0; 2],
-            commands: [[0.0; COMMANDS]; 2],
+            commands: [[0.0; KEPT_COMMANDS]; 2],
             lines: [line(0), line(1)],
             steps: 0,
         }
     }
 
-    /// Puts the smooth states of the baseline where a record says they were.
+    /// Sets the smooth states of the baseline to those of a record.
     pub(super) fn set(&self, state: &mut State, axes: &[TrueAxis; 2]) {
         for (i, axis) in axes.iter().enumerate() {
             let y = &mut state.y[i];
@@ -133,7 +134,8 @@ impl Rig {
         state.steps as f64 * self.step_s()
     }
 
-    /// Moves by one period under these commands; the sensors see the truth of each step, `at_start` that of the first one.
+    /// Advances by one period under these commands. The sensors get the true values of each step, `at_start` those of the
+    /// first.
     pub(super) fn advance(
         &self,
         state: &mut State,
@@ -158,7 +160,7 @@ impl Rig {
         }
     }
 
-    /// True values of position, force, pressures of an axis, in rig coordinates.
+    /// True values of position, force and pressures of an axis, in rig coordinates.
     pub(super) fn sensed(&self, state: &State, evaluated: &Evaluated, i: usize) -> [f64; CHANNELS] {
         let axis = &self.axes[i];
         let x = state.y[i][X];
@@ -168,7 +170,7 @@ impl Rig {
         [position, force, a, b]
     }
 
-    /// Where both spools are sent in a step of the period.
+    /// Target positions of both spools in a step of the period.
     fn targets(&self, state: &mut State, step: usize) -> [f64; 2] {
         let mut targets = [0.0; 2];
         for (i, target) in targets.iter_mut().enumerate() {
@@ -187,10 +189,10 @@ impl Rig {
             let late_s = self.late_s[i];
             let mut command = past[0];
             if late_s > 0.0 {
-                // Over the step; it meets at most one edge of the command.
+                // Mean over the step, in which the command changes at most once.
                 let end_ms = (step + 1) as f64 / self.steps_per_ms as f64 - pure * late_s * 1e3;
                 let begin_ms = end_ms - 1.0 / self.steps_per_ms as f64;
-                let at = |ms: f64| past[((-ms.floor()).max(0.0) as usize).min(COMMANDS - 1)];
+                let at = |ms: f64| past[((-ms.floor()).max(0.0) as usize).min(KEPT_COMMANDS - 1)];
                 let before_edge = (end_ms.ceil() - 1.0 - begin_ms).max(0.0) * self.steps_per_ms as f64;
                 let share = before_edge.min(1.0);
                 command = share * at(begin_ms) + (1.0 - share) * at(end_ms - 1e-9);
@@ -207,7 +209,7 @@ impl Rig {
         targets
     }
 
-    /// Evaluates the laws at the start of a step, and lets go what is torn off.
+    /// Evaluates the laws at the start of a step, and starts the motion of pistons that break away.
     fn evaluate_first(&self, state: &mut State, targets: [f64; 2]) -> Evaluated {
         let lines = [0, 1].map(|i| self.delay_steps(i).map(|_| state.lines[i].leaves));
         let time_s = self.time_s(state);
@@ -218,12 +220,12 @@ impl Rig {
             bristles: state.bristles,
             supply_pa: state.supply_pa,
             rest_s,
-            torn_off: state.torn_off,
+            last_break_away: state.last_break_away,
         };
         let evaluated = self.evaluate(&at, &mut direction, targets, lines, true);
         for i in 0..2 {
             if state.direction[i] == 0.0 && direction[i] != 0.0 {
-                state.torn_off[i] = [rest_s[i], state.y[i][X]];
+                state.last_break_away[i] = [rest_s[i], state.y[i][X]];
             }
         }
         state.direction = direction;
@@ -236,7 +238,7 @@ impl Rig {
         direction: &mut [f64; 2],
         targets: [f64; 2],
         lines: [Option<[f64; 2]>; 2],
-        lets_go: bool,
+        may_break_away: bool,
     ) -> Evaluated {
         let mut evaluated = Evaluated::NONE;
         let mut drawn = 0.0;
@@ -262,7 +264,7 @@ impl Rig {
         }
         for i in 0..2 {
             if self.active[i] {
-                self.move_axis(i, at, direction, &mut evaluated, lets_go);
+                self.move_axis(i, at, direction, &mut evaluated, may_break_away);
             }
         }
         evaluated
@@ -275,11 +277,11 @@ impl Rig {
         at: &Instant<'_>,
         direction: &mut [f64; 2],
         evaluated: &mut Evaluated,
-        lets_go: bool,
+        may_break_away: bool,
     ) {
         let (axis, y) = (&self.axes[i], &at.y[i]);
         let motion = &axis.motion;
-        let place = axis.at(y, &evaluated.air[i], at.rest_s[i], at.torn_off[i]);
+        let place = axis.at(y, &evaluated.air[i], at.rest_s[i], at.last_break_away[i]);
         let pushed_n = evaluated.air[i].force_n + motion.pushes(y[X]) + evaluated.contact_n;
         let stroke_m = axis.numbers.stroke_m;
         let pressed = |force: f64| y[X] <= 0.0 && force < 0.0 || y[X] >= stroke_m && force > 0.0;
@@ -292,7 +294,7 @@ impl Rig {
             evaluated.rates[i][V] = if held { 0.0 } else { sum / motion.mass_kg };
             return;
         }
-        if direction[i] == 0.0 && lets_go && !pressed(pushed_n) {
+        if direction[i] == 0.0 && may_break_away && !pressed(pushed_n) {
             let way = if pushed_n < 0.0 { -1.0 } else { 1.0 };
             if pushed_n.abs() > motion.break_away(place, way) {
                 direction[i] = way;
@@ -308,7 +310,7 @@ impl Rig {
         evaluated.rates[i][V] = (pushed_n + friction_n) / motion.mass_kg;
     }
 
-    /// Moves by one step from what its start was evaluated to.
+    /// Advances by one step from the evaluation at its start.
     fn step(&self, state: &mut State, targets: [f64; 2], first: &Evaluated) {
         let h = self.step_s();
         let rest_s = [0, 1].map(|i| self.time_s(state) - state.rest_since_s[i]);
@@ -318,7 +320,8 @@ impl Rig {
             if self.active[i] {
                 add(&mut y[i], &first.rates[i], h / 2.0);
                 if self.axes[i].motion.laws.presliding.is_some() {
-                    let place = self.axes[i].at(&state.y[i], &first.air[i], rest_s[i], state.torn_off[i]);
+                    let place =
+                        self.axes[i].at(&state.y[i], &first.air[i], rest_s[i], state.last_break_away[i]);
                     bristles[i] = self.axes[i].motion.deflect(place, state.y[i][V], bristles[i], h / 2.0);
                 }
             }
@@ -326,7 +329,7 @@ impl Rig {
         let supply_pa = state.supply_pa + h / 2.0 * first.supply_rate;
         let lines = [0, 1].map(|i| self.leaving(state, i, &y[i], supply_pa));
         let mut direction = state.direction;
-        let at = Instant { y: &y, bristles, supply_pa, rest_s, torn_off: state.torn_off };
+        let at = Instant { y: &y, bristles, supply_pa, rest_s, last_break_away: state.last_break_away };
         let middle =
             if self.first_order { *first } else { self.evaluate(&at, &mut direction, targets, lines, false) };
         for i in 0..2 {
@@ -336,12 +339,12 @@ impl Rig {
             let from = state.y[i];
             add(&mut state.y[i], &middle.rates[i], h);
             if state.y[i][SPOOL].abs() > 1.0 {
-                // The spool meets the end of its way.
+                // The spool reaches its stop.
                 (state.y[i][SPOOL], state.y[i][SPOOL + 1]) = (state.y[i][SPOOL].signum(), 0.0);
             }
             let axis = &self.axes[i];
             if axis.motion.laws.presliding.is_some() {
-                let place = axis.at(&y[i], &middle.air[i], rest_s[i], state.torn_off[i]);
+                let place = axis.at(&y[i], &middle.air[i], rest_s[i], state.last_break_away[i]);
                 state.bristles[i] = axis.motion.deflect(place, y[i][V], state.bristles[i], h);
             }
             self.catch(state, i, &from);
@@ -352,7 +355,7 @@ impl Rig {
         state.steps += 1;
     }
 
-    /// What leaves the lines of an axis in the middle of this step; keeps what enters them.
+    /// Flow out of the lines of an axis at the middle of this step; stores what enters them.
     fn leaving(&self, state: &mut State, i: usize, y: &Y, supply_pa: f64) -> Option<[f64; 2]> {
         let delay = self.delay_steps(i).filter(|_| self.active[i])?;
         let enters = self.axes[i].air(y, supply_pa).edge_flow;
@@ -372,7 +375,7 @@ impl Rig {
         Some(leaves)
     }
 
-    /// Catches a piston that turned round within the step, and stops one at the ends.
+    /// Sticks a piston whose velocity changed sign within the step, and stops one at the ends.
     #[inline(always)]
     fn catch(&self, state: &mut State, i: usize, from: &Y) {
         let axis = &self.axes[i];
@@ -380,7 +383,7 @@ impl Rig {
         let y = &mut state.y[i];
         let sticks = axis.motion.laws.presliding.is_none();
         if sticks && state.direction[i] != 0.0 && y[V] * state.direction[i] <= 0.0 {
-            // It goes on to where a straight line of the velocity meets zero.
+            // It moves on to where the straight line of the velocity crosses zero.
             let share = if from[V] == y[V] { 0.0 } else { (from[V] / (from[V] - y[V])).clamp(0.0, 1.0) };
             y[X] = from[X] + from[V] * share * self.step_s() / 2.0;
             y[V] = 0.0;
@@ -407,7 +410,7 @@ struct Instant<'a> {
     bristles: [f64; 2],
     supply_pa: f64,
     rest_s: [f64; 2],
-    torn_off: [[f64; 2]; 2],
+    last_break_away: [[f64; 2]; 2],
 }
 
 impl Evaluated {
@@ -420,7 +423,7 @@ impl Evaluated {
         exhaust_pa: 0.0,
         force_n: 0.0,
     };
-    /// Nothing moves.
+    /// At rest.
     pub(super) const NONE: Evaluated = Evaluated {
         rates: [[0.0; 14]; 2],
         air: [Self::NO_AIR; 2],
@@ -437,8 +440,8 @@ fn add(y: &mut Y, rates: &Y, span_s: f64) {
     }
 }
 
-/// A lagged flow neither fills a chamber past its supply nor empties it past its exhaust: it stops, and the air stays at the
-/// bound that it has just passed.
+/// A lagged flow neither fills a chamber beyond its supply nor empties it below its exhaust: it becomes zero, and the air stays
+/// at the bound that it has just passed.
 #[inline(always)]
 fn bound(axis: &Axis, y: &mut Y, from: &Y, supply_pa: [f64; 2]) {
     let volumes = axis.volumes(y[X]);

@@ -4,7 +4,7 @@
 //!   truth, each step ─► lags ─► ring of the last milliseconds ─► at t_k (- age) (+ jitter) ─► gain, offset ─► noise ─► rounded
 //! ```
 //!
-//! A period is integrated before it is sampled, so that an instant a little after t_k is the truth too and no guess.
+//! A period is integrated before it is sampled, so that the value shortly after t_k is known too.
 
 use super::Form;
 use super::noise::{Noise, Stream};
@@ -14,7 +14,7 @@ use plant::{AxisReadings, Reading};
 /// Position, force, pressure a, pressure b.
 pub(super) const CHANNELS: usize = 4;
 
-/// What of the sensors' effects is on, for each channel; SI.
+/// Effects on the sensors that are on, for each channel; SI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SensingLaws {
     pub(super) form: Form,
@@ -28,10 +28,10 @@ pub(super) struct SensingLaws {
 pub(super) struct Sensing {
     laws: SensingLaws,
     parameters: SensorParameters,
-    /// What the sensor reads too much by its mounting, m.
+    /// Error of the reading by the mounting of the sensor, m.
     mounted_m: f64,
     step_s: f64,
-    /// Up to three lags in a row.
+    /// Up to three lags in series.
     lags: [[Option<Lag>; 3]; CHANNELS],
     before: [f64; CHANNELS],
     ring: Vec<[f64; CHANNELS]>,
@@ -41,38 +41,39 @@ pub(super) struct Sensing {
 
 #[derive(Debug, Clone, Copy)]
 struct Lag {
-    rising: Time,
-    falling: Time,
+    rising: LagTime,
+    falling: LagTime,
     shown: f64,
 }
 
-/// Time of a lag, and the share that is left after a step.
+/// Time constant of a lag, s, and the share of a difference that remains after a step.
 #[derive(Debug, Clone, Copy)]
-struct Time {
+struct LagTime {
     s: f64,
     kept: f64,
 }
 
-/// Share of the near form's skew that is a lag.
+/// Share of the near form's skew that is a first-order lag.
 const AGE_LAG_SHARE: f64 = 0.25;
-/// The far form's skew slides by this share about its mean and jumps back so often, s: two clocks that are not synchronised.
+/// The far form's skew is a sawtooth about its mean, as between two clocks that are not synchronised: relative amplitude, and
+/// period, s.
 const AGE_SLIDES: [f64; CHANNELS] = [0.28, 0.5, 0.8, 0.8];
 const AGE_BEAT_S: f64 = 0.37;
-/// The far form's position sensor measures in a cycle of its own, so many of its lags long, and holds the value; its lag is
-/// shorter by half of that.
+/// The far form's position sensor samples with a period of so many of its lags and holds the value; its lag is shorter by half
+/// of that period.
 const HOLDS_LAGS: f64 = 0.36;
-/// By how much the far forms' offsets drift.
+/// Relative drift of the far forms' offsets.
 const DRIFTS: [f64; CHANNELS] = [0.55, 0.7, 0.7, 0.7];
 /// The far form's pressure sensor is slower by this share as the pressure falls, and faster as it rises.
 const SNUBBER_DIFFERS: f64 = 0.5;
-/// How the forms' gains bend over the way, with the force and with the pressure.
+/// Curvature of the forms' gains over position, force and pressure.
 const FORCE_BENDS: [f64; 3] = [0.0, 0.1, 0.85];
 const POSITION_BENDS: [f64; 2] = [-0.4, 2.8];
-/// By how much the far form's gain of a pressure drifts.
+/// Relative drift of the far form's gain of a pressure.
 const GAIN_DRIFTS: f64 = 0.7;
-/// Longest look back and ahead, ms.
+/// Farthest sample back or ahead, ms.
 const REACH_MS: usize = 14;
-/// Half of the pressure range of use and a force of use, where the near form's gains are those of the catalogue.
+/// Half of the usual pressure range, where the near form's gain equals the catalogue's, Pa, and a usual force, N.
 const GAIN_AGREES_PA: f64 = 4e5;
 const GAIN_BENDS_N: f64 = 40.0;
 
@@ -85,7 +86,7 @@ impl Sensing {
         streams: impl Fn(usize) -> Stream,
         (noise, coloured, slow): (f64, bool, Option<f64>),
     ) -> Self {
-        let time = |s: f64| Time { s, kept: libm::exp(-step_s / s) };
+        let time = |s: f64| LagTime { s, kept: libm::exp(-step_s / s) };
         let between = |s: f64, differs: f64| {
             let of = |rises: bool| time(laws.form.side(!rises, differs) * s);
             (s > 0.0).then(|| Lag { rising: of(true), falling: of(false), shown: 0.0 })
@@ -95,7 +96,7 @@ impl Sensing {
             let (lag_s, age_s) = (laws.lag_s[channel], laws.age_s[channel]);
             match laws.form {
                 Form::Catalogue => [lag(lag_s), None, None],
-                // Two equal lags in a row, as an anti-aliasing filter has; a skew whose end is soft.
+                // Two equal lags in series, as in an anti-aliasing filter; a skew with a smooth step response.
                 Form::Near => [lag(lag_s / 2.0), lag(lag_s / 2.0), lag(AGE_LAG_SHARE * age_s)],
                 Form::Far if channel == 0 => [lag((1.0 - HOLDS_LAGS / 2.0) * lag_s), None, None],
                 Form::Far => [between(lag_s, SNUBBER_DIFFERS), None, None],
@@ -127,7 +128,7 @@ impl Sensing {
         }
     }
 
-    /// Takes the truth at the start of a step.
+    /// Stores the true values at the start of a step.
     #[inline(always)]
     pub(super) fn see(&mut self, truth: [f64; CHANNELS]) {
         let first = self.steps == 0;
@@ -147,14 +148,14 @@ impl Sensing {
         self.steps += 1;
     }
 
-    /// What the sensors would show without noise at step `at`, a sample of `time_s`, and `late_s` after it.
+    /// Values without noise at step `at`, for a sample of `time_s` taken `late_s` later.
     pub(super) fn without_noise(&self, at: usize, late_s: f64, time_s: f64) -> [f64; CHANNELS] {
         let laws = &self.laws;
         std::array::from_fn(|channel| {
             let back_s = match laws.form {
                 Form::Catalogue => laws.age_s[channel] - late_s,
                 Form::Near => (1.0 - AGE_LAG_SHARE) * laws.age_s[channel] - late_s,
-                Form::Far => self.slid_s(channel, at as f64 * self.step_s + late_s) - late_s,
+                Form::Far => self.far_age_s(channel, at as f64 * self.step_s + late_s) - late_s,
             };
             let truth = self.seen(channel, at as f64 - back_s / self.step_s);
             let mounted = if channel == 0 { self.mounted_m } else { 0.0 };
@@ -165,8 +166,8 @@ impl Sensing {
         })
     }
 
-    /// How old the value of the far form is at an instant, s.
-    fn slid_s(&self, channel: usize, instant_s: f64) -> f64 {
+    /// Age of the value of the far form at an instant, s.
+    fn far_age_s(&self, channel: usize, instant_s: f64) -> f64 {
         let laws = &self.laws;
         let saw = |turns: f64| turns - turns.floor();
         let slid = 1.0 + AGE_SLIDES[channel] * (2.0 * saw(instant_s / AGE_BEAT_S) - 1.0);
@@ -204,7 +205,7 @@ impl Sensing {
         gain * bent * truth
     }
 
-    /// Readings of values without noise: noise added, rounded, clipped.
+    /// Readings from values without noise: noise added, rounded, clipped.
     pub(super) fn read(&mut self, values: [f64; CHANNELS]) -> AxisReadings {
         let parameters = &self.parameters;
         let pressure = [parameters.pressure_step_pa(), 0.0, parameters.pressure_counts()];
@@ -230,7 +231,7 @@ impl Sensing {
 }
 
 impl Lag {
-    /// What is shown after a step in which the truth went straight from one value to another.
+    /// Output after a step in which the input went linearly from one value to another.
     #[inline(always)]
     fn after(&self, shown: f64, from: f64, to: f64, step_s: f64) -> f64 {
         let time = if to < shown { self.falling } else { self.rising };

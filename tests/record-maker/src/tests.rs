@@ -1,4 +1,4 @@
-//! Claims of the record maker: the same bytes again, all effects in all forms, sticking, convergence, no truth in a measurement.
+//! Tests of the record maker: reproducible bytes, all effects in all forms, sticking, convergence, no truth in a measurement.
 
 use super::closed_loop::{replay_with, run};
 use super::files::measurement_csv;
@@ -12,7 +12,7 @@ fn rig() -> RigParameters {
     RigParameters::baseline()
 }
 
-/// An effect at its first place with a number of each key.
+/// An effect at its first place with a number for each key.
 fn hidden(sheet: &Sheet, number: impl Fn(&[f64; 2]) -> f64) -> Hidden {
     let numbers = sheet.keys.iter().map(|key| number(&key.drawn)).collect();
     Hidden { name: sheet.name, place: sheet.place.places()[0], numbers }
@@ -37,7 +37,7 @@ fn commands(rows: usize) -> Vec<[f64; 2]> {
         (200, 0.07),
     ];
     let parts = PARTS.iter().flat_map(|(rows, command)| std::iter::repeat_n(*command, *rows));
-    // The controllers' commands are never as still: 1 % at 25 Hz.
+    // The controllers' commands are never this still: 1 % at 25 Hz.
     let hum = |row: usize| 0.01 * libm::sin(std::f64::consts::TAU * row as f64 / 40.0);
     let both = |(row, command): (usize, f64)| [command + hum(row), -0.3 * command - hum(row)];
     parts.cycle().take(rows).enumerate().map(|row| both(row).map(plant::quantise_valve)).collect()
@@ -90,7 +90,7 @@ fn all_effects_of_an_axis_together_keep_the_rig_a_rig() {
 
 #[test]
 fn records_of_the_catalogues_and_the_near_form_keep_their_bytes() {
-    // Draws of all studies before there were far forms. FNV-1a.
+    // Draws of all studies before the far forms existed. FNV-1a.
     let hash = |bytes: &[u8]| {
         bytes.iter().fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| {
             (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3)
@@ -120,11 +120,11 @@ fn a_foreign_form_differs_from_the_catalogues_and_means_the_same() {
         let null = &null[usize::from(recipe.both_axes)];
         let name = sheet.name;
         let mut others = Vec::new();
-        // Alike means: the same direction within 45 degrees, far within 70, the size within a factor of three.
+        // Alike: the same direction within 45 degrees, far within 70; the size within a factor of three.
         for (form, least_cosine) in [(Form::Near, 0.7), (Form::Far, 0.34)] {
             let foreign = replay(&Recipe { form, ..recipe.clone() }, &rig(), &valves).unwrap();
             let [one, other, cosine] = comparison::from_null(null, &own, &foreign, 2);
-            // A rest's growth moves a few instants of break-away: far, a free run has other ones.
+            // The growth of a rest moves a few instants of break-away: in a free run of the far form they are others.
             if form == Form::Far && name == "rest-time-dependent-break-away" {
                 others.push(foreign);
                 continue;
@@ -138,7 +138,7 @@ fn a_foreign_form_differs_from_the_catalogues_and_means_the_same() {
             one.rows.iter().zip(&other.rows).any(|(a, b)| a.without_noise != b.without_noise)
         };
         let [near, far] = &others[..] else { panic!("two other forms") };
-        // The near form of heat exchange is far enough.
+        // The near form of heat exchange is different enough.
         let is_one_more = differ(near, far) || name == "heat-exchange";
         assert!(differ(&own, near) && differ(&own, far) && is_one_more, "{name}");
     }
@@ -147,8 +147,8 @@ fn a_foreign_form_differs_from_the_catalogues_and_means_the_same() {
 
 #[test]
 fn every_effect_of_the_catalogues_form_is_the_plants_effect() {
-    // One stroke at full opening, into the cushion: short of where corners decide, as the end of the stroke and a chamber that
-    // meets the supply's pressure, where the lagged flow jumps.
+    // One stroke at full opening, into the cushion. It ends before events decide, such as the end of the stroke, and a chamber
+    // that reaches the supply pressure, where the lagged flow jumps.
     const ROWS: usize = 660;
     let valves = commands(ROWS);
     for sheet in SHEETS {
@@ -162,7 +162,7 @@ fn every_effect_of_the_catalogues_form_is_the_plants_effect() {
             let active = if recipe.both_axes { &rms[..] } else { &rms[..1] };
             active.iter().flatten().copied().fold(0.0, f64::max)
         };
-        // A free run under given commands: half of the noise, or a fiftieth of the effect where corners come at other instants.
+        // A free run under given commands: half of the noise, or a fiftieth of the effect where events come at other instants.
         let (size, off) = (largest(&rig()), largest(&plants));
         assert!(off < f64::max(0.5, size / 50.0), "{}: {off} of the noise, the effect is {size}", sheet.name);
     }
@@ -177,7 +177,7 @@ fn a_held_piston_rests_to_the_bit_under_load() {
         .map(|rows| [rows[0].axes[0], rows[1].axes[0]])
         .filter(|[one, other]| one.rod_velocity_m_per_s == 0.0 && other.rod_velocity_m_per_s == 0.0)
         .collect();
-    // It slips and is caught again within a millisecond at most a few times.
+    // It slips and sticks again within a millisecond at most a few times.
     let moved = held.iter().filter(|[one, other]| one.extension_m != other.extension_m).count();
     assert!(moved * 100 < held.len(), "{moved} of {}", held.len());
     assert!(held.iter().any(|[one, _]| one.pneumatic_force_n.abs() > 20.0), "under load");
@@ -189,7 +189,7 @@ fn halving_the_step_changes_next_to_nothing() {
     for both_axes in [false, true] {
         let recipe = Recipe { both_axes, ..Recipe::default() };
         let changed = comparison::of_halved_step(&recipe, &rig(), [5000, STEPS_PER_MS]).unwrap();
-        // A twentieth of the noise: 400 records would have to be averaged to see it.
+        // A twentieth of the noise: it would show in the mean of no fewer than 400 records.
         assert!(changed.iter().flatten().all(|rms| *rms < 0.05), "{changed:?}");
     }
 }
@@ -212,7 +212,7 @@ fn halving_the_step_changes_next_to_nothing_with_the_stiffest_effects() {
         let halved = replay_with(&recipe, &rig(), &valves, 2 * STEPS_PER_MS).unwrap();
         let null = Record { rows: own.rows.clone(), ..own.clone() };
         let [_, rms, _] = comparison::from_null(&null, &own, &halved, 2);
-        // A free run under given commands, where what was missed once stays: a fifth of the noise.
+        // A free run under given commands, in which errors persist: a fifth of the noise.
         assert!(rms < 0.2, "{name}: {rms}");
     }
 }
@@ -296,7 +296,7 @@ fn null_records_lie_within_a_fifth_of_the_noise_of_the_plant() {
             let differences = comparison::against_plant(&record, &rig(), comparison::WINDOW).unwrap();
             for (signals, axis) in differences.iter().zip(Axis::ALL) {
                 for (difference, name) in signals.iter().zip(comparison::SIGNALS) {
-                    // What rig-model.md allows any simulation of it (Accuracy), so both may not be wrong by more.
+                    // The deviation that rig-model.md (Accuracy) allows any simulation, so neither may be wrong by more.
                     let rms = difference.rms();
                     assert!(rms < 0.2, "{recipe:?}: {} {name}: {rms} of the noise", axis.name());
                     let left_out = difference.left_out;

@@ -4,14 +4,14 @@
 //!   command (late, shifted, with play) ─► target ─► spool, rate ─► opening (overlap) ─► c of both supply and both exhaust edges
 //! ```
 //!
-//! Each law has the catalogue's form and two others that mean the same ([`Form`]); their tables stand in
+//! Each law has the form of the catalogue and two others for the same phenomenon ([`Form`]); their tables are in
 //! `tests/docs/record-maker.md`.
 
 use super::Form;
 use super::numbers::Numbers;
 use plant::parameters::VALVE_POINTS;
 
-/// What of the valve's effects is on; SI.
+/// Effects of the valve that are on; SI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ValveLaws {
     pub(super) form: Form,
@@ -42,15 +42,15 @@ pub(super) struct Valve {
     edges: [[f64; VALVE_POINTS]; 2],
 }
 
-/// What the play between command and spool remembers.
+/// State of the play between command and spool.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Play {
     command: f64,
-    /// By how much its output lags behind the command.
+    /// Lag of its output behind the command.
     lag: f64,
 }
 
-/// Spool, its rate, and the third state that only the near form has.
+/// Spool position, its rate, and the third state that only the near form has.
 pub(super) type Spool = [f64; 3];
 
 impl Valve {
@@ -59,13 +59,13 @@ impl Valve {
         Valve { laws, time_s: numbers.spool_time_s, opening: numbers.opening, edges }
     }
 
-    /// Where the spool is sent by a command that acts now; to be asked once a step, since the play moves.
+    /// Target position of the spool for the acting command. To be called once a step, since it updates the play.
     pub(super) fn target(&self, command: f64, play: &mut Play, drift: f64) -> f64 {
         let moved = command - play.command;
         let half = self.laws.form.side(command > 0.0, SOLENOIDS_DIFFER) * self.laws.play;
         play.command = command;
         if half > 0.0 && self.laws.form == Form::Near && moved != 0.0 {
-            // Coleman, Hodgdon 1986: the lag bends exponentially towards the side that it comes from.
+            // Coleman, Hodgdon 1986: the lag approaches the limit exponentially after a reversal.
             let side = half.copysign(moved);
             play.lag = side + (play.lag - side) * libm::exp(-moved.abs() / (PLAY_BEND * half));
         } else {
@@ -93,7 +93,7 @@ impl Valve {
         };
         let w = std::f64::consts::TAU * frequency_hz * laws.form.side(!opens, SPRING_SPEEDS);
         if laws.form == Form::Near {
-            // The pilot stage ahead of it is a lag of its own; a stiffer slide makes up for its time.
+            // The pilot stage ahead of it is a first-order lag; a stiffer slide compensates for its time.
             let (w, lag_s) = (FOREIGN_STIFFER * w, FOREIGN_PILOT / w);
             let pull = w * w * (third - place) - 2.0 * damping * w * rate;
             return [limit(rate), pull, (target - third) / lag_s];
@@ -152,11 +152,11 @@ impl Valve {
         if self.laws.form != Form::Near {
             return (opening - d).max(0.0) / (1.0 - d);
         }
-        // A rounded edge: softplus of width d / 4, through 0 at 0 and 1 at 1.
+        // A rounded edge: softplus of width d / 4, 0 at 0 and 1 at 1.
         let width = d / 4.0;
         let soft = |o: f64| {
             let over = (o - d) / width;
-            // Beyond 40 widths the edge's rounding is below a rounding.
+            // Beyond 40 widths the rounding of the edge is below the rounding of the number.
             if over > 40.0 { o - d } else { width * libm::log1p(libm::exp(over)) }
         };
         (soft(opening) - soft(0.0)) / (soft(1.0) - soft(0.0))
@@ -201,15 +201,15 @@ impl Valve {
     }
 }
 
-/// Length of the near form's bend of the play, in half-widths.
+/// Length over which the near form's play closes, in half-widths.
 const PLAY_BEND: f64 = 0.5;
-/// The near form's flow has ISO 6358-3's subsonic index m for an exponent: 0.5, and this share of what b lies below 0.5.
+/// Exponent of the near form's flow, the subsonic index m of ISO 6358-3: 0.5 plus this share of 0.5 - b.
 const SUBSONIC_SHIFT: f64 = 0.15;
-/// The near form's spool: its slide against the catalogue's natural frequency, and its pilot's lag in units of 1/w.
+/// The near form's spool: natural frequency of its slide over that of the catalogue, and lag of its pilot in units of 1/w.
 const FOREIGN_STIFFER: f64 = 1.15;
 const FOREIGN_PILOT: f64 = 0.25;
-/// The far forms: lands that one direction has worn more than the other, ports that differ, and a spring that helps the spool to
-/// close and is in its way when it opens; each is the share that one side has more, and the other less.
+/// The far forms: lands worn more in one direction, unequal ports, and a spring that helps the spool to close and opposes its
+/// opening; each is the share by which one side is larger and the other smaller.
 const SOLENOIDS_DIFFER: f64 = 0.5;
 const NOTCHES_DIFFER: f64 = 0.42;
 const OVERLAPS_DIFFER: f64 = 0.65;
