@@ -1,4 +1,4 @@
-//! What a campaign is given of a draw: the keys that its file may collect.
+//! What a campaign collects of a draw: the keys of its answer.
 //!
 //! ```text
 //! run, leave-out   kind, axis, hidden, where, over_limit, called, wall_s, memory_mib
@@ -6,15 +6,15 @@
 //!   leave-out      verdict, no_wrong_name, balance_right, variable_right, closed
 //! resolve          outcome, experiment
 //! ```
-//! Truths are 0 or 1; what does not apply to a draw is left out. The rates with their intervals, and what counts as right, are
-//! [`super::score`]'s: a campaign shows how far it is, and where it goes wrong.
+//! Truth values are 0 or 1; keys that do not apply to a draw are missing. The rates with their intervals, and what counts as
+//! right, are in [`super::score`]: a campaign only shows its progress and where the program fails.
 
 use crate::draws::Kind;
-use crate::resolve::{self, Found};
+use crate::resolve::{self, ProposalState};
 use crate::score::Case;
 use serde_json::{Map, Value, json};
 
-/// Of a draw that a program was let loose on.
+/// The answer for a draw that the program has run on: a JSON object with the keys of `run` or `leave-out`.
 pub fn of_case(case: &Case) -> Value {
     let judgement = &case.judgement;
     let hidden = &judgement.hidden;
@@ -56,12 +56,14 @@ pub fn of_case(case: &Case) -> Value {
     Value::Object(answer)
 }
 
-/// Of a draw that the program left open, or not.
-pub fn of_found(found: &Found, outcome: Option<resolve::Outcome>) -> Value {
+/// The answer for a draw of `resolve`: a JSON object. `outcome` is that of a measured experiment.
+pub fn of_proposal(found: &ProposalState, outcome: Option<resolve::Outcome>) -> Value {
     match found {
-        Found::NotOpen => json!({"outcome": "not-open"}),
-        Found::NothingProposed => json!({"outcome": "nothing-proposed"}),
-        Found::Measured(resolution) => json!({"outcome": outcome, "experiment": resolution.experiment}),
+        ProposalState::NotOpen => json!({"outcome": "not-open"}),
+        ProposalState::NothingProposed => json!({"outcome": "nothing-proposed"}),
+        ProposalState::Measured(resolution) => {
+            json!({"outcome": outcome, "experiment": resolution.experiment})
+        }
     }
 }
 

@@ -1,23 +1,23 @@
-//! Which effects leave the same signature in a record: arithmetic in place of taste.
+//! Classes of effects that leave the same signature in a record, by the cosine between the signatures.
 //!
 //! ```text
 //! cosine = |M J_true . M J_other| / (|M J_true| |M J_other|)         above 0.95 the two count as one class in this record
 //! ```
 //!
-//! J_true is the hidden effect at its drawn numbers, in the catalogue's form; J_other each other effect, and the same one at
-//! other places of the measured axes, at the geometric mean of its drawn range with the shapes' defaults. The windows start
-//! from the truth of the very record ([`super::signature`]). Union is by draw: what is alike in one record need not be in
-//! another.
+//! J_true is the signature of the hidden effect at its drawn numbers, in the catalogue's form. J_other is that of each other
+//! effect, and of the same one at other places of the measured axes, at the geometric mean of its drawn range with default
+//! shapes. The windows start from the true states of the record ([`super::signature`]). Classes are formed per draw: effects
+//! that are alike in one record need not be in another.
 //!
-//! Parameters of the baseline are compared too, by 5 %. A wrong parameter is no missing effect, so such a twin is reported but is
-//! not in the class.
+//! Parameters of the baseline are compared too, changed by 5 %. A wrong parameter is no missing effect, so such a twin is
+//! reported but is not in the class.
 
 use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, axis_of};
 use crate::folder::{FolderError, Plan, read};
 use crate::limits::threshold;
 use crate::nearest::NearestLaw;
-use crate::signature::{Observer, alike, length};
+use crate::signature::{Observer, abs_cosine, length};
 use crate::trajectory::TrueTrajectory;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{Place, Sheet};
@@ -28,61 +28,64 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Cosine above which two effects count as one class.
-pub const TWIN_COSINE: f64 = 0.95;
-/// Cosine above which a pair is worth telling.
-const TOLD_COSINE: f64 = 0.8;
-/// What a parameter of the baseline is off by when it is compared.
+pub(crate) const TWIN_COSINE: f64 = 0.95;
+/// Cosine above which a pair is reported.
+const REPORTED_COSINE: f64 = 0.8;
+/// Factor on a parameter of the baseline when it is compared.
 const PARAMETER_FACTOR: f64 = 1.05;
 
-/// Another effect, or a parameter, and how alike it is.
+/// Another effect, or a parameter, and the cosine of its signature.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Member {
-    pub effect: String,
-    /// Where it is; nothing for a parameter.
+pub(crate) struct Member {
+    /// Name of the effect or parameter.
+    pub(crate) effect: String,
+    /// Its place; empty for a parameter.
     #[serde(rename = "where")]
-    pub place: String,
+    pub(crate) place: String,
     /// |cosine| of the two signatures.
-    pub cosine: f64,
+    pub(crate) cosine: f64,
 }
 
-/// What resembles one hidden effect.
+/// Class of one hidden effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HiddenClass {
-    pub effect: String,
+pub(crate) struct HiddenClass {
+    pub(crate) effect: String,
     #[serde(rename = "where")]
-    pub place: String,
-    /// |M J| in this record over what an ideal observer needs.
-    pub strength: f64,
-    /// What is more than 0.8 alike, the most alike first; the first in any case.
-    pub members: Vec<Member>,
-    /// The catalogue's law that is nearest to a hidden effect of another form.
+    pub(crate) place: String,
+    /// |M J| in this record over the threshold of an ideal observer.
+    pub(crate) strength: f64,
+    /// Members with a cosine above 0.8, in descending order; the first one in any case.
+    pub(crate) members: Vec<Member>,
+    /// The catalogue's law nearest to a hidden effect of another form.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nearest: Option<NearestLaw>,
+    pub(crate) nearest: Option<NearestLaw>,
 }
 
+/// The classes of the hidden effects of a draw, as `classes/NUMBER.json` holds them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DrawClasses {
-    pub schema_version: u32,
-    pub number: usize,
-    pub hidden: Vec<HiddenClass>,
+    pub(crate) schema_version: u32,
+    pub(crate) number: usize,
+    pub(crate) hidden: Vec<HiddenClass>,
 }
 
 /// The classes of a whole study, as `tests/study/classes.json` holds them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Classes {
-    pub plan: Plan,
-    pub draws: Vec<DrawClasses>,
+    pub(crate) plan: Plan,
+    pub(crate) draws: Vec<DrawClasses>,
 }
 
 impl Classes {
-    /// Those of these draws, by their numbers there: the same draw has another number in a study of another shape.
+    /// The committed classes of these draws, by their number. A draw is identified by its recipe, since its number depends on
+    /// the shape of the study.
     ///
-    /// Noise of another size scales all signatures alike, but for the rounding of the sensors: the classes stay, and a strength
-    /// is the one at the noise of this study, as the committed limits are.
+    /// The size of the noise is ignored: it scales all signatures alike, but for the rounding of the sensors. The strengths are
+    /// those at the noise of this study, as the committed limits are.
     pub fn of_draws(&self, draws: &[Draw]) -> BTreeMap<usize, DrawClasses> {
         let own = self.plan.draws();
         let recipe_of = |number: usize| own.get(number).map(|draw| &draw.recipe);
@@ -98,11 +101,11 @@ impl Classes {
     }
 }
 
-/// The classes of a draw in its train record.
+/// Computes the classes of a draw in its train record.
 ///
 /// # Errors
-/// [`ParameterError`] when a drawn effect is refused: a bug of the catalogue.
-pub fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<DrawClasses, ParameterError> {
+/// [`ParameterError`] when a drawn effect is refused, which is a fault of the catalogue.
+pub(crate) fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<DrawClasses, ParameterError> {
     let measured = trajectory.measured;
     let observer = Observer::new(trajectory);
     let rig = observer.rig();
@@ -129,12 +132,12 @@ pub fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<DrawClasses
             .map(|(effect, at, signature)| Member {
                 effect: effect.clone(),
                 place: at.clone(),
-                // Four digits are more than the comparison is worth, and the file stays small.
-                cosine: (alike(&own, signature) * 1e4).round() / 1e4,
+                // Four digits are precise enough, and keep the file small.
+                cosine: (abs_cosine(&own, signature) * 1e4).round() / 1e4,
             })
             .collect();
         members.sort_by(|left, right| right.cosine.total_cmp(&left.cosine));
-        let reported = members.iter().take_while(|member| member.cosine > TOLD_COSINE).count();
+        let reported = members.iter().take_while(|member| member.cosine > REPORTED_COSINE).count();
         members.truncate(reported.max(1));
         let two_sided = sheet.keys[0].signed;
         let strength = length(&own) / threshold(two_sided);
@@ -149,16 +152,16 @@ pub fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<DrawClasses
     Ok(DrawClasses { schema_version: SCHEMA_VERSION, number: draw.number, hidden: hidden_classes })
 }
 
-/// Whether something at this place could be seen in a record of these axes.
+/// Whether an effect at this place shows in a record of these axes.
 fn is_measured(place: Place, measured: [bool; 2]) -> bool {
     axis_of(place).map_or(measured == [true, true], |axis| measured[axis.index()])
 }
 
-/// The middle of what is drawn.
+/// The first key of a sheet at the middle of its drawn range.
 pub(crate) fn nominal(sheet: &Sheet) -> Vec<(&'static str, f64)> {
     let key = &sheet.keys[0];
     let mean = (key.drawn[0] * key.drawn[1]).sqrt();
-    // The middle must not be the baseline itself.
+    // The middle must not be the baseline.
     let value = if key.neutral.is_some_and(|neutral| (mean / neutral).ln().abs() < 0.1) {
         key.drawn[1]
     } else {
@@ -167,14 +170,18 @@ pub(crate) fn nominal(sheet: &Sheet) -> Vec<(&'static str, f64)> {
     vec![(key.name, value)]
 }
 
-/// A rig one of whose parameters is off by a factor.
+/// A rig with one parameter multiplied by a factor.
 ///
 /// # Errors
-/// [`ParameterError`] when the rig file would not take it.
+/// [`ParameterError`] when the rig file does not allow the value.
 ///
 /// # Panics
-/// For a name that is none of [`PARAMETERS`].
-pub fn with_parameter(rig: &RigParameters, name: &str, factor: f64) -> Result<RigParameters, ParameterError> {
+/// For a name that is not in [`PARAMETERS`].
+pub(crate) fn with_parameter(
+    rig: &RigParameters,
+    name: &str,
+    factor: f64,
+) -> Result<RigParameters, ParameterError> {
     let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect::<Vec<_>>();
     let (friction, cylinder, valve) = (rig.friction(), rig.cylinder(), rig.valve());
     match name {
@@ -211,10 +218,10 @@ pub fn with_parameter(rig: &RigParameters, name: &str, factor: f64) -> Result<Ri
     }
 }
 
-/// Reads the classes of a draw.
+/// Reads the classes of draw `number`.
 ///
 /// # Errors
-/// [`FolderError`] when the file is none of this version.
+/// [`FolderError`] when the file cannot be read, is of another version or of another draw.
 pub fn read_draw(path: &Path, number: usize) -> Result<DrawClasses, FolderError> {
     let classes: DrawClasses = serde_json::from_str(&read(path)?)
         .map_err(|error| FolderError::content(path, format!("holds no classes of this version: {error}")))?;

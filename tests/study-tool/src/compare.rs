@@ -1,11 +1,11 @@
-//! Several scores side by side, in Markdown: one column for each program, so that what another one does better is seen.
+//! Tables of several scores in Markdown, with a column for each program.
 //!
 //! ```text
 //! 166/223 (68 to 80 %)        a rate that should be high, with Wilson's interval of 95 %
 //! 0/100 (at most 3.0 %)       a rate that should be low, with the exact one-sided bound of 95 %
 //! ```
 //!
-//! The scores may be of different studies, as far as they are of one mode: the first row says of how many draws and which seed.
+//! The scores may be of different studies of one mode: the first row states the number of draws and the seed.
 
 use crate::draws::Shape;
 use crate::interval::Rate;
@@ -14,22 +14,30 @@ use crate::score::Score;
 use crate::score::tables::{Line, Split, Spread};
 use std::fmt::Write;
 
+/// Why scores cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
+    /// No scores.
     #[error("nothing to compare: give LABEL@FOLDER, once for each program")]
-    Nothing,
+    Empty,
+    /// One score has the hidden effects left out of the catalogue, the other one has not.
     #[error(
         "'{left}' and '{right}' are of different modes, one without the hidden effects: compare them apart"
     )]
-    Modes { left: String, right: String },
+    Modes {
+        /// Label of one score.
+        left: String,
+        /// Label of the other one.
+        right: String,
+    },
 }
 
-/// The tables of several scores: targets and figures, parts of the draws, effect by effect.
+/// The tables of several scores in Markdown: targets and figures, parts of the draws, effect by effect.
 ///
 /// # Errors
-/// [`CompareError`] when there is none or they are of different modes.
+/// [`CompareError`] when there is no score, or the scores are of different modes.
 pub fn markdown(scores: &[Score]) -> Result<String, CompareError> {
-    let first = scores.first().ok_or(CompareError::Nothing)?;
+    let first = scores.first().ok_or(CompareError::Empty)?;
     let is_left_out = |score: &Score| score.leave_out.is_some();
     if let Some(other) = scores.iter().find(|other| is_left_out(other) != is_left_out(first)) {
         return Err(CompareError::Modes { left: first.label.clone(), right: other.label.clone() });
@@ -57,7 +65,7 @@ pub fn markdown(scores: &[Score]) -> Result<String, CompareError> {
     Ok(text)
 }
 
-/// A row: its name, a cell for each score, what is wanted.
+/// A row: its name, a cell for each score, the target.
 struct Row {
     name: String,
     cells: Vec<String>,
@@ -74,16 +82,16 @@ pub(crate) fn reported(rate: &Rate) -> String {
 }
 
 /// `0/100 (at most 3.0 %)`.
-fn told_low(rate: &Rate) -> String {
+fn bound_cell(rate: &Rate) -> String {
     if rate.of == 0 {
         return "none".to_owned();
     }
     format!("{}/{} (at most {:.1} %)", rate.count, rate.of, rate.at_most * 100.0)
 }
 
-/// Of a line whose rate should be low, the bound above; else the interval.
-pub(crate) fn told_line(line: &Line) -> String {
-    if line.is_low() { told_low(&line.rate) } else { reported(&line.rate) }
+/// The upper bound for a line whose rate should be low, else the interval.
+pub(crate) fn line_cell(line: &Line) -> String {
+    if line.is_low() { bound_cell(&line.rate) } else { reported(&line.rate) }
 }
 
 fn quantile(spread: &Spread, at: usize, scale: f64, unit: &str) -> String {
@@ -102,7 +110,7 @@ fn figures(scores: &[Score]) -> Vec<Row> {
     ];
     let lines = scores.first().map_or(&[][..], |first| &first.tables.headline);
     rows.extend(lines.iter().enumerate().map(|(at, line)| {
-        let cell = |score: &Score| score.tables.headline.get(at).map_or(String::new(), told_line);
+        let cell = |score: &Score| score.tables.headline.get(at).map_or(String::new(), line_cell);
         row(&line.name, line.wanted, &cell)
     }));
     let is_left_out = scores.iter().any(|score| score.leave_out.is_some());
@@ -138,7 +146,7 @@ fn figures(scores: &[Score]) -> Vec<Row> {
     rows
 }
 
-/// The rate of a class among the names, part by part; parts that no score has a draw of are left out.
+/// The rate of the class among the names, part by part, without the parts that no score has a draw of.
 fn parts(scores: &[Score], of: impl Fn(&Score) -> &Vec<Split>) -> Vec<Row> {
     let splits = scores.first().map_or(&[][..], |first| of(first));
     let row = |(at, split): (usize, &Split)| Row {
@@ -154,7 +162,7 @@ fn parts(scores: &[Score], of: impl Fn(&Score) -> &Vec<Split>) -> Vec<Row> {
     splits.iter().enumerate().filter(|(at, _)| any(*at)).map(row).collect()
 }
 
-/// What a column is called: the label, and noise and amplitudes where they are not the specified ones.
+/// Head of a column: the label, and noise and amplitudes where they are not the specified ones.
 fn head(score: &Score) -> String {
     let Shape { noise_factor, weaker_factor, .. } = score.shape;
     let mut head = score.label.clone();
@@ -214,7 +222,7 @@ pub(crate) fn verdicts(split: &LeftSplit) -> String {
 }
 
 pub(crate) fn grid(heads: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    // A bar within a cell would end it.
+    // An unescaped bar would end the cell.
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
     let mut text = line(heads);
     let _ = writeln!(text, "|{}", "---|".repeat(heads.len()));
@@ -264,7 +272,7 @@ mod tests {
         assert!(text.contains("outside-catalogue 1 |"));
         let mixed = markdown(&[scored("ours"), scored_without("without")]).unwrap_err();
         assert_eq!(mixed, CompareError::Modes { left: "ours".to_owned(), right: "without".to_owned() });
-        assert_eq!(markdown(&[]), Err(CompareError::Nothing));
+        assert_eq!(markdown(&[]), Err(CompareError::Empty));
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! What is computed before any program is judged: limits and classes, from records whose truth is known.
+//! What is computed before any program is judged: limits and classes, from records with known truth.
 
 use crate::SCHEMA_VERSION;
 use crate::classes::{Classes, DrawClasses, classes_of, read_draw};
 use crate::draws::Draw;
 use crate::folder::{FolderError, Study, write_whole};
-use crate::limits::{Limits, Measured, limits_in};
+use crate::limits::{Limits, MeasuredAxes, limits_in};
 use crate::nearest::nearest_law;
 use crate::signature::Observer;
 use crate::trajectory::{Point, TrueTrajectory, WINDOW};
@@ -15,30 +15,45 @@ use record_maker::{MakeError, Recipe, Record, simulate};
 use serde_json::json;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+/// Why limits or classes were not computed.
 #[derive(Debug, thiserror::Error)]
 pub enum ComputeError {
+    /// The record of a draw cannot be made.
     #[error("draw {number}: {error}")]
-    Make { number: usize, error: MakeError },
+    Make {
+        /// Number of the draw.
+        number: usize,
+        /// Why.
+        error: MakeError,
+    },
+    /// The rig file does not allow an effect or a parameter.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
+    /// A file of the study cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// The thread pool cannot be started.
     #[error("no threads: {0}")]
     Threads(#[from] ThreadPoolBuildError),
+    /// Classes are missing.
     #[error("{count} draws have no classes yet: run the command to its end")]
-    Missing { count: usize },
+    Missing {
+        /// Number of draws without classes.
+        count: usize,
+    },
 }
 
-/// The limits of all effects at all places, from train records with nothing hidden.
+/// Computes the limits of all effects at all places, from train records of `seed` with nothing hidden; `say` gets a line for
+/// each.
 ///
 /// # Errors
-/// [`ComputeError`] when a record cannot be made or an effect is refused.
+/// [`ComputeError`] when a record cannot be made, or an effect is refused.
 pub fn limits(seed: u64, say: &(dyn Fn(&str) + Sync)) -> Result<Limits, ComputeError> {
     let rig = RigParameters::baseline();
     let mut limits = Vec::new();
-    for measured in [Measured::One(Axis::Drive), Measured::One(Axis::Load), Measured::Both] {
-        let axis = if let Measured::One(axis) = measured { axis } else { Axis::Drive };
-        let recipe = Recipe { seed, axis, both_axes: measured == Measured::Both, ..Recipe::default() };
+    for measured in [MeasuredAxes::One(Axis::Drive), MeasuredAxes::One(Axis::Load), MeasuredAxes::Both] {
+        let axis = if let MeasuredAxes::One(axis) = measured { axis } else { Axis::Drive };
+        let recipe = Recipe { seed, axis, both_axes: measured == MeasuredAxes::Both, ..Recipe::default() };
         let record = simulate(&recipe, &rig).map_err(|error| ComputeError::Make { number: 0, error })?;
         let observer = Observer::new(trajectory(&record, &rig));
         limits.extend(limits_in(&observer, measured, say)?);
@@ -46,8 +61,8 @@ pub fn limits(seed: u64, say: &(dyn Fn(&str) + Sync)) -> Result<Limits, ComputeE
     Ok(Limits { schema_version: SCHEMA_VERSION, window_ms: WINDOW as u32, seed, limits })
 }
 
-/// The trajectory of a record for an observer with this rig file.
-pub fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory {
+/// The true trajectory of a record for an observer with this rig file.
+pub(crate) fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory {
     let (both, axis) = (record.recipe.both_axes, record.recipe.axis);
     let row = &record.rows[0];
     let state_of = |i: usize| {
@@ -89,11 +104,11 @@ fn point(axis: &record_maker::TrueAxis) -> Point {
     }
 }
 
-/// Computes the classes of all draws that hide something and have none yet; of those alone that have a result under the label
-/// `done`, if there is one.
+/// Computes and writes the classes of all draws with hidden effects that have none yet, `jobs` at a time, until `stop` is set.
+/// With a label `done`, only those of draws that have a result under it. `say` gets a line for each.
 ///
 /// # Errors
-/// [`ComputeError`] with the first draw that failed.
+/// [`ComputeError`] of the first draw that failed.
 pub fn classes(
     study: &Study,
     done: Option<&str>,
@@ -136,10 +151,10 @@ fn one(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
     Ok(())
 }
 
-/// The classes of a study whose draws all have them.
+/// The classes of all draws of a study.
 ///
 /// # Errors
-/// [`ComputeError::Missing`] when some are missing.
+/// [`ComputeError::Missing`] when draws have no classes yet, [`ComputeError::Folder`] when a file cannot be read.
 pub fn collected(study: &Study) -> Result<Classes, ComputeError> {
     let count = hiding(study).filter(|draw| !study.class(draw.number).exists()).count();
     if count > 0 {
@@ -150,7 +165,7 @@ pub fn collected(study: &Study) -> Result<Classes, ComputeError> {
     Ok(Classes { plan: study.plan, draws })
 }
 
-/// The text of committed classes: a line for each draw, so that a change is seen in a difference of files.
+/// Text of the committed classes: JSON with a line for each draw, so that a diff shows which draws changed.
 pub fn classes_text(classes: &Classes) -> String {
     let draws: Vec<_> = classes.draws.iter().map(|draw| json!(draw).to_string()).collect();
     format!("{{\"plan\": {},\n\"draws\": [\n{}\n]}}\n", json!(classes.plan), draws.join(",\n"))

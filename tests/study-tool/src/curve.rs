@@ -1,18 +1,18 @@
-//! How rates fall: over the noise of the sensors, and over the amplitude from below the limit to far above it.
+//! Rates over the noise of the sensors, and over the amplitude from below the limit to far above it.
 //!
 //! ```text
 //! one score for each noise factor ──► over noise:      class named, right alone, false alarms, all of the same draws
 //!                                 └─► over amplitude:  class named, amplitude / (committed limit x noise factor)
 //! ```
 //!
-//! The committed limits are those at the specified noise, and a limit grows in proportion to the noise, but for the
-//! rounding of the sensors: over the own limit of each study the curves of all noise factors should lie on each other. "3
-//! x limit and more" is of the committed limits in each study: the same draws at each noise.
+//! The committed limits are those at the specified noise. A limit grows in proportion to the noise, but for the rounding of the
+//! sensors: over the limit of each study the curves of all noise factors should coincide. "3 x limit and more" refers to the
+//! committed limits in each study: the same draws at each noise.
 //!
-//! What is drawn lies mostly far above the limits. A study of the same noise whose amplitudes are divided by a factor
-//! (`draws --weaker`) adds its draws to the curve over amplitude, and to no other.
+//! Most drawn amplitudes lie far above the limits. A study of the same noise whose amplitudes are divided by a factor (`draws
+//! --weaker`) adds its draws to the curve over amplitude only.
 
-use crate::compare::{grid, reported, told_line};
+use crate::compare::{grid, line_cell, reported};
 use crate::draws::Kind;
 use crate::interval::Rate;
 use crate::score::tables::{Line, hidden, over_limit};
@@ -20,17 +20,22 @@ use crate::score::{Case, Score};
 
 mod picture;
 
-/// Ends of the bins of amplitude, in limits; below the first and above the last there is one each.
+/// Edges of the bins of amplitude, in limits; there is one more bin below the first and above the last.
 const ENDS: [f64; 6] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 
+/// Why scores have no curves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
+    /// No scores.
     #[error("nothing to draw: give LABEL@FOLDER, once for each noise factor")]
-    Nothing,
+    Empty,
+    /// The score with this label has the hidden effects left out of the catalogue.
     #[error("'{0}' is of a run without the hidden effects: there are no names to draw")]
     LeftOut(String),
+    /// Two scores of the same noise factor and divisor of the amplitudes.
     #[error("two studies have noise times {0} and amplitudes over {1}: give one of each")]
-    Doubled(f64, f64),
+    Duplicate(f64, f64),
+    /// The drawing library failed.
     #[error("the picture cannot be drawn: {0}")]
     Picture(String),
 }
@@ -40,18 +45,19 @@ pub(crate) struct Curve {
     pub(crate) points: Vec<(f64, Rate)>,
 }
 
+/// Curves of several scores: rates over noise and over amplitude.
 pub struct Curves<'a> {
-    /// By their noise; of the amplitudes as they are drawn.
+    /// Scores of undivided amplitudes, by their noise.
     scores: Vec<&'a Score>,
-    /// The same, and those with weaker amplitudes.
+    /// All scores, those of divided amplitudes included.
     all: Vec<&'a Score>,
 }
 
 impl<'a> Curves<'a> {
-    /// The curves of scores that differ in their noise or in how weak they are.
+    /// The curves of scores that differ in noise or in the divisor of the amplitudes.
     ///
     /// # Errors
-    /// [`CurveError`] when there is none, or one that cannot stand there.
+    /// [`CurveError`] when there is no score, one without names, or two of the same noise and divisor.
     pub fn new(scores: &'a [Score]) -> Result<Self, CurveError> {
         if let Some(left) = scores.iter().find(|score| score.leave_out.is_some()) {
             return Err(CurveError::LeftOut(left.label.clone()));
@@ -64,11 +70,11 @@ impl<'a> Curves<'a> {
         });
         if let Some(pair) = all.windows(2).find(|pair| key(pair[0]) == key(pair[1])) {
             let (noise, weaker) = key(pair[0]);
-            return Err(CurveError::Doubled(noise, weaker));
+            return Err(CurveError::Duplicate(noise, weaker));
         }
         let scores: Vec<&Score> =
             all.iter().copied().filter(|score| score.shape.weaker_factor == 1.0).collect();
-        if scores.is_empty() { Err(CurveError::Nothing) } else { Ok(Curves { scores, all }) }
+        if scores.is_empty() { Err(CurveError::Empty) } else { Ok(Curves { scores, all }) }
     }
 
     /// Class among the names over amplitude, for each noise factor.
@@ -83,6 +89,7 @@ impl<'a> Curves<'a> {
         factors.into_iter().map(of_factor).collect()
     }
 
+    /// Both curves as tables in Markdown.
     pub fn markdown(&self) -> String {
         let row = |name: &str, cell: &dyn Fn(&Score) -> String| {
             std::iter::once(name.to_owned())
@@ -93,7 +100,7 @@ impl<'a> Curves<'a> {
         let programs = row("program, CRC-32", &|score| score.program.reported());
         let draws = row("draws, seed", &|score| format!("{}, {}", score.cases.len(), score.seed));
         let lines = self.scores[0].tables.headline.iter().map(|line| {
-            row(&line.name, &|score| rate_of(score, &line.name).as_ref().map_or(String::new(), told_line))
+            row(&line.name, &|score| rate_of(score, &line.name).as_ref().map_or(String::new(), line_cell))
         });
         let over_noise = grid(&heads, [programs, draws].into_iter().chain(lines));
         let mut heads = vec!["amplitude over its limit at this noise".to_owned()];
@@ -106,10 +113,10 @@ impl<'a> Curves<'a> {
         format!("{over_noise}\nClass among the names, draws of one effect:\n\n{}", grid(&heads, rows))
     }
 
-    /// Both as a picture, as SVG.
+    /// Both curves as a picture: the text of an SVG file.
     ///
     /// # Errors
-    /// [`CurveError::Picture`] with what the drawing library says.
+    /// [`CurveError::Picture`] with the message of the drawing library.
     pub fn svg(&self) -> Result<String, CurveError> {
         let names = [
             ("class among the names, 3 x limit and more", "one effect, 3 x limit and more: its class"),
@@ -150,7 +157,7 @@ fn noise(score: &Score) -> f64 {
     score.shape.noise_factor
 }
 
-/// The line of a score that begins so.
+/// The line of a score whose name begins so.
 fn rate_of(score: &Score, name: &str) -> Option<Line> {
     score.tables.headline.iter().find(|line| line.name.starts_with(name)).cloned()
 }
@@ -177,7 +184,7 @@ fn bin_name(bin: usize) -> String {
     }
 }
 
-/// Where a bin stands on the axis: the geometric middle, as wide as its neighbours where it has no end.
+/// Position of a bin on the axis: the geometric middle; the outermost bins are as wide as their neighbours.
 fn place(bin: usize) -> f64 {
     let step = 10_f64.sqrt();
     let low = if bin == 0 { ENDS[0] / step } else { ENDS[bin - 1] };
@@ -241,8 +248,8 @@ mod tests {
     #[test]
     fn scores_that_cannot_stand_on_one_curve_are_refused() {
         let refused = |scores: &[Score]| Curves::new(scores).err();
-        assert_eq!(refused(&[]), Some(CurveError::Nothing));
-        assert_eq!(refused(&[scored("a"), scored("b")]), Some(CurveError::Doubled(1.0, 1.0)));
+        assert_eq!(refused(&[]), Some(CurveError::Empty));
+        assert_eq!(refused(&[scored("a"), scored("b")]), Some(CurveError::Duplicate(1.0, 1.0)));
         assert_eq!(refused(&[scored_without("w")]), Some(CurveError::LeftOut("w".to_owned())));
     }
 }

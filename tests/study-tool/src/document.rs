@@ -1,4 +1,4 @@
-//! Limits and twins as tables of a page, between two marks.
+//! Limits and twins as tables in Markdown, inserted into a page between two marks.
 
 use crate::classes::{Classes, TWIN_COSINE};
 use crate::folder::{FolderError, read, write_whole};
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
-/// The table of limits: the drive's place of each effect, the rest in the file.
+/// The table of limits in Markdown: of each effect at the places that are not the load's; the file has all.
 pub fn limit_table(limits: &Limits) -> String {
     let mut table = String::from(
         "| effect | amplitude | limit | unit | drawn | signature of the most drawn, over the limit's | |\n|---|---|---|---|---|---|---|\n",
@@ -26,17 +26,17 @@ pub fn limit_table(limits: &Limits) -> String {
                 limit.effect,
                 limit.place,
                 key.name,
-                told_limit(limit),
+                limit_cell(limit),
                 limit.unit,
                 digits(limit.strength),
-                told_excited(limit)
+                excitation_cell(limit)
             );
         }
     }
     table
 }
 
-fn told_limit(limit: &Limit) -> String {
+fn limit_cell(limit: &Limit) -> String {
     let neutral = || plant::effects::sheet(&limit.effect)?.keys[0].neutral;
     match (limit.limit_value, neutral()) {
         (Some(value), Some(neutral)) if neutral.is_finite() && neutral != 0.0 => {
@@ -49,7 +49,7 @@ fn told_limit(limit: &Limit) -> String {
     }
 }
 
-fn told_excited(limit: &Limit) -> &'static str {
+fn excitation_cell(limit: &Limit) -> &'static str {
     if limit.excited { "" } else { "not excited" }
 }
 
@@ -62,7 +62,7 @@ fn digits(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// The table of twins: for each effect with whom, in how many of its draws, and the largest cosine of all.
+/// The table of twins in Markdown: for each effect its twins, in how many of its draws, and the largest cosine of all.
 pub fn twin_table(classes: &Classes) -> String {
     #[derive(Default)]
     struct Row<'a> {
@@ -107,10 +107,10 @@ pub fn twin_table(classes: &Classes) -> String {
     table
 }
 
-/// Puts a text between the two marks of its name on a page.
+/// Replaces the text between the two marks `name` of a page.
 ///
 /// # Errors
-/// [`FolderError`] when the page lacks one of them, or cannot be written.
+/// [`FolderError`] when the page lacks a mark, or cannot be read or written.
 pub fn put(page: &Path, name: &str, text: &str) -> Result<(), FolderError> {
     let old = read(page)?;
     let [begin, end] = ["begin", "end"].map(|mark| format!("<!-- {name}: {mark} -->\n"));

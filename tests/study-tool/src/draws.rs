@@ -1,26 +1,26 @@
-//! Which effects, how strong, where, under which difficulties: a pure function of a study's seed and shape.
+//! Draws of a study: effects, amplitudes, places and difficulties, as a pure function of seed and shape.
 //!
-//! Each draw has a generator of its own, seeded with the study's seed, the kind of draw and its number within the kind: a study
-//! with more draws keeps those of a smaller one.
+//! Each draw has its generator, seeded with the seed of the study, the kind of draw and its number within the kind. A study
+//! with more draws therefore contains those of a smaller one.
 //!
-//! - Amplitude: log-uniform over the `drawn` range of the effect's sheet, either sign where the sheet says so. Each number
-//!   that only shapes the effect: one half its default, one half uniform over its `drawn` range.
-//! - Place: any of the effect's kind. The record is of the axis it is at; of both, linked, for what needs two.
-//! - A fifth has a functional form that is not the catalogue's, a half 1 to 3 parameters of the baseline off by 1 to 3 %, a third
-//!   coloured noise and jitter: each drawn by itself. That form is the near one, or by the study's shape the far one.
-//! - A study near the limits divides all amplitudes by a factor, the draws staying the same ones: what is drawn lies far
-//!   above them.
-//! - A case of wrong parameters alone has one that is off by 3 to 15 % and none of the other difficulties in the baseline.
+//! - Amplitude: log-uniform over the `drawn` range of the effect's sheet, either sign where the sheet says so. Each shape
+//!   number of the effect: its default in one half of the draws, uniform over its `drawn` range in the other.
+//! - Place: any that the effect allows. The record is of the axis of the place; of both, linked, for effects that need two.
+//! - A fifth has a functional form that is not the catalogue's, a half 1 to 3 parameters of the baseline wrong by 1 to 3 %, a
+//!   third coloured noise and jitter, each drawn independently. The form is the near one, or by the study's shape the far one.
+//! - A study near the limits divides all amplitudes by a factor and keeps the draws otherwise: most drawn amplitudes lie far
+//!   above the limits.
+//! - A draw of wrong parameters only has one that is wrong by 3 to 15 %, and no other difficulty in the baseline.
 //!
-//! - A study of both worlds ([`worlds`]) records both axes, and its draws take turns in the world where the catalogue's laws
-//!   are exact and the one where everything is a little wrong, in the catalogue's form and in another.
+//! - A study of both worlds ([`worlds`]) records both axes. Its draws alternate between the world in which the catalogue's laws
+//!   are exact and the one with model errors in the whole rig, each in the catalogue's form and in another.
 //!
 //! Source: effects.md; discrepancy-notes.md, Blind protocol.
 
 pub(crate) mod twins;
 mod worlds;
 
-pub use worlds::is_beyond_drawn;
+pub(crate) use worlds::is_beyond_drawn;
 
 use crate::limits::Scale;
 use plant::Axis;
@@ -31,27 +31,33 @@ use rand_pcg::Pcg64;
 use record_maker::{Experiment, Form, Hidden, PARAMETERS, Recipe};
 use serde::{Deserialize, Serialize};
 
-/// Parameters that a case of wrong parameters alone is about, with their names in reports.
-pub const ALONE: [&str; 4] =
+/// Parameters of the draws of wrong parameters only, with their names in reports.
+pub(crate) const SINGLE_PARAMETERS: [&str; 4] =
     ["parameter:mass", "parameter:viscous-friction", "parameter:supply-pressure", "parameter:kv-scale"];
 
+/// Numbers of draws of a study, and what all its draws have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
+    /// Draws of each effect of the catalogue.
     pub each: u32,
+    /// Draws with nothing hidden.
     pub nulls: u32,
+    /// Draws of each parameter of the baseline that is wrong alone.
     pub parameters: u32,
+    /// Draws of two effects.
     pub pairs: u32,
+    /// Draws of three effects.
     pub triples: u32,
-    /// Noise of all records; 1 is as specified.
+    /// Noise of all records over the specified noise.
     pub noise_factor: f64,
-    /// What the amplitudes of the drawn range are divided by, counted from the baseline; absent in a file when it is 1.
+    /// Divisor of the amplitudes, counted from the baseline; absent in a file when it is 1.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub weaker_factor: f64,
-    /// Exact and background world in turn, both axes recorded; absent in a file when the world is exact alone.
+    /// Draws alternate between the exact world and the one with a background, both axes recorded; absent in a file when false.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub worlds: bool,
-    /// Other forms are the far ones; absent in a file when they are the near ones.
+    /// Forms other than the catalogue's are the far ones instead of the near ones; absent in a file when false.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub far_forms: bool,
 }
@@ -98,40 +104,46 @@ impl Default for Shape {
     }
 }
 
+/// What is hidden in a draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
+    /// One effect.
     Single,
-    /// Nothing hidden; parameters of the baseline may be off by little.
+    /// No effect; parameters of the baseline may be wrong by up to 3 %.
     Null,
-    /// One parameter of the baseline off by much, no effect.
+    /// No effect; one parameter of the baseline is wrong by 3 to 15 %.
     Parameter,
+    /// Two effects.
     Pair,
+    /// Three effects.
     Triple,
 }
 
-/// One draw: the recipe of its records, but for the experiment.
+/// One draw: number, kind, and the recipe of its records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
+    /// Number within the study, from 0.
     pub number: usize,
+    /// What is hidden.
     pub kind: Kind,
-    /// How its records are made; the experiment is the train one.
+    /// Recipe of the train record; the other records differ in the experiment only.
     pub recipe: Recipe,
 }
 
 impl Draw {
-    pub fn recipe(&self, experiment: Experiment) -> Recipe {
+    pub(crate) fn recipe(&self, experiment: Experiment) -> Recipe {
         Recipe { experiment, ..self.recipe.clone() }
     }
 
-    /// Which of the two held-out experiments the program is tested on: they take turns.
-    pub fn test(&self) -> Experiment {
+    /// The held-out experiment that the program is tested on: they alternate.
+    pub(crate) fn test(&self) -> Experiment {
         Experiment::HeldOut((self.number % 2) as u8)
     }
 }
 
 /// All draws of a study, in the order of their numbers.
-pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
+pub(crate) fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
     let mut drawn: Vec<(Kind, Recipe)> = Vec::new();
     let in_world = |recipe, seed, stream, repetition| {
         if shape.worlds { worlds::turn(recipe, seed, stream, repetition) } else { recipe }
@@ -151,7 +163,7 @@ pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
             .collect::<Vec<_>>()
     };
     drawn.extend(more(Kind::Null, 1000, shape.nulls, &Generator::null));
-    for (place, name) in ALONE.iter().enumerate() {
+    for (place, name) in SINGLE_PARAMETERS.iter().enumerate() {
         let make = |generator: Generator| generator.parameter(name);
         drawn.extend(more(Kind::Parameter, 2000 + place as u64, shape.parameters, &make));
     }
@@ -170,7 +182,7 @@ pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
     drawn.into_iter().enumerate().map(finish).collect()
 }
 
-/// Brings an amplitude nearer to the baseline; one that no number of is the baseline stays.
+/// Divides an amplitude, counted from the baseline; without a neutral value it stays.
 fn weaken(hidden: &mut Hidden, factor: f64) {
     let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
     let (key, amplitude) = (&sheet.keys[0], hidden.numbers[0]);
@@ -182,8 +194,8 @@ fn weaken(hidden: &mut Hidden, factor: f64) {
     }
 }
 
-/// Whether an effect is seen only where the axes are linked, or both draw air.
-pub fn needs_both_axes(kind: PlaceKind) -> bool {
+/// Whether an effect shows only where the axes are linked, or both draw air.
+pub(crate) fn needs_both_axes(kind: PlaceKind) -> bool {
     matches!(kind, PlaceKind::Linkage | PlaceKind::Supply)
 }
 
@@ -191,7 +203,7 @@ struct Generator(Pcg64);
 
 impl Generator {
     fn new(seed: u64, stream: u64, repetition: u32) -> Self {
-        // An odd factor keeps seeds apart; `seed_from_u64` spreads neighbours over the whole state.
+        // An odd factor separates seeds; `seed_from_u64` spreads neighbours over the whole state.
         let own = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(stream << 32 | u64::from(repetition));
         Generator(Pcg64::seed_from_u64(own))
     }
@@ -228,7 +240,7 @@ impl Generator {
 
     fn null(mut self) -> Recipe {
         let axis = self.axis();
-        // As often linked as the draws of effects are.
+        // Linked as often as the draws of effects are.
         let linked = SHEETS.iter().filter(|sheet| needs_both_axes(sheet.place)).count();
         let both_axes = self.below(SHEETS.len()) < linked;
         Recipe { both_axes, ..self.plain(axis) }
@@ -291,7 +303,7 @@ impl Generator {
         }
     }
 
-    /// Exact in every program that reads JSON.
+    /// 53 bits: every JSON reader represents it exactly.
     fn recipe_seed(&mut self) -> u64 {
         self.0.next_u64() >> 11
     }
@@ -318,8 +330,8 @@ impl Generator {
     }
 }
 
-/// The axis of a place; none for linkage and supply.
-pub fn axis_of(place: Place) -> Option<Axis> {
+/// The axis of a place; `None` for linkage and supply.
+pub(crate) fn axis_of(place: Place) -> Option<Axis> {
     match place.part {
         Part::Drive => Some(Axis::Drive),
         Part::Load => Some(Axis::Load),

@@ -1,4 +1,4 @@
-//! The files of a study's folder; each is whole or absent, so that a study can be killed at any time and goes on where it was.
+//! The files of a study's folder, each written atomically, so that a study can be killed at any time and resumed.
 //!
 //! ```text
 //! OUT/draws.json               schema version, seed, shape, all recipes
@@ -12,8 +12,8 @@
 //! OUT/twins.json               twins in place of draws.json; OUT/twins-LABEL.json what became of them
 //! ```
 //!
-//! `draws.json` is written for people and other programs. It is never read back: the draws follow from seed and shape, and the
-//! file must be what this program would write, else it stems from another version and is refused.
+//! `draws.json` is for people and other programs. Its draws are not read back, since they follow from seed and shape: the file
+//! has to equal what this program would write, else it is of another version and is refused.
 
 use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, Shape, draws};
@@ -28,27 +28,32 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
+/// A study: its folder and its draws.
 #[derive(Debug, Clone)]
 pub struct Study {
+    /// Folder of the study.
     pub root: PathBuf,
-    pub plan: Plan,
+    pub(crate) plan: Plan,
+    /// All draws, in the order of their numbers.
     pub draws: Vec<Draw>,
 }
 
+/// Seed and shape of a study, which determine its draws.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    pub schema_version: u32,
-    /// Of all random numbers; below 2^53, as JSON is read.
-    pub seed: u64,
-    pub shape: Shape,
+    pub(crate) schema_version: u32,
+    /// Seed of all random numbers; below 2^53, so that JSON holds it exactly.
+    pub(crate) seed: u64,
+    pub(crate) shape: Shape,
 }
 
 impl Plan {
+    /// The plan of a study in the current schema version; `seed` below 2^53.
     pub fn new(seed: u64, shape: Shape) -> Self {
         Plan { schema_version: SCHEMA_VERSION, seed, shape }
     }
 
-    pub fn draws(&self) -> Vec<Draw> {
+    pub(crate) fn draws(&self) -> Vec<Draw> {
         draws(self.seed, &self.shape)
     }
 
@@ -59,12 +64,25 @@ impl Plan {
     }
 }
 
+/// Why a file of a study cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
+    /// The operating system refuses to read or write it.
     #[error("{path}: {error}")]
-    File { path: String, error: io::Error },
+    File {
+        /// Path of the file.
+        path: String,
+        /// What the operating system says.
+        error: io::Error,
+    },
+    /// Its content is not valid.
     #[error("{path}: {what}")]
-    Content { path: String, what: String },
+    Content {
+        /// Path of the file.
+        path: String,
+        /// What is wrong with it.
+        what: String,
+    },
 }
 
 impl FolderError {
@@ -78,10 +96,10 @@ impl FolderError {
 }
 
 impl Study {
-    /// Begins a study, or opens the same one again.
+    /// Begins a study in a folder, or opens the same one.
     ///
     /// # Errors
-    /// [`FolderError`] when the folder holds another study or cannot be written.
+    /// [`FolderError`] when the folder holds another study, or cannot be written.
     pub fn begin(root: &Path, plan: &Plan) -> Result<Self, FolderError> {
         let path = root.join("draws.json");
         if path.exists() {
@@ -97,10 +115,10 @@ impl Study {
         Ok(Study { root: root.to_owned(), plan: *plan, draws: plan.draws() })
     }
 
-    /// Opens a study.
+    /// Opens the study of a folder.
     ///
     /// # Errors
-    /// [`FolderError`] when there is none, or one of another version of this program.
+    /// [`FolderError`] when there is none, or it is of another version of this program.
     pub fn open(root: &Path) -> Result<Self, FolderError> {
         let path = root.join("draws.json");
         let text = read(&path)?;
@@ -114,18 +132,20 @@ impl Study {
         Ok(Study { root: root.to_owned(), plan, draws: plan.draws() })
     }
 
-    pub fn records(&self, number: usize) -> PathBuf {
+    pub(crate) fn records(&self, number: usize) -> PathBuf {
         self.root.join("records").join(name(number))
     }
 
-    pub fn truth(&self, number: usize) -> PathBuf {
+    pub(crate) fn truth(&self, number: usize) -> PathBuf {
         self.root.join("truth").join(name(number))
     }
 
+    /// Folder of the results of a draw under a label.
     pub fn run(&self, label: &str, number: usize) -> PathBuf {
         self.root.join("runs").join(label).join(name(number))
     }
 
+    /// File of the classes of a draw.
     pub fn class(&self, number: usize) -> PathBuf {
         self.root.join("classes").join(format!("{}.json", name(number)))
     }
@@ -136,7 +156,7 @@ fn name(number: usize) -> String {
 }
 
 /// A draw as `draws.json` and `score.json` hold it.
-pub fn draw_as_json(draw: &Draw) -> Value {
+pub(crate) fn draw_as_json(draw: &Draw) -> Value {
     let Recipe { seed, axis, both_axes, hidden, form, wrong_parameters, background, .. } = &draw.recipe;
     let wrong = |(name, factor): &(String, f64)| json!({"name": name, "factor": factor});
     let mut draw_json = json!({
@@ -152,7 +172,7 @@ pub fn draw_as_json(draw: &Draw) -> Value {
         "jitter": draw.recipe.jitter,
         "noise_factor": draw.recipe.noise,
     });
-    // What older studies did not have stands where it is something.
+    // Added later: written only when set, so that older studies keep their bytes.
     if *form == Form::Far {
         draw_json["far_form"] = json!(true);
     }
@@ -177,12 +197,16 @@ fn hidden_as_json(hidden: &Hidden) -> Value {
     json!({"effect": hidden.name, "where": hidden.place.to_string(), "numbers": numbers})
 }
 
+/// Reads a text file.
+///
+/// # Errors
+/// [`FolderError::File`] when it cannot be read.
 pub fn read(path: &Path) -> Result<String, FolderError> {
     fs::read_to_string(path).map_err(FolderError::file(path))
 }
 
-/// What a program left of a draw, of this version.
-pub(crate) fn read_left<T: DeserializeOwned>(
+/// Reads a JSON file `what` of the current schema version.
+pub(crate) fn read_versioned<T: DeserializeOwned>(
     path: &Path,
     what: &str,
     version: impl Fn(&T) -> u32,
@@ -195,26 +219,29 @@ pub(crate) fn read_left<T: DeserializeOwned>(
     }
 }
 
-/// Writes a file so that it is whole or absent.
+/// Writes a file atomically.
+///
+/// # Errors
+/// [`FolderError::File`] when it cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
     parts::write_whole(path, bytes).map_err(FolderError::file(path))
 }
 
-/// Makes a folder so that it is whole or absent: `fill` fills another one, which then gets the name. When two starts are at the
-/// same folder, the first that is done has made it.
-pub fn make_whole<T, E: From<FolderError>>(
+/// Makes a folder atomically: `fill` fills a temporary folder, which is then renamed. When two processes make the same folder,
+/// that of the first to finish stays.
+pub(crate) fn make_whole<T, E: From<FolderError>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<T, E>,
 ) -> Result<T, E> {
     let is_made_again = path.exists();
-    let beside = beside(path).map_err(FolderError::file(path))?;
-    let filled = fill(beside.path())?;
+    let unfinished = unfinished_folder(path).map_err(FolderError::file(path))?;
+    let filled = fill(unfinished.path())?;
     if is_made_again {
         fs::remove_dir_all(path).map_err(FolderError::file(path))?;
     }
-    match fs::rename(beside.path(), path) {
+    match fs::rename(unfinished.path(), path) {
         Ok(()) => {
-            let _ = beside.keep();
+            let _ = unfinished.keep();
             Ok(filled)
         }
         Err(_) if !is_made_again && path.exists() => Ok(filled),
@@ -222,8 +249,8 @@ pub fn make_whole<T, E: From<FolderError>>(
     }
 }
 
-/// The unfinished twin of a folder: hidden, and each start's own.
-fn beside(path: &Path) -> io::Result<TempDir> {
+/// A temporary folder beside `path`: hidden, with a name of its own for each process.
+fn unfinished_folder(path: &Path) -> io::Result<TempDir> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)?;

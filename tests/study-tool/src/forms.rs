@@ -1,12 +1,12 @@
-//! What the best fit of the catalogue's law leaves of the other forms of each effect.
+//! Share of the signature of the near and far forms that the best fit of the catalogue's law leaves.
 //!
 //! ```text
 //! share = min over z |M (y - y_law(z))|^2 / |M (y - y_baseline)|^2       y: readings without noise of the form, alone, train
 //! ```
 //!
-//! At both ends and in the geometric middle of the drawn range; numbers that only shape the effect have their default, or the
-//! middle of what is drawn. The record is of the drive, and of both axes, linked, for an effect of the linkage: there stick and
-//! contact events count as differences too, so that much is left of the catalogue's own form as well.
+//! At both ends and in the geometric middle of the drawn range; shape numbers have their default, or the middle of their range.
+//! The record is of the drive; for an effect of the linkage it is of both axes, linked. There stick and contact events count as
+//! differences too, so that even the catalogue's form leaves a large share.
 
 use crate::compute::ComputeError;
 use crate::draws::axis_of;
@@ -113,29 +113,30 @@ const FAR: [(&str, &str); 38] = [
 /// The forms that are not the catalogue's.
 pub const OTHERS: [Form; 2] = [Form::Near, Form::Far];
 
-/// Shares of the squared signature that are left of a form: low end, middle and high end.
+/// Shares of the squared signature of a form that the best fit leaves: low end, middle and high end of the amplitudes.
 #[derive(Debug, Clone, Copy)]
-pub struct Left {
-    pub effect: &'static str,
-    pub form: Form,
-    pub shares: [f64; 3],
+pub struct FormResidual {
+    pub(crate) effect: &'static str,
+    pub(crate) form: Form,
+    pub(crate) shares: [f64; 3],
 }
 
-/// Which effects, and which forms of them.
+/// Effects, and forms of them.
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'a> {
-    /// All of them where it is empty.
+    /// Names of the effects; all when empty.
     pub effects: &'a [String],
-    /// The first place of an effect, or the one with this name.
+    /// Name of the place; the first place of each effect when `None`.
     pub place: Option<&'a str>,
+    /// Forms of each effect.
     pub forms: &'a [Form],
 }
 
-/// The share that the best fit of the catalogue's law leaves of a hidden effect in one of its forms.
+/// Share of the squared signature of a hidden effect in one of its forms that the best fit of the catalogue's law leaves.
 ///
 /// # Errors
 /// [`ComputeError`] when the record cannot be made.
-pub fn left_share(hidden: &Hidden, form: Form) -> Result<f64, ComputeError> {
+pub(crate) fn unexplained_share(hidden: &Hidden, form: Form) -> Result<f64, ComputeError> {
     let axis = axis_of(hidden.place).unwrap_or(Axis::Drive);
     let both_axes = hidden.place.part == Part::Linkage;
     let recipe = Recipe { hidden: vec![hidden.clone()], axis, both_axes, form, ..Recipe::default() };
@@ -144,8 +145,8 @@ pub fn left_share(hidden: &Hidden, form: Form) -> Result<f64, ComputeError> {
     Ok(fitted(&made, hidden)?.left_share)
 }
 
-/// An effect with the low end of its drawn amplitudes, their geometric middle, and their high end.
-pub fn amplitudes(sheet: &Sheet, place: Place) -> [Hidden; 3] {
+/// An effect at the low end of its drawn amplitudes, their geometric middle, and the high end.
+pub(crate) fn amplitudes(sheet: &Sheet, place: Place) -> [Hidden; 3] {
     let middle = |drawn: [f64; 2]| (drawn[0] * drawn[1]).sqrt();
     let [low, high] = sheet.keys[0].drawn;
     [low, middle([low, high]), high].map(|amplitude| {
@@ -155,16 +156,17 @@ pub fn amplitudes(sheet: &Sheet, place: Place) -> [Hidden; 3] {
     })
 }
 
-/// What is left of a selection, `jobs` fits at once; none of what is not begun when it is asked to stop.
+/// Fits the catalogue's law to a selection of forms, `jobs` at a time, until `stop` is set: only finished ones are in the
+/// result. `say` gets a line for each.
 ///
 /// # Errors
-/// [`ComputeError`] with the first fit that failed.
-pub fn left(
+/// [`ComputeError`] of the first fit that failed.
+pub fn residuals(
     of: &Selection<'_>,
     jobs: usize,
     stop: &AtomicBool,
     say: &(dyn Fn(&str) + Sync),
-) -> Result<Vec<Left>, ComputeError> {
+) -> Result<Vec<FormResidual>, ComputeError> {
     let is_meant = |sheet: &&Sheet| of.effects.is_empty() || of.effects.iter().any(|name| name == sheet.name);
     let at = |sheet: &Sheet| match of.place {
         None => sheet.place.places().first().copied(),
@@ -183,10 +185,10 @@ pub fn left(
         }
         let mut shares = [0.0; 3];
         for (share, hidden) in shares.iter_mut().zip(amplitudes(sheet, place)) {
-            *share = left_share(&hidden, form)?;
+            *share = unexplained_share(&hidden, form)?;
         }
         say(&format!("{} {place} {}: {}", sheet.name, form.name(), percent(&shares)));
-        Ok(Some(Left { effect: sheet.name, form, shares }))
+        Ok(Some(FormResidual { effect: sheet.name, form, shares }))
     };
     pool.install(|| all.into_par_iter().with_max_len(1).map(one).filter_map(Result::transpose).collect())
 }
@@ -195,17 +197,19 @@ fn percent(shares: &[f64]) -> String {
     shares.iter().map(|share| format!("{:.1}", 100.0 * share)).collect::<Vec<_>>().join(", ")
 }
 
-/// The shares as a table: one line for each effect.
-pub fn table(left: &[Left]) -> String {
+/// The shares as a table in Markdown, a line for each effect.
+pub fn table(residuals: &[FormResidual]) -> String {
     let mut table = String::from(
         "| effect | far form | left of near, %: low end, middle, high end | left of far, % |\n|---|---|---|---|\n",
     );
     for sheet in SHEETS {
-        if !left.iter().any(|left| left.effect == sheet.name) {
+        if !residuals.iter().any(|residual| residual.effect == sheet.name) {
             continue;
         }
-        let of = |form| left.iter().find(|left| left.effect == sheet.name && left.form == form);
-        let shares = OTHERS.map(|form| of(form).map_or_else(String::new, |left| percent(&left.shares)));
+        let of =
+            |form| residuals.iter().find(|residual| residual.effect == sheet.name && residual.form == form);
+        let shares =
+            OTHERS.map(|form| of(form).map_or_else(String::new, |residual| percent(&residual.shares)));
         let words = FAR.iter().find(|(effect, _)| *effect == sheet.name).map_or("", |(_, words)| words);
         let _ = writeln!(table, "| {} | {words} | {} |", sheet.name, shares.join(" | "));
     }
@@ -229,7 +233,7 @@ mod tests {
         for name in ["valve-offset", "piston-leakage", "inclination", "force-sensor-offset"] {
             let sheet = plant::effects::sheet(name).expect("of the catalogue");
             let [_, middle, _] = amplitudes(sheet, sheet.place.places()[0]);
-            let share = left_share(&middle, Form::Far).unwrap();
+            let share = unexplained_share(&middle, Form::Far).unwrap();
             assert!((0.1..0.4).contains(&share), "{name}: {share}");
         }
     }

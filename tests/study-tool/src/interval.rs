@@ -1,12 +1,12 @@
-//! What so many of so many prove: intervals of a rate.
+//! Confidence intervals of a rate.
 //!
 //! ```text
 //! Wilson          (p + z^2/2n ± z sqrt(p (1-p)/n + z^2/4n^2)) / (1 + z^2/n)      two-sided, 95 %
 //! Clopper, Pearson    upper u with P(at most k of n | u) = 0.05                  one-sided, 95 %: at most so much
 //! ```
 //!
-//! Rates that should be high are reported with Wilson's interval, whose mean coverage is near 95 %; false alarms with the exact
-//! upper bound, which never promises too much: 0 of 200 proves less than 1.5 %.
+//! Rates that should be high are reported with Wilson's interval, whose mean coverage is near 95 %. False alarms are reported
+//! with the exact upper bound, which is conservative: 0 of 200 bounds the rate by 1.5 %.
 //!
 //! Source: Wilson 1927, J. Am. Stat. Assoc. 22(158); Clopper, Pearson 1934, Biometrika 26(4); Brown, Cai, DasGupta 2001, Stat.
 //! Sci. 16(2).
@@ -16,20 +16,22 @@ use statrs::distribution::{Beta, ContinuousCDF, Normal};
 
 const CONFIDENCE: f64 = 0.95;
 
-/// So many of so many, with intervals.
+/// A count of a total, with confidence intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rate {
+    /// Cases that count.
     pub count: usize,
+    /// All cases.
     pub of: usize,
-    pub share: Option<f64>,
+    pub(crate) share: Option<f64>,
     /// Wilson's interval of the rate.
-    pub interval: [f64; 2],
+    pub(crate) interval: [f64; 2],
     /// Exact one-sided upper bound of the rate.
-    pub at_most: f64,
+    pub(crate) at_most: f64,
 }
 
 impl Rate {
-    pub fn new(count: usize, of: usize) -> Self {
+    pub(crate) fn new(count: usize, of: usize) -> Self {
         let share = (of > 0).then(|| count as f64 / of as f64);
         Rate {
             count,
@@ -40,8 +42,8 @@ impl Rate {
         }
     }
 
-    /// The rate of those that `is` holds for.
-    pub fn of<T>(items: impl IntoIterator<Item = T>, mut is: impl FnMut(T) -> bool) -> Self {
+    /// The rate of the items for which `is` holds.
+    pub(crate) fn of<T>(items: impl IntoIterator<Item = T>, mut is: impl FnMut(T) -> bool) -> Self {
         let (mut count, mut of) = (0, 0);
         for item in items {
             of += 1;
@@ -51,7 +53,7 @@ impl Rate {
     }
 }
 
-/// Wilson's interval of `count` of `of`, which need not be whole where they are weighted.
+/// Wilson's interval of `count` of `of`, which need not be integers when they are weighted.
 pub(crate) fn wilson(count: f64, of: f64, confidence: f64) -> [f64; 2] {
     if of <= 0.0 {
         return [0.0, 1.0];

@@ -1,95 +1,98 @@
-//! One case: what was hidden against what was named.
+//! Judgement of one case: what was hidden against what was named.
 //!
-//! An effect's *class* are all (effect, place) whose signature in this very record is more than 0.95 alike
-//! ([`super::classes`]), and itself. The rules:
+//! The *class* of an effect is the effect itself and all (effect, place) whose signature in this record has a cosine above 0.95
+//! with its own ([`super::classes`]). The rules:
 //!
-//! - A name is *right* when it is of the class, and at most two names stand beside those that are. Said as `ambiguous`, it is
-//!   right only where the class has more than one effect, when one of its alternatives or itself is of the class, and at most
-//!   two of them lie beyond it.
-//! - It is right *alone* when it is the only one, has no alternatives, and is the effect itself.
-//! - `where` is right when the name's place is that of the truth, or effect and place are of the class.
-//! - With several effects hidden, each name can stand for one class only; names that stand for none are too many.
-//! - With nothing hidden every name is a false alarm, and so is `outside-catalogue`; a parameter is none.
+//! - A name is *right* when it is of the class, and at most two names beside the right ones are reported. An `ambiguous` verdict
+//!   is right only where the class has more than one effect, when the name or one of its alternatives is of the class, and at
+//!   most two of them are not.
+//! - A name is right *alone* when it is the only one, has no alternatives, and is the effect itself.
+//! - `where` is right when the name's place is the true one, or effect and place are of the class.
+//! - With several effects hidden, each name is assigned to one class only; names without a class are too many.
+//! - With nothing hidden every name is a false alarm, and so is `outside-catalogue`; a parameter is not.
 
 use crate::classes::{Member, TWIN_COSINE};
 use crate::draws::{Draw, Kind};
-use crate::program::{Ended, Taken};
+use crate::program::{Execution, ProgramEnd};
 use crate::report::{Named, Report, Verdict};
 use plant::effects::sheet::Place;
 use record_maker::Hidden;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
 
-/// Most alternatives of an ambiguous verdict that may lie beyond the class.
+/// Most alternatives of an ambiguous verdict that may lie outside the class.
 const MOST_BEYOND: usize = 2;
 
 #[derive(Debug, Clone, Serialize)]
-pub struct Judgement {
-    /// What it was called: an effect, or `nothing`, `parameter`, `outside`, `ambiguous`, `error`.
-    pub called: String,
-    pub error: Option<String>,
-    /// For each hidden effect whether a name of its class was there, and at the right place.
-    pub hidden: Vec<HiddenJudged>,
+pub(crate) struct Judgement {
+    /// The verdict in one word: an effect, or `nothing`, `parameter`, `outside`, `ambiguous`, `error`.
+    pub(crate) called: String,
+    pub(crate) error: Option<String>,
+    /// For each hidden effect whether a name of its class was reported, and at the right place.
+    pub(crate) hidden: Vec<HiddenJudgement>,
     /// Whether the first name is the one hidden effect itself.
-    pub top: bool,
-    pub alone: bool,
-    /// Whether something was said to be outside the catalogue and to resemble the one hidden effect, or one of its class.
-    pub resembled: bool,
-    /// Names that stand for nothing hidden.
-    pub too_many: usize,
-    /// With nothing hidden: whether anything was called missing.
-    pub false_alarm: bool,
-    /// With one parameter off and nothing hidden: whether it was reported, and nothing else called missing.
-    pub parameter_right: bool,
-    /// Share of the gap that the program claims to have closed, the worst signal.
-    pub claimed_closed_ratio: Option<f64>,
-    /// The same of all signals together, each in units of its noise.
-    pub claimed_joint_ratio: Option<f64>,
-    /// Whether the program claims that its model leaves no more on the held-out record than nothing missing would.
-    pub claimed_white: Option<bool>,
+    pub(crate) top: bool,
+    pub(crate) alone: bool,
+    /// Whether the verdict was outside the catalogue, with the hidden effect or one of its class as the nearest.
+    pub(crate) resembled: bool,
+    /// Names that are assigned to no hidden effect.
+    pub(crate) too_many: usize,
+    /// With nothing hidden: whether anything was reported as missing.
+    pub(crate) false_alarm: bool,
+    /// With one parameter wrong and nothing hidden: whether it was reported, and nothing reported as missing.
+    pub(crate) parameter_right: bool,
+    /// Share of the gap that the program claims to have closed, of the worst signal.
+    pub(crate) claimed_closed_ratio: Option<f64>,
+    /// The same for all signals together, each in units of its noise.
+    pub(crate) claimed_joint_ratio: Option<f64>,
+    /// Whether the program claims that the residual of its model on the held-out record is within the range of a complete
+    /// model.
+    pub(crate) claimed_white: Option<bool>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct HiddenJudged {
-    pub effect: &'static str,
+pub(crate) struct HiddenJudgement {
+    pub(crate) effect: &'static str,
     #[serde(rename = "where", serialize_with = "as_text")]
-    pub place: Place,
-    pub class_size: usize,
-    pub right: bool,
-    pub where_right: bool,
-    /// Its numbers against the truth, when the effect itself was named at its place.
-    pub numbers: Vec<NumberJudged>,
+    pub(crate) place: Place,
+    pub(crate) class_size: usize,
+    pub(crate) right: bool,
+    pub(crate) where_right: bool,
+    /// Its numbers against the truth, if the effect itself was named at its place.
+    pub(crate) numbers: Vec<NumberJudgement>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct NumberJudged {
-    pub name: &'static str,
-    pub amplitude: bool,
+pub(crate) struct NumberJudgement {
+    pub(crate) name: &'static str,
+    pub(crate) amplitude: bool,
     /// |fitted - true| / |true|.
-    pub off_ratio: f64,
+    pub(crate) off_ratio: f64,
     /// Standard error / |true|.
-    pub error_ratio: Option<f64>,
-    pub covered: Option<bool>,
+    pub(crate) error_ratio: Option<f64>,
+    pub(crate) covered: Option<bool>,
 }
 
 fn as_text<S: Serializer>(place: &Place, out: S) -> Result<S::Ok, S::Error> {
     out.collect_str(place)
 }
 
-/// Judges what a program said about a draw, given the class of each of its hidden effects.
-pub fn judge(
+/// Judges the report of a program on a draw, given the class of each of its hidden effects.
+pub(crate) fn judge(
     draw: &Draw,
     classes: &[Vec<Member>],
-    taken: &Taken,
+    taken: &Execution,
     report: &Result<Report, String>,
 ) -> Judgement {
     let error = match (taken.ended, report) {
-        (Ended::TimedOut, _) => Some("took longer than its time limit".to_owned()),
-        (Ended::Signalled(signal), _) => Some(format!("crashed with signal {signal}")),
-        (Ended::NotStarted, _) => Some("could not be started".to_owned()),
-        (Ended::Exited(code), Err(reason)) => Some(format!("{reason} (exit code {code})")),
-        (Ended::Exited(_), Ok(report)) if report.verdict == Verdict::BadData => Some("bad-data".to_owned()),
-        (Ended::Exited(_), Ok(_)) => None,
+        (ProgramEnd::TimedOut, _) => Some("took longer than its time limit".to_owned()),
+        (ProgramEnd::Signalled(signal), _) => Some(format!("crashed with signal {signal}")),
+        (ProgramEnd::NotStarted, _) => Some("could not be started".to_owned()),
+        (ProgramEnd::Exited(code), Err(reason)) => Some(format!("{reason} (exit code {code})")),
+        (ProgramEnd::Exited(_), Ok(report)) if report.verdict == Verdict::BadData => {
+            Some("bad-data".to_owned())
+        }
+        (ProgramEnd::Exited(_), Ok(_)) => None,
     };
     let good = if error.is_none() { report.as_ref().ok() } else { None };
     let empty = Vec::new();
@@ -97,12 +100,12 @@ pub fn judge(
     let hidden = &draw.recipe.hidden;
     let mut matched = good.map_or_else(Vec::new, |report| matching(report, hidden, &class));
     if good.is_some_and(|report| report.named.len() > matched.len() + MOST_BEYOND) {
-        // Whoever names everything has named nothing.
+        // A report that names everything distinguishes no effect.
         matched.clear();
     }
     let judged = hidden.iter().enumerate().map(|(at, hidden)| {
         let name = matched.iter().find(|(_, of)| *of == at).map(|(name, _)| *name);
-        hidden_judged(hidden, class(at), name)
+        judge_hidden(hidden, class(at), name)
     });
     let names = good.map_or(&[][..], |report| &report.named);
     let first = names.first();
@@ -132,7 +135,7 @@ pub fn judge(
     }
 }
 
-/// Whether the one wrong parameter is among those reported.
+/// Whether the wrong parameter is among those reported.
 fn reported(report: &Report, draw: &Draw) -> bool {
     draw.recipe
         .wrong_parameters
@@ -152,7 +155,7 @@ fn called(verdict: Option<Verdict>, first: Option<&Named>) -> String {
     .to_owned()
 }
 
-/// Names of effects in a class, the true one included.
+/// Names of the effects of a class, the true one included.
 fn effects<'a>(hidden: &'a Hidden, class: &'a [Member]) -> BTreeSet<&'a str> {
     class
         .iter()
@@ -173,7 +176,7 @@ fn stands_for<'a>(
     let verdict = report.verdict;
     let effects = effects(hidden, class);
     let of_class = |name: &Named| effects.contains(name.sheet.name);
-    // Of several names an ambiguous verdict may be sure of one.
+    // Of several names, an ambiguous verdict may have single ones without alternatives.
     if verdict != Verdict::Ambiguous || entry.alternatives.is_empty() && !alone {
         return of_class(entry).then_some(entry);
     }
@@ -182,7 +185,7 @@ fn stands_for<'a>(
     if effects.len() < 2 || beyond > MOST_BEYOND {
         return None;
     }
-    // The one at the right place, if there is one.
+    // Prefers the one at the right place.
     let at_place = |name: &&Named| of_class(name) && place_right(name, hidden, class);
     all().find(at_place).or_else(|| all().find(|name| of_class(name)))
 }
@@ -195,7 +198,7 @@ fn place_right(name: &Named, hidden: &Hidden, class: &[Member]) -> bool {
     own || class.iter().any(twin)
 }
 
-/// Which name stands for which hidden effect: the assignment that serves most, and among those most right places.
+/// Assigns names to hidden effects: most effects, and among those assignments most right places.
 fn matching<'a>(
     report: &'a Report,
     hidden: &[Hidden],
@@ -236,20 +239,20 @@ fn matching<'a>(
     assign(&options, 0, 0).1
 }
 
-fn hidden_judged(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> HiddenJudged {
+fn judge_hidden(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> HiddenJudgement {
     let own = name.filter(|name| name.sheet.name == hidden.name && name.place == hidden.place);
     let keys = plant::effects::sheet(hidden.name).map_or(&[][..], |sheet| sheet.keys);
     let mut numbers = Vec::new();
     for (at, (key, truth)) in keys.iter().zip(&hidden.numbers).enumerate() {
         let reported = own.and_then(|name| name.parameters.iter().find(|reported| reported.name == key.name));
-        // A number in another unit is not reported at all; relative to nothing there is no error.
+        // A number in another unit does not count as reported; relative to a true 0 there is no error.
         let Some(reported) = reported.filter(|reported| reported.unit == key.unit.name() && *truth != 0.0)
         else {
             continue;
         };
         let off = (reported.value - truth).abs();
         let error = reported.standard_error.filter(|error| *error >= 0.0);
-        numbers.push(NumberJudged {
+        numbers.push(NumberJudgement {
             name: key.name,
             amplitude: at == 0,
             off_ratio: off / truth.abs(),
@@ -257,7 +260,7 @@ fn hidden_judged(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> Hid
             covered: error.map(|error| off <= 2.0 * error),
         });
     }
-    HiddenJudged {
+    HiddenJudgement {
         effect: hidden.name,
         place: hidden.place,
         class_size: effects(hidden, class).len(),
@@ -268,8 +271,8 @@ fn hidden_judged(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> Hid
 }
 
 impl Member {
-    /// Whether it is in the class, and no parameter of the baseline.
-    pub fn is_twin(&self) -> bool {
+    /// Whether it is in the class, and not a parameter of the baseline.
+    pub(crate) fn is_twin(&self) -> bool {
         self.cosine > TWIN_COSINE && !self.effect.starts_with("parameter:")
     }
 }

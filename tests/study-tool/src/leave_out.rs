@@ -1,20 +1,20 @@
-//! Leave one out: what a program says of an effect that its catalogue does not have.
+//! Leave one out: what a program reports of an effect that its catalogue lacks.
 //!
 //! ```text
 //! hidden effect + its class in this record ──► PROGRAM close ... --without A --without B ──► report.json
 //! outside-expected.json: balances, variables ──────────────────────────────────────────────► right, or not
 //! ```
 //!
-//! An effect is left out as a whole, at all its places, and with it every effect that is its twin in this very record
-//! ([`super::classes`]); where the classes of a draw are not known, only the effect itself. The rules:
+//! An effect is left out at all its places, and with it every effect that is its twin in this record ([`super::classes`]).
+//! Where the classes of a draw are not known, only the effect itself is left out. The rules:
 //!
-//! - *No wrong name*: there is a good report and nothing of the catalogue is named in it. A parameter of the baseline is no name.
-//! - The *balance* is right when it is one that `outside-expected.json` has for the effect, on the axis that the effect is at;
-//!   what acts on both axes may be seen on either.
+//! - *No wrong name*: the report is good and names nothing of the catalogue. A parameter of the baseline is no name.
+//! - The *balance* is right when `outside-expected.json` lists it for the effect, on the axis of the effect; an effect on both
+//!   axes may show on either.
 //! - The *variable* is right when one of the first two is expected. Both come from what the program reports as outside the
-//!   catalogue; where it reports another verdict, from what it locates under the rig file's own values.
-//! - The gap *still closes* for effects without memory: a term over what is measured can stand in for them. With memory are those
-//!   for which the plant keeps something from step to step (`plant/src/effects/memory.rs`).
+//!   catalogue; with another verdict, from what it locates with the values of the rig file.
+//! - The gap *still closes* for effects without memory, since a term over measured variables can replace them. Effects have
+//!   memory when the plant keeps a state for them from step to step (`plant/src/effects/memory.rs`).
 //!
 //! Source: `discrepancy/docs/outside-expected.md`.
 
@@ -30,40 +30,41 @@ pub mod tables;
 
 pub use tables::Tables;
 
-/// Variables of a report that are looked at.
-const FIRST: usize = 2;
+/// Variables of a report that count, from the first.
+const COUNTED_VARIABLES: usize = 2;
 
+/// Balances and variables in which an effect is expected to show.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expected {
-    /// Balances without their axis, as `flow-a`.
-    pub balances: Vec<String>,
-    /// Variables, as `p_a-p_b`.
-    pub variables: Vec<String>,
+    /// Balances without their axis, such as `flow-a`.
+    pub(crate) balances: Vec<String>,
+    /// Variables, such as `p_a-p_b`.
+    pub(crate) variables: Vec<String>,
 }
 
-/// What must show, by the name of the effect: `tests/study/outside-expected.json`.
+/// Expectations by the name of the effect: `tests/study/outside-expected.json`.
 pub type Expectations = BTreeMap<String, Expected>;
 
-/// What a program said without the hidden effect in its catalogue.
+/// Judgement of a report without the hidden effect in the catalogue.
 #[derive(Debug, Clone, Serialize)]
-pub struct LeftOut {
-    pub without: Vec<String>,
-    /// Its verdict, or `error`.
-    pub verdict: &'static str,
-    /// Whether there is a good report that names nothing.
-    pub no_wrong_name: bool,
-    pub balance: Option<String>,
-    /// All variables it reported, the strongest first.
-    pub variables: Vec<String>,
-    pub formula: Option<String>,
-    pub balance_right: bool,
+pub(crate) struct LeaveOutJudgement {
+    pub(crate) without: Vec<String>,
+    /// The verdict of the report, or `error`.
+    pub(crate) verdict: &'static str,
+    /// Whether the report is good and names nothing.
+    pub(crate) no_wrong_name: bool,
+    pub(crate) balance: Option<String>,
+    /// All reported variables, the strongest first.
+    pub(crate) variables: Vec<String>,
+    pub(crate) formula: Option<String>,
+    pub(crate) balance_right: bool,
     /// Whether one of the first two variables is right.
-    pub variable_right: bool,
-    pub with_memory: bool,
+    pub(crate) variable_right: bool,
+    pub(crate) with_memory: bool,
 }
 
-/// Effects to leave out for a draw: those that are hidden, and all that are of their classes.
+/// Names of the effects to leave out for a draw: the hidden ones, and all of their classes.
 pub fn left_out(draw: &Draw, classes: Option<&DrawClasses>) -> Vec<String> {
     let hidden = draw.recipe.hidden.iter().map(|hidden| hidden.name.to_owned());
     let members = classes.into_iter().flat_map(|classes| &classes.hidden).flat_map(|own| &own.members);
@@ -71,18 +72,18 @@ pub fn left_out(draw: &Draw, classes: Option<&DrawClasses>) -> Vec<String> {
     hidden.chain(twins).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
-/// The arguments of a program that has to do without effects.
-pub fn arguments(without: &[String]) -> Vec<String> {
+/// Command-line arguments of a program without these effects.
+pub(crate) fn arguments(without: &[String]) -> Vec<String> {
     without.iter().flat_map(|name| ["--without".to_owned(), name.clone()]).collect()
 }
 
-/// Judges what a program said about a draw of one effect, if its report is good.
-pub fn judge(
+/// Judges the report of a program on a draw of one effect; `None` without a good report.
+pub(crate) fn judge(
     draw: &Draw,
     without: &[String],
     expectations: &Expectations,
     report: Option<&Report>,
-) -> LeftOut {
+) -> LeaveOutJudgement {
     let hidden = draw.recipe.hidden.first();
     let expected = hidden.and_then(|hidden| expectations.get(hidden.name));
     let outside = report.and_then(|report| report.outside.as_ref());
@@ -93,9 +94,10 @@ pub fn judge(
     let of_located = located.iter().flat_map(|located| &located.variables).map(|own| own.variable.clone());
     let variables: Vec<String> = of_outside.chain(of_located).collect();
     let balance_right = |place: Place| Some(is_expected(balance.as_ref()?, place, &expected?.balances));
-    let variable_right = expected
-        .is_some_and(|own| variables.iter().take(FIRST).any(|reported| own.variables.contains(reported)));
-    LeftOut {
+    let variable_right = expected.is_some_and(|own| {
+        variables.iter().take(COUNTED_VARIABLES).any(|reported| own.variables.contains(reported))
+    });
+    LeaveOutJudgement {
         without: without.to_vec(),
         verdict: report.map_or("error", |report| report.verdict.name()),
         no_wrong_name: report.is_some_and(|report| report.named.is_empty()),
@@ -108,7 +110,7 @@ pub fn judge(
     }
 }
 
-/// Whether a balance as `drive.flow-a` is one of those expected, on the axis of a place.
+/// Whether a balance such as `drive.flow-a` is an expected one, on the axis of a place.
 fn is_expected(balance: &str, place: Place, expected: &[String]) -> bool {
     let (axis, name) = balance.split_once('.').map_or((None, balance), |(axis, name)| (Some(axis), name));
     let on_axis = match (axis, axis_of(place)) {

@@ -1,16 +1,16 @@
-//! The ledger of seeds: which ones somebody has opened, with which program, and what was changed afterwards.
+//! The ledger of seeds: which were opened, with which program, and what was changed afterwards.
 //!
 //! ```text
 //! seed < 100        development: thresholds may be chosen on its draws
 //! any other seed    SHA-256 of the frozen program's sources, entered as [[fresh]] before its first draw is made
 //! opened            by a draw, a figure or a failure: development from then on, for every later program; the frozen one may
-//!                   go on with draws that nobody has seen; figures of the first opening stand beside those of any later one
+//!                   continue with unseen draws; figures of later openings are listed beside those of the first
 //! ```
 //!
-//! Worlds and twins of a seed are draws of different random streams ([`crate::draws`]): each opening says which it saw.
+//! Worlds and twins of a seed use different random streams ([`crate::draws`]): each opening states which it saw.
 //!
-//! A figure that was measured on draws whose failures had been read before is optimistic by an unknown amount. The ledger
-//! makes that visible; it cannot prevent somebody from drawing with another copy of this program.
+//! A figure measured on draws whose failures had been read before is optimistic by an unknown amount. The ledger makes that
+//! visible; it cannot prevent draws with another copy of this program.
 
 use crate::compare::{grid, reported};
 use crate::folder::{FolderError, read};
@@ -21,51 +21,52 @@ use std::path::Path;
 use toml::value::Datetime;
 
 /// Seeds below this one are development seeds.
-pub const FIRST_FRESH_SEED: u64 = 100;
+pub(crate) const FIRST_FRESH_SEED: u64 = 100;
 
+/// Entered and opened seeds, as `tests/study/evidence/ledger.toml` holds them.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ledger {
     #[serde(default)]
-    pub fresh: Vec<Fresh>,
+    pub(crate) fresh: Vec<FreshSeed>,
     #[serde(default)]
-    pub opening: Vec<Opening>,
+    pub(crate) opening: Vec<Opening>,
 }
 
 /// A seed that was entered before its first draw.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fresh {
-    pub seed: u64,
-    /// Of the sources of the program that is judged, in hexadecimal; the seed is its first 13 digits.
-    pub sha256: String,
-    pub commit: String,
-    pub date: Datetime,
+pub(crate) struct FreshSeed {
+    pub(crate) seed: u64,
+    /// Of the sources of the judged program, in hexadecimal; the seed is its first 13 digits.
+    pub(crate) sha256: String,
+    pub(crate) commit: String,
+    pub(crate) date: Datetime,
 }
 
-/// One run of a study whose results somebody saw.
+/// One run of a study whose results were seen.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Opening {
-    pub seed: u64,
-    pub study: String,
-    pub date: Datetime,
-    pub commit: String,
-    /// Of the program's executable, as results identify it; absent where several were judged.
-    pub crc32: Option<String>,
-    pub command: String,
-    /// What was changed after the results had been read.
-    pub after: String,
+pub(crate) struct Opening {
+    pub(crate) seed: u64,
+    pub(crate) study: String,
+    pub(crate) date: Datetime,
+    pub(crate) commit: String,
+    /// Of the program's executable, as in its results; absent where several were judged.
+    pub(crate) crc32: Option<String>,
+    pub(crate) command: String,
+    /// What was changed after the results were read.
+    pub(crate) after: String,
     /// Name and `count/of`.
-    pub figures: Vec<(String, Count)>,
+    pub(crate) figures: Vec<(String, Count)>,
 }
 
 /// `202/218`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
-pub struct Count {
-    pub count: usize,
-    pub of: usize,
+pub(crate) struct Count {
+    pub(crate) count: usize,
+    pub(crate) of: usize,
 }
 
 impl TryFrom<String> for Count {
@@ -81,8 +82,10 @@ impl TryFrom<String> for Count {
     }
 }
 
+/// Why draws of a seed are refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SeedError {
+    /// The seed is neither for development nor in the ledger.
     #[error(
         "seed {0} is not in the ledger: seeds below {FIRST_FRESH_SEED} are for development; a fresh one comes from \
          `scripts/study seed` and is entered in tests/study/evidence/ledger.toml before its first draw"
@@ -94,7 +97,7 @@ impl Ledger {
     /// Reads the ledger.
     ///
     /// # Errors
-    /// [`FolderError`] when it cannot be read, has an unknown key, or enters a seed that its hash does not give.
+    /// [`FolderError`] when it cannot be read, has an unknown key, or a seed does not match its hash.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
         let ledger: Ledger =
             toml::from_str(&read(path)?).map_err(|error| FolderError::content(path, error))?;
@@ -106,7 +109,7 @@ impl Ledger {
         Ok(ledger)
     }
 
-    /// Whether draws of this seed may be made.
+    /// Refuses a seed whose draws may not be made.
     ///
     /// # Errors
     /// [`SeedError`] when the seed is neither for development nor entered.
@@ -115,7 +118,8 @@ impl Ledger {
         if seed < FIRST_FRESH_SEED || is_entered() { Ok(()) } else { Err(SeedError::NotEntered(seed)) }
     }
 
-    /// Every opening, every entered seed, and for each study of a seed its figures side by side, the first opening first.
+    /// The ledger in Markdown: every opening, every entered seed, and for each study of a seed its figures side by side, those
+    /// of the first opening first.
     pub fn markdown(&self) -> String {
         let heads = [
             "seed",
@@ -142,7 +146,7 @@ impl Ledger {
         let mut text = format!("## Openings\n\n{}", grid(&heads.map(str::to_owned), openings));
         text.push_str("\n## Seeds entered before their first draw\n\n");
         for fresh in &self.fresh {
-            let Fresh { seed, sha256, commit, date } = fresh;
+            let FreshSeed { seed, sha256, commit, date } = fresh;
             let _ = writeln!(
                 text,
                 "- Seed {seed} was entered on {date} for the sources of {commit}, SHA-256\n  {sha256}."
@@ -180,7 +184,7 @@ impl Ledger {
     }
 }
 
-/// The seed of a hash: its first 13 hexadecimal digits, which a number of JSON holds exactly.
+/// The seed of a hash: its first 13 hexadecimal digits, which a JSON number holds exactly.
 fn seed_of(sha256: &str) -> Option<u64> {
     let is_whole = sha256.len() == 64 && sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
     is_whole.then(|| u64::from_str_radix(&sha256[..13], 16).ok()).flatten()

@@ -1,23 +1,22 @@
-//! Detection limits: the amplitude from which an ideal observer, who knows which effect it is, sees it in 90 % of records at 1
-//! % false alarms.
+//! Detection limits: the amplitude at which an ideal observer that knows the effect detects it in 90 % of records at 1 % false
+//! alarms.
 //!
 //! ```text
 //! |M J(a)| = z_0.99 + z_0.90 = 3.608         one side;  z_0.995 + z_0.90 = 3.857 where the effect may have either sign
 //! ```
 //!
-//! `|M J|` is the observer's [`super::signature`] in the train record with nothing hidden; shapes have their defaults. The
-//! amplitude is found on a logarithmic scale of the *excursion*, the distance from the value at which the rig is the
-//! baseline:
+//! `|M J|` is the [`super::signature`] in the train record with nothing hidden; shapes have their defaults. The amplitude is
+//! found on a logarithmic scale of the *excursion*, the distance from the value at which the rig is the baseline:
 //!
 //! | neutral value | excursion |
 //! |---|---|
 //! | 0 | the magnitude |
 //! | a number of the rig file | magnitude of the logarithm of the ratio, upwards and downwards each with its own limit |
 //! | infinity | 1 / value |
-//! | none | no limit: the weakest of the drawn range is reported in standard deviations |
+//! | none | no limit: the weakest amplitude of the drawn range is reported in standard deviations |
 //!
-//! An effect that is seen at the weakest that a rig file takes (a stiffness or a coefficient that would have to be larger) has
-//! no limit either: it is always seen.
+//! An effect that is detected at the weakest value that a rig file allows (a larger stiffness or coefficient would be refused)
+//! has no limit either: it is always detected.
 //!
 //! Limits are computed from the plant and committed before any program is judged.
 
@@ -32,16 +31,16 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Rate of false alarms of the ideal observer.
 const FALSE_ALARMS: f64 = 0.01;
-/// Share of records in which it sees the effect.
-const SEEN: f64 = 0.9;
+/// Detection rate at the limit.
+const POWER: f64 = 0.9;
 /// Ratio of the ends of the last bracket.
 const PRECISION: f64 = 1.02;
-/// Excursions below this share of the largest are no matter of physics.
+/// Smallest excursion of the search as a share of the drawn one; below it the value has no physical meaning.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// Where the baseline lies on an amplitude's scale, and to which side of it.
+/// The value of an amplitude at which the rig is the baseline, and the side of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Scale {
+pub(crate) enum Scale {
     Zero,
     About(f64, bool),
     Infinite,
@@ -49,8 +48,8 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// The scales of an amplitude: two where the drawn range lies on both sides of a number.
-    pub fn of(key: &EffectKey) -> Vec<Scale> {
+    /// Scales of an amplitude: two where the drawn range lies on both sides of a number.
+    pub(crate) fn of(key: &EffectKey) -> Vec<Scale> {
         match key.neutral {
             None => vec![Scale::None],
             Some(0.0) => vec![Scale::Zero],
@@ -63,9 +62,9 @@ impl Scale {
         }
     }
 
-    /// Excursion of a value; `None` for one of the other side.
+    /// Excursion of a value; `None` for one on the other side.
     #[must_use]
-    pub fn excursion(self, value: f64) -> Option<f64> {
+    pub(crate) fn excursion(self, value: f64) -> Option<f64> {
         match self {
             Scale::Zero => Some(value.abs()),
             Scale::About(neutral, above) => {
@@ -78,7 +77,7 @@ impl Scale {
     }
 
     #[must_use]
-    pub fn value(self, excursion: f64) -> f64 {
+    pub(crate) fn value(self, excursion: f64) -> f64 {
         match self {
             Scale::Zero | Scale::None => excursion,
             Scale::About(neutral, true) => neutral * excursion.exp(),
@@ -87,7 +86,7 @@ impl Scale {
         }
     }
 
-    /// Excursions of the most that a file may hold and of the most that is drawn.
+    /// Excursions of the strongest value that a file allows, and of the strongest that is drawn.
     fn most(self, key: &EffectKey) -> [f64; 2] {
         let ends = match self {
             Scale::Zero | Scale::About(_, true) | Scale::None => [key.max, key.drawn[1]],
@@ -96,7 +95,7 @@ impl Scale {
         ends.map(|end| self.excursion(end).unwrap_or(end))
     }
 
-    /// Excursion of the least that a file may hold.
+    /// Excursion of the weakest value that a file allows.
     fn least(self, key: &EffectKey) -> f64 {
         if self == Scale::Infinite { 1.0 / key.max } else { 0.0 }
     }
@@ -106,43 +105,43 @@ impl Scale {
     }
 }
 
-/// |M J| from which an effect is seen.
-pub fn threshold(two_sided: bool) -> f64 {
+/// |M J| at the detection limit.
+pub(crate) fn threshold(two_sided: bool) -> f64 {
     let quantile = |share| Normal::standard().inverse_cdf(share);
-    quantile(1.0 - if two_sided { FALSE_ALARMS / 2.0 } else { FALSE_ALARMS }) + quantile(SEEN)
+    quantile(1.0 - if two_sided { FALSE_ALARMS / 2.0 } else { FALSE_ALARMS }) + quantile(POWER)
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limit {
-    pub effect: String,
+pub(crate) struct Limit {
+    pub(crate) effect: String,
     #[serde(rename = "where")]
-    pub place: String,
-    pub key: String,
-    pub unit: String,
+    pub(crate) place: String,
+    pub(crate) key: String,
+    pub(crate) unit: String,
     /// `above` or `below` a number of the rig file.
-    pub side: Option<String>,
-    /// The amplitude from which it is seen; `None` when no amplitude that a rig file takes is, or every one.
+    pub(crate) side: Option<String>,
+    /// The amplitude at the limit; `None` when no amplitude that a rig file allows is detected, or every one.
     #[serde(rename = "limit")]
-    pub limit_value: Option<f64>,
-    /// |M J| / threshold at the most that is drawn; of the weakest of the drawn range where there is no neutral value.
-    pub strength: f64,
-    pub excited: bool,
+    pub(crate) limit_value: Option<f64>,
+    /// |M J| / threshold at the strongest drawn value; at the weakest where there is no neutral value.
+    pub(crate) strength: f64,
+    pub(crate) excited: bool,
 }
 
 /// All limits, as `tests/study/limits.json` holds them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    pub schema_version: u32,
-    pub window_ms: u32,
-    pub seed: u64,
-    pub limits: Vec<Limit>,
+    pub(crate) schema_version: u32,
+    pub(crate) window_ms: u32,
+    pub(crate) seed: u64,
+    pub(crate) limits: Vec<Limit>,
 }
 
 impl Limits {
-    /// How far the amplitude of an effect lies above its limit: 0 when no amplitude is seen, `None` when every one is.
-    pub fn ratio(&self, sheet: &Sheet, place: Place, amplitude: f64) -> Option<f64> {
+    /// Ratio of the excursion of an amplitude to that of its limit: 0 when no amplitude is detected, `None` when every one is.
+    pub(crate) fn ratio(&self, sheet: &Sheet, place: Place, amplitude: f64) -> Option<f64> {
         let key = &sheet.keys[0];
         Scale::of(key).into_iter().find_map(|scale| {
             let own = scale.excursion(amplitude)?;
@@ -164,36 +163,36 @@ fn side(scale: Scale) -> Option<String> {
     }
 }
 
-/// Which records the limits are computed from: of each axis alone, and of both.
+/// Records from which the limits are computed: of one axis, or of both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measured {
+pub(crate) enum MeasuredAxes {
     One(Axis),
     Both,
 }
 
-impl Measured {
-    /// The record in which the limit of an effect at a place is looked for.
-    pub fn of(kind: PlaceKind, place: Place) -> Self {
+impl MeasuredAxes {
+    /// The record for the limit of an effect at a place.
+    pub(crate) fn of(kind: PlaceKind, place: Place) -> Self {
         match axis_of(place) {
-            Some(axis) if !needs_both_axes(kind) => Measured::One(axis),
-            _ => Measured::Both,
+            Some(axis) if !needs_both_axes(kind) => MeasuredAxes::One(axis),
+            _ => MeasuredAxes::Both,
         }
     }
 }
 
-/// The limits of all effects at all places that are seen in such records.
+/// The limits of all effects at all places that show in such records.
 ///
 /// # Errors
-/// [`ParameterError`] when a sheet's own range is refused: a bug of the catalogue.
-pub fn limits_in(
+/// [`ParameterError`] when a value of a sheet's range is refused, which is a fault of the catalogue.
+pub(crate) fn limits_in(
     observer: &Observer,
-    measured: Measured,
+    measured: MeasuredAxes,
     say: &(dyn Fn(&str) + Sync),
 ) -> Result<Vec<Limit>, ParameterError> {
     let mut cases = Vec::new();
     for sheet in SHEETS {
         for place in
-            sheet.place.places().iter().filter(|place| Measured::of(sheet.place, **place) == measured)
+            sheet.place.places().iter().filter(|place| MeasuredAxes::of(sheet.place, **place) == measured)
         {
             cases.extend(Scale::of(&sheet.keys[0]).into_iter().map(|scale| (sheet, *place, scale)));
         }
@@ -211,7 +210,7 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
     let name = place.to_string();
     let threshold = threshold(scale.two_sided(key));
     let strength_at = |value: f64| {
-        // An excursion to the end of the range and back may round beyond it.
+        // Rounding of an excursion and back may leave the range.
         let value = value.clamp(key.min, key.max);
         let rig = observer.rig().with_effect(sheet.name, &name, &[(key.name, value)])?;
         Ok::<_, ParameterError>(length(&observer.signature(&rig)) / threshold)
@@ -247,21 +246,21 @@ fn weakest(
     })
 }
 
-/// Excursions between which a limit is looked for.
+/// Excursions between which a limit is searched.
 struct Ends {
     least: f64,
-    /// That a file may hold.
+    /// Strongest that a file allows.
     most: f64,
     drawn: f64,
 }
 
-struct Found {
+struct SearchResult {
     limit: Option<f64>,
     strength: f64,
 }
 
-/// The excursion at which the strength passes 1, looked for from the most that is drawn: down to the least, or up to the most.
-fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result<Found, E> {
+/// The excursion at which the strength crosses 1: searched from the strongest drawn one, down to the least or up to the most.
+fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result<SearchResult, E> {
     let &Ends { least, most, drawn } = ends;
     let strength = strength_at(drawn)?;
     let least = least.max(drawn * LEAST_SHARE);
@@ -269,12 +268,12 @@ fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result
         if strength >= 1.0 { (least, least, drawn) } else { (most, drawn, most) };
     let there = strength_at(beyond)?;
     if (there >= 1.0) == (strength >= 1.0) {
-        return Ok(Found { limit: None, strength });
+        return Ok(SearchResult { limit: None, strength });
     }
     let mut next = drawn / strength;
     while high / low > PRECISION {
-        // Strength is nearly proportional to the excursion; where that leads out of the bracket, or no further, its middle is
-        // safer.
+        // Strength is nearly proportional to the excursion; where that predicts a point outside the bracket or at its edge, its
+        // middle is used.
         let inside = next > low * PRECISION.sqrt() && next < high / PRECISION.sqrt();
         let at = if inside { next } else { (low * high).sqrt() };
         let here = strength_at(at)?;
@@ -283,11 +282,11 @@ fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result
         } else {
             low = at;
         }
-        // To the other side of the limit, so that the bracket closes from both ends.
+        // Overshoots the limit, so that the bracket closes from both ends.
         let overshoot = if here >= 1.0 { 1.0 / PRECISION.sqrt() } else { PRECISION.sqrt() };
         next = if here > 0.0 { at / here * overshoot } else { 0.0 };
     }
-    Ok(Found { limit: Some(high), strength })
+    Ok(SearchResult { limit: Some(high), strength })
 }
 
 #[cfg(test)]

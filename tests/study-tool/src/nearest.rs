@@ -1,15 +1,15 @@
-//! The numbers of the catalogue's law that come nearest to another form of it: what a program can be right about.
+//! Numbers of the catalogue's law nearest to another form of it: the true numbers for a program that only knows the law.
 //!
 //! ```text
 //!   minimise |M (y - y_law(z))|^2      y: readings without noise of the record with that effect alone, in its other form
 //! ```
 //!
-//! Windows, their true starts, and what does not count are those of [`super::signature`]; parameters are those of the record, and
-//! there is no background. The fit is Gauss-Newton in the coordinates of a candidate, from the drawn numbers, and ends where no
-//! shortened step falls. A number that the record hardly shows stays near the drawn one.
+//! Windows, true initial states and excluded readings are those of [`super::signature`]; the parameters are those of the
+//! record, and there is no background. The fit is Gauss-Newton in the coordinates of a candidate, from the drawn numbers. It
+//! ends where no shortened step reduces the squares. A number that the record hardly determines stays near the drawn one.
 //!
-//! The true number of another form is that of the best fit. Source: White 1982, Econometrica 50(1): what the fit of a
-//! misspecified model converges to.
+//! The true number of another form is defined as that of the best fit. Source: White 1982, Econometrica 50(1): the limit of the
+//! estimates of a misspecified model.
 
 use crate::classes::with_parameter;
 use crate::compute::{ComputeError, trajectory};
@@ -22,15 +22,15 @@ use plant::RigParameters;
 use record_maker::{Form, Hidden, PARAMETERS, Recipe, Record, simulate};
 use serde::{Deserialize, Serialize};
 
-/// Step of finite differences, as a coordinate.
+/// Step of the finite differences, in coordinates.
 const CHANGE: f64 = 0.01;
-/// Most steps, the fall of the squares that ends the fit, as a share of the squared signature, and the longest step of a
+/// Most iterations; decrease of the squares at convergence, as a share of the squared signature; and longest step of a
 /// coordinate.
 const STEPS: usize = 12;
 const CONVERGED: f64 = 1e-7;
 const LONGEST: f64 = 0.3;
-/// What the fit may leave of an effect of the catalogue's own form, as a share of its squared signature, and by which share a
-/// number may be off there.
+/// Largest residual of an effect of the catalogue's form, as a share of its squared signature, and largest relative error of a
+/// number, for the fit to count as faithful.
 const FAITHFUL_LEFT: f64 = 0.05;
 const FAITHFUL: f64 = 0.01;
 /// Ridge as a share of a column's square.
@@ -41,19 +41,19 @@ const MOST_OFF: f64 = 0.15;
 /// The law nearest to a hidden effect of another form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct NearestLaw {
+pub(crate) struct NearestLaw {
     /// One for each key of the sheet, in its unit.
-    pub numbers: Vec<f64>,
-    /// Share of the form's squared signature that it leaves.
-    pub left_share: f64,
+    pub(crate) numbers: Vec<f64>,
+    /// Share of the form's squared signature that the fit leaves.
+    pub(crate) left_share: f64,
 }
 
-/// The nearest law of one hidden effect of a draw; `None` where the same fit does not find an effect of the catalogue's own form
-/// again, as between linked rods. A number that it does not find there is the drawn one.
+/// The nearest law of one hidden effect of a draw; `None` where the same fit does not recover an effect of the catalogue's
+/// form, as between linked rods. A number that it does not recover there is the drawn one.
 ///
 /// # Errors
 /// [`ComputeError`] when a record cannot be made.
-pub fn nearest_law(draw: &Draw, hidden: &Hidden) -> Result<Option<NearestLaw>, ComputeError> {
+pub(crate) fn nearest_law(draw: &Draw, hidden: &Hidden) -> Result<Option<NearestLaw>, ComputeError> {
     let fitted = |form| fitted(&record(draw, hidden, form)?, hidden);
     let own = fitted(Form::Catalogue)?;
     if own.left_share > FAITHFUL_LEFT {
@@ -91,7 +91,7 @@ pub(crate) fn fitted(made: &Record, hidden: &Hidden) -> Result<NearestLaw, Compu
     Ok(NearestLaw { numbers, left_share: nearest.squares / whole.max(1e-12) })
 }
 
-/// The fit of a law, with the first parameters of the baseline beside it.
+/// The fit of a law together with the first parameters of the baseline.
 pub(crate) struct Fit<'a> {
     pub(crate) observer: &'a Observer,
     pub(crate) observed: &'a Run,
@@ -101,16 +101,16 @@ pub(crate) struct Fit<'a> {
     pub(crate) priors: &'a [f64],
 }
 
-/// The law at some coordinates, behind which the deviations of the parameters stand.
-pub(crate) struct Simulated {
+/// A point of the fit: coordinates of the law, then deviations of the parameters.
+pub(crate) struct FitPoint {
     pub(crate) coordinates: Vec<f64>,
     pub(crate) run: Run,
     residual: Vec<f64>,
-    /// With those of the deviations by their priors.
+    /// Weighted squares of the deviations by their priors included.
     squares: f64,
 }
 
-impl Iterate for Simulated {
+impl Iterate for FitPoint {
     fn loss(&self) -> f64 {
         self.squares
     }
@@ -121,7 +121,7 @@ impl Iterate for Simulated {
 }
 
 impl Fit<'_> {
-    /// The rig at some coordinates; `None` where there is none.
+    /// The rig at some coordinates; `None` where it is refused.
     pub(crate) fn rig_at(&self, coordinates: &[f64]) -> Option<RigParameters> {
         let (own, deviations) = coordinates.split_at(self.keys());
         let mut all = PARAMETERS.iter().zip(deviations);
@@ -138,21 +138,21 @@ impl Fit<'_> {
         Some(self.observer.readings(&self.rig_at(coordinates)?))
     }
 
-    /// At some coordinates; `None` where no rig can have them.
-    pub(crate) fn at(&self, coordinates: Vec<f64>) -> Option<Simulated> {
+    /// The point at some coordinates; `None` where the rig is refused.
+    pub(crate) fn at(&self, coordinates: Vec<f64>) -> Option<FitPoint> {
         let run = self.simulated(&coordinates)?;
         let residual = self.observer.between(self.observed, &run);
         let off = coordinates[self.keys()..].iter().zip(self.priors);
         let squares = length(&residual).powi(2) + off.map(|(off, prior)| prior * off * off).sum::<f64>();
-        Some(Simulated { coordinates, run, residual, squares })
+        Some(FitPoint { coordinates, run, residual, squares })
     }
 
     fn bounds(&self, at: usize) -> [f64; 2] {
         if at < self.keys() { self.candidate.fit_bounds(at) } else { [-MOST_OFF, MOST_OFF] }
     }
 
-    /// The least squares from a start, to a share of `whole`.
-    pub(crate) fn nearest(&self, start: Simulated, whole: f64) -> Simulated {
+    /// Least squares from a start; converged when the decrease is below a share of `whole`.
+    pub(crate) fn nearest(&self, start: FitPoint, whole: f64) -> FitPoint {
         let options = Options { steps: STEPS, converged: CONVERGED * whole, ..JOINT };
         let (fitted, _) = Estimator::new(options).descend(start, |estimator, point| {
             let Some(step) = self.step(&point.coordinates, &point.run, &point.residual) else {

@@ -1,10 +1,10 @@
-//! The score as one page: opens offline, needs no script, asks for nothing from elsewhere.
+//! The score as one HTML page that works offline and without scripts.
 //!
-//! Markup that an XML parser reads too, with the stylesheet of all pages of airbench (light, dark, print). The shade of a cell
-//! of the confusion matrix is its share of the row; its number and the frame of what is right say the same without colour.
+//! Well-formed XML, with the stylesheet of all pages of airbench (light, dark, print). The shade of a cell of the confusion
+//! matrix is its share of the row; the number and the frame of right cells show the same without colour.
 
 use crate::interval::Rate;
-use crate::score::tables::{BESIDE, ConfusionRow, Split, Spread};
+use crate::score::tables::{ConfusionRow, OTHER_COLUMNS, Split, Spread};
 use crate::score::{Case, Score};
 use pagekit::page::{document, escaped};
 use plant::effects::SHEETS;
@@ -12,6 +12,7 @@ use std::fmt::Write;
 
 mod leave_out;
 
+/// The page of a score, complete HTML.
 pub fn page(score: &Score) -> String {
     let title = format!("Study of {}: {}", score.program.name, score.label);
     let mut sections = vec![
@@ -90,7 +91,7 @@ fn lead(score: &Score) -> String {
     )
 }
 
-/// A table: heads, and rows whose first cell is a head; all of them markup.
+/// A table of heads and rows, all of them markup; the first cell of a row is a head.
 fn table(heads: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut text = String::from("<div class=\"scroll\" tabindex=\"0\">\n<table>\n<thead><tr>");
     for head in heads {
@@ -149,7 +150,7 @@ fn splits(head: &str, splits: &[Split]) -> String {
 fn confusion(score: &Score) -> String {
     const TIGHT: &str = "style=\"padding:.1rem .15rem;text-align:center\"";
     let numbered = (1..).map(|number: usize| number.to_string()).zip(SHEETS.iter().map(|sheet| sheet.name));
-    let beside = BESIDE.iter().map(|name| ((*name).to_owned(), *name));
+    let beside = OTHER_COLUMNS.iter().map(|name| ((*name).to_owned(), *name));
     let columns: Vec<(String, &str)> = numbered.chain(beside).collect();
     let mut text = String::from(
         "<p>One effect hidden: rows are the truth, columns the first name, numbered as the rows. A framed number is of the true \
@@ -176,7 +177,7 @@ fn confusion(score: &Score) -> String {
     text
 }
 
-/// A cell: how often, framed when right, shaded by its share of the row.
+/// A cell of the confusion matrix: the count, framed when right, shaded by its share of the row.
 fn cell(row: &ConfusionRow, name: &str) -> String {
     let Some([all, right, at_place]) = row.called.get(name) else {
         return "<span class=\"soft\">·</span>".to_owned();

@@ -1,10 +1,10 @@
-//! Whether probabilities keep what they promise: of what is said at 90 %, 90 % should be right.
+//! Calibration of the probabilities of explanations: of those stated at 90 %, 90 % should be right.
 //!
-//! An explanation is *right* when it is what was hidden: nothing, parameters alone, or a set of effects in which each stands
-//! for one hidden effect, itself or a twin at its place. Where none of a report is, or the effect was left out of the
-//! catalogue, *none of these* is right; so it is, beside nothing or parameters, of a record whose background alone is
-//! missing. Two that are right are one event, which has the sum of their probabilities. The weights of the probabilities were
-//! fitted by the same rules (`discrepancy/study/explanations.py`), without that sum.
+//! An explanation is *right* when it is what was hidden: nothing, parameters only, or a set of effects of which each stands for
+//! one hidden effect, itself or a twin at its place. Where no explanation of a report is right, or the effect was left out of
+//! the catalogue, *none of these* is right. It is also right, beside nothing or parameters, for a record with a background and
+//! nothing hidden. Two right explanations are one event with the sum of their probabilities. The weights of the probabilities
+//! were fitted by the same rules (`discrepancy/study/explanations.py`), without that sum.
 
 use crate::classes::Member;
 use crate::draws::{Draw, Kind};
@@ -14,35 +14,40 @@ use discrepancy::report::{EffectPlace, Explanation, ExplanationKind};
 use record_maker::Hidden;
 use serde::Serialize;
 
-/// Edges between the bins before small ones are joined.
+/// Edges between the bins before small ones are merged.
 const EDGES: [f64; 5] = [0.01, 0.1, 0.5, 0.9, 0.99];
-/// Explanations that a bin holds at least.
+/// Fewest explanations of a bin.
 const LEAST_IN_BIN: usize = 60;
-/// Least probability in a bin from which on it tests high ones.
+/// Lower end of a bin that tests high probabilities.
 const HIGH: f64 = 0.5;
-/// Share of the weight that records with nothing hidden have.
+/// Weight of the records with nothing hidden, as a share of all.
 const NULL_SHARE: f64 = 1.0 / 3.0;
 const CONFIDENCE: f64 = 0.95;
-/// What a log loss takes a smaller probability for: one that is 0 would be the whole mean.
+/// Smallest probability in a log loss: a single 0 would dominate the mean.
 const LEAST_PROBABILITY: f64 = 1e-6;
 
-/// One explanation of a report.
+/// One explanation of a report and whether it is right.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Said {
-    pub probability: f64,
-    /// By the marginal likelihood, where the report has it.
-    pub marginal: Option<f64>,
-    pub right: bool,
+pub(crate) struct JudgedExplanation {
+    pub(crate) probability: f64,
+    /// Probability by the marginal likelihood, where the report states it.
+    pub(crate) marginal: Option<f64>,
+    pub(crate) right: bool,
 }
 
-/// The explanations of a report with the probabilities of the marginal likelihood; `None` where it has none.
-pub fn by_marginal(said: &[Said]) -> Option<Vec<Said>> {
-    let own = |said: &Said| Some(Said { probability: said.marginal?, ..*said });
-    said.iter().map(own).collect::<Option<Vec<Said>>>().filter(|said| !said.is_empty())
+/// The explanations with the probabilities of the marginal likelihood; `None` where the report has none.
+pub(crate) fn by_marginal(said: &[JudgedExplanation]) -> Option<Vec<JudgedExplanation>> {
+    let own = |said: &JudgedExplanation| Some(JudgedExplanation { probability: said.marginal?, ..*said });
+    said.iter().map(own).collect::<Option<Vec<JudgedExplanation>>>().filter(|said| !said.is_empty())
 }
 
-/// Judges the explanations of a report about a draw.
-pub fn judge(draw: &Draw, classes: &[Vec<Member>], left_out: bool, report: &Report) -> Vec<Said> {
+/// Judges the explanations of a report on a draw.
+pub(crate) fn judge(
+    draw: &Draw,
+    classes: &[Vec<Member>],
+    left_out: bool,
+    report: &Report,
+) -> Vec<JudgedExplanation> {
     let recipe = &draw.recipe;
     let alone = recipe.hidden.is_empty();
     let is_right = |explanation: &Explanation| match explanation.kind {
@@ -54,12 +59,12 @@ pub fn judge(draw: &Draw, classes: &[Vec<Member>], left_out: bool, report: &Repo
         }
         ExplanationKind::NoneOfThese => alone && recipe.background.is_some(),
     };
-    let said = |explanation: &Explanation| Said {
+    let said = |explanation: &Explanation| JudgedExplanation {
         probability: explanation.probability,
         marginal: explanation.marginal.map(|own| own.probability),
         right: is_right(explanation),
     };
-    let mut judged: Vec<Said> = report.explanations.iter().map(said).collect();
+    let mut judged: Vec<JudgedExplanation> = report.explanations.iter().map(said).collect();
     let any = judged.iter().any(|said| said.right);
     let fallen = report.explanations.iter().position(|own| own.kind == ExplanationKind::NoneOfThese);
     if let Some(none) = fallen.filter(|_| !any) {
@@ -68,7 +73,7 @@ pub fn judge(draw: &Draw, classes: &[Vec<Member>], left_out: bool, report: &Repo
     judged
 }
 
-/// Whether each effect of a set stands for one that is hidden, and none is over.
+/// Whether the effects of a set match the hidden ones one to one.
 fn stand_for(set: &[EffectPlace], hidden: &[Hidden], classes: &[Vec<Member>]) -> bool {
     let Some(first) = set.first().filter(|_| set.len() == hidden.len()) else { return hidden.is_empty() };
     (0..hidden.len()).any(|at| {
@@ -85,50 +90,50 @@ fn stands_for(named: &EffectPlace, hidden: &Hidden, class: &[Member]) -> bool {
     named.effect == hidden.name && place == hidden.place.to_string() || class.iter().any(twin)
 }
 
-/// What was said with like probabilities.
+/// Explanations of similar probabilities.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Bin {
-    /// Probabilities from the first to the second.
-    pub between: [f64; 2],
-    pub explanations: usize,
+pub(crate) struct Bin {
+    /// Smallest and largest probability.
+    pub(crate) between: [f64; 2],
+    pub(crate) explanations: usize,
     /// Weighted means.
-    pub said: f64,
-    pub right: f64,
-    /// Simultaneous over the bins at 95 %: Wilson's at the Bonferroni level, of the effective number. It takes explanations
-    /// of one report as independent, which they are not: it is too narrow.
-    pub band: [f64; 2],
+    pub(crate) said: f64,
+    pub(crate) right: f64,
+    /// Simultaneous over the bins at 95 %: Wilson's interval at the Bonferroni level, for the effective number. It assumes that
+    /// the explanations of one report are independent, which they are not: it is too narrow.
+    pub(crate) band: [f64; 2],
 }
 
-/// The explanations of a report as events that exclude each other: those that are right together are one.
-fn events(said: &[Said]) -> impl Iterator<Item = Said> {
+/// The explanations of a report as mutually exclusive events: right ones are one event.
+fn events(said: &[JudgedExplanation]) -> impl Iterator<Item = JudgedExplanation> {
     let wrong = said.iter().copied().filter(|said| !said.right);
     let right = said.iter().filter(|said| said.right).map(|said| said.probability);
     let both = right.reduce(|one, other| one + other);
-    wrong.chain(both.map(|probability| Said { probability, marginal: None, right: true }))
+    wrong.chain(both.map(|probability| JudgedExplanation { probability, marginal: None, right: true }))
 }
 
 /// Reliability of the probabilities of all reports, and the expected calibration error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Reliability {
-    pub bins: Vec<Bin>,
-    /// Mean over the explanations of |said - right| of their bins.
-    pub calibration_error: f64,
-    /// Reports whose most probable explanation is right, and all.
-    pub first_right: [usize; 2],
-    /// Mean over the reports of -ln of the probability of what is right; `None` without reports.
-    pub log_loss: Option<f64>,
+pub(crate) struct Reliability {
+    pub(crate) bins: Vec<Bin>,
+    /// Weighted mean of |said - right| of the bins.
+    pub(crate) calibration_error: f64,
+    /// Reports whose most probable explanation is right, and all reports.
+    pub(crate) first_right: [usize; 2],
+    /// Mean over the reports of -ln of the probability of the right event; `None` without reports.
+    pub(crate) log_loss: Option<f64>,
 }
 
 impl Reliability {
-    /// The calibration error where a bin lies wholly from one half on; elsewhere it says nothing of high probabilities. One
-    /// event of each report is right, so that the means of a single bin agree by construction.
-    pub fn shown_error(&self) -> Option<f64> {
+    /// The calibration error if a bin lies wholly above one half; otherwise it does not test high probabilities. One event of
+    /// each report is right, so that the means of a single bin agree by construction.
+    pub(crate) fn shown_error(&self) -> Option<f64> {
         let is_high = self.bins.len() > 1 && self.bins.iter().any(|bin| bin.between[0] >= HIGH);
         is_high.then_some(self.calibration_error)
     }
 
-    /// Of reports by the kind of their draw; weighted so that a third are of nothing hidden.
-    pub fn of(reports: &[(Kind, &[Said])]) -> Self {
+    /// Reliability of reports with the kinds of their draws, weighted so that nothing hidden has a third of the weight.
+    pub(crate) fn of(reports: &[(Kind, &[JudgedExplanation])]) -> Self {
         let given: Vec<_> = reports.iter().filter(|(_, said)| !said.is_empty()).collect();
         let is_null = |kind: Kind| matches!(kind, Kind::Null | Kind::Parameter);
         let nulls = given.iter().filter(|(kind, _)| is_null(*kind)).count();
@@ -138,18 +143,20 @@ impl Reliability {
             _ if is_null(kind) => NULL_SHARE / nulls as f64,
             _ => (1.0 - NULL_SHARE) / others as f64,
         };
-        let mut all: Vec<(f64, Said)> =
+        let mut all: Vec<(f64, JudgedExplanation)> =
             given.iter().flat_map(|(kind, said)| events(said).map(|event| (weight(*kind), event))).collect();
         all.sort_by(|left, right| left.1.probability.total_cmp(&right.1.probability));
         let parts = parts(&all);
         let bins: Vec<Bin> = parts.iter().map(|part| bin(part, parts.len())).collect();
-        let weight_of = |part: &[(f64, Said)]| part.iter().map(|(weight, _)| weight).sum::<f64>();
+        let weight_of =
+            |part: &[(f64, JudgedExplanation)]| part.iter().map(|(weight, _)| weight).sum::<f64>();
         let errors =
             bins.iter().zip(&parts).map(|(bin, part)| (bin.said - bin.right).abs() * weight_of(part));
-        let first =
-            |said: &[Said]| said.iter().copied().max_by(|a, b| a.probability.total_cmp(&b.probability));
+        let first = |said: &[JudgedExplanation]| {
+            said.iter().copied().max_by(|a, b| a.probability.total_cmp(&b.probability))
+        };
         let right = given.iter().filter(|(_, said)| first(said).is_some_and(|said| said.right)).count();
-        let loss = |said: &[Said]| {
+        let loss = |said: &[JudgedExplanation]| {
             let of_right = events(said).filter(|event| event.right).map(|event| event.probability);
             -of_right.sum::<f64>().max(LEAST_PROBABILITY).ln()
         };
@@ -163,8 +170,8 @@ impl Reliability {
     }
 }
 
-/// Explanations cut at the edges; what is below the least number joins what lies above it, the last what lies below.
-fn parts(all: &[(f64, Said)]) -> Vec<&[(f64, Said)]> {
+/// Explanations split at the edges; a bin with too few is merged with the next higher one, the last with the one below.
+fn parts(all: &[(f64, JudgedExplanation)]) -> Vec<&[(f64, JudgedExplanation)]> {
     let mut cuts = vec![0];
     for edge in EDGES {
         let at = all.partition_point(|(_, said)| said.probability < edge);
@@ -179,8 +186,8 @@ fn parts(all: &[(f64, Said)]) -> Vec<&[(f64, Said)]> {
     cuts.windows(2).map(|ends| &all[ends[0]..ends[1]]).filter(|part| !part.is_empty()).collect()
 }
 
-fn bin(part: &[(f64, Said)], of: usize) -> Bin {
-    let sum = |value: &dyn Fn(&(f64, Said)) -> f64| part.iter().map(value).sum::<f64>();
+fn bin(part: &[(f64, JudgedExplanation)], of: usize) -> Bin {
+    let sum = |value: &dyn Fn(&(f64, JudgedExplanation)) -> f64| part.iter().map(value).sum::<f64>();
     let total = sum(&|(weight, _)| *weight);
     let right = sum(&|(weight, said)| weight * f64::from(said.right)) / total;
     let effective = total * total / sum(&|(weight, _)| weight * weight);
@@ -205,18 +212,18 @@ mod tests {
             .unwrap()
     }
 
-    fn said(probability: f64, right: bool) -> Said {
-        Said { probability, marginal: Some(0.5), right }
+    fn said(probability: f64, right: bool) -> JudgedExplanation {
+        JudgedExplanation { probability, marginal: Some(0.5), right }
     }
 
     #[test]
     fn a_log_loss_is_of_what_is_right_by_each_rule() {
         let report = [said(0.1, true), said(0.7, false), said(0.2, true)];
-        let loss = |said: &[Said]| Reliability::of(&[(Kind::Single, said)]).log_loss.unwrap();
+        let loss = |said: &[JudgedExplanation]| Reliability::of(&[(Kind::Single, said)]).log_loss.unwrap();
         assert!((loss(&report) + 0.3_f64.ln()).abs() < 1e-12);
         assert!(loss(&by_marginal(&report[..2]).unwrap()) - 2.0_f64.ln() < 1e-12);
         assert!(loss(&[said(0.0, true), said(1.0, false)]) < 14.0);
-        let without = Said { marginal: None, ..report[0] };
+        let without = JudgedExplanation { marginal: None, ..report[0] };
         assert!(by_marginal(&[report[1], without]).is_none() && by_marginal(&[]).is_none());
     }
 
@@ -255,7 +262,7 @@ mod tests {
     #[test]
     fn probabilities_that_keep_their_promise_have_no_error_and_others_have() {
         // 80 reports: of what is said at 75 %, three quarters are right.
-        let of = |right: usize| -> Vec<Vec<Said>> {
+        let of = |right: usize| -> Vec<Vec<JudgedExplanation>> {
             (0..80)
                 .map(|at| {
                     let first = at % 4 < right;
@@ -263,7 +270,7 @@ mod tests {
                 })
                 .collect()
         };
-        let reliability = |reports: &[Vec<Said>]| {
+        let reliability = |reports: &[Vec<JudgedExplanation>]| {
             Reliability::of(&reports.iter().map(|said| (Kind::Single, &said[..])).collect::<Vec<_>>())
         };
         let good = reliability(&of(3));
@@ -293,7 +300,7 @@ mod tests {
     #[test]
     fn explanations_that_are_right_together_are_one_event() {
         let background = [said(0.3, true), said(0.1, false), said(0.6, true)];
-        let events: Vec<Said> = events(&background).collect();
+        let events: Vec<JudgedExplanation> = events(&background).collect();
         assert_eq!(events.len(), 2);
         assert!(!events[0].right && events[1].right && (events[1].probability - 0.9).abs() < 1e-12);
     }
@@ -301,7 +308,7 @@ mod tests {
     #[test]
     fn a_third_of_the_weight_is_of_records_with_nothing_hidden() {
         let [right, wrong] = [true, false].map(|right| vec![said(0.5, right)]);
-        let mut reports: Vec<(Kind, &[Said])> = vec![(Kind::Null, &right); 90];
+        let mut reports: Vec<(Kind, &[JudgedExplanation])> = vec![(Kind::Null, &right); 90];
         reports.extend(vec![(Kind::Single, &wrong[..]); 10]);
         let bins = Reliability::of(&reports).bins;
         assert!(bins.len() == 1 && (bins[0].right - 1.0 / 3.0).abs() < 1e-12, "{bins:?}");

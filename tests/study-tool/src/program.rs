@@ -1,16 +1,16 @@
-//! One start of the program under study: its command line, its limits, and how it ended.
+//! One run of the program under study: its command line, its limits, and how it ended.
 //!
-//! The program runs in a process group of its own in a folder that holds nothing but `rig.toml`, `train.csv` and `test.csv`:
+//! The program runs in a new process group, in a folder that contains only `rig.toml`, `train.csv` and `test.csv`:
 //!
 //! ```text
 //! PROGRAM close --rig rig.toml --train train.csv [next.csv] --test test.csv --out out [ARGUMENTS] [--without EFFECT ...]
 //! ```
 //!
-//! The last ones stand there when effects are left out of its catalogue ([`super::leave_out`]), `next.csv` when it is given the
-//! record of the experiment that it proposed ([`super::resolve`]).
+//! `--without` is given when effects are left out of its catalogue ([`super::leave_out`]), `next.csv` when it gets the record
+//! of the experiment that it proposed ([`super::resolve`]).
 //!
-//! When it has ended, or has used up its time, what is left of the group is killed. Memory is the kernel's largest resident set
-//! of the program and of the children it waited for; the kernel starts counting at what the study itself had at the time.
+//! When the program has ended or its time is over, the rest of the group is killed. Memory is the kernel's largest resident set
+//! of the program and of the children it waited for; it is at least the resident set of the study at the time of the start.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use rustix::process::{Pid, Signal, kill_process_group};
@@ -27,66 +27,71 @@ use wait4::Wait4;
 
 const POLL: Duration = Duration::from_millis(20);
 
+/// The program under study, with its arguments and its time limit.
 #[derive(Debug, Clone)]
 pub struct Program {
     /// The executable, absolute.
-    pub path: PathBuf,
-    pub arguments: Vec<String>,
-    pub limit: Duration,
+    pub(crate) path: PathBuf,
+    pub(crate) arguments: Vec<String>,
+    pub(crate) limit: Duration,
     identity: Identity,
 }
 
-/// Which program it was: results of different ones are never mixed.
+/// Identity of a program: results of different ones are never mixed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
-    pub name: String,
+    pub(crate) name: String,
     /// CRC-32 of its bytes.
-    pub crc32: u32,
-    pub arguments: Vec<String>,
-    /// Whether it had to do without what was hidden; absent in a file when it had not.
+    pub(crate) crc32: u32,
+    pub(crate) arguments: Vec<String>,
+    /// Whether the hidden effects were left out of its catalogue; absent in a file when not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub leave_out: bool,
+    pub(crate) leave_out: bool,
 }
 
 impl Identity {
-    /// Name and checksum in a table's cell.
-    pub fn reported(&self) -> String {
+    /// Name and checksum for the cell of a table.
+    pub(crate) fn reported(&self) -> String {
         format!("{} {:08x}", self.name, self.crc32)
     }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Ended {
+pub(crate) enum ProgramEnd {
     Exited(i32),
     Signalled(i32),
     TimedOut,
     NotStarted,
 }
 
+/// How a run of the program ended, and what it used.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Taken {
-    pub ended: Ended,
+pub struct Execution {
+    pub(crate) ended: ProgramEnd,
     /// Wall time, s.
-    pub wall_s: f64,
-    pub memory_kib: u64,
+    pub(crate) wall_s: f64,
+    pub(crate) memory_kib: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub struct Start<'a> {
-    pub folder: &'a Path,
-    pub train: &'a [&'a str],
-    /// Arguments behind those of every start.
-    pub own: &'a [String],
+pub(crate) struct Start<'a> {
+    pub(crate) folder: &'a Path,
+    pub(crate) train: &'a [&'a str],
+    /// Arguments after those of every run.
+    pub(crate) arguments: &'a [String],
 }
 
-/// The study was asked to stop while the program ran; it was killed.
+/// The study was interrupted while the program ran; the program was killed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Interrupted;
+pub(crate) struct Interrupted;
 
 impl Program {
-    /// A program that exists.
+    /// Identifies an executable by the checksum of its bytes; `limit` is the longest wall time of a run.
+    ///
+    /// # Errors
+    /// When the file does not exist or cannot be read.
     pub fn new(path: &Path, arguments: Vec<String>, limit: Duration) -> io::Result<Self> {
         let path = path.canonicalize()?;
         let crc32 = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&fs::read(&path)?);
@@ -95,33 +100,39 @@ impl Program {
         Ok(Program { path, arguments, limit, identity })
     }
 
-    pub fn identity(&self) -> &Identity {
+    pub(crate) fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// Runs it once; what it says goes to a file.
+    /// Runs the program once; its standard error goes to a file.
     ///
     /// # Errors
     /// [`Interrupted`] when `stop` is set before it has ended.
-    pub fn run(&self, start: &Start<'_>, said: File, stop: &AtomicBool) -> Result<Taken, Interrupted> {
+    pub(crate) fn run(
+        &self,
+        start: &Start<'_>,
+        said: File,
+        stop: &AtomicBool,
+    ) -> Result<Execution, Interrupted> {
         let began = Instant::now();
-        let taken = |ended, memory_kib| Taken { ended, wall_s: began.elapsed().as_secs_f64(), memory_kib };
+        let taken =
+            |ended, memory_kib| Execution { ended, wall_s: began.elapsed().as_secs_f64(), memory_kib };
         let started = Command::new(&self.path)
             .args(["close", "--rig", "rig.toml", "--train"])
             .args(start.train)
             .args(["--test", "test.csv", "--out", "out"])
             .args(&self.arguments)
-            .args(start.own)
+            .args(start.arguments)
             .current_dir(start.folder)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(said)
             .process_group(0)
             .spawn();
-        let Ok(child) = started else { return Ok(taken(Ended::NotStarted, 0)) };
+        let Ok(child) = started else { return Ok(taken(ProgramEnd::NotStarted, 0)) };
         let group = Pid::from_child(&child);
         let kill = || {
-            // Nobody left to kill is what is wanted.
+            // The group may be gone already.
             let _ = kill_process_group(group, Signal::KILL);
         };
         let (tell, reported) = mpsc::channel();
@@ -136,7 +147,7 @@ impl Program {
                     kill();
                 }
                 Err(RecvTimeoutError::Timeout) if began.elapsed() > self.limit && end.is_none() => {
-                    end = Some(Ok(Ended::TimedOut));
+                    end = Some(Ok(ProgramEnd::TimedOut));
                     kill();
                 }
                 Err(RecvTimeoutError::Timeout) => {}
@@ -145,13 +156,14 @@ impl Program {
         kill();
         let _ = waiter.join();
         let memory_kib = used.map_or(0, |used| used.rusage.maxrss >> 10);
-        let ended = end.unwrap_or_else(|| Ok(used.map_or(Ended::NotStarted, |used| how(used.status))))?;
+        let ended =
+            end.unwrap_or_else(|| Ok(used.map_or(ProgramEnd::NotStarted, |used| program_end(used.status))))?;
         Ok(taken(ended, memory_kib))
     }
 }
 
-fn how(status: ExitStatus) -> Ended {
-    status.code().map_or_else(|| Ended::Signalled(status.signal().unwrap_or(0)), Ended::Exited)
+fn program_end(status: ExitStatus) -> ProgramEnd {
+    status.code().map_or_else(|| ProgramEnd::Signalled(status.signal().unwrap_or(0)), ProgramEnd::Exited)
 }
 
 #[cfg(test)]
@@ -162,18 +174,18 @@ pub(crate) mod tests {
     pub(crate) fn script(folder: &Path, text: &str, arguments: &[&str], limit: Duration) -> Program {
         let (source, path) = (folder.join("program.sh"), folder.join("program"));
         fs::write(&source, format!("#!/bin/sh\n{text}\n")).unwrap();
-        // Copied by another process: a child that another thread starts meanwhile would inherit a file that is open for writing
-        // here, and the system starts no program that somebody has open for writing (ETXTBSY).
+        // Copied by another process: a child started by another thread meanwhile would inherit a file open for writing, and the
+        // kernel executes no program that is open for writing (ETXTBSY).
         let copied = Command::new("install").args(["-m", "755"]).args([&source, &path]).status();
         assert!(copied.expect("install of coreutils").success());
         Program::new(&path, arguments.iter().map(|word| (*word).to_owned()).collect(), limit).unwrap()
     }
 
-    fn run(text: &str, limit: Duration, stop: bool) -> Result<Taken, Interrupted> {
+    fn run(text: &str, limit: Duration, stop: bool) -> Result<Execution, Interrupted> {
         let folder = tempfile::tempdir().unwrap();
         let program = script(folder.path(), text, &[], limit);
         let said = File::create(folder.path().join("said")).unwrap();
-        let start = Start { folder: folder.path(), train: &["train.csv"], own: &[] };
+        let start = Start { folder: folder.path(), train: &["train.csv"], arguments: &[] };
         program.run(&start, said, &AtomicBool::new(stop))
     }
 
@@ -181,10 +193,10 @@ pub(crate) mod tests {
 
     #[test]
     fn a_program_ends_by_itself_by_a_signal_or_at_its_limit() {
-        assert_eq!(run("exit 3", PATIENCE, false).unwrap().ended, Ended::Exited(3));
-        assert_eq!(run("kill -SEGV $$", PATIENCE, false).unwrap().ended, Ended::Signalled(11));
+        assert_eq!(run("exit 3", PATIENCE, false).unwrap().ended, ProgramEnd::Exited(3));
+        assert_eq!(run("kill -SEGV $$", PATIENCE, false).unwrap().ended, ProgramEnd::Signalled(11));
         let hung = run("sleep 1000 & sleep 1000", Duration::from_millis(50), false).unwrap();
-        assert_eq!(hung.ended, Ended::TimedOut);
+        assert_eq!(hung.ended, ProgramEnd::TimedOut);
         assert!(hung.wall_s < 60.0, "{hung:?}");
     }
 
@@ -195,7 +207,7 @@ pub(crate) mod tests {
 
     #[test]
     fn memory_is_that_of_the_program() {
-        // The shell alone is larger than nothing; what the study had is the least the kernel tells.
+        // The shell needs some memory; the resident set of the study is the lower bound that the kernel reports.
         assert!(run("true", PATIENCE, false).unwrap().memory_kib > 100);
     }
 

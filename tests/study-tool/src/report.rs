@@ -1,10 +1,10 @@
-//! `report.json` of a program under study, read as strictly as it is promised.
+//! `report.json` of a program under study, parsed strictly.
 //!
-//! What cannot be read is a result like any other: the program wrote no good report. So is a name that the catalogue does not
-//! have, a place that the effect cannot be at, a number that is none, a verdict that its own list contradicts. Fields that the
-//! study does not judge are not looked at.
+//! A report that cannot be parsed is a result: the program wrote no good report. The same holds for a name that the catalogue
+//! lacks, a place that the effect cannot have, a number that is not valid, and a verdict that contradicts the list of names.
+//! Fields that the study does not judge are ignored.
 
-pub use discrepancy::report::Verdict;
+pub(crate) use discrepancy::report::Verdict;
 use discrepancy::report::{
     self, Explanation, LocatedTerm, Misfit, NamedEffect, Next, Outside, Quantity, Verification,
 };
@@ -13,45 +13,46 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+/// A valid report: the fields that the study judges.
 #[derive(Debug, Clone)]
 pub struct Report {
-    pub verdict: Verdict,
-    /// What is missing, the best first.
-    pub named: Vec<Named>,
-    /// What comes nearest to something outside the catalogue.
-    pub nearest: Option<Named>,
-    pub parameters: Vec<Quantity>,
-    pub misfit: BTreeMap<String, Misfit>,
-    /// What is missing that the catalogue does not have.
-    pub outside: Option<Outside>,
-    /// What the rig file's own model lacks, whatever the verdict.
-    pub dependence: Option<LocatedTerm>,
-    /// What the program says of its model on the held-out record.
-    pub verification: Option<Verification>,
-    pub explanations: Vec<Explanation>,
-    pub next: Option<Next>,
+    pub(crate) verdict: Verdict,
+    /// Missing effects, the best explanation first.
+    pub(crate) named: Vec<Named>,
+    /// The effect nearest to something outside the catalogue.
+    pub(crate) nearest: Option<Named>,
+    pub(crate) parameters: Vec<Quantity>,
+    pub(crate) misfit: BTreeMap<String, Misfit>,
+    /// What is missing and not in the catalogue.
+    pub(crate) outside: Option<Outside>,
+    /// What the model of the rig file lacks, whatever the verdict.
+    pub(crate) dependence: Option<LocatedTerm>,
+    /// Check of the model on the held-out record.
+    pub(crate) verification: Option<Verification>,
+    pub(crate) explanations: Vec<Explanation>,
+    pub(crate) next: Option<Next>,
 }
 
-/// An effect of the catalogue, at one of its places.
+/// An effect of the catalogue at one of its places.
 #[derive(Debug, Clone)]
-pub struct Named {
-    pub sheet: &'static Sheet,
-    pub place: Place,
-    pub parameters: Vec<Quantity>,
-    /// What explains the record as well.
-    pub alternatives: Vec<Named>,
+pub(crate) struct Named {
+    pub(crate) sheet: &'static Sheet,
+    pub(crate) place: Place,
+    pub(crate) parameters: Vec<Quantity>,
+    /// Effects that explain the record as well.
+    pub(crate) alternatives: Vec<Named>,
 }
 
-/// Reads a report; says what is wrong with it.
+/// Reads and checks a report.
 ///
 /// # Errors
-/// A sentence for the list of errors.
+/// A sentence for the list of errors: what is wrong with it.
 pub fn read(path: &Path) -> Result<Report, String> {
     let bytes = fs::read(path).map_err(|_| "wrote no report.json".to_owned())?;
     parse(&bytes)
 }
 
-pub fn parse(bytes: &[u8]) -> Result<Report, String> {
+pub(crate) fn parse(bytes: &[u8]) -> Result<Report, String> {
     let raw: report::Report =
         serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
     let named = raw.named.into_iter().map(known).collect::<Result<Vec<_>, _>>()?;
@@ -94,26 +95,27 @@ fn known(raw: NamedEffect) -> Result<Named, String> {
 }
 
 impl Report {
-    /// File of the experiment that it proposes: a plain name beside it, else there is none.
-    pub fn proposed(&self) -> Option<&str> {
+    /// File name of the proposed experiment; `None` unless it is a plain name beside the report.
+    pub(crate) fn proposed(&self) -> Option<&str> {
         let name = self.next.as_ref()?.experiment.as_deref()?;
         let plain = Path::new(name).file_name().is_some_and(|file| file == name);
         (plain && name.starts_with("next") && name.ends_with(".toml")).then_some(name)
     }
 
-    /// Smallest share of the gap that the program claims to have closed, over the signals it tells one for.
-    pub fn claimed_closed(&self) -> Option<f64> {
+    /// Smallest share of the gap that the program claims to have closed, over the signals that state one.
+    pub(crate) fn claimed_closed(&self) -> Option<f64> {
         self.misfit.values().filter_map(|misfit| misfit.closed).reduce(f64::min)
     }
 
-    /// Share of the gap that went, all signals together, each in units of its noise: one that was hardly off counts for little.
+    /// Share of the gap that was closed, all signals together, each in units of its noise: a signal with a small gap has a
+    /// small weight.
     ///
     /// ```text
     /// 1 - sum(after^2 / floor^2 - 1) / sum(before^2 / floor^2 - 1)
     /// ```
     ///
-    /// `None` when no signal has all three, or there was no gap.
-    pub fn claimed_joint(&self) -> Option<f64> {
+    /// `None` when no signal has all three numbers, or there was no gap.
+    pub(crate) fn claimed_joint(&self) -> Option<f64> {
         let mut excess = [0.0, 0.0];
         let is_whole =
             |misfit: &&Misfit| misfit.floor > 0.0 && !misfit.before.is_nan() && !misfit.after.is_nan();
@@ -124,8 +126,9 @@ impl Report {
         (excess[0] > 0.0).then(|| 1.0 - excess[1] / excess[0])
     }
 
-    /// Whether the program claims that its model leaves no more on the held-out record than nothing missing would.
-    pub fn claimed_white(&self) -> Option<bool> {
+    /// Whether the program claims that the residual of its model on the held-out record is within the range of a complete
+    /// model.
+    pub(crate) fn claimed_white(&self) -> Option<bool> {
         let Verification { chi2_after, chi2_null: [low, high], .. } = self.verification.as_ref()?;
         Some((low..=high).contains(&chi2_after))
     }

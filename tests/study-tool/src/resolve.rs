@@ -1,30 +1,30 @@
-//! Whether the experiment that a program proposes tells apart what its first record could not.
+//! Whether the experiment that a program proposes distinguishes what its first record could not.
 //!
 //! ```text
 //! runs/LABEL/0007/report.json ── ambiguous, the truth among the names ──► next.experiment ──► none: "no experiment can"
 //!                                                                                │
-//!    the same hidden draw under that experiment, with noise of its own ◄─────────┘
+//!    the same hidden draw under that experiment, with new noise ◄────────────────┘
 //!       │
 //!       └─► PROGRAM close --train train.csv next.csv --test test.csv … in an empty folder ──► runs/LABEL-resolve/0007/
 //! ```
 //!
-//! The experiment is the file that the program wrote beside its report; where a run did not keep it, the program is run once more
-//! on the same records, which gives the same report. The new record is made by the record maker as the first was: same rig, same
-//! numbers that are off, same kind and level of noise.
+//! The experiment is the file that the program wrote beside its report. Where a run did not keep it, the program is run again
+//! on the same records, which gives the same report. The record maker makes the new record as it made the first: same rig, same
+//! wrong parameters, same kind and level of noise.
 //!
-//! - *Resolved*: one name, the truth's, at its place, and no alternative but itself.
-//! - *Still ambiguous*: the truth is among the names and alternatives, but not alone.
-//! - *Wrong*: it is not.
+//! - *Resolved*: one name, the true one, at its place, and no other alternative.
+//! - *Still ambiguous*: the truth is among several names and alternatives.
+//! - *Wrong*: the truth is not among them.
 //! - *Error*: no good report, an experiment that cannot be run, or one that the program does not propose again.
 //!
-//! Draws of one effect alone are looked at: of several, an ambiguity between two is not one draw's own.
+//! Only draws of one effect are considered: with several, an ambiguity between two has no single truth.
 
 pub mod tables;
 
 use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, Kind};
-use crate::folder::{FolderError, read, read_left};
-use crate::program::{Ended, Identity, Program, Start, Taken};
+use crate::folder::{FolderError, read, read_versioned};
+use crate::program::{Execution, Identity, Program, ProgramEnd, Start};
 use crate::report::{self, Named, Report, Verdict};
 use crate::step::{Step, StepError, check_blind, check_program, read_result, whole_run};
 use plant::RigParameters;
@@ -36,53 +36,57 @@ use std::path::Path;
 
 pub use tables::Table;
 
-/// What makes the noise of the new record another one; below 2^53, as seeds are.
-const OWN_NOISE: u64 = 0x4e_4558_5400;
+/// Changes the noise of the new record; below 2^53, as seeds are.
+const NOISE_SEED_MASK: u64 = 0x4e_4558_5400;
 
+/// Judgement of the report on both records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
+    /// Only the truth is named.
     Resolved,
-    /// The right name among others.
+    /// The truth is among several names.
     StillAmbiguous,
+    /// The truth is not named.
     Wrong,
+    /// No good report, or the experiment was not run.
     Error,
 }
 
-/// What is left of a draw whose proposed experiment was run, as `resolution.json`.
+/// Result of running the proposed experiment of a draw, as `resolution.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Resolution {
-    pub schema_version: u32,
-    pub number: usize,
-    pub program: Identity,
-    pub experiment: String,
+    pub(crate) schema_version: u32,
+    pub(crate) number: usize,
+    pub(crate) program: Identity,
+    pub(crate) experiment: String,
     /// Why the experiment was not run, or not given to the program.
-    pub problem: Option<String>,
-    /// How the program ended with both records; nothing when there was a problem.
-    pub taken: Option<Taken>,
+    pub(crate) problem: Option<String>,
+    /// The run of the program on both records; `None` when there was a problem.
+    pub taken: Option<Execution>,
 }
 
-/// Gives the label under which resolutions stand.
+/// The label of the resolutions of a label.
 pub fn label(label: &str) -> String {
     format!("{label}-resolve")
 }
 
 /// The entry of a report that leaves the truth ambiguous: it or one of its alternatives is the truth.
-pub fn ambiguous<'a>(draw: &Draw, report: &'a Report) -> Option<&'a Named> {
+pub(crate) fn ambiguous<'a>(draw: &Draw, report: &'a Report) -> Option<&'a Named> {
     let [hidden] = draw.recipe.hidden.as_slice() else { return None };
     let open = report.named.iter().filter(|entry| !entry.alternatives.is_empty());
     open.into_iter().find(|entry| names(entry).any(|name| is_truth(name, hidden)))
 }
 
-pub fn leaves_open(report: &Report) -> bool {
+pub(crate) fn leaves_open(report: &Report) -> bool {
     report.verdict == Verdict::Ambiguous || report.named.iter().any(|entry| !entry.alternatives.is_empty())
 }
 
-/// Judges what the program said with both records.
-pub fn judge(hidden: &Hidden, taken: &Taken, report: &Result<Report, String>) -> Outcome {
+/// Judges the report on both records.
+pub fn judge(hidden: &Hidden, taken: &Execution, report: &Result<Report, String>) -> Outcome {
     let report = match (taken.ended, report) {
-        (Ended::Exited(_), Ok(report)) if report.verdict != Verdict::BadData => report,
+        (ProgramEnd::Exited(_), Ok(report)) if report.verdict != Verdict::BadData => report,
         _ => return Outcome::Error,
     };
     let mut all = report.named.iter().flat_map(names).peekable();
@@ -98,7 +102,7 @@ pub fn judge(hidden: &Hidden, taken: &Taken, report: &Result<Report, String>) ->
     }
 }
 
-/// An entry and what explains the records as well.
+/// An entry and its alternatives.
 pub(crate) fn names(entry: &Named) -> impl Iterator<Item = &Named> {
     std::iter::once(entry).chain(&entry.alternatives)
 }
@@ -107,32 +111,35 @@ fn is_truth(name: &Named, hidden: &Hidden) -> bool {
     name.sheet.name == hidden.name && name.place == hidden.place
 }
 
-/// The recipe of a draw's new record: the same rig with noise of its own.
-pub fn recipe(draw: &Draw) -> Recipe {
-    Recipe { seed: draw.recipe.seed ^ OWN_NOISE, ..draw.recipe.clone() }
+/// The recipe of a draw's new record: the same rig with other noise.
+pub(crate) fn recipe(draw: &Draw) -> Recipe {
+    Recipe { seed: draw.recipe.seed ^ NOISE_SEED_MASK, ..draw.recipe.clone() }
 }
 
+/// What became of the experiment that a program proposes for a draw.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Found {
-    /// Nothing: it has no result yet, is not of one effect, or leaves the truth not open.
+pub enum ProposalState {
+    /// Not considered: no result yet, several effects, or the truth is not left ambiguous.
     NotOpen,
-    /// Nothing: the program says that no experiment can tell.
+    /// The program proposes no experiment.
     NothingProposed,
+    /// The experiment was run, now or before.
     Measured(Resolution),
 }
 
-/// Measures what is proposed for a draw, unless it was, and runs the program on both records; `None` when it was asked to stop.
+/// Measures the proposed experiment of a draw, unless that was done, and runs the program on both records; `None` when
+/// interrupted.
 ///
 /// # Errors
-/// [`StepError`] when a file of the study cannot be used, or the results are another program's.
-pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Found>, StepError> {
+/// [`StepError`] when a file of the study cannot be used, or the results are of another program.
+pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<ProposalState>, StepError> {
     let folder = step.study.run(step.label, draw.number);
     if draw.kind != Kind::Single || !folder.exists() {
-        return Ok(Some(Found::NotOpen));
+        return Ok(Some(ProposalState::NotOpen));
     }
     let report = report::read(&folder.join("report.json")).ok();
     let Some(report) = report.filter(|report| ambiguous(draw, report).is_some()) else {
-        return Ok(Some(Found::NotOpen));
+        return Ok(Some(ProposalState::NotOpen));
     };
     let path = folder.join("result.json");
     check_program(&path, &read_result(&path)?.program, program.identity(), SAME_PROGRAM)?;
@@ -142,22 +149,22 @@ pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Fou
         let resolution = read_resolution(&path)?;
         check_program(&path, &resolution.program, program.identity(), SAME_PROGRAM)?;
         if !step.again {
-            return Ok(Some(Found::Measured(resolution)));
+            return Ok(Some(ProposalState::Measured(resolution)));
         }
     }
     if report.proposed().is_none() {
-        return Ok(Some(Found::NothingProposed));
+        return Ok(Some(ProposalState::NothingProposed));
     }
     step.check_disk()?;
     step.records(draw)?;
     let resolution = whole_run(&done, |folder| resolve(step, program, draw, folder))?;
-    Ok(resolution.map(Found::Measured))
+    Ok(resolution.map(ProposalState::Measured))
 }
 
-/// What to do where a proposal is another program's.
+/// Advice for results of another program.
 const SAME_PROGRAM: &str = "give the one that was run, with its arguments";
 
-/// Fills the folder of a draw; `None` when the study was asked to stop.
+/// Fills the folder of a draw; `None` when interrupted.
 fn resolve(
     step: &Step<'_>,
     program: &Program,
@@ -169,7 +176,7 @@ fn resolve(
     let first = report::read(&step.study.run(step.label, number).join("report.json"));
     let experiment = first.as_ref().ok().and_then(Report::proposed).unwrap_or_default().to_owned();
     let empty = tempfile::tempdir().map_err(files)?;
-    step.lay_out(draw, empty.path())?;
+    step.copy_inputs(draw, empty.path())?;
     let mut resolution = Resolution {
         schema_version: SCHEMA_VERSION,
         number,
@@ -183,7 +190,7 @@ fn resolve(
         Err(problem) => resolution.problem = Some(problem),
         Ok(()) => {
             check_blind(number, &empty.path().join("next.csv"))?;
-            let start = Start { folder: empty.path(), train: &["train.csv", "next.csv"], own: &[] };
+            let start = Start { folder: empty.path(), train: &["train.csv", "next.csv"], arguments: &[] };
             let Some(taken) = step.start(number, program, &start, folder)? else { return Ok(None) };
             resolution.taken = Some(taken);
         }
@@ -192,7 +199,7 @@ fn resolve(
     Ok(Some(resolution))
 }
 
-/// Text of the proposed experiment, or why there is none; `None` when the study was asked to stop.
+/// Text of the proposed experiment, or why there is none; `None` when interrupted.
 fn proposal(
     step: &Step<'_>,
     program: &Program,
@@ -205,10 +212,10 @@ fn proposal(
     if kept.is_file() {
         return Ok(Some(Ok(read(&kept)?)));
     }
-    // It was not kept: equal records give an equal report, and the file beside it.
+    // It was not kept: equal records give an equal report with the same experiment file.
     let [empty, folder] = [tempfile::tempdir().map_err(files)?, tempfile::tempdir().map_err(files)?];
-    step.lay_out(draw, empty.path())?;
-    let start = Start { folder: empty.path(), train: &["train.csv"], own: &[] };
+    step.copy_inputs(draw, empty.path())?;
+    let start = Start { folder: empty.path(), train: &["train.csv"], arguments: &[] };
     if step.start(number, program, &start, folder.path())?.is_none() {
         return Ok(None);
     }
@@ -225,12 +232,12 @@ fn measure(draw: &Draw, name: &str, toml: &str, empty: &Path, folder: &Path) -> 
         .map_err(|error| format!("the experiment cannot be run: {error}"))
 }
 
-/// A draw's resolution.
+/// Reads the resolution of a draw.
 ///
 /// # Errors
-/// [`FolderError`] when it is none of this version.
-pub fn read_resolution(path: &Path) -> Result<Resolution, FolderError> {
-    read_left(path, "resolution", |resolution: &Resolution| resolution.schema_version)
+/// [`FolderError`] when it cannot be read, or is of another version.
+pub(crate) fn read_resolution(path: &Path) -> Result<Resolution, FolderError> {
+    read_versioned(path, "resolution", |resolution: &Resolution| resolution.schema_version)
 }
 
 #[cfg(test)]

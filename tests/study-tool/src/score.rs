@@ -1,12 +1,12 @@
-//! All cases of a study, from one folder or from several: rates with intervals, confusion matrix, parameters, time.
+//! Score of a study, from one folder or from several: rates with intervals, confusion matrix, parameters, time.
 
 use crate::classes::{DrawClasses, Member, read_draw};
 use crate::draws::{Draw, Kind, Shape, is_beyond_drawn};
 use crate::folder::{FolderError, Study, draw_as_json};
 use crate::judge::{Judgement, judge};
-use crate::leave_out::{self, Expectations, LeftOut};
+use crate::leave_out::{self, Expectations, LeaveOutJudgement};
 use crate::limits::Limits;
-use crate::probability::{self, Said};
+use crate::probability::{self, JudgedExplanation};
 use crate::program::Identity;
 use crate::report::{self, Report};
 use crate::step::{RunResult, read_result};
@@ -20,101 +20,140 @@ pub mod tables;
 
 pub use tables::Tables;
 
-/// Multiple of its limit from which an effect must be named.
-pub const CLEAR: f64 = 3.0;
+/// Multiple of the limit from which an effect must be named.
+pub(crate) const CLEAR: f64 = 3.0;
 
+/// The score of the results under a label.
 #[derive(Debug, Serialize)]
 pub struct Score {
-    pub schema_version: u32,
-    pub label: String,
-    pub program: Identity,
-    pub seed: u64,
-    pub shape: Shape,
-    /// Draws whose classes are not known: there an effect is alone in its class.
-    pub without_classes: usize,
-    /// What the cases say together; with effects left out, only what makes sense then.
+    pub(crate) schema_version: u32,
+    pub(crate) label: String,
+    pub(crate) program: Identity,
+    pub(crate) seed: u64,
+    pub(crate) shape: Shape,
+    /// Draws whose classes are not known: there the class is the effect alone.
+    pub(crate) without_classes: usize,
+    /// Tables over all cases; with effects left out, only those that apply then.
     pub tables: Tables,
-    /// What they say when the hidden effects were left out of the program's catalogue.
+    /// Tables of the cases whose hidden effects were left out of the program's catalogue; `None` for the whole catalogue.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leave_out: Option<leave_out::Tables>,
-    pub cases: Vec<Case>,
+    pub(crate) cases: Vec<Case>,
 }
 
+/// One draw and the judgement of its result.
 #[derive(Debug, Clone, Serialize)]
 pub struct Case {
-    pub number: usize,
-    pub kind: Kind,
-    pub recipe: Value,
+    pub(crate) number: usize,
+    pub(crate) kind: Kind,
+    pub(crate) recipe: Value,
     /// For each hidden effect its amplitude over the committed limit, or its strength in this record where it has no limit.
-    pub over_limit: Vec<Option<f64>>,
-    /// Whether two or more hidden effects are of different classes, and all three times above their limits.
-    pub separable: bool,
-    pub foreign_form: bool,
-    /// Whether everything is a little wrong beside what is hidden.
-    pub background: bool,
+    pub(crate) over_limit: Vec<Option<f64>>,
+    /// Whether two or more hidden effects are of different classes, each at least three times above its limit.
+    pub(crate) separable: bool,
+    pub(crate) foreign_form: bool,
+    /// Whether the rig has model errors beside what is hidden.
+    pub(crate) background: bool,
     /// Whether an amplitude lies beyond its drawn range.
-    pub beyond_drawn: bool,
-    pub wrong_parameters: bool,
+    pub(crate) beyond_drawn: bool,
+    pub(crate) wrong_parameters: bool,
     /// Whether its noise is coloured and its sampling jitters.
-    pub coloured_noise: bool,
-    pub judgement: Judgement,
-    /// How probable it said what was so, and what was not.
-    pub explanations: Vec<Said>,
-    /// Chi2 per degree of freedom that the rig file leaves on the held-out record, as reported.
-    pub rig_file_chi2: Option<f64>,
-    /// Reported parameters of the baseline that the rig file has right: by which share of its value each is off.
-    pub parameter_errors: Vec<f64>,
-    /// What it came to when the hidden effect was left out of the program's catalogue.
+    pub(crate) coloured_noise: bool,
+    pub(crate) judgement: Judgement,
+    /// Probabilities of the explanations, and which are right.
+    pub(crate) explanations: Vec<JudgedExplanation>,
+    /// Chi2 per degree of freedom of the rig file on the held-out record, as reported.
+    pub(crate) rig_file_chi2: Option<f64>,
+    /// Relative errors of reported parameters of the baseline that the rig file has right.
+    pub(crate) parameter_errors: Vec<f64>,
+    /// The judgement with the hidden effect left out of the program's catalogue.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub left_out: Option<LeftOut>,
-    pub wall_s: f64,
-    pub memory_kib: u64,
-    /// The command that repeats it, as far as the program goes.
-    pub repeat: String,
+    pub(crate) left_out: Option<LeaveOutJudgement>,
+    pub(crate) wall_s: f64,
+    pub(crate) memory_kib: u64,
+    /// The command that repeats the run of the program.
+    pub(crate) repeat: String,
 }
 
+/// Why there is no score.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
+    /// A file of the study cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// No folders, or no results.
     #[error("no study to score: give its folder")]
-    Nothing,
+    Empty,
+    /// Folders of different studies.
     #[error("{left} and {right} are of different studies: score those of one")]
-    Mixed { left: String, right: String },
+    DifferentStudies {
+        /// One folder.
+        left: String,
+        /// The other one.
+        right: String,
+    },
+    /// Two folders have a result of the same draw.
     #[error(
         "draw {number} has a result in {left} and in {right}: give each folder once, or delete one of them"
     )]
-    Doubled { number: usize, left: String, right: String },
+    Duplicate {
+        /// Number of the draw.
+        number: usize,
+        /// One folder.
+        left: String,
+        /// The other one.
+        right: String,
+    },
+    /// Draws without a result.
     #[error(
         "{folders}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
     )]
-    MissingRuns { folders: String, label: String, count: usize, first: usize },
+    MissingRuns {
+        /// Folders that were read, separated by commas.
+        folders: String,
+        /// Label of the results that were asked for.
+        label: String,
+        /// Number of draws without a result.
+        count: usize,
+        /// Number of the first one.
+        first: usize,
+    },
+    /// Results of different programs.
     #[error("draw {number} was run with {other:?}, the others with {program:?}: score one program at a time")]
-    Programs { number: usize, other: Box<Identity>, program: Box<Identity> },
+    Programs {
+        /// Number of the first draw of another program.
+        number: usize,
+        /// Program that this draw was run with.
+        other: Box<Identity>,
+        /// The program of the draws before.
+        program: Box<Identity>,
+    },
+    /// Effects were left out, and [`ScoreInputs::expectations`] is `None`.
     #[error("effects were left out of the program's catalogue: tests/study/outside-expected.json is wanted")]
     NoExpectations,
 }
 
-/// What a score is made with besides the results.
+/// Inputs of a score besides the results.
 #[derive(Debug, Clone, Copy)]
-pub struct Known<'a> {
+pub struct ScoreInputs<'a> {
+    /// The committed limits; without them no case has a ratio to its limit.
     pub limits: Option<&'a Limits>,
-    /// Classes that are known beforehand, by the number of the draw.
+    /// Classes that are known beforehand, by the number of the draw; others are read from the folder.
     pub classes: Option<&'a BTreeMap<usize, DrawClasses>>,
-    /// What must show of effects that are left out.
+    /// Where effects that are left out are expected to show; required for such results.
     pub expectations: Option<&'a Expectations>,
-    /// Whether draws without a result are passed over; otherwise they are an error.
+    /// Whether draws without a result are skipped; otherwise they are an error.
     pub partly: bool,
 }
 
 /// Scores a study whose results are in one folder or in several, as machines without a common disk leave them.
 ///
 /// # Errors
-/// [`ScoreError`] when anything is missing, doubled or mixed.
-pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score, ScoreError> {
+/// [`ScoreError`] when results are missing, duplicate, or of different studies or programs.
+pub fn score(folders: &[PathBuf], label: &str, known: ScoreInputs<'_>) -> Result<Score, ScoreError> {
     let studies = folders.iter().map(|folder| Study::open(folder)).collect::<Result<Vec<_>, _>>()?;
-    let first = studies.first().ok_or(ScoreError::Nothing)?;
-    check_mixed(first, &studies)?;
+    let first = studies.first().ok_or(ScoreError::Empty)?;
+    check_same_study(first, &studies)?;
     let leave_out = leaves_out(&studies, label)?;
     let mut cases = Vec::new();
     let mut program: Option<Identity> = None;
@@ -130,10 +169,10 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
         without_classes += usize::from(classes.is_none() && !draw.recipe.hidden.is_empty());
         cases.push(case(study, draw, label, &result, classes.as_ref(), known)?);
     }
-    let program = program.ok_or(ScoreError::Nothing)?;
+    let program = program.ok_or(ScoreError::Empty)?;
     let mut tables = Tables::of(&cases);
     if leave_out {
-        // Nobody names what is not in the catalogue.
+        // Names do not apply without the effect in the catalogue.
         tables.headline = leave_out::tables::headline(&cases);
         tables.splits.clear();
         tables.effects.clear();
@@ -152,25 +191,25 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
     })
 }
 
-/// One draw alone, as far as its classes are known.
+/// Judges one draw that has a result under the label.
 ///
 /// # Errors
-/// [`ScoreError`] when a file of the study cannot be used.
-pub fn one(study: &Study, draw: &Draw, label: &str, known: Known<'_>) -> Result<Case, ScoreError> {
+/// [`ScoreError`] when a file of the study cannot be used, or expectations are missing.
+pub fn one(study: &Study, draw: &Draw, label: &str, known: ScoreInputs<'_>) -> Result<Case, ScoreError> {
     let result = read_result(&study.run(label, draw.number).join("result.json"))?;
     let classes = classes_of(study, draw, known)?;
     case(study, draw, label, &result, classes.as_ref(), known)
 }
 
-fn check_mixed(first: &Study, studies: &[Study]) -> Result<(), ScoreError> {
+fn check_same_study(first: &Study, studies: &[Study]) -> Result<(), ScoreError> {
     let name = |study: &Study| study.root.display().to_string();
     match studies.iter().find(|study| study.plan != first.plan) {
-        Some(other) => Err(ScoreError::Mixed { left: name(first), right: name(other) }),
+        Some(other) => Err(ScoreError::DifferentStudies { left: name(first), right: name(other) }),
         None => Ok(()),
     }
 }
 
-/// Which study has the result of each draw.
+/// The study that has the result of each draw.
 fn places<'a>(
     studies: &'a [Study],
     label: &str,
@@ -180,7 +219,7 @@ fn places<'a>(
     let name = |study: &Study| study.root.display().to_string();
     let mut places = Vec::new();
     let mut missing = Vec::new();
-    // With effects left out, draws of one effect alone are run.
+    // With effects left out, only draws of one effect are run.
     let wanted = |draw: &&Draw| !leave_out || draw.kind == Kind::Single;
     for draw in studies.iter().take(1).flat_map(|study| &study.draws).filter(wanted) {
         let mut own = studies.iter().filter(|study| study.run(label, draw.number).exists());
@@ -189,7 +228,7 @@ fn places<'a>(
             (Some(study), None) => places.push((study, draw)),
             (Some(one), Some(other)) => {
                 let (left, right) = (name(one), name(other));
-                return Err(ScoreError::Doubled { number: draw.number, left, right });
+                return Err(ScoreError::Duplicate { number: draw.number, left, right });
             }
         }
     }
@@ -198,7 +237,7 @@ fn places<'a>(
     Err(ScoreError::MissingRuns { folders, label: label.to_owned(), count: missing.len(), first: *first })
 }
 
-/// Whether the hidden effects were left out: what the first result says, wherever it is.
+/// Whether the hidden effects were left out, by the first result of any folder.
 fn leaves_out(studies: &[Study], label: &str) -> Result<bool, FolderError> {
     let paths = studies
         .iter()
@@ -207,7 +246,11 @@ fn leaves_out(studies: &[Study], label: &str) -> Result<bool, FolderError> {
     Ok(first.map(|path| read_result(&path)).transpose()?.is_some_and(|result| result.program.leave_out))
 }
 
-fn classes_of(study: &Study, draw: &Draw, known: Known<'_>) -> Result<Option<DrawClasses>, FolderError> {
+fn classes_of(
+    study: &Study,
+    draw: &Draw,
+    known: ScoreInputs<'_>,
+) -> Result<Option<DrawClasses>, FolderError> {
     if let Some(classes) = known.classes.and_then(|classes| classes.get(&draw.number)) {
         return Ok(Some(classes.clone()));
     }
@@ -221,7 +264,7 @@ fn case(
     label: &str,
     result: &RunResult,
     classes: Option<&DrawClasses>,
-    known: Known<'_>,
+    known: ScoreInputs<'_>,
 ) -> Result<Case, ScoreError> {
     let recipe = &draw.recipe;
     let report = report::read(&study.run(label, draw.number).join("report.json"));
@@ -289,16 +332,16 @@ fn with_nearest_laws(draw: &Draw, classes: Option<&DrawClasses>) -> Draw {
 
 fn parameters_off(draw: &Draw, report: &Report) -> Vec<f64> {
     let wrong = |name: &str| draw.recipe.wrong_parameters.iter().any(|(own, _)| own == name);
-    // A program that does not tell the file's value has reported it all the same.
+    // A program that does not state the file's value has still reported the parameter.
     let off = |own: &Quantity| own.before.map_or(0.0, |before| (own.value / before - 1.0).abs());
     report.parameters.iter().filter(|own| !wrong(&own.name)).map(off).collect()
 }
 
-/// How far a hidden effect lies above its limit.
+/// Ratio of a hidden effect to its limit.
 fn over_limit(draw: &Draw, at: usize, classes: Option<&DrawClasses>, limits: Option<&Limits>) -> Option<f64> {
     let hidden = &draw.recipe.hidden[at];
     let sheet = plant::effects::sheet(hidden.name)?;
-    // What is always seen has no limit: there its signature in this record counts.
+    // Without a limit: its strength in this record.
     let ratio = limits?.ratio(sheet, hidden.place, hidden.numbers[0]);
     ratio.or_else(|| Some(classes?.hidden.get(at)?.strength))
 }

@@ -1,34 +1,35 @@
-//! What an effect changes in a record, as an ideal observer sees it.
+//! Signature of an effect: the change of a record as an ideal observer sees it.
 //!
 //! ```text
 //! J = (readings of the plant with the effect - readings of the baseline) / noise of the sensors        in windows of 100 ms
-//! M = 1 - S S^+          S: what the readings change with x, v, p_a, p_b at the start of the window
-//! |M J|                  how many standard deviations the matched filter of the effect lies from nothing
+//! M = 1 - S S^+          S: change of the readings with x, v, p_a, p_b at the start of the window
+//! |M J|                  distance of the matched filter of the effect from zero, in standard deviations
 //! ```
 //!
-//! Every window starts at the true x, v, p_a, p_b of the record, and with the same inputs; what else moves (spool, lagged flow,
-//! the effects' memories) goes on from the window before, of each plant its own. The observer does not know the true initial
-//! state: what a change of it could explain is projected out, window by window.
+//! Every window starts at the true x, v, p_a, p_b of the record, with the same inputs. The other states (spool, lagged flow,
+//! memories of effects) continue from the previous window, in each plant separately. The observer does not know the true
+//! initial state: what a change of it could explain is projected out, window by window.
 //!
-//! That holds for the sensors' effects too, without an exception. A constant offset of the position is a change of x at the
-//! start as far as the readings of x go; what is left of it is what only the true x would do to the rest: volumes and with them
-//! the rates of the pressures, cushions and stops, the gap of the linkage against the other axis. An offset of a pressure is
-//! left in the flow (which depends on the absolute pressure) and in the force balance; one of the force sensor is left whole,
-//! since no initial state shifts a force. At rest with shut valves an offset is truly invisible, and no sum over such windows
-//! brings it back. Windows know nothing of each other: the creep of a leak over seconds counts only for what it is within each
-//! 100 ms, and an observer of longer windows sees such effects below these limits.
+//! This includes the effects of sensors. A constant offset of the position is a change of x at the start as far as the readings
+//! of x go. What remains is the effect of the true x on the rest: volumes and with them the rates of the pressures, cushions
+//! and stops, the gap of the linkage against the other axis. An offset of a pressure remains in the flow (which depends on the
+//! absolute pressure) and in the force balance; an offset of the force sensor remains entirely, since no initial state shifts a
+//! force. At rest with closed valves an offset cannot be observed, and no sum over such windows changes that. Windows are
+//! independent: a slow leak over seconds counts only for its change within each 100 ms, and an observer with longer windows
+//! detects such effects below these limits.
 //!
-//! Noise: that of the sensor and of its rounding together, sqrt(sigma^2 + step^2/12). The readings are the plant's own, before
-//! noise and rounding. The first window is left out: memories fill in it [rig-model.md: a record is judged after 0.1 s].
+//! Noise: that of the sensor and of its rounding together, sqrt(sigma^2 + step^2/12). The readings are the plant's, before
+//! noise and rounding. The first window is excluded, since memories build up in it [rig-model.md: a record is judged after 0.1
+//! s].
 //!
-//! Where a piston stops, breaks away or turns, and where the linkage makes contact, the force jumps. Which side of a sample
-//! such an event falls on is decided by microseconds; a difference of hundreds of newtons in one sample is then no measure of
-//! anything. The readings of the force next to an event (of the baseline, of the plant with the effect, or of one with a nudged
-//! initial state) count for nothing [rig-model.md, Accuracy: single samples of the force at stick and contact events excepted].
-//! An event that moves by more than a sample is seen in those between.
+//! Where a piston stops, breaks away or reverses, and where the linkage makes contact, the force jumps. Microseconds decide on
+//! which side of a sample such an event falls, and a difference of hundreds of newtons in one sample is then meaningless. The
+//! readings of the force next to an event (of the baseline, of the plant with the effect, or of one with a perturbed initial
+//! state) are excluded [rig-model.md, Accuracy: single samples of the force at stick and contact events excepted]. An event
+//! that moves by more than a sample shows in the samples between.
 //!
-//! Sensitivities are differences over a change that is small against the noise. Through stick and slip they are what they are:
-//! one side of a kink. Source: discrepancy-notes.md, 1 and 6; Kay 1998, Fundamentals of Statistical Signal Processing II, 4.3.
+//! Sensitivities are finite differences over a change that is small against the noise. At stick and slip they are one-sided
+//! derivatives. Source: discrepancy-notes.md, 1 and 6; Kay 1998, Fundamentals of Statistical Signal Processing II, 4.3.
 
 use crate::trajectory::{POINT_NUMBERS, Point, TrueTrajectory, WINDOW};
 use nalgebra::DMatrix;
@@ -37,42 +38,42 @@ use record_maker::{Record, Row};
 
 /// Readings of an axis: position, force, pressures a and b.
 const CHANNELS: usize = 4;
-/// Share of the largest singular value below which a direction of the initial state changes nothing.
+/// Relative singular value below which a direction of the initial state counts as without effect.
 const RANK: f64 = 1e-6;
 
-/// Place of the force among the readings of an axis.
+/// Index of the force among the readings of an axis.
 const FORCE: usize = 1;
-/// Slower than this a piston is at rest, m/s: bristles creep.
+/// Below this speed a piston counts as at rest, m/s: bristles creep.
 const REST_M_PER_S: f64 = 1e-5;
 
 #[derive(Debug)]
-pub struct Observer {
+pub(crate) struct Observer {
     trajectory: TrueTrajectory,
     noise: [f64; CHANNELS],
     baseline: Run,
-    /// What the initial state of each window explains.
+    /// Subspace of the initial state for each window.
     windows: Vec<Window>,
 }
 
-/// The whitened readings of a plant, and which of them stand next to an event.
+/// The whitened readings of a plant, and which of them are next to an event.
 #[derive(Debug, Default)]
-pub struct Run {
+pub(crate) struct Run {
     readings: Vec<f64>,
     jumps: Vec<bool>,
 }
 
 #[derive(Debug)]
 struct Window {
-    /// One column for each number of the state, all of one length.
+    /// One column for each number of the state, all of the same length.
     sensitivities: Vec<f64>,
-    /// Readings next to an event of the baseline or of a nudged plant.
+    /// Readings next to an event of the baseline or of a perturbed plant.
     jumps: Vec<bool>,
     /// Orthonormal, 0 where `jumps`.
     basis: Vec<Vec<f64>>,
 }
 
 impl Observer {
-    pub fn new(trajectory: TrueTrajectory) -> Self {
+    pub(crate) fn new(trajectory: TrueTrajectory) -> Self {
         let sensors = trajectory.rig.sensors();
         let with_rounding = |noise: f64, step: f64| (noise * noise + step * step / 12.0).sqrt();
         let pressure = with_rounding(sensors.pressure_noise_pa, sensors.pressure_step_pa());
@@ -90,21 +91,21 @@ impl Observer {
     }
 
     /// M J of a rig against the baseline.
-    pub fn signature(&self, rig: &RigParameters) -> Vec<f64> {
+    pub(crate) fn signature(&self, rig: &RigParameters) -> Vec<f64> {
         self.between(&self.readings(rig), &self.baseline)
     }
 
     /// The readings of a rig.
-    pub fn readings(&self, rig: &RigParameters) -> Run {
+    pub(crate) fn readings(&self, rig: &RigParameters) -> Run {
         self.run(rig).0
     }
 
-    pub fn baseline(&self) -> &Run {
+    pub(crate) fn baseline(&self) -> &Run {
         &self.baseline
     }
 
-    /// The readings of the record that the trajectory is of, without noise.
-    pub fn observed(&self, record: &Record) -> Run {
+    /// The readings of the record of the trajectory, without noise.
+    pub(crate) fn observed(&self, record: &Record) -> Run {
         let measured: Vec<usize> = (0..2).filter(|axis| self.trajectory.measured[*axis]).collect();
         let whole = self.trajectory.windows() * WINDOW;
         let rows = &record.rows[..whole];
@@ -123,8 +124,8 @@ impl Observer {
         run
     }
 
-    /// M of the difference of two runs.
-    pub fn between(&self, run: &Run, from: &Run) -> Vec<f64> {
+    /// M applied to the difference of two runs.
+    pub(crate) fn between(&self, run: &Run, from: &Run) -> Vec<f64> {
         let rows = self.rows();
         let mut differences: Vec<f64> =
             run.readings.iter().zip(&from.readings).map(|(own, from)| own - from).collect();
@@ -139,23 +140,23 @@ impl Observer {
         differences
     }
 
-    pub fn rig(&self) -> &RigParameters {
+    pub(crate) fn rig(&self) -> &RigParameters {
         &self.trajectory.rig
     }
 
-    /// Readings of a window.
+    /// Number of readings in a window.
     pub(crate) fn rows(&self) -> usize {
         WINDOW * CHANNELS * self.trajectory.measured.iter().filter(|measured| **measured).count()
     }
 
-    /// The readings of a rig in all windows, and the state that each begins with.
+    /// The readings of a rig in all windows, and the initial state of each.
     fn run(&self, rig: &RigParameters) -> (Run, Vec<State>) {
         let windows = self.trajectory.windows();
         let mut run = Run::default();
         let mut starts = Vec::with_capacity(windows);
         let mut plant = self.plant(rig, &self.trajectory.start);
         for window in 0..windows {
-            let start = seated(&plant, &self.trajectory.points[window * WINDOW]);
+            let start = at_true_state(&plant, &self.trajectory.points[window * WINDOW]);
             starts.push(start);
             plant.go_on_in(&start).expect("the states of a record are some that the rig can be in");
             self.read(&mut plant, window, &mut run);
@@ -191,7 +192,7 @@ impl Observer {
         }
     }
 
-    /// What a change of the initial state can explain in a window.
+    /// The changes of a window by changes of its initial state.
     fn window(&self, window: usize, start: &State) -> Window {
         let rows = self.rows();
         let baseline = &self.baseline.readings[window * rows..][..rows];
@@ -200,16 +201,16 @@ impl Observer {
         for axis in (0..2).filter(|axis| self.trajectory.measured[*axis]) {
             for number in 0..POINT_NUMBERS {
                 let mut points = self.trajectory.points[window * WINDOW];
-                points[axis] = points[axis].nudged(number);
+                points[axis] = points[axis].perturbed(number);
                 let mut plant = self.plant(&self.trajectory.rig, start);
                 plant
-                    .go_on_in(&seated(&plant, &points))
+                    .go_on_in(&at_true_state(&plant, &points))
                     .expect("a nudge leaves the rig in a state of its own");
-                let mut nudged = Run::default();
-                self.read(&mut plant, window, &mut nudged);
+                let mut perturbed = Run::default();
+                self.read(&mut plant, window, &mut perturbed);
                 sensitivities
-                    .extend(nudged.readings.iter().zip(baseline).map(|(own, baseline)| own - baseline));
-                jumps.iter_mut().zip(&nudged.jumps).for_each(|(all, own)| *all |= own);
+                    .extend(perturbed.readings.iter().zip(baseline).map(|(own, baseline)| own - baseline));
+                jumps.iter_mut().zip(&perturbed.jumps).for_each(|(all, own)| *all |= own);
             }
         }
         let basis = basis(&sensitivities, &jumps);
@@ -217,7 +218,7 @@ impl Observer {
     }
 
     fn plant(&self, rig: &RigParameters, state: &State) -> Plant {
-        // A supply of another pressure has fallen by the same share.
+        // A supply of another pressure has dropped by the same share.
         let ratio = rig.supply().pressure_pa / self.trajectory.rig.supply().pressure_pa;
         let state = State { supply_pressure_pa: ratio * state.supply_pressure_pa, ..*state };
         Plant::in_state(rig, &state).expect("the states of a record are some that the rig can be in")
@@ -225,7 +226,7 @@ impl Observer {
 }
 
 impl Window {
-    /// Projects what the initial state explains out of a difference of readings, of which those at `jumps` count for nothing.
+    /// Projects the subspace of the initial state out of a difference of readings; those at `jumps` are set to 0.
     fn project(&self, difference: &mut [f64], jumps: &[bool]) {
         let all: Vec<bool> = self.jumps.iter().zip(jumps).map(|(left, right)| *left || *right).collect();
         let zeroed = difference.iter_mut().zip(&all).filter(|(_, jumps)| **jumps);
@@ -244,14 +245,14 @@ impl Window {
     }
 }
 
-/// An orthonormal basis of some columns without the rows that count for nothing.
+/// An orthonormal basis of some columns, with the rows of `without` set to 0.
 fn basis(columns: &[f64], without: &[bool]) -> Vec<Vec<f64>> {
     let rows = without.len();
     let mut kept = Vec::with_capacity(columns.len());
     for column in columns.chunks_exact(rows) {
         let column: Vec<f64> =
             column.iter().zip(without).map(|(own, without)| if *without { 0.0 } else { *own }).collect();
-        // The scale of a column is no matter, but it would decide what the rank is.
+        // Columns are normalised, since their scale would decide the rank.
         let length = length(&column);
         if length > 0.0 {
             kept.extend(column.iter().map(|own| own / length));
@@ -267,7 +268,7 @@ fn basis(columns: &[f64], without: &[bool]) -> Vec<Vec<f64>> {
     kept.map(|column| u.column(column).iter().copied().collect()).collect()
 }
 
-/// Which way an axis goes, and whether the rods touch.
+/// Direction of motion of an axis, and whether the rods are in contact.
 fn phase(truth: &Truth, axis: usize) -> (i8, bool) {
     (way(truth.axes[axis].rod_velocity_m_per_s), truth.contact_force_n != 0.0)
 }
@@ -276,14 +277,14 @@ fn way(velocity_m_per_s: f64) -> i8 {
     if velocity_m_per_s.abs() < REST_M_PER_S { 0 } else { velocity_m_per_s.signum() as i8 }
 }
 
-/// A plant's state with the mechanical state and the pressures of a record; the rest stays its own.
-fn seated(plant: &Plant, points: &[Point; 2]) -> State {
+/// A plant's state with the mechanical state and the pressures of a record.
+fn at_true_state(plant: &Plant, points: &[Point; 2]) -> State {
     let mut state = *plant.state();
     let truth = plant.truth(&Inputs::default());
     let cylinder = plant.rig().cylinder();
     for ((own, point), axis) in state.axes.iter_mut().zip(points).zip(&truth.axes) {
         let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
-        // The volumes are the plant's own: an effect may have changed them.
+        // The volumes are those of this plant: an effect may have changed them.
         let volume_a = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
         let volume_b = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
         own.extension_m += way_m;
@@ -295,12 +296,12 @@ fn seated(plant: &Plant, points: &[Point; 2]) -> State {
 }
 
 /// Length of a signature: standard deviations of the matched filter.
-pub fn length(signature: &[f64]) -> f64 {
+pub(crate) fn length(signature: &[f64]) -> f64 {
     dot(signature, signature).sqrt()
 }
 
-/// How alike two signatures are, 0 to 1, whatever their sign; 0 if one is nothing.
-pub fn alike(left: &[f64], right: &[f64]) -> f64 {
+/// Absolute cosine between two signatures, 0 to 1; 0 if one is zero.
+pub(crate) fn abs_cosine(left: &[f64], right: &[f64]) -> f64 {
     let lengths = length(left) * length(right);
     if lengths > 0.0 { (dot(left, right) / lengths).abs().min(1.0) } else { 0.0 }
 }
@@ -312,7 +313,16 @@ pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use plant::Setup;
+    use plant::{Setup, Truth};
+
+    fn points(truth: &Truth) -> [Point; 2] {
+        let point = |axis: usize, extension_m: f64| Point {
+            extension_m,
+            rod_velocity_m_per_s: truth.axes[axis].rod_velocity_m_per_s,
+            pressures_pa: [truth.axes[axis].pressure_a_pa, truth.axes[axis].pressure_b_pa],
+        };
+        [point(0, truth.axes[0].position_m), point(1, 0.5 - truth.axes[1].position_m)]
+    }
 
     /// Two seconds of strokes of the drive, without a controller.
     pub(crate) fn trajectory() -> TrueTrajectory {
@@ -330,7 +340,7 @@ mod tests {
             let valve = 0.3 * (f64::from(cycle) * 0.012).sin() + if cycle % 500 < 100 { 0.3 } else { 0.0 };
             let inputs = Inputs { valve: [plant::quantise_valve(valve), 0.0], ..Inputs::default() };
             trajectory.inputs.push(inputs);
-            trajectory.points.push(Point::of(&plant.truth(&inputs), 0.5));
+            trajectory.points.push(points(&plant.truth(&inputs)));
             plant.step(&inputs);
         }
         trajectory
@@ -352,7 +362,7 @@ mod tests {
         let ratio = length(&two) / length(&one);
         // Stops shift with the friction: a tenth beside the straight line.
         assert!((ratio - 2.0).abs() < 0.2, "{ratio}");
-        assert!(alike(&one, &two) > 0.95, "{}", alike(&one, &two));
+        assert!(abs_cosine(&one, &two) > 0.95, "{}", abs_cosine(&one, &two));
         assert!(length(&one) > 3.6, "{}", length(&one));
     }
 
@@ -363,7 +373,7 @@ mod tests {
             |path: &str, value| observer.signature(&RigParameters::baseline().with(path, &[value]).unwrap());
         let mass = with("mass.drive_kg", 5.2);
         let lag = with("valve.flow_lag_time_constant_ms", 8.5);
-        assert!(alike(&mass, &lag) < 0.8, "{}", alike(&mass, &lag));
+        assert!(abs_cosine(&mass, &lag) < 0.8, "{}", abs_cosine(&mass, &lag));
     }
 
     #[test]

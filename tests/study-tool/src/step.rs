@@ -1,15 +1,15 @@
-//! One draw: its records made, the program let loose on copies of them, what it wrote kept.
+//! One step of a study: the records of a draw, the run of the program on copies of them, its output.
 //!
-//! A draw is done when its folder has its name, so that a step may be killed at any instant and is taken again. Which draws are
-//! taken, by whom and how many at once is the affair of a campaign (`campaign/docs/campaigns.md`), whose command is
-//! `study one`. A program that crashes, hangs or writes nonsense is a result. A disk that fills up is none: the step is not taken
-//! then, since a report that found no room would tell nothing about the program.
+//! A draw is done when its folder has its final name, so that a step can be killed at any time and repeated. A campaign decides
+//! which draws are run, where, and how many at a time (`campaign/docs/campaigns.md`); its command is `study one`. A program
+//! that crashes, hangs or writes an invalid report is a result. A full disk is not: the step is not started then, since a
+//! report that did not fit says nothing about the program.
 
 use crate::SCHEMA_VERSION;
 use crate::draws::Draw;
-use crate::folder::{FolderError, Study, make_whole, read_left};
+use crate::folder::{FolderError, Study, make_whole, read_versioned};
 use crate::leave_out;
-use crate::program::{Identity, Interrupted, Program, Start, Taken};
+use crate::program::{Execution, Identity, Interrupted, Program, Start};
 use crate::report::{self, Report};
 use plant::RigParameters;
 use record_maker::{Experiment, Recipe};
@@ -21,8 +21,8 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Names of the folders of a draw's records.
-pub const EXPERIMENTS: [(Experiment, &str); 3] = [
+/// Folder names of the records of a draw.
+pub(crate) const EXPERIMENTS: [(Experiment, &str); 3] = [
     (Experiment::Train, "train"),
     (Experiment::HeldOut(0), "held-out-0"),
     (Experiment::HeldOut(1), "held-out-1"),
@@ -30,12 +30,16 @@ pub const EXPERIMENTS: [(Experiment, &str); 3] = [
 
 const LARGEST_REPORT: u64 = 64 << 20;
 const LARGEST_EXPERIMENT: u64 = 1 << 20;
-/// Most that is kept of what a program says.
-const MOST_SAID: u64 = 1 << 20;
+/// Largest part of the program's standard error that is kept, bytes.
+const LARGEST_STDERR: u64 = 1 << 20;
 
-/// Makes a record: measurement into the first folder, truth into the second; says why it cannot.
+/// Makes a record: measurement into the first folder, truth into the second; the error says why it cannot.
 pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
 
+/// Makes a record with the record maker, as [`Make`].
+///
+/// # Errors
+/// Why the record cannot be made.
 pub fn make_record(
     recipe: &Recipe,
     rig: &RigParameters,
@@ -45,54 +49,88 @@ pub fn make_record(
     record_maker::make(recipe, rig, measurement, truth).map_err(|error| error.to_string())
 }
 
+/// How the steps of a study are run.
 pub struct Step<'a> {
+    /// Study whose draws are run.
     pub study: &'a Study,
+    /// Label under which the results are stored.
     pub label: &'a str,
+    /// Makes the records of a draw: [`make_record`], but for twins.
     pub make: Make<'a>,
-    /// Effects that are left out of the program's catalogue.
+    /// Effects that are left out of the program's catalogue; `None` for the whole catalogue.
     pub without: Option<Vec<String>>,
     /// Whether truth.csv is kept, 17 MB each.
     pub keep_truth: bool,
-    /// Whether records are deleted once a program has seen them.
+    /// Whether records are deleted after the run of the program.
     pub drop_records: bool,
-    /// Whether what is done is done again.
+    /// Whether finished runs are repeated.
     pub again: bool,
-    /// Free space below which nothing is begun, MiB.
+    /// Free space below which no step is started, MiB.
     pub least_free_mib: u64,
+    /// Interrupts a running step when set.
     pub stop: &'a AtomicBool,
 }
 
+/// Why a step was not taken.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
+    /// A file of the study cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// A file of a draw cannot be read or written.
     #[error("draw {number}: {error}")]
-    Files { number: usize, error: io::Error },
+    Files {
+        /// Number of the draw.
+        number: usize,
+        /// What the operating system says.
+        error: io::Error,
+    },
+    /// The record of a draw cannot be made.
     #[error("draw {number}: its record cannot be made: {reason}")]
-    Make { number: usize, reason: String },
+    Make {
+        /// Number of the draw.
+        number: usize,
+        /// Why.
+        reason: String,
+    },
+    /// A record is not a valid measurement.
     #[error("draw {number}: {error}")]
-    Record { number: usize, error: ReadError },
+    Record {
+        /// Number of the draw.
+        number: usize,
+        /// Why.
+        error: ReadError,
+    },
+    /// Too little space on the disk.
     #[error(
         "{free_mib} MiB are left on the disk, {least_free_mib} are wanted: free some and start again, nothing is lost"
     )]
-    Disk { free_mib: u64, least_free_mib: u64 },
+    Disk {
+        /// Free space, MiB.
+        free_mib: u64,
+        /// Required space, MiB.
+        least_free_mib: u64,
+    },
 }
 
-/// What a run leaves as `result.json`.
+/// Result of a run, as `result.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunResult {
-    pub schema_version: u32,
-    pub number: usize,
-    pub program: Identity,
-    pub taken: Taken,
-    /// Effects that were left out of its catalogue; absent in a file when none was.
+    pub(crate) schema_version: u32,
+    pub(crate) number: usize,
+    pub(crate) program: Identity,
+    pub(crate) taken: Execution,
+    /// Effects that were left out of the program's catalogue; absent in a file when there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub without: Vec<String>,
+    pub(crate) without: Vec<String>,
 }
 
 impl Step<'_> {
-    /// Makes the records of a draw, unless they are there.
+    /// Makes the records of a draw, unless they exist.
+    ///
+    /// # Errors
+    /// [`StepError`] when the disk is full, a record cannot be made, or a file cannot be written.
     pub fn records(&self, draw: &Draw) -> Result<(), StepError> {
         if self.study.records(draw.number).exists() {
             return Ok(());
@@ -101,10 +139,10 @@ impl Step<'_> {
         self.make_records(draw)
     }
 
-    /// Lets the program loose on a draw, unless it was; `None` when it was asked to stop in its midst.
+    /// Runs the program on a draw, unless it has a result; `None` when interrupted.
     ///
     /// # Errors
-    /// [`StepError`] for what is no result of the program's.
+    /// [`StepError`] for whatever is not a result of the program.
     pub fn run(&self, draw: &Draw, program: &Program) -> Result<Option<RunResult>, StepError> {
         let number = draw.number;
         let path = self.study.run(self.label, number);
@@ -113,7 +151,7 @@ impl Step<'_> {
         }
         self.check_disk()?;
         self.records(draw)?;
-        let result = whole_run(&path, |folder| self.let_loose(draw, program, folder))?;
+        let result = whole_run(&path, |folder| self.run_program(draw, program, folder))?;
         if self.drop_records && result.is_some() {
             fs::remove_dir_all(self.study.records(number))
                 .map_err(|error| StepError::Files { number, error })?;
@@ -125,7 +163,7 @@ impl Step<'_> {
         Identity { leave_out: self.without.is_some(), ..program.identity().clone() }
     }
 
-    /// Results of another program under the same label are never mixed with its own.
+    /// Results of another program under the same label are never mixed.
     fn done(&self, path: &Path, program: &Program) -> Result<RunResult, StepError> {
         let result = read_result(path)?;
         check_program(path, &result.program, &self.identity(program), "give another --label")?;
@@ -133,14 +171,14 @@ impl Step<'_> {
     }
 
     pub(crate) fn check_disk(&self) -> Result<(), StepError> {
-        // A system that does not tell is no reason to stop.
+        // A system that does not report its free space is no reason to stop.
         let Ok(reported) = rustix::fs::statvfs(&self.study.root) else { return Ok(()) };
         let free_mib = reported.f_bavail.saturating_mul(reported.f_frsize) >> 20;
         let least_free_mib = self.least_free_mib;
         if free_mib < least_free_mib { Err(StepError::Disk { free_mib, least_free_mib }) } else { Ok(()) }
     }
 
-    /// The truth first: records without it would be of no use, the other way round they are made again.
+    /// The truth first: records without it would be useless, truth without records is made again.
     fn make_records(&self, draw: &Draw) -> Result<(), StepError> {
         let (number, rig) = (draw.number, RigParameters::baseline());
         make_whole(&self.study.records(number), |records| {
@@ -152,7 +190,7 @@ impl Step<'_> {
                     (self.make)(&draw.recipe(experiment), &rig, &record, &truth)
                         .map_err(|reason| StepError::Make { number, reason })?;
                     if !self.keep_truth {
-                        // It follows from the recipe.
+                        // It can be made again from the recipe.
                         let _ = fs::remove_file(truth.join("truth.csv"));
                     }
                 }
@@ -161,7 +199,7 @@ impl Step<'_> {
         })
     }
 
-    fn let_loose(
+    fn run_program(
         &self,
         draw: &Draw,
         program: &Program,
@@ -170,10 +208,10 @@ impl Step<'_> {
         let number = draw.number;
         let files = |error| StepError::Files { number, error };
         let empty = tempfile::tempdir().map_err(files)?;
-        self.lay_out(draw, empty.path())?;
+        self.copy_inputs(draw, empty.path())?;
         let without = self.without.clone().unwrap_or_default();
-        let own = leave_out::arguments(&without);
-        let start = Start { folder: empty.path(), train: &["train.csv"], own: &own };
+        let arguments = leave_out::arguments(&without);
+        let start = Start { folder: empty.path(), train: &["train.csv"], arguments: &arguments };
         let Some(taken) = self.start(number, program, &start, folder)? else { return Ok(None) };
         let program = self.identity(program);
         let result = RunResult { schema_version: SCHEMA_VERSION, number, program, taken, without };
@@ -181,8 +219,8 @@ impl Step<'_> {
         Ok(Some(result))
     }
 
-    /// Puts what a program may see of a draw into an empty folder.
-    pub(crate) fn lay_out(&self, draw: &Draw, empty: &Path) -> Result<(), StepError> {
+    /// Copies the inputs of the program for a draw into an empty folder.
+    pub(crate) fn copy_inputs(&self, draw: &Draw, empty: &Path) -> Result<(), StepError> {
         let number = draw.number;
         let files = |error| StepError::Files { number, error };
         let folder_of_records = self.study.records(number);
@@ -199,14 +237,14 @@ impl Step<'_> {
         Ok(())
     }
 
-    /// Starts the program, and keeps in `folder` what it says, its report and the experiment that this proposes.
+    /// Runs the program, and keeps in `folder` its standard error, its report and the experiment that it proposes.
     pub(crate) fn start(
         &self,
         number: usize,
         program: &Program,
         start: &Start<'_>,
         folder: &Path,
-    ) -> Result<Option<Taken>, StepError> {
+    ) -> Result<Option<Execution>, StepError> {
         let files = |error| StepError::Files { number, error };
         let said = folder.join("stderr.txt");
         let taken = match program.run(start, File::create(&said).map_err(files)?, self.stop) {
@@ -214,11 +252,11 @@ impl Step<'_> {
             Err(Interrupted) => return Ok(None),
         };
         let reported = fs::metadata(&said).map_err(files)?.len();
-        if reported > MOST_SAID {
+        if reported > LARGEST_STDERR {
             File::options()
                 .write(true)
                 .open(&said)
-                .and_then(|file| file.set_len(MOST_SAID))
+                .and_then(|file| file.set_len(LARGEST_STDERR))
                 .map_err(files)?;
         }
         let out = start.folder.join("out");
@@ -231,13 +269,13 @@ impl Step<'_> {
     }
 }
 
-/// A record that holds more than a measurement could tell what is hidden.
+/// Refuses a record with more columns than a measurement, which could reveal what is hidden.
 pub(crate) fn check_blind(number: usize, record: &Path) -> Result<(), StepError> {
     let blind = ReadOptions { unknown: UnlistedColumns::Refused, ..ReadOptions::default() };
     records::read(record, &blind).map(drop).map_err(|error| StepError::Record { number, error })
 }
 
-/// Copies a file of a program's folder. What cannot be copied was not written, or is no file: the judge says so.
+/// Copies a file of a program's folder. A missing or too large file is skipped, which the judge reports.
 fn keep(out: &Path, folder: &Path, name: &str, largest: u64) -> io::Result<()> {
     let file = out.join(name);
     if fs::metadata(&file).is_ok_and(|file| file.is_file() && file.len() <= largest) {
@@ -259,7 +297,7 @@ pub(crate) fn check_program(
     Err(FolderError::content(path, what))
 }
 
-/// Makes the folder of a run, whole or absent; `None` when the study was asked to stop in its midst.
+/// Makes the folder of a run atomically; `None` when interrupted.
 pub(crate) fn whole_run<T>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<Option<T>, StepError>,
@@ -283,12 +321,12 @@ impl From<FolderError> for StepEnd {
     }
 }
 
-/// The result of a run.
+/// Reads the result of a run.
 ///
 /// # Errors
-/// [`FolderError`] when it is none of this version.
-pub fn read_result(path: &Path) -> Result<RunResult, FolderError> {
-    read_left(path, "result", |result: &RunResult| result.schema_version)
+/// [`FolderError`] when it cannot be read, or is of another version.
+pub(crate) fn read_result(path: &Path) -> Result<RunResult, FolderError> {
+    read_versioned(path, "result", |result: &RunResult| result.schema_version)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! What is wanted of a rate, and whether it is reached.
+//! Targets of rates, and whether they are reached.
 //!
-//! A target is reached when the estimate reaches it. The interval says whether so many draws resolve that:
+//! A target is reached when the estimate reaches it. The interval shows whether the number of draws resolves that:
 //!
 //! ```text
 //! interval within the target            reached
@@ -8,36 +8,36 @@
 //! interval across an end of it          not resolved: the estimate reaches the target, or misses it
 //! ```
 //!
-//! The interval is Wilson's of 95 % ([`crate::interval`]). None in so many draws is reached by their number alone.
+//! The interval is Wilson's of 95 % ([`crate::interval`]). A target of none in so many draws is reached by their number alone.
 
 use crate::interval::Rate;
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
 
-/// What is wanted of a rate; written in words.
+/// The target of a rate; serialised in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(into = "String")]
-pub enum Target {
-    /// Nothing: the rate is part of another one.
-    Unasked,
-    /// The rate is reported and has no target.
+pub(crate) enum Target {
+    /// No target: the rate is part of another one.
+    Component,
+    /// No target: the rate is only reported.
     Reported,
-    /// So many per cent and more.
+    /// At least so many per cent.
     AtLeast(u32),
-    /// So many per cent and less.
+    /// At most so many per cent.
     AtMost(u32),
-    /// From so many per cent to so many.
+    /// Between these per cents.
     Between(u32, u32),
-    /// Not one in so many draws.
+    /// None in so many draws.
     NoneOf(usize),
 }
 
 impl Target {
-    /// The shares that reach it.
+    /// The shares that reach the target.
     fn bounds(self) -> Option<[f64; 2]> {
         let share = |percent: u32| f64::from(percent) / 100.0;
         match self {
-            Target::Unasked | Target::Reported => None,
+            Target::Component | Target::Reported => None,
             Target::AtLeast(least) => Some([share(least), 1.0]),
             Target::AtMost(most) => Some([0.0, share(most)]),
             Target::Between(least, most) => Some([share(least), share(most)]),
@@ -49,7 +49,7 @@ impl Target {
 impl Display for Target {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         match self {
-            Target::Unasked => Ok(()),
+            Target::Component => Ok(()),
             Target::Reported => write!(formatter, "reported"),
             Target::AtLeast(least) => write!(formatter, "{least} %"),
             Target::AtMost(most) => write!(formatter, "at most {most} %"),
@@ -65,21 +65,21 @@ impl From<Target> for String {
     }
 }
 
-/// What a rate and its interval say of a target.
+/// Outcome of a rate and its interval against a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub(crate) enum Outcome {
     NoDraw,
     Reached,
     Missed,
-    /// The interval crosses an end of the target.
+    /// The estimate reaches the target; the interval crosses an end of it.
     EstimateReaches,
     EstimateMisses,
 }
 
 impl Outcome {
     /// `None` without a target.
-    pub fn of(rate: &Rate, target: Target) -> Option<Self> {
+    pub(crate) fn of(rate: &Rate, target: Target) -> Option<Self> {
         let [least, most] = target.bounds()?;
         let Some(share) = rate.share else { return Some(Outcome::NoDraw) };
         let [low, high] = rate.interval;
@@ -134,7 +134,7 @@ mod tests {
                 "{count} of {of}, {target}"
             );
         }
-        for target in [Target::Unasked, Target::Reported] {
+        for target in [Target::Component, Target::Reported] {
             assert_eq!(Outcome::of(&Rate::new(1, 2), target), None);
         }
     }
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn a_target_is_written_in_words() {
-        let words = [Target::Unasked, Target::AtLeast(97), Target::AtMost(5), Target::Between(93, 97)];
+        let words = [Target::Component, Target::AtLeast(97), Target::AtMost(5), Target::Between(93, 97)];
         assert_eq!(words.map(|target| target.to_string()), ["", "97 %", "at most 5 %", "93 to 97 %"]);
         assert_eq!(serde_json::json!(Target::NoneOf(200)), "none of 200");
         assert_eq!(serde_json::json!(Outcome::EstimateReaches), "estimate-reaches");

@@ -1,53 +1,41 @@
-//! What really happened in a record: inputs and true states, millisecond by millisecond.
+//! True trajectory of a record: inputs and true states for each millisecond.
 
-use plant::{Inputs, RigParameters, State, Truth};
+use plant::{Inputs, RigParameters, State};
 
-pub const WINDOW: usize = 100;
+/// Length of a window, rows of 1 ms.
+pub(crate) const WINDOW: usize = 100;
 
-/// The trajectory of a record, as only its maker knows it.
+/// The true trajectory of a record.
 #[derive(Debug, Clone)]
-pub struct TrueTrajectory {
-    pub rig: RigParameters,
+pub(crate) struct TrueTrajectory {
+    pub(crate) rig: RigParameters,
     /// Which axes are measured, drive and load.
-    pub measured: [bool; 2],
-    /// State at the start, from which everything but the points is carried on.
-    pub start: State,
-    pub inputs: Vec<Inputs>,
-    /// Windows at the start in which memories fill: they count for nothing.
-    pub settling: usize,
-    /// The true mechanical state and pressures at the start of each millisecond.
-    pub points: Vec<[Point; 2]>,
+    pub(crate) measured: [bool; 2],
+    /// Initial state; every state other than the points continues from it.
+    pub(crate) start: State,
+    pub(crate) inputs: Vec<Inputs>,
+    /// Windows at the start in which memories build up: they are excluded.
+    pub(crate) settling: usize,
+    /// True mechanical state and pressures at the start of each millisecond.
+    pub(crate) points: Vec<[Point; 2]>,
 }
 
-/// What a window's free initial state is made of, for one axis.
+/// The free initial state of a window, for one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
-    pub extension_m: f64,
+pub(crate) struct Point {
+    pub(crate) extension_m: f64,
     /// Its rate, m/s.
-    pub rod_velocity_m_per_s: f64,
+    pub(crate) rod_velocity_m_per_s: f64,
     /// Absolute pressures of the chambers a and b, Pa.
-    pub pressures_pa: [f64; 2],
+    pub(crate) pressures_pa: [f64; 2],
 }
 
-pub const POINT_NUMBERS: usize = 4;
+pub(crate) const POINT_NUMBERS: usize = 4;
 
 impl Point {
-    pub fn of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
-        std::array::from_fn(|i| {
-            let axis = &truth.axes[i];
-            let extension_m = if i == 0 { axis.position_m } else { stroke_m - axis.position_m };
-            Point {
-                extension_m: extension_m.clamp(0.0, stroke_m),
-                rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
-                pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
-            }
-        })
-    }
-
-    /// The same with one of its numbers a little larger: by less than the sensors' noise, so that the trajectory stays what it
-    /// is.
+    /// The point with one of its numbers increased by less than the sensors' noise, so that the trajectory hardly changes.
     #[must_use]
-    pub fn nudged(mut self, number: usize) -> Self {
+    pub(crate) fn perturbed(mut self, number: usize) -> Self {
         match number {
             0 => self.extension_m += 2e-6,
             1 => self.rod_velocity_m_per_s += 2e-4,
@@ -59,8 +47,8 @@ impl Point {
 }
 
 impl TrueTrajectory {
-    /// Whole windows of the trajectory; what is left over at the end is not looked at.
-    pub fn windows(&self) -> usize {
+    /// Number of whole windows; a remainder is ignored.
+    pub(crate) fn windows(&self) -> usize {
         self.inputs.len().min(self.points.len()) / WINDOW
     }
 }

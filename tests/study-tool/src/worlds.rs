@@ -1,12 +1,12 @@
-//! A study of two worlds as one table: what the program says where the catalogue's laws are exact, and where everything is a
-//! little wrong.
+//! A study of two worlds as one table: the results where the catalogue's laws are exact, and where the whole rig has small
+//! model errors.
 
 use crate::draws::Kind;
 use crate::interval::Rate;
-use crate::judge::NumberJudged;
-use crate::leave_out::LeftOut;
+use crate::judge::NumberJudgement;
+use crate::leave_out::LeaveOutJudgement;
 use crate::leave_out::tables::STILL_CLOSED;
-use crate::probability::{Reliability, Said, by_marginal};
+use crate::probability::{JudgedExplanation, Reliability, by_marginal};
 use crate::score::tables::{Spread, hidden, is_clear, over_limit};
 use crate::score::{Case, Score};
 use crate::target::{Outcome, Target};
@@ -15,46 +15,47 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Excursion of a parameter from which on it is off by much, as a share of its value.
+/// Relative error from which a parameter is much off.
 const MUCH_OFF: f64 = 0.02;
-/// Multiple of the limit that parts weak and strong effects.
+/// Multiple of the limit between weak and strong effects.
 const STRONG: f64 = 10.0;
-/// Targets in the exact world and beside a background: median and longest wall time of a draw, s; calibration error, points.
+/// Targets in the exact world and with a background: median and longest wall time of a draw, s; calibration error, points.
 const MEDIAN_S: [f64; 2] = [12.0, 15.0];
 const LONGEST_S: [f64; 2] = [60.0, 90.0];
 const CALIBRATION_POINTS: [u32; 2] = [5, 10];
 
+/// Results of a program in both worlds: the exact one, then the one with a background.
 #[derive(Debug, Serialize)]
 pub struct Worlds {
-    pub rows: Vec<Row>,
-    /// Draws that have a result, and all that the study has.
-    pub done: [usize; 2],
+    pub(crate) rows: Vec<Row>,
+    /// Number of draws with a result, and of all draws of the study.
+    pub(crate) done: [usize; 2],
     /// Draws with a result in which the hidden effects were left out.
-    pub left_out: usize,
-    /// Exact world, world with a background; draws with effects left out included.
-    pub reliability: [Reliability; 2],
-    /// The same of those reports that have marginal likelihoods: by the rule that decides, and by these.
-    pub rules: [[Reliability; 2]; 2],
-    pub wall_s: [Spread; 2],
-    /// What the rig file leaves of held-out records with nothing hidden and no parameter off, chi2 per degree of freedom: in the
-    /// world with a background how large that is.
-    pub null_chi2: [Spread; 2],
-    /// Draws that took longer than the target of the median, and than that of the longest, in each world.
-    pub longer: [[Rate; 2]; 2],
-    pub errors: usize,
+    pub(crate) left_out: usize,
+    /// Calibration; draws with effects left out included.
+    pub(crate) reliability: [Reliability; 2],
+    /// The same for reports that state marginal likelihoods: with the stated probabilities, and with those.
+    pub(crate) rules: [[Reliability; 2]; 2],
+    pub(crate) wall_s: [Spread; 2],
+    /// Chi2 per degree of freedom of the rig file on held-out records with nothing hidden and no wrong parameter: with a
+    /// background it shows the size of that.
+    pub(crate) null_chi2: [Spread; 2],
+    /// Draws that took longer than the targets of the median and of the longest, in each world.
+    pub(crate) longer: [[Rate; 2]; 2],
+    pub(crate) errors: usize,
     /// Other programs on the same draws.
-    pub others: Vec<Paired>,
+    pub(crate) others: Vec<PairedCounts>,
 }
 
-/// Draws that two programs got right, exactly: name, place, nothing beside; in each world.
+/// Paired counts of two programs: which got a draw exactly right (name, place, no other name), in each world.
 #[derive(Debug, Serialize)]
-pub struct Paired {
-    pub label: String,
-    /// Right by both, by the first alone, by the other alone, by neither.
-    pub counts: [[usize; 4]; 2],
+pub(crate) struct PairedCounts {
+    pub(crate) label: String,
+    /// Right by both, by the first only, by the other only, by neither.
+    pub(crate) counts: [[usize; 4]; 2],
 }
 
-impl Paired {
+impl PairedCounts {
     fn of(score: &Score, other: &Score) -> Self {
         let theirs: BTreeMap<usize, &Case> = other.cases.iter().map(|case| (case.number, case)).collect();
         let mut counts = [[0; 4]; 2];
@@ -63,11 +64,11 @@ impl Paired {
             let place = 2 * usize::from(!is_exact(case)) + usize::from(!is_exact(other));
             counts[usize::from(case.background)][place] += 1;
         }
-        Paired { label: other.label.clone(), counts }
+        PairedCounts { label: other.label.clone(), counts }
     }
 }
 
-/// Whether a case is right, and nothing stands beside.
+/// Whether a case is right, without any other name.
 fn is_exact(case: &Case) -> bool {
     let judgement = &case.judgement;
     match case.kind {
@@ -82,20 +83,20 @@ fn is_no_name(case: &Case) -> bool {
     ["nothing", "parameter", "outside"].contains(&case.judgement.called.as_str())
 }
 
-/// Exact McNemar test: two-sided probability of so uneven a split of the draws that one program alone got right.
+/// Exact McNemar test: two-sided probability of a split at least as uneven of the draws that only one program got right.
 fn mcnemar(one: usize, other: usize) -> f64 {
     let of = (one + other) as u64;
     Binomial::new(0.5, of).map_or(1.0, |binomial| (2.0 * binomial.cdf(one.min(other) as u64)).min(1.0))
 }
 
-/// A rate in both worlds, and what is wanted of it.
+/// A rate in both worlds, and its targets.
 #[derive(Debug, Serialize)]
-pub struct Row {
-    pub name: &'static str,
-    pub rates: [Rate; 2],
-    pub wanted: [Target; 2],
+pub(crate) struct Row {
+    pub(crate) name: &'static str,
+    pub(crate) rates: [Rate; 2],
+    pub(crate) wanted: [Target; 2],
     /// `None` without a target.
-    pub outcomes: [Option<Outcome>; 2],
+    pub(crate) outcomes: [Option<Outcome>; 2],
 }
 
 impl Row {
@@ -106,7 +107,8 @@ impl Row {
 }
 
 impl Worlds {
-    /// Of a score with the whole catalogue, of one with the hidden effects left out, and of other programs'.
+    /// The results of a score with the whole catalogue, of one with the hidden effects left out, and of other programs; `draws`
+    /// is the number of draws of the study.
     pub fn of(score: &Score, left: Option<&Score>, others: &[Score], draws: usize) -> Self {
         let in_world = |score: &Score, background| -> Vec<Case> {
             score.cases.iter().filter(|case| case.background == background).cloned().collect()
@@ -122,7 +124,7 @@ impl Worlds {
         });
         let rules = [0, 1].map(|world: usize| {
             let all = worlds[world].iter().chain(&left[world]);
-            let both: Vec<(Kind, &[Said], Vec<Said>)> = all
+            let both: Vec<(Kind, &[JudgedExplanation], Vec<JudgedExplanation>)> = all
                 .filter_map(|case| {
                     Some((case.kind, &case.explanations[..], by_marginal(&case.explanations)?))
                 })
@@ -149,12 +151,12 @@ impl Worlds {
             }),
             wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
             longer,
-            others: others.iter().map(|other| Paired::of(score, other)).collect(),
+            others: others.iter().map(|other| PairedCounts::of(score, other)).collect(),
             errors: cases().filter(|case| case.judgement.error.is_some()).count(),
         }
     }
 
-    /// As a page of Markdown.
+    /// The tables in Markdown.
     pub fn markdown(&self) -> String {
         let mut text = format!(
             "{} of {} draws, and {} with what is hidden left out of the catalogue; {} without a good report, which count as \
@@ -168,6 +170,17 @@ impl Worlds {
             });
             let _ = writeln!(text, "| {name} | {} |", cells.join(" | "));
         }
+        text += &self.wall_time_rows();
+        text += &self.null_chi2_in_words();
+        text += &self.others_in_words();
+        text += &self.calibration_in_words();
+        text += &self.rules_in_words();
+        text
+    }
+
+    /// Rows of the table for the wall times.
+    fn wall_time_rows(&self) -> String {
+        let mut text = String::new();
         for (at, (name, limits_s)) in [("median", MEDIAN_S), ("longest", LONGEST_S)].into_iter().enumerate() {
             let cells = [0, 1].map(|world: usize| {
                 let quantiles = self.wall_s[world].quantiles;
@@ -178,7 +191,12 @@ impl Worlds {
             });
             let _ = writeln!(text, "| {name} of the wall time | {} |", cells.join(" | "));
         }
-        text += &self.null_chi2_in_words();
+        text
+    }
+
+    /// Comparison with other programs on the same draws.
+    fn others_in_words(&self) -> String {
+        let mut text = String::new();
         for (label, world, [both, ours, theirs, neither]) in self.others.iter().flat_map(|paired| {
             let worlds = ["exact world", "background"].into_iter().zip(paired.counts);
             worlds.map(|(world, counts)| (&paired.label, world, counts))
@@ -191,6 +209,12 @@ impl Worlds {
                 mcnemar(ours, theirs)
             );
         }
+        text
+    }
+
+    /// Calibration of the probabilities, with a table of their bins.
+    fn calibration_in_words(&self) -> String {
+        let mut text = String::new();
         for (at, (world, reliability)) in
             ["exact world", "background"].into_iter().zip(&self.reliability).enumerate()
         {
@@ -223,6 +247,12 @@ impl Worlds {
                 );
             }
         }
+        text
+    }
+
+    /// The marginal likelihood against the rule that decides.
+    fn rules_in_words(&self) -> String {
+        let mut text = String::new();
         for (world, [decides, marginal]) in ["exact world", "background"].into_iter().zip(&self.rules) {
             let (Some(of_deciding), Some(of_marginal)) = (decides.log_loss, marginal.log_loss) else {
                 continue;
@@ -260,13 +290,13 @@ impl Worlds {
         )
     }
 
-    /// What is wanted of the draws that took longer than the target of the median (0), and than that of the longest (1).
+    /// Target of the draws that took longer than the target of the median (0), and of the longest (1).
     fn longer_wanted(&self, at: usize) -> Target {
         let [done, draws] = self.done;
         match at {
-            // The median is below what no more than half of the draws exceed.
+            // At most half of the draws exceed the median.
             0 => Target::AtMost(50),
-            // Some of the draws prove nothing of the longest of all.
+            // Part of the draws does not bound the longest of all.
             _ if done < draws => Target::NoneOf(usize::MAX),
             _ => Target::NoneOf(1),
         }
@@ -283,7 +313,7 @@ fn in_words(rate: Rate) -> String {
     format!("{}/{}{share} ({low:.0} to {high:.0} %)", rate.count, rate.of)
 }
 
-/// The rate of those cases of `all` that `is` holds for.
+/// The rate of the cases of `all` for which `is` holds.
 fn row(
     name: &'static str,
     wanted: [Target; 2],
@@ -296,7 +326,7 @@ fn row(
 }
 
 fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
-    use Target::{AtLeast, AtMost, Between, NoneOf, Reported, Unasked};
+    use Target::{AtLeast, AtMost, Between, Component, NoneOf, Reported};
 
     let single = |case: &Case| case.kind == Kind::Single && is_clear(case);
     let ordinary = |case: &Case| single(case) && !case.foreign_form && !case.beyond_drawn;
@@ -322,19 +352,19 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
             ordinary,
             named,
         ),
-        row("the same, named or resembled", [Unasked; 2], worlds, ordinary, |case| {
+        row("the same, named or resembled", [Component; 2], worlds, ordinary, |case| {
             named(case) || case.judgement.resembled
         }),
         row(
             "the catalogue's form, 3 to 10 limits",
-            [Unasked; 2],
+            [Component; 2],
             worlds,
             |case| ordinary(case) && !strong(case),
             named,
         ),
         row(
             "the same, 10 limits and more",
-            [Unasked; 2],
+            [Component; 2],
             worlds,
             |case| ordinary(case) && strong(case),
             named,
@@ -348,7 +378,7 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
         ),
         row(
             "the same, named or resembled",
-            [Unasked; 2],
+            [Component; 2],
             worlds,
             |case| single(case) && !ordinary(case),
             |case| named(case) || case.judgement.resembled,
@@ -373,7 +403,7 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
             null,
             |case| !case.parameter_errors.is_empty(),
         ),
-        row("the same by more than 2 % of its value", [Unasked, NoneOf(200)], worlds, null, much_off),
+        row("the same by more than 2 % of its value", [Component, NoneOf(200)], worlds, null, much_off),
         row("two effects: both classes named", [AtLeast(88), AtLeast(70)], worlds, pair, all_named),
         row("two effects: no third", [AtLeast(95), AtLeast(90)], worlds, pair, |case| {
             case.judgement.too_many == 0
@@ -394,14 +424,14 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
     ]
 }
 
-fn hidden_numbers(case: &Case) -> &[NumberJudged] {
+fn hidden_numbers(case: &Case) -> &[NumberJudgement] {
     case.judgement.hidden.first().map_or(&[], |own| &own.numbers)
 }
 
 fn left_out_rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
     use Target::{AtLeast, Reported};
 
-    let is = |case: &Case, is: &dyn Fn(&LeftOut) -> bool| case.left_out.as_ref().is_some_and(is);
+    let is = |case: &Case, is: &dyn Fn(&LeaveOutJudgement) -> bool| case.left_out.as_ref().is_some_and(is);
     let closed = |case: &Case| case.judgement.claimed_joint_ratio.is_some_and(|ratio| ratio >= STILL_CLOSED);
     let remembers = |case: &Case| is(case, &|left| left.with_memory);
     vec![

@@ -7,7 +7,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 pub(super) struct Panel<'a> {
     pub(super) title: &'a str,
-    /// Places of the axis that are named; they span it.
+    /// Labelled positions of the axis; the outermost ones define its range.
     pub(super) ticks: Vec<(f64, String)>,
     pub(super) curves: &'a [Curve],
 }
@@ -22,7 +22,7 @@ const COLOURS: [RGBColor; 5] = [
 ];
 const WIDTH: u32 = 1100;
 const HEIGHT: u32 = 440;
-/// Room around the axes of a panel, in pixels.
+/// Margins around the axes of a panel, in pixels.
 const LEFT: i32 = 60;
 const RIGHT: i32 = 20;
 const BOTTOM: i32 = 34;
@@ -57,7 +57,7 @@ fn draw_panel(area: &Area<'_>, panel: &Panel<'_>) -> Result<(), Failure> {
 
     let places = || panel.ticks.iter().map(|(place, _)| place.log10());
     let [least, most] = [places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max)];
-    // Half a tick beside the outermost; a single one stands in the middle.
+    // Half a tick beyond the outermost; a single one is in the middle.
     let margin = ((most - least) / panel.ticks.len() as f64 / 2.0).max(0.1);
     let x = |place: f64| {
         let share = (place.log10() - least + margin) / (most - least + 2.0 * margin);
@@ -79,7 +79,7 @@ fn draw_panel(area: &Area<'_>, panel: &Panel<'_>) -> Result<(), Failure> {
     }
     for (at, curve) in panel.curves.iter().enumerate() {
         let colour = COLOURS[at % COLOURS.len()];
-        // Curves stand side by side where their intervals would hide each other.
+        // Curves are offset where their intervals would hide each other.
         let aside = 4 * at as i32 - 2 * (panel.curves.len() as i32 - 1);
         let reported =
             || curve.points.iter().filter_map(|(place, rate)| Some((*place, rate.share?, rate.interval)));

@@ -1,6 +1,6 @@
-//! Starts of twins: an effect on one axis, weakened towards the smallest amplitude that is drawn.
+//! Starts of twins: an effect on one axis, its amplitude drawn between the smallest and the usual range.
 //!
-//! Which other effect explains a part of its record as well, and at which noise, is found by [`crate::twins`].
+//! [`crate::twins`] finds the other effect that explains a part of its record as well, and the noise.
 
 use super::worlds::smallest;
 use super::{Generator, axis_of};
@@ -10,25 +10,25 @@ use plant::effects::SHEETS;
 use plant::effects::sheet::{Place, PlaceKind};
 use record_maker::{Background, Hidden, Recipe};
 
-/// Generators of twins, and of what is in the background of them, are beside those of draws and worlds.
+/// Streams of the generators of twins and of their backgrounds, separate from those of draws and worlds.
 const STREAM: u64 = 1 << 21;
 const BACKGROUND_STREAM: u64 = 1 << 22;
-/// Distances that the two models of a twin are brought to in the train record by its noise, in standard deviations: an oracle is
-/// right in 60 to 70 % of the records.
+/// Range of the distance between the two models of a twin in the train record, set by its noise, in standard deviations: an
+/// oracle is right in 60 to 70 % of the records.
 const DISTANCES: [f64; 2] = [0.5, 1.04];
 
-/// An effect that a twin may be made of.
+/// An effect from which a twin may be made.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Start {
     /// Of the train record, at the specified noise.
     pub(crate) recipe: Recipe,
-    /// The wanted distance of the two models in the train record.
+    /// Required distance of the two models in the train record.
     pub(crate) distance: f64,
-    /// Whether the effect that explains the record as well is the one that is hidden.
+    /// Whether the hidden effect is the other one, which explains the record as well.
     pub(crate) rival_is_true: bool,
 }
 
-/// The start of so many in a row: all effects in turn. `None` for an effect of linked rods, whose records are none of one axis.
+/// The start with this number; all effects in turn. `None` for an effect of linked rods, which needs records of both axes.
 pub(crate) fn start(seed: u64, number: usize) -> Option<Start> {
     let (turn, repetition) = (number % SHEETS.len(), number / SHEETS.len());
     let sheet = &SHEETS[turn];
@@ -48,7 +48,7 @@ pub(crate) fn start(seed: u64, number: usize) -> Option<Start> {
     Some(Start { recipe, distance, rival_is_true })
 }
 
-/// Brings an amplitude to the smallest that is drawn, by all of the way at 0 and by none at 1.
+/// Interpolates an amplitude between the smallest that is drawn (0) and its value (1).
 fn weaken(hidden: &mut Hidden, share: f64) {
     let key = &plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn").keys[0];
     let amplitude = hidden.numbers[0];
@@ -58,7 +58,7 @@ fn weaken(hidden: &mut Hidden, share: f64) {
     hidden.numbers[0] = if key.signed { amplitude.signum() * value } else { value };
 }
 
-/// What is in the background of a twin, at places that its record shows.
+/// The background of a twin, at places that its record shows.
 pub(crate) fn background(seed: u64, number: usize, recipe: &Recipe) -> Background {
     Generator::new(seed, BACKGROUND_STREAM, number as u32).background(recipe)
 }

@@ -1,4 +1,4 @@
-//! Draws of two worlds: one in which the catalogue's laws are exact, and one in which everything is a little wrong.
+//! Draws of two worlds: one in which the catalogue's laws are exact, and one with small model errors in the whole rig.
 //!
 //! ```text
 //!   number within its kind    0              1            2                   3                 4
@@ -7,9 +7,9 @@
 //!   nothing hidden            even: exact    odd: background
 //! ```
 //!
-//! Both axes are recorded, so that the place of an effect is a question. Every tenth amplitude lies beyond the drawn range, where
-//! a rig file takes that. The smallest that is drawn is the smallest of the sheet: what lies below is background, which nobody
-//! is asked to name.
+//! Both axes are recorded, so that the place of an effect has to be found. Every tenth amplitude lies beyond the drawn range,
+//! where a rig file allows that. The smallest drawn amplitude is that of the sheet: weaker effects are background, which no
+//! report is expected to name.
 
 use super::{Generator, axis_of};
 use crate::limits::Scale;
@@ -18,20 +18,20 @@ use plant::effects::sheet::{EffectKey, Place, PlaceKind, Sheet};
 use plant::parameters::VALVE_POINTS;
 use record_maker::{Background, Form, Hidden, Recipe};
 
-/// Generators of worlds are beside those of draws.
+/// Stream of the generators of worlds, separate from those of draws.
 const STREAM: u64 = 1 << 20;
 /// Amplitudes of background effects, as shares of the smallest of their sheets.
 const BACKGROUND_SHARES: [f64; 2] = [0.2, 0.8];
-/// The smallest where the drawn range holds the rig file's own number, as an excursion: one twentieth.
+/// Smallest excursion where the drawn range contains the rig file's value: one twentieth.
 const SMALLEST_EXCURSION: f64 = 0.05;
-/// By which an amplitude may exceed the drawn range.
+/// Range of the factor by which an amplitude exceeds the drawn range.
 const BEYOND: [f64; 2] = [1.2, 2.0];
 /// Largest errors of K_V at a point of the table, of a dead volume, and of the air's temperature, as shares.
 const VALVE_POINT_ERROR: f64 = 0.015;
 const DEAD_VOLUME_ERROR: f64 = 0.03;
 const TEMPERATURE_ERROR: f64 = 0.01;
 
-/// A recipe as it is in the world whose turn it is.
+/// A recipe in the world of its repetition.
 pub(super) fn turn(recipe: Recipe, seed: u64, stream: u64, repetition: u32) -> Recipe {
     let mut generator = Generator::new(seed, STREAM + stream, repetition);
     let mut recipe = Recipe { unlinked: !recipe.both_axes, both_axes: true, ..recipe };
@@ -51,7 +51,7 @@ pub(super) fn turn(recipe: Recipe, seed: u64, stream: u64, repetition: u32) -> R
     recipe
 }
 
-/// Puts an amplitude beyond the stronger end of its drawn range by a factor of its excursion.
+/// Sets an amplitude to `factor` times the excursion of the stronger end of its drawn range.
 fn beyond(hidden: &mut Hidden, factor: f64) {
     let key = &plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn").keys[0];
     let scale_of = |scale: &Scale| scale.excursion(hidden.numbers[0]).is_some();
@@ -60,13 +60,13 @@ fn beyond(hidden: &mut Hidden, factor: f64) {
     };
     let ends = key.drawn.map(|end| scale.excursion(end).unwrap_or(0.0));
     let value = scale.value(factor * ends[0].max(ends[1])).min(key.max);
-    // Where that lies at the very end of what a file takes, it may be no rig any more.
+    // Without this bound a value at the end of the allowed range might be refused.
     let value = value.max(if key.signed { 0.0 } else { key.min });
     hidden.numbers[0] = if key.signed { hidden.numbers[0].signum() * value } else { value };
 }
 
 /// Whether the amplitude of a hidden effect lies beyond the stronger end of its drawn range.
-pub fn is_beyond_drawn(hidden: &Hidden) -> bool {
+pub(crate) fn is_beyond_drawn(hidden: &Hidden) -> bool {
     let keys = plant::effects::sheet(hidden.name).map_or(&[][..], |sheet| sheet.keys);
     let Some((key, number)) = keys.first().zip(hidden.numbers.first()) else { return false };
     Scale::of(key).into_iter().filter_map(|scale| Some((scale, scale.excursion(*number)?))).any(
@@ -103,14 +103,14 @@ impl Generator {
         }
     }
 
-    /// An effect at a share of its smallest amplitude; `None` for one whose amplitude is nowhere the baseline's.
+    /// An effect at a share of its smallest amplitude; `None` where no amplitude equals the baseline.
     fn below_its_smallest(&mut self, sheet: &'static Sheet, recipe: &Recipe) -> Option<Hidden> {
         let seen =
             |place: &&Place| recipe.both_axes || axis_of(**place).is_none_or(|axis| axis == recipe.axis);
         let places: Vec<&Place> = sheet.place.places().iter().filter(seen).collect();
         let place = *places[self.below(places.len())];
         let mut hidden = self.hidden(sheet, place);
-        // All its amplitudes, bump, slope and ripple alike; numbers that only shape it stay as drawn.
+        // All amplitudes of an effect, as bump, slope and ripple; shape numbers stay as drawn.
         for (at, (key, number)) in sheet.keys.iter().zip(&mut hidden.numbers).enumerate() {
             let scales = Scale::of(key);
             let scale = scales[self.below(scales.len())];
@@ -131,7 +131,7 @@ impl Generator {
     }
 }
 
-/// The smallest excursion that is drawn.
+/// The smallest drawn excursion.
 pub(super) fn smallest(key: &EffectKey, scale: Scale) -> Option<f64> {
     match scale {
         Scale::None => None,

@@ -4,7 +4,7 @@ use super::*;
 use crate::draws::{Shape, draws};
 use crate::report::parse;
 
-pub(crate) const TAKEN: Taken = Taken { ended: Ended::Exited(0), wall_s: 1.0, memory_kib: 1024 };
+pub(crate) const TAKEN: Execution = Execution { ended: ProgramEnd::Exited(0), wall_s: 1.0, memory_kib: 1024 };
 
 /// The first draw of a kind that hides these effects.
 pub(crate) fn draw(kind: Kind, effects: &[&str]) -> Draw {
@@ -214,15 +214,15 @@ fn what_is_no_report_is_an_error_with_its_reason() {
     let case = draw(Kind::Single, &["inclination"]);
     let good = || reported("named", &["inclination"]);
     for (ended, report, reason) in [
-        (Ended::TimedOut, good(), "time limit"),
-        (Ended::Signalled(11), good(), "signal 11"),
-        (Ended::NotStarted, good(), "not be started"),
-        (Ended::Exited(101), Err("wrote no report.json".to_owned()), "exit code 101"),
-        (Ended::Exited(0), parse(b"{\"verdict\": NaN}"), "report.json"),
-        (Ended::Exited(0), reported("named", &["phlogiston"]), "phlogiston"),
-        (Ended::Exited(0), reported("bad-data", &[]), "bad-data"),
+        (ProgramEnd::TimedOut, good(), "time limit"),
+        (ProgramEnd::Signalled(11), good(), "signal 11"),
+        (ProgramEnd::NotStarted, good(), "not be started"),
+        (ProgramEnd::Exited(101), Err("wrote no report.json".to_owned()), "exit code 101"),
+        (ProgramEnd::Exited(0), parse(b"{\"verdict\": NaN}"), "report.json"),
+        (ProgramEnd::Exited(0), reported("named", &["phlogiston"]), "phlogiston"),
+        (ProgramEnd::Exited(0), reported("bad-data", &[]), "bad-data"),
     ] {
-        let judged = judge(&case, &[], &Taken { ended, ..TAKEN }, &report);
+        let judged = judge(&case, &[], &Execution { ended, ..TAKEN }, &report);
         assert_eq!(judged.called, "error");
         assert!(judged.error.as_ref().is_some_and(|error| error.contains(reason)), "{reason}: {judged:?}");
         assert!(!judged.hidden[0].right && !judged.top);

@@ -1,6 +1,6 @@
-//! What all cases with an effect left out say together.
+//! Rates over all cases with an effect left out.
 
-use super::LeftOut;
+use super::LeaveOutJudgement;
 use crate::interval::Rate;
 use crate::score::Case;
 use crate::score::tables::{Line, Spread, hidden, parts};
@@ -9,34 +9,35 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Share of the gap that must close for effects without memory.
-pub const STILL_CLOSED: f64 = 0.6;
+pub(crate) const STILL_CLOSED: f64 = 0.6;
 
+/// Tables of the cases with an effect left out.
 #[derive(Debug, Serialize)]
 pub struct Tables {
     /// By memory, amplitude and difficulties.
-    pub splits: Vec<Split>,
-    pub effects: Vec<Split>,
+    pub(crate) splits: Vec<Split>,
+    pub(crate) effects: Vec<Split>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct Split {
-    pub name: String,
-    pub no_wrong_name: Rate,
-    pub balance_right: Rate,
-    pub variable_right: Rate,
-    pub both_right: Rate,
-    /// Share of the gap that the program claims to have closed, the worst signal.
-    pub claimed_closed_ratio: Spread,
-    /// The same of all signals together, each in units of its noise.
-    pub claimed_joint_ratio: Spread,
-    pub verdicts: BTreeMap<&'static str, usize>,
+pub(crate) struct Split {
+    pub(crate) name: String,
+    pub(crate) no_wrong_name: Rate,
+    pub(crate) balance_right: Rate,
+    pub(crate) variable_right: Rate,
+    pub(crate) both_right: Rate,
+    /// Share of the gap that the program claims to have closed, of the worst signal.
+    pub(crate) claimed_closed_ratio: Spread,
+    /// The same for all signals together, each in units of its noise.
+    pub(crate) claimed_joint_ratio: Spread,
+    pub(crate) verdicts: BTreeMap<&'static str, usize>,
 }
 
 impl Tables {
-    /// The tables of all cases; those with the whole catalogue are none of them.
-    pub fn of(cases: &[Case]) -> Self {
+    /// The tables of the cases with an effect left out; others are ignored.
+    pub(crate) fn of(cases: &[Case]) -> Self {
         let pairs = || cases.iter().filter_map(|case| Some((case, case.left_out.as_ref()?)));
-        let split = |name: &str, is: &dyn Fn(&Case, &LeftOut) -> bool| {
+        let split = |name: &str, is: &dyn Fn(&Case, &LeaveOutJudgement) -> bool| {
             split(name, &pairs().filter(|(case, left)| is(case, left)).collect::<Vec<_>>())
         };
         let mut splits = vec![
@@ -49,8 +50,8 @@ impl Tables {
     }
 }
 
-fn split(name: &str, cases: &[(&Case, &LeftOut)]) -> Split {
-    let rate = |is: &dyn Fn(&LeftOut) -> bool| Rate::of(cases, |(_, left)| is(left));
+fn split(name: &str, cases: &[(&Case, &LeaveOutJudgement)]) -> Split {
+    let rate = |is: &dyn Fn(&LeaveOutJudgement) -> bool| Rate::of(cases, |(_, left)| is(left));
     let mut verdicts = BTreeMap::new();
     for (_, left) in cases {
         *verdicts.entry(left.verdict).or_default() += 1;
@@ -68,7 +69,7 @@ fn split(name: &str, cases: &[(&Case, &LeftOut)]) -> Split {
     }
 }
 
-pub fn headline(cases: &[Case]) -> Vec<Line> {
+pub(crate) fn headline(cases: &[Case]) -> Vec<Line> {
     let left = || cases.iter().filter_map(|case| case.left_out.as_ref());
     let no_memory =
         || cases.iter().filter(|case| case.left_out.as_ref().is_some_and(|left| !left.with_memory));
@@ -76,7 +77,7 @@ pub fn headline(cases: &[Case]) -> Vec<Line> {
     let joint = || no_memory().filter_map(|case| case.judgement.claimed_joint_ratio);
     let told = |case: &Case| case.judgement.claimed_closed_ratio.is_some();
     let closed = |ratio: f64| ratio >= STILL_CLOSED;
-    let both_right = |left: &LeftOut| left.balance_right && left.variable_right;
+    let both_right = |left: &LeaveOutJudgement| left.balance_right && left.variable_right;
     let variable = "the same: right variable among the first two";
     let both = "the same: right balance, and right variable among the first two";
     vec![

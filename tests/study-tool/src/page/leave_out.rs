@@ -1,4 +1,4 @@
-//! The sections of a score whose effects were left out of the program's catalogue.
+//! Sections of a score with effects left out of the program's catalogue.
 
 use super::{percent, reported, table};
 use crate::compare::verdicts;
@@ -12,7 +12,7 @@ pub(super) fn sections(score: &Score, tables: &Tables) -> Vec<(&'static str, &'s
     vec![
         ("splits", "By memory, amplitude and difficulties", splits("part", &tables.splits)),
         ("effects", "Effect by effect", splits("effect", &tables.effects)),
-        ("told", "What was told", told_cases(score)),
+        ("told", "What was told", left_out_cases(score)),
     ]
 }
 
@@ -44,7 +44,7 @@ fn median(spread: &Spread) -> String {
     })
 }
 
-fn told_cases(score: &Score) -> String {
+fn left_out_cases(score: &Score) -> String {
     let row = |case: &Case| {
         let left = case.left_out.as_ref()?;
         let mark = |right| if right { '✓' } else { '✗' };

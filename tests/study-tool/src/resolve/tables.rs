@@ -1,4 +1,4 @@
-//! All ambiguous draws of a label: class by class what the proposed experiments resolve.
+//! Table of all ambiguous draws of a label: what the proposed experiments resolve, class by class.
 
 use super::{Outcome, ambiguous, judge, label, leaves_open, names, read_resolution};
 use crate::SCHEMA_VERSION;
@@ -14,72 +14,72 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::fs;
 
-/// What is wanted of those that an experiment can resolve.
+/// Target of the share that an experiment resolves.
 const WANTED: &str = "at least 80 %";
 
-/// What became of the ambiguous draws of a label, as `resolve-LABEL.json`.
+/// Outcomes of the ambiguous draws of a label, as `resolve-LABEL.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Table {
-    pub schema_version: u32,
-    pub label: String,
-    /// Which program; nothing when there are no results.
-    pub program: Option<Identity>,
-    pub seed: u64,
-    pub shape: Shape,
-    pub singles: usize,
-    /// Those among them whose report leaves something open.
-    pub open: usize,
-    /// Those of the open ones whose truth is not among what is left open: not looked at any further.
-    pub truth_not_among: usize,
+    pub(crate) schema_version: u32,
+    pub(crate) label: String,
+    /// The program; `None` without results.
+    pub(crate) program: Option<Identity>,
+    pub(crate) seed: u64,
+    pub(crate) shape: Shape,
+    pub(crate) singles: usize,
+    /// Draws of one effect whose report is ambiguous.
+    pub(crate) open: usize,
+    /// Those of the ambiguous ones whose truth is not among the names: not considered further.
+    pub(crate) truth_not_among: usize,
     /// Class by class, the most frequent first.
-    pub classes: Vec<Class>,
-    pub all: Class,
-    pub cases: Vec<Case>,
+    pub(crate) classes: Vec<Class>,
+    pub(crate) all: Class,
+    pub(crate) cases: Vec<Case>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct Case {
-    pub number: usize,
-    pub truth: String,
-    /// What could not be distinguished, each with its place, the best first.
-    pub between: Vec<String>,
-    pub class: String,
-    /// What would tell where no experiment does.
-    pub otherwise: Option<String>,
-    /// The proposed experiment; nothing where none can tell.
-    pub experiment: Option<String>,
-    /// What came of it; nothing where none was proposed, or it was not run yet.
-    pub outcome: Option<Outcome>,
+pub(crate) struct Case {
+    pub(crate) number: usize,
+    pub(crate) truth: String,
+    /// Names that were not distinguished, each with its place, the best first.
+    pub(crate) between: Vec<String>,
+    pub(crate) class: String,
+    /// The measurement that would distinguish them where no experiment does.
+    pub(crate) otherwise: Option<String>,
+    /// The proposed experiment; `None` where none distinguishes them.
+    pub(crate) experiment: Option<String>,
+    /// Its outcome; `None` where none was proposed, or it was not run yet.
+    pub(crate) outcome: Option<Outcome>,
     /// Why it was not run, or why there is no good report.
-    pub problem: Option<String>,
-    /// What the program named with both records, alternatives in brackets.
-    pub named: Vec<String>,
+    pub(crate) problem: Option<String>,
+    /// Names of the report on both records, alternatives in brackets.
+    pub(crate) named: Vec<String>,
 }
 
-/// The draws that could not tell the same effects apart.
+/// The draws that left the same effects ambiguous.
 #[derive(Debug, Clone, Serialize)]
-pub struct Class {
-    /// The effects, in the order of the alphabet.
-    pub name: String,
-    pub ambiguous: usize,
+pub(crate) struct Class {
+    /// The effects, in alphabetical order.
+    pub(crate) name: String,
+    pub(crate) ambiguous: usize,
     /// Draws for which no experiment is proposed.
-    pub no_experiment: usize,
-    /// What would tell these, and how often it was said.
-    pub otherwise: BTreeMap<String, usize>,
-    pub experiments: BTreeMap<String, usize>,
-    /// Of the proposed experiments that were run: how many resolved.
-    pub resolved: Rate,
-    pub still_ambiguous: usize,
-    pub wrong: usize,
-    pub errors: usize,
-    pub not_run: usize,
+    pub(crate) no_experiment: usize,
+    /// Measurements that would distinguish these, and how often each was named.
+    pub(crate) otherwise: BTreeMap<String, usize>,
+    pub(crate) experiments: BTreeMap<String, usize>,
+    /// Resolved ones of the proposed experiments that were run.
+    pub(crate) resolved: Rate,
+    pub(crate) still_ambiguous: usize,
+    pub(crate) wrong: usize,
+    pub(crate) errors: usize,
+    pub(crate) not_run: usize,
 }
 
 impl Table {
-    /// The table of what is done.
+    /// Collects the table of the results so far.
     ///
     /// # Errors
-    /// [`FolderError`] when a result is none.
+    /// [`FolderError`] when a result cannot be read.
     pub fn of(study: &Study, own_label: &str) -> Result<Self, FolderError> {
         let (mut singles, mut open, mut program, mut cases) = (0, 0, None, Vec::new());
         for draw in study.draws.iter().filter(|draw| draw.kind == Kind::Single) {
@@ -117,7 +117,7 @@ impl Table {
         })
     }
 
-    /// As a table in Markdown, with what it is of above it.
+    /// The table in Markdown, with a heading line.
     pub fn markdown(&self) -> String {
         let identity = self
             .program
@@ -180,7 +180,7 @@ impl Class {
         let listed = |tally: &BTreeMap<String, usize>| {
             tally.iter().map(|(what, count)| format!("{what} ({count})")).collect::<Vec<_>>().join("; ")
         };
-        // Of all together the list would be as long as the table.
+        // For all classes together the list would be as long as the table.
         let all = |text: String| if self.name == "all" { String::new() } else { text };
         let proposed: usize = self.experiments.values().sum();
         vec![
@@ -233,7 +233,7 @@ fn case(
     Ok(case)
 }
 
-/// The effects of an entry and its alternatives; one that is alone with itself is so at another place.
+/// The effects of an entry and its alternatives; one alone means the same effect at another place.
 fn class(entry: &Named) -> String {
     let effects: BTreeSet<&str> = names(entry).map(|name| name.sheet.name).collect();
     match effects.iter().collect::<Vec<_>>()[..] {

@@ -48,7 +48,7 @@ fn a_right_name_that_is_gone_is_wrong_and_no_report_an_error() {
     assert_eq!(outcome("bad-data", &[]), Outcome::Error);
     assert_eq!(outcome("named", &[]), Outcome::Error);
     let hidden = &draw(Kind::Single, &["inclination"]).recipe.hidden[0];
-    let late = Taken { ended: Ended::TimedOut, ..TAKEN };
+    let late = Execution { ended: ProgramEnd::TimedOut, ..TAKEN };
     assert_eq!(judge(hidden, &late, &reported("named", &["inclination@drive"])), Outcome::Error);
 }
 

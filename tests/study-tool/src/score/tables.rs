@@ -1,47 +1,54 @@
-//! What the cases say together.
+//! Tables over all cases of a score.
 
 use super::{CLEAR, Case};
 use crate::draws::Kind;
 use crate::interval::Rate;
-use crate::judge::{HiddenJudged, NumberJudged};
+use crate::judge::{HiddenJudgement, NumberJudgement};
 use model_fit::stats::quantile;
 use plant::effects::SHEETS;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Columns of the confusion matrix beside the effects.
-pub const BESIDE: [&str; 5] = ["nothing", "parameter", "outside", "ambiguous", "error"];
+/// Columns of the confusion matrix other than the effects.
+pub(crate) const OTHER_COLUMNS: [&str; 5] = ["nothing", "parameter", "outside", "ambiguous", "error"];
 
+/// All tables of a score but those of effects left out.
 #[derive(Debug, Serialize)]
 pub struct Tables {
+    /// The rates that have targets.
     pub headline: Vec<Line>,
-    /// Single effects, split by difficulty and by amplitude.
-    pub splits: Vec<Split>,
-    pub effects: Vec<Split>,
-    /// True effects against what they were called.
-    pub confusion: Vec<ConfusionRow>,
-    /// What was called in cases with nothing hidden, and in those of a wrong parameter.
-    pub nothing_hidden: Vec<ConfusionRow>,
-    pub numbers: Numbers,
-    pub wall_s: Spread,
-    pub memory_mib: Spread,
-    /// Share of the gap that the program claims to have closed on the held-out record, single effects that were named right.
-    pub claimed_closed_ratio: Spread,
-    /// The same of all signals together, each in units of its noise.
-    pub claimed_joint_ratio: Spread,
-    /// Why cases have no good report, and how many.
-    pub errors: BTreeMap<String, usize>,
+    /// Single effects, by difficulty and by amplitude.
+    pub(crate) splits: Vec<Split>,
+    pub(crate) effects: Vec<Split>,
+    /// True effects against the verdicts.
+    pub(crate) confusion: Vec<ConfusionRow>,
+    /// Verdicts in cases with nothing hidden, and in those of a wrong parameter.
+    pub(crate) nothing_hidden: Vec<ConfusionRow>,
+    pub(crate) numbers: Numbers,
+    pub(crate) wall_s: Spread,
+    pub(crate) memory_mib: Spread,
+    /// Share of the gap that the program claims to have closed on the held-out record, for single effects that were named
+    /// right.
+    pub(crate) claimed_closed_ratio: Spread,
+    /// The same for all signals together, each in units of its noise.
+    pub(crate) claimed_joint_ratio: Spread,
+    /// Reasons why cases have no good report, and how many.
+    pub(crate) errors: BTreeMap<String, usize>,
 }
 
+/// A rate and its target.
 #[derive(Debug, Clone, Serialize)]
 pub struct Line {
+    /// What the rate is of.
     pub name: String,
+    /// Count, total and intervals.
     pub rate: Rate,
+    /// The target in words.
     pub wanted: &'static str,
 }
 
 impl Line {
-    /// How many of the items are so.
+    /// The rate of the items for which `is` holds.
     pub(crate) fn of<T>(
         name: &str,
         wanted: &'static str,
@@ -57,55 +64,55 @@ impl Line {
     }
 
     /// Whether the rate should be low: then its upper bound is reported.
-    pub fn is_low(&self) -> bool {
+    pub(crate) fn is_low(&self) -> bool {
         self.wanted == "none" || self.wanted.starts_with("at most")
     }
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct Split {
-    pub name: String,
-    pub class_right: Rate,
-    pub top: Rate,
-    /// The effect itself alone, of those that are alone in their class.
-    pub alone: Rate,
+pub(crate) struct Split {
+    pub(crate) name: String,
+    pub(crate) class_right: Rate,
+    pub(crate) top: Rate,
+    /// The effect itself alone, of those without twins.
+    pub(crate) alone: Rate,
     /// The place, of those whose class was named.
-    pub where_right: Rate,
+    pub(crate) where_right: Rate,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct ConfusionRow {
-    pub truth: String,
-    pub of: usize,
-    /// How often it was called so: all, of its class, at the right place.
-    pub called: BTreeMap<String, [usize; 3]>,
+pub(crate) struct ConfusionRow {
+    pub(crate) truth: String,
+    pub(crate) of: usize,
+    /// Cases with this verdict: all, of its class, at the right place.
+    pub(crate) called: BTreeMap<String, [usize; 3]>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct Numbers {
+pub(crate) struct Numbers {
     /// |fitted - true| / |true| of amplitudes, in the catalogue's form.
-    pub off_ratio: Spread,
+    pub(crate) off_ratio: Spread,
     /// Standard error / |true| of amplitudes.
-    pub error_ratio: Spread,
-    /// Amplitudes that two standard errors cover.
-    pub covered: Rate,
-    /// All numbers that two standard errors cover.
-    pub all_covered: Rate,
-    /// The same of draws with a foreign form.
-    pub foreign_covered: Rate,
-    /// Right names without a number or without its error.
-    pub untold: usize,
+    pub(crate) error_ratio: Spread,
+    /// Share of amplitudes within two standard errors.
+    pub(crate) covered: Rate,
+    /// Share of all numbers within two standard errors.
+    pub(crate) all_covered: Rate,
+    /// The same for draws of another form.
+    pub(crate) foreign_covered: Rate,
+    /// Right names without a number or without its standard error.
+    pub(crate) untold: usize,
 }
 
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct Spread {
-    pub of: usize,
-    /// Least, median, 90th percentile, largest; `None` of nothing.
-    pub quantiles: Option<[f64; 4]>,
+pub(crate) struct Spread {
+    pub(crate) of: usize,
+    /// Smallest, median, 90th percentile, largest; `None` without values.
+    pub(crate) quantiles: Option<[f64; 4]>,
 }
 
 impl Spread {
-    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+    pub(crate) fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.into_iter().collect();
         let all = [0.0, 0.5, 0.9, 1.0].map(|share| quantile(&mut values, share));
         let [Some(least), Some(median), Some(high), Some(largest)] = all else { return Spread::default() };
@@ -114,7 +121,7 @@ impl Spread {
 }
 
 impl Tables {
-    pub fn of(cases: &[Case]) -> Self {
+    pub(crate) fn of(cases: &[Case]) -> Self {
         let singles: Vec<&Case> = of_kind(cases, Kind::Single).collect();
         let mut errors = BTreeMap::new();
         for error in cases.iter().filter_map(|case| case.judgement.error.clone()) {
@@ -158,7 +165,7 @@ fn of_kind(cases: &[Case], kind: Kind) -> impl Iterator<Item = &Case> {
     cases.iter().filter(move |case| case.kind == kind)
 }
 
-pub(crate) fn hidden(case: &Case) -> &HiddenJudged {
+pub(crate) fn hidden(case: &Case) -> &HiddenJudgement {
     &case.judgement.hidden[0]
 }
 
@@ -217,7 +224,7 @@ fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
 
 pub(crate) type IsPart = Box<dyn Fn(&Case) -> bool>;
 
-/// Parts of single effects, by amplitude and by what was made hard.
+/// Parts of single effects, by amplitude and by difficulty.
 pub(crate) fn parts() -> Vec<(&'static str, IsPart)> {
     fn part(is: impl Fn(&Case) -> bool + 'static) -> IsPart {
         Box::new(is)
@@ -283,7 +290,7 @@ fn nothing_hidden(cases: &[Case]) -> Vec<ConfusionRow> {
         name.unwrap_or_default().to_owned()
     };
     rows.extend(
-        crate::draws::ALONE
+        crate::draws::SINGLE_PARAMETERS
             .iter()
             .map(|name| row(name, of_kind(cases, Kind::Parameter).filter(|case| wrong(case) == *name))),
     );
@@ -295,7 +302,7 @@ fn numbers(singles: &[&Case]) -> Numbers {
         singles.iter().filter(move |case| case.foreign_form == foreign).flat_map(|case| &hidden(case).numbers)
     };
     let amplitudes = || reported(false).filter(|number| number.amplitude);
-    let covered = |numbers: &mut dyn Iterator<Item = &NumberJudged>| {
+    let covered = |numbers: &mut dyn Iterator<Item = &NumberJudgement>| {
         Rate::of(numbers.filter_map(|number| number.covered), |covered| covered)
     };
     Numbers {

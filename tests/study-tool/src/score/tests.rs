@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::folder::{Plan, make_whole};
-use crate::program::{Ended, Taken};
+use crate::program::{Execution, ProgramEnd};
 use plant::effects::SHEETS;
 use serde_json::json;
 use std::fs;
@@ -27,7 +27,7 @@ fn part_of_study(root: &Path, program: &str, holds: impl Fn(usize) -> bool) -> S
 }
 
 fn leave(study: &Study, number: usize, program: Identity, without: Vec<String>, report: &Value) {
-    let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
+    let taken = Execution { ended: ProgramEnd::Exited(0), wall_s: 2.0, memory_kib: 2048 };
     let result = RunResult { schema_version: 1, number, program, taken, without };
     make_whole(&study.run("truth", number), |folder| {
         fs::write(folder.join("result.json"), json!(result).to_string()).unwrap();
@@ -84,7 +84,7 @@ pub(crate) fn scored(label: &str) -> Score {
 pub(crate) fn scored_without(label: &str) -> Score {
     let folder = tempfile::tempdir().unwrap();
     let expectations = without(folder.path());
-    let known = Known { expectations: Some(&expectations), ..UNKNOWN };
+    let known = ScoreInputs { expectations: Some(&expectations), ..UNKNOWN };
     let score = score(&[folder.path().to_owned()], "truth", known).unwrap();
     Score { label: label.to_owned(), ..score }
 }
@@ -137,12 +137,13 @@ fn with_effects_left_out_only_single_draws_are_wanted_and_the_tables_are_others(
     let folders = [folder.path().to_owned()];
     assert!(matches!(super::score(&folders, "truth", UNKNOWN), Err(ScoreError::NoExpectations)));
     fs::remove_dir_all(folder.path().join("runs/truth/0007")).unwrap();
-    let known = Known { expectations: Some(&expectations), ..UNKNOWN };
+    let known = ScoreInputs { expectations: Some(&expectations), ..UNKNOWN };
     let missing = super::score(&folders, "truth", known);
     assert!(matches!(missing, Err(ScoreError::MissingRuns { count: 1, first: 7, .. })));
 }
 
-const UNKNOWN: Known<'_> = Known { limits: None, classes: None, expectations: None, partly: false };
+const UNKNOWN: ScoreInputs<'_> =
+    ScoreInputs { limits: None, classes: None, expectations: None, partly: false };
 
 #[test]
 fn whoever_tells_the_truth_has_all_points() {
@@ -199,7 +200,7 @@ fn amplitudes_stand_in_the_bin_of_their_limit() {
     };
     let over = |limit| {
         let limits = limits(limit);
-        let known = Known { limits: Some(&limits), ..UNKNOWN };
+        let known = ScoreInputs { limits: Some(&limits), ..UNKNOWN };
         let score = score(&[folder.path().to_owned()], "truth", known).unwrap();
         score.cases[draw.number].over_limit[0]
     };
@@ -230,8 +231,8 @@ fn folders_are_scored_together_when_each_result_is_there_once() {
     assert!(whole.cases.iter().enumerate().all(|(at, case)| case.number == at));
     assert_eq!(whole.tables.splits[0].top.count, SHEETS.len());
     assert!(matches!(of(&[&a, &b]), Err(ScoreError::MissingRuns { first: 2, .. })));
-    assert!(matches!(of(&[&a, &b, &again, &c]), Err(ScoreError::Doubled { number: 1, .. })));
-    assert!(matches!(of(&[&a, &other, &c]), Err(ScoreError::Mixed { .. })));
+    assert!(matches!(of(&[&a, &b, &again, &c]), Err(ScoreError::Duplicate { number: 1, .. })));
+    assert!(matches!(of(&[&a, &other, &c]), Err(ScoreError::DifferentStudies { .. })));
     assert!(matches!(of(&[&a, &b, &foreign]), Err(ScoreError::Programs { .. })));
-    assert!(matches!(of(&[]), Err(ScoreError::Nothing)));
+    assert!(matches!(of(&[]), Err(ScoreError::Empty)));
 }

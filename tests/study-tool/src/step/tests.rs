@@ -3,7 +3,7 @@
 use super::*;
 use crate::draws::{Kind, Shape};
 use crate::folder::Plan;
-use crate::program::Ended;
+use crate::program::ProgramEnd;
 use crate::program::tests::script;
 use crate::report;
 use std::path::PathBuf;
@@ -99,7 +99,7 @@ fn a_program_sees_copies_in_an_empty_folder_and_its_report_is_kept() {
         let result = read_result(&bench.path(draw.number, "result.json")).unwrap();
         assert_eq!(results[draw.number].as_ref(), Some(&result));
         let reported = fs::read_to_string(bench.path(draw.number, "stderr.txt")).unwrap();
-        assert_eq!((result.number, result.taken.ended), (draw.number, Ended::Exited(0)), "{reported}");
+        assert_eq!((result.number, result.taken.ended), (draw.number, ProgramEnd::Exited(0)), "{reported}");
         assert_eq!(reported, "seen: # linked=false added_mass_kg=0\n");
         assert!(report::read(&bench.path(draw.number, "report.json")).is_ok());
         assert!(!bench.study.truth(draw.number).join("train/truth.csv").exists());
@@ -139,14 +139,14 @@ fn a_study_that_was_killed_goes_on_where_it_was() {
 fn a_program_that_crashes_hangs_or_writes_nonsense_is_a_result() {
     let nonsense = "mkdir out; echo '{\"verdict\": ' >out/report.json";
     for (script, ended) in [
-        ("exit 101", Ended::Exited(101)),
-        ("kill -9 $$", Ended::Signalled(9)),
-        ("sleep 1000", Ended::TimedOut),
-        (nonsense, Ended::Exited(0)),
-        ("mkdir -p out/report.json", Ended::Exited(0)),
+        ("exit 101", ProgramEnd::Exited(101)),
+        ("kill -9 $$", ProgramEnd::Signalled(9)),
+        ("sleep 1000", ProgramEnd::TimedOut),
+        (nonsense, ProgramEnd::Exited(0)),
+        ("mkdir -p out/report.json", ProgramEnd::Exited(0)),
     ] {
         let mut bench = Bench::new(script);
-        bench.program.limit = Duration::from_millis(if ended == Ended::TimedOut { 100 } else { 60_000 });
+        bench.program.limit = Duration::from_millis(if ended == ProgramEnd::TimedOut { 100 } else { 60_000 });
         let results = bench.run(|_, _| {}).unwrap();
         let result = results[0].as_ref().unwrap();
         assert_eq!(result.taken.ended, ended, "{script}");

@@ -1,12 +1,12 @@
-//! How often an oracle that knows two rigs exactly tells which of them made a record.
+//! Share of records for which an oracle that knows two rigs exactly decides which of them made the record.
 //!
 //! ```text
 //!   d = |M (y_A - y_B)|      y: readings without noise over the noise, windows of 100 ms; M: free initial states ([signature])
-//!   right in Phi(d / 2) of the records, if either is as likely
+//!   right in Phi(d / 2) of the records, if both are equally likely
 //! ```
 //!
 //! The noise is that of the rig file times a factor, rounding included, and white. The record of an experiment is the closed
-//! loop by which `next` rehearses it, driven as if the one, then the other were true: the smaller distance counts.
+//! loop with which `next` rehearses it, simulated with either rig as the truth: the smaller distance counts.
 //!
 //! [signature]: crate::signature
 
@@ -20,8 +20,8 @@ use record_maker::Record;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 
-/// Experiments that a twin is certified with: without the other four no pair of the table of `next.md` has a smaller T. Those
-/// with linked rods are none for a record of one axis.
+/// Experiments of the certificate: without the other four no pair in the table of `next.md` has a smaller T. Experiments with
+/// linked rods do not apply to a record of one axis.
 const CERTIFIED: [&str; 8] = [
     "shut-and-hold",
     "chirps",
@@ -32,35 +32,35 @@ const CERTIFIED: [&str; 8] = [
     "weights",
     "load-steps",
 ];
-/// Share of records that an oracle gets right at most in the train record, and at least in one experiment.
+/// Largest share of right decisions in the train record, and smallest in one experiment.
 pub(crate) const ALIKE: f64 = 0.7;
 pub(crate) const APART: f64 = 0.9;
 /// Keys of the sensors' noise.
 const NOISE: [&str; 3] = ["sensors.position_noise_um", "sensors.force_noise_n", "sensors.pressure_noise_pa"];
 
-/// Share of the records of two equally likely models that the likelihood ratio gets right.
-pub fn probability(distance: f64) -> f64 {
+/// Share of right decisions of the likelihood ratio between two equally likely models.
+pub(crate) fn probability(distance: f64) -> f64 {
     Normal::standard().cdf(0.5 * distance)
 }
 
-/// A rig with so many times its sensors' noise.
+/// A rig with its sensors' noise multiplied.
 ///
 /// # Errors
-/// [`ParameterError`] for a noise that no rig file takes.
-pub fn with_noise(rig: &RigParameters, noise: f64) -> Result<RigParameters, ParameterError> {
+/// [`ParameterError`] for a noise that the rig file does not allow.
+pub(crate) fn with_noise(rig: &RigParameters, noise: f64) -> Result<RigParameters, ParameterError> {
     NOISE.iter().try_fold(rig.clone(), |rig, key| {
         let scaled: Vec<f64> = rig.numbers(key).iter().map(|number| noise * number).collect();
         rig.with(key, &scaled)
     })
 }
 
-/// Distance of two rigs in a part of a record, of which the first made it.
-pub fn in_record(record: &Record, part: Part, truth: &RigParameters, other: &RigParameters) -> f64 {
+/// Distance of two rigs in a part of a record that the first one made.
+pub(crate) fn in_record(record: &Record, part: Part, truth: &RigParameters, other: &RigParameters) -> f64 {
     between(part.of(record, truth), other)
 }
 
 /// Distance of two rigs in an experiment; `None` where one of them cannot run it.
-pub fn in_experiment(entry: &Entry, rigs: [&RigParameters; 2], axis: Axis) -> Option<f64> {
+pub(crate) fn in_experiment(entry: &Entry, rigs: [&RigParameters; 2], axis: Axis) -> Option<f64> {
     let baseline = RigParameters::baseline();
     let with = |truth: &RigParameters, other: &RigParameters| {
         let run = drive(entry, &baseline, truth, SEED).ok()?;
@@ -71,8 +71,8 @@ pub fn in_experiment(entry: &Entry, rigs: [&RigParameters; 2], axis: Axis) -> Op
     Some(with(one, other)?.min(with(other, one)?))
 }
 
-/// Distances of two rigs in the experiments that a twin is certified with.
-pub fn in_menu(rigs: [&RigParameters; 2], axis: Axis) -> BTreeMap<String, f64> {
+/// Distances of two rigs in the experiments of the certificate.
+pub(crate) fn in_menu(rigs: [&RigParameters; 2], axis: Axis) -> BTreeMap<String, f64> {
     let entries = MENU.iter().filter(|entry| CERTIFIED.contains(&entry.name) && !entry.is_linked());
     let of = |entry: &Entry| Some((entry.name.to_owned(), in_experiment(entry, rigs, axis)?));
     entries.filter_map(of).collect()

@@ -1,11 +1,11 @@
-//! The law of another effect that is nearest to a rig in a part of a record, with parameters of the baseline fitted beside it.
+//! The law of another effect nearest to a rig in a part of a record, with parameters of the baseline fitted too.
 //!
 //! ```text
 //!   record ──► responses of all effects and parameters, window by window ──► each part: share of the effect's signature that
 //!              one amplitude of another effect leaves, parameters held by their priors ──► the best: fitted in the simulator
 //! ```
 //!
-//! Responses are those at the middle of a range; the fit ([`Fit`]) moves all numbers of the other effect and all parameters.
+//! Responses are those at the middle of a range; the fit ([`Fit`]) varies all numbers of the other effect and all parameters.
 
 use super::{Model, Part};
 use crate::classes::{nominal, with_parameter};
@@ -20,18 +20,18 @@ use record_maker::{Hidden, PARAMETERS};
 
 /// Change of a parameter for its response.
 const CHANGE: f64 = 0.01;
-/// Noise at which the priors are weighed against the readings: the middle of those that twins have.
+/// Noise at which the priors are weighted against the readings: the middle of those that twins have.
 const NOISE: f64 = 3.0;
-/// Smallest amplitude of a rival as a share of the smallest drawn, and where the range holds the baseline; largest as a multiple
-/// of the largest drawn. A program names nothing below.
+/// Smallest amplitude of a rival as a share of the smallest drawn, and where the range contains the baseline; largest as a
+/// multiple of the largest drawn. A program names nothing below.
 const SMALLEST: f64 = 1.0;
 const SMALLEST_ABOUT: f64 = 0.05;
 const LARGEST: f64 = 2.0;
-/// Lengths of parts, windows, the longest first, and between the beginnings of parts.
+/// Lengths of parts, the longest first, and spacing of their starts, windows.
 const LENGTHS: [usize; 5] = [150, 100, 60, 40, 20];
 const BETWEEN: usize = 2;
-/// Of the parts in which an effect stands out this much from its rival the longest is taken, else the one with the most, if it
-/// is [`LEAST_CONTRAST`]: a fit leaves less than the responses promise.
+/// Of the parts in which the contrast of an effect to its rival exceeds this, the longest is taken; else the one with the
+/// largest contrast, if that exceeds [`LEAST_CONTRAST`]. The fit leaves less than the responses predict.
 const CONTRAST: f64 = 14.0;
 const LEAST_CONTRAST: f64 = 3.0;
 
@@ -39,9 +39,9 @@ const LEAST_CONTRAST: f64 = 3.0;
 #[derive(Debug)]
 pub(crate) struct Screening {
     rig: RigParameters,
-    /// Readings of a window.
+    /// Number of readings in a window.
     rows: usize,
-    /// Of the effect: its readings without those of the baseline.
+    /// Readings of the effect minus those of the baseline.
     signature: Vec<f64>,
     parameters: Vec<Vec<f64>>,
     others: Vec<(Candidate, Vec<f64>)>,
@@ -55,11 +55,11 @@ pub(crate) struct Screened {
     pub(crate) part: Part,
     /// Distance of the effect from the baseline, parameters fitted, at the specified noise.
     pub(crate) seen: f64,
-    /// The same over what the other effect leaves.
+    /// The same over the residual of the other effect.
     pub(crate) contrast: f64,
 }
 
-/// A law that was fitted.
+/// A fitted law.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
     pub(crate) rig: RigParameters,
@@ -69,7 +69,7 @@ pub(crate) struct Rival {
 }
 
 impl Screening {
-    /// `observer` sees the whole record, the rig with the effect as its baseline.
+    /// `observer` sees the whole record and has the rig with the effect as its baseline.
     pub(crate) fn new(observer: &Observer, hidden: &Hidden, axis: Axis) -> Option<Self> {
         let rig = RigParameters::baseline();
         let without = observer.readings(&rig);
@@ -91,7 +91,7 @@ impl Screening {
         Some(Screening { rig, rows: observer.rows(), signature, parameters, others })
     }
 
-    /// All other effects, each in the part that suits it, the one that leaves the least first.
+    /// All other effects, each in its best part, by descending contrast.
     pub(crate) fn all(&self) -> Vec<Screened> {
         let mut all: Vec<Screened> = Vec::new();
         let windows = self.signature.len() / self.rows;
@@ -117,7 +117,7 @@ impl Screening {
         all
     }
 
-    /// For each other effect the sums of the products of signature, response and parameters over the windows so far.
+    /// For each other effect the cumulative sums over windows of the products of signature, response and parameters.
     fn products(&self, windows: usize) -> Vec<Vec<DMatrix<f64>>> {
         let of = |response: &Vec<f64>| {
             let all: Vec<&Vec<f64>> =
@@ -154,7 +154,7 @@ impl Screening {
         priors().iter().enumerate().for_each(|(at, prior)| normal[(at, at)] += prior);
         let factor = normal.cholesky()?;
         let along = all.view((2, 0), (count, 2)).into_owned();
-        // What the parameters leave of signature and response.
+        // Residuals of signature and response after the parameters.
         let left = all.view((0, 0), (2, 2)) - along.transpose() * factor.solve(&along);
         let [square, own, product] = [left[(0, 0)], left[(1, 1)], left[(0, 1)]];
         let amplitude = product / own;
@@ -173,8 +173,8 @@ impl Screening {
         Some(Screened { candidate, start, part, seen: square.sqrt(), contrast: share.sqrt().recip() })
     }
 
-    /// The nearest law of another effect in its part, whose observer sees the rig with the effect as its baseline; `None` where
-    /// no rig can have it, or its amplitude is none that is drawn.
+    /// The nearest law of another effect in its part; the observer has the rig with the effect as its baseline. `None` where
+    /// the rig is refused, or the amplitude is out of range.
     pub(crate) fn fitted(&self, screened: &Screened, observer: &Observer) -> Option<Rival> {
         let candidate = screened.candidate;
         let priors = priors();
@@ -207,7 +207,7 @@ fn priors() -> Vec<f64> {
     PARAMETERS.iter().map(|name| (NOISE / of(name)).powi(2)).collect()
 }
 
-/// Whether a first coordinate is one that is drawn, or not far beyond.
+/// Whether a first coordinate is within the range of rivals.
 fn is_drawn(candidate: &Candidate, coordinate: f64) -> bool {
     let ends = candidate.sheet.keys[0].drawn.map(|number| candidate.coordinate(0, number));
     let least =

@@ -1,7 +1,8 @@
-//! The search for twins: starts one after the other, until there are enough twins.
+//! The search for twins: tries starts in turn until there are enough twins.
 //!
-//! A start is refused where a record at the largest noise still tells it from every other effect, where it is hardly seen, or
-//! where no experiment tells it from its rival. Of one pair of effects no more than [`MOST_OF_A_PAIR`] twins are taken.
+//! A start is refused where a record at the largest noise still distinguishes it from every other effect, where it is hardly
+//! detected, or where no experiment distinguishes it from its rival. At most [`MOST_OF_A_PAIR`] twins are of the same pair of
+//! effects.
 
 use super::certificate::{ALIKE, APART, in_menu, in_record, probability, with_noise};
 use super::rival::{Rival, Screened, Screening};
@@ -18,34 +19,34 @@ use record_maker::{Record, simulate};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Most twins of one pair of effects, wherever they are, so that many classes are among the twins.
+/// Most twins of the same pair of effects at any places, so that the twins cover many classes.
 const MOST_OF_A_PAIR: usize = 5;
-/// Largest noise of a record, over the specified one.
+/// Largest noise of a record over the specified one.
 const MOST_NOISE: f64 = 8.0;
-/// Least distance from the baseline in the train record. At 7, whose square is twice the gain that the workflow wants of an
-/// effect, twins of a development seed with 8 to 16 had no name.
-const SEEN: f64 = 10.0;
-/// Rivals of a start that are fitted, until one makes a twin.
-const FITTED: usize = 4;
+/// Smallest distance from the baseline in the train record. At 7, whose square is twice the gain that the workflow requires of
+/// an effect, twins of a development seed with 8 to 16 were not named.
+const LEAST_SEEN: f64 = 10.0;
+/// Most rivals of a start that are fitted.
+const MOST_FITTED: usize = 4;
 /// Starts of each effect after which the search ends.
 const MOST_ROUNDS: usize = 24;
 
-/// Why a start is no twin.
+/// Why a start gives no twin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// Its record is none of one axis.
+    /// Its record needs both axes.
     Linked,
-    /// Its record cannot be made, or is too strange for the catalogue.
+    /// Its record cannot be made, or cannot be compared with the catalogue.
     NoRecord,
     /// No other effect resembles it.
     NoRival,
-    /// The nearest law of another effect leaves too much, or is none that is drawn.
+    /// The nearest law of another effect leaves too much, or is outside the drawn range.
     NotAlike,
-    /// An observer hardly sees it at the noise that would hide the difference.
+    /// An observer hardly detects it at the noise that would hide the difference.
     NotSeen,
-    /// No experiment tells the two apart.
+    /// No experiment distinguishes the two.
     NoExperiment,
-    /// There are enough of this pair.
+    /// There are enough twins of this pair.
     Enough,
 }
 
@@ -63,10 +64,11 @@ impl Refusal {
     }
 }
 
-/// Searches until there are so many twins; fewer where the starts are used up, or it was asked to stop.
+/// Searches for `count` twins, `jobs` starts at a time; fewer when the starts are used up or `stop` is set. `say` gets a line
+/// for each round.
 ///
 /// # Errors
-/// [`ComputeError`] when there are no threads.
+/// [`ComputeError`] when the thread pool cannot be started.
 pub fn search(
     seed: u64,
     count: usize,
@@ -86,16 +88,16 @@ pub fn search(
         if found.twins.len() >= count {
             break;
         }
-        let tried = of_round(&pool, seed, round, stop);
+        let trials = of_round(&pool, seed, round, stop);
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        for (number, twin) in tried {
+        for (number, twin) in trials {
             if found.twins.len() >= count {
                 break;
             }
             found.starts = number + 1;
-            match twin.and_then(|twin| found.of_few(twin)) {
+            match twin.and_then(|twin| found.check_pair(twin)) {
                 Ok(twin) => found.twins.push(Twin { number: found.twins.len(), ..twin }),
                 Err(refusal) => *found.refused.entry(refusal.reason().to_owned()).or_default() += 1,
             }
@@ -105,22 +107,22 @@ pub fn search(
     Ok(found)
 }
 
-type Tried = (usize, Result<Twin, Refusal>);
+type Trial = (usize, Result<Twin, Refusal>);
 
-fn tried(seed: u64, number: usize) -> Result<Twin, Refusal> {
+fn try_start(seed: u64, number: usize) -> Result<Twin, Refusal> {
     twin_of(&start(seed, number).ok_or(Refusal::Linked)?, number)
 }
 
 /// The starts of all effects once, in their order.
-fn of_round(pool: &ThreadPool, seed: u64, round: usize, stop: &AtomicBool) -> Vec<Tried> {
+fn of_round(pool: &ThreadPool, seed: u64, round: usize, stop: &AtomicBool) -> Vec<Trial> {
     let numbers = round * SHEETS.len()..(round + 1) * SHEETS.len();
-    let one = |number| (!stop.load(Ordering::Relaxed)).then(|| (number, tried(seed, number)));
+    let one = |number| (!stop.load(Ordering::Relaxed)).then(|| (number, try_start(seed, number)));
     pool.install(|| numbers.into_par_iter().with_max_len(1).filter_map(one).collect())
 }
 
 impl Twins {
-    /// A twin of a pair of which there are not enough.
-    fn of_few(&self, twin: Twin) -> Result<Twin, Refusal> {
+    /// The twin, unless there are enough of its pair.
+    fn check_pair(&self, twin: Twin) -> Result<Twin, Refusal> {
         let pair = |twin: &Twin| {
             let mut pair = [twin.hidden.effect.clone(), twin.rival.effect.clone()];
             pair.sort();
@@ -131,7 +133,7 @@ impl Twins {
     }
 }
 
-/// The first rival of a start that is certified makes the twin.
+/// The twin of a start with the first rival that passes the certificate.
 pub(super) fn twin_of(start: &Start, number: usize) -> Result<Twin, Refusal> {
     let (hidden, axis) = (&start.recipe.hidden[0], start.recipe.axis);
     let rig = rig_of(hidden).map_err(|_| Refusal::NoRecord)?;
@@ -139,7 +141,7 @@ pub(super) fn twin_of(start: &Start, number: usize) -> Result<Twin, Refusal> {
     let whole = Observer::new(trajectory(&record, &rig));
     let screening = Screening::new(&whole, hidden, axis).ok_or(Refusal::NoRecord)?;
     let mut refusal = Refusal::NoRival;
-    for screened in screening.all().iter().filter(|screened| screened.seen >= SEEN).take(FITTED) {
+    for screened in screening.all().iter().filter(|screened| screened.seen >= LEAST_SEEN).take(MOST_FITTED) {
         let observer = Observer::new(screened.part.of(&record, &rig));
         let Some(rival) = screening.fitted(screened, &observer) else {
             refusal = Refusal::NotAlike;
@@ -153,7 +155,7 @@ pub(super) fn twin_of(start: &Start, number: usize) -> Result<Twin, Refusal> {
     Err(refusal)
 }
 
-/// The twin of a start and the law that was fitted to it, certified.
+/// The twin of a start and a fitted law, if it passes the certificate.
 fn of_rival(
     start: &Start,
     number: usize,
@@ -165,7 +167,7 @@ fn of_rival(
         return Err(Refusal::NotAlike);
     }
     let seen = screened.seen / noise;
-    if seen < SEEN {
+    if seen < LEAST_SEEN {
         return Err(Refusal::NotSeen);
     }
     let noisy = |rig: &RigParameters| with_noise(rig, noise).map_err(|_| Refusal::NoRecord);

@@ -1,4 +1,4 @@
-//! What a program made of twins: what it said of their records, and whether the experiment that it proposed told them apart.
+//! Results of a program on twins: its report on the record, and whether the experiment that it proposed distinguished them.
 
 use super::Twins;
 use super::certificate::probability;
@@ -7,7 +7,7 @@ use crate::compare::{grid, reported};
 use crate::draws::Draw;
 use crate::folder::{FolderError, Study};
 use crate::interval::Rate;
-use crate::program::{Identity, Taken};
+use crate::program::{Execution, Identity};
 use crate::report::{self, Report};
 use crate::resolve::{self, Outcome, ambiguous, judge, leaves_open};
 use crate::step::read_result;
@@ -16,22 +16,22 @@ use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
 
-/// What is wanted of all twins, in the exact world and beside a background.
+/// Targets for all twins, in the exact world and with a background.
 const WANTED: [Target; 2] = [Target::AtLeast(80), Target::AtLeast(70)];
 
-/// What a program said of the first record.
+/// Judgement of the report on the first record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum First {
+pub(crate) enum FirstAnswer {
     /// The truth is among names that explain the record alike.
     Ambiguous,
-    /// One name, the truth's.
+    /// One name, the true one.
     Right,
-    /// The truth is named, and another effect beside it, or more is missing.
+    /// The truth is named together with another effect, or something outside the catalogue is missing too.
     NotAlone,
-    /// Names without the truth, nothing left open.
+    /// Names without the truth, no ambiguity.
     Wrong,
-    /// Names that explain the record alike, without the truth.
+    /// Ambiguous names without the truth.
     TruthNotAmong,
     NoName,
     Error,
@@ -39,42 +39,42 @@ pub enum First {
 
 /// One twin in one world.
 #[derive(Debug, Clone, Serialize)]
-pub struct Case {
-    pub number: usize,
-    pub background: bool,
-    pub hidden: String,
-    pub rival: String,
-    pub first: First,
+pub(crate) struct Case {
+    pub(crate) number: usize,
+    pub(crate) background: bool,
+    pub(crate) hidden: String,
+    pub(crate) rival: String,
+    pub(crate) first: FirstAnswer,
     /// Whether the rival is among the names of the first report.
-    pub rival_named: bool,
-    /// The first report's names, alternatives in brackets, and the second one's.
-    pub named: [Vec<String>; 2],
-    pub experiment: Option<String>,
-    /// The best one of the certificate, and how often an oracle is right with it.
-    pub certified: Option<(String, f64)>,
-    /// Of an ambiguous one whose proposed experiment was made; nothing where none was proposed.
-    pub outcome: Option<Outcome>,
+    pub(crate) rival_named: bool,
+    /// Names of the first and second report, alternatives in brackets.
+    pub(crate) named: [Vec<String>; 2],
+    pub(crate) experiment: Option<String>,
+    /// The best experiment of the certificate, and the share of right decisions of an oracle with it.
+    pub(crate) certified: Option<(String, f64)>,
+    /// Of an ambiguous one whose proposed experiment was run; `None` where none was proposed.
+    pub(crate) outcome: Option<Outcome>,
     /// Whether the rival is among the names of the second report.
-    pub rival_left: bool,
-    pub problem: Option<String>,
-    pub wall_s: f64,
+    pub(crate) rival_left: bool,
+    pub(crate) problem: Option<String>,
+    pub(crate) wall_s: f64,
 }
 
-/// What became of the twins, as `twins-LABEL.json`.
+/// Results of the twins of a folder, as `twins-LABEL.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Table {
-    pub schema_version: u32,
-    pub label: String,
-    pub program: Option<Identity>,
-    pub seed: u64,
-    pub cases: Vec<Case>,
+    pub(crate) schema_version: u32,
+    pub(crate) label: String,
+    pub(crate) program: Option<Identity>,
+    pub(crate) seed: u64,
+    pub(crate) cases: Vec<Case>,
 }
 
 impl Table {
-    /// The table of what is done.
+    /// Collects the table of the results so far.
     ///
     /// # Errors
-    /// [`FolderError`] when a result is none.
+    /// [`FolderError`] when a result cannot be read.
     pub fn of(twins: &Twins, root: &Path, label: &str) -> Result<Self, FolderError> {
         let study = twins.study(root);
         let resolved = resolve::Table::of(&study, label)?;
@@ -86,7 +86,7 @@ impl Table {
         Ok(Table { schema_version: SCHEMA_VERSION, label, program: resolved.program, seed, cases })
     }
 
-    /// As tables in Markdown.
+    /// The tables in Markdown.
     pub fn markdown(&self) -> String {
         let program = self.program.as_ref().map_or_else(|| "no program".to_owned(), Identity::reported);
         let mut text = format!("{} ({program}), twins of seed {}.\n\n", self.label, self.seed);
@@ -121,12 +121,12 @@ impl Table {
                 [&[what.to_owned()][..], &exact[..], &beside[..]].concat()
             };
         let all = |_: &Case| true;
-        let open = |case: &Case| case.first == First::Ambiguous;
-        let first = |first: First| move |case: &Case| case.first == first;
+        let open = |case: &Case| case.first == FirstAnswer::Ambiguous;
+        let first = |first: FirstAnswer| move |case: &Case| case.first == first;
         let then = |outcome: Outcome| move |case: &Case| case.outcome == Some(outcome);
-        let none = [Target::Unasked; 2];
+        let none = [Target::Component; 2];
         let right_at_last =
-            |case: &Case| case.first == First::Right || case.outcome == Some(Outcome::Resolved);
+            |case: &Case| case.first == FirstAnswer::Right || case.outcome == Some(Outcome::Resolved);
         vec![
             row("of all: the right one named at the end", &all, &right_at_last, WANTED),
             row("ambiguous at first, the truth among the names", &all, &open, none),
@@ -142,12 +142,12 @@ impl Table {
             row("of these: the truth gone", &open, &then(Outcome::Wrong), none),
             row("of these: no good report", &open, &then(Outcome::Error), none),
             row("of these: no experiment proposed", &open, &|case| case.experiment.is_none(), none),
-            row("right name at once", &all, &first(First::Right), none),
-            row("right name at once, not alone", &all, &first(First::NotAlone), none),
-            row("wrong name at once", &all, &first(First::Wrong), none),
-            row("ambiguous without the truth", &all, &first(First::TruthNotAmong), none),
-            row("no name", &all, &first(First::NoName), none),
-            row("no good report", &all, &first(First::Error), none),
+            row("right name at once", &all, &first(FirstAnswer::Right), none),
+            row("right name at once, not alone", &all, &first(FirstAnswer::NotAlone), none),
+            row("wrong name at once", &all, &first(FirstAnswer::Wrong), none),
+            row("ambiguous without the truth", &all, &first(FirstAnswer::TruthNotAmong), none),
+            row("no name", &all, &first(FirstAnswer::NoName), none),
+            row("no good report", &all, &first(FirstAnswer::Error), none),
         ]
     }
 }
@@ -168,7 +168,7 @@ impl Case {
     }
 }
 
-/// As `twins-LABEL.json` has it.
+/// The word of a value in `twins-LABEL.json`.
 fn word(value: impl Serialize) -> String {
     json!(value).as_str().unwrap_or_default().to_owned()
 }
@@ -210,16 +210,16 @@ fn case(
     })
 }
 
-/// What a report says of the record of a twin.
-pub(super) fn first(draw: &Draw, taken: &Taken, report: &Result<Report, String>) -> First {
+/// Judges the report on the record of a twin.
+pub(super) fn first(draw: &Draw, taken: &Execution, report: &Result<Report, String>) -> FirstAnswer {
     let hidden = &draw.recipe.hidden[0];
     match (judge(hidden, taken, report), report) {
-        (Outcome::Error, _) | (_, Err(_)) => First::Error,
-        (_, Ok(report)) if ambiguous(draw, report).is_some() => First::Ambiguous,
-        (Outcome::Resolved, _) => First::Right,
-        (Outcome::StillAmbiguous, _) => First::NotAlone,
-        (_, Ok(report)) if report.named.is_empty() => First::NoName,
-        (_, Ok(report)) if leaves_open(report) => First::TruthNotAmong,
-        _ => First::Wrong,
+        (Outcome::Error, _) | (_, Err(_)) => FirstAnswer::Error,
+        (_, Ok(report)) if ambiguous(draw, report).is_some() => FirstAnswer::Ambiguous,
+        (Outcome::Resolved, _) => FirstAnswer::Right,
+        (Outcome::StillAmbiguous, _) => FirstAnswer::NotAlone,
+        (_, Ok(report)) if report.named.is_empty() => FirstAnswer::NoName,
+        (_, Ok(report)) if leaves_open(report) => FirstAnswer::TruthNotAmong,
+        _ => FirstAnswer::Wrong,
     }
 }

@@ -2,12 +2,12 @@
 
 use super::certificate::{in_experiment, probability, with_noise};
 use super::search::{Refusal, twin_of};
-use super::tables::{Case, First, Table, first};
+use super::tables::{Case, FirstAnswer, Table, first};
 use super::*;
 use crate::SCHEMA_VERSION;
 use crate::draws::twins::{Start, start};
 use crate::judge::tests::{TAKEN, draw, reported};
-use crate::program::{Ended, Taken};
+use crate::program::{Execution, ProgramEnd};
 use crate::resolve::Outcome;
 use discrepancy::next::menu::{Entry, MENU};
 
@@ -98,14 +98,14 @@ fn a_twin_is_alike_in_its_record_and_apart_in_an_experiment() {
 }
 
 /// A twin of which this was said at first, and then.
-fn case(first: First, outcome: Option<Outcome>) -> Case {
+fn case(first: FirstAnswer, outcome: Option<Outcome>) -> Case {
     Case {
         number: 0,
         background: false,
         hidden: "valve-offset drive".to_owned(),
         rival: "valve-dead-zone drive".to_owned(),
         first,
-        rival_named: first == First::Ambiguous,
+        rival_named: first == FirstAnswer::Ambiguous,
         named: [Vec::new(), Vec::new()],
         experiment: None,
         certified: None,
@@ -118,8 +118,9 @@ fn case(first: First, outcome: Option<Outcome>) -> Case {
 
 #[test]
 fn the_target_is_of_all_twins_and_not_of_those_that_are_left_ambiguous() {
-    let resolved = case(First::Ambiguous, Some(Outcome::Resolved));
-    let others = [case(First::Right, None), case(First::NoName, None), case(First::NoName, None)];
+    let resolved = case(FirstAnswer::Ambiguous, Some(Outcome::Resolved));
+    let others =
+        [case(FirstAnswer::Right, None), case(FirstAnswer::NoName, None), case(FirstAnswer::NoName, None)];
     let cases = std::iter::once(resolved).chain(others).collect();
     let label = "ours".to_owned();
     let table = Table { schema_version: SCHEMA_VERSION, label, program: None, seed: 31, cases };
@@ -138,13 +139,13 @@ fn the_target_is_of_all_twins_and_not_of_those_that_are_left_ambiguous() {
 fn what_is_said_at_first_is_one_of_seven() {
     let twin = draw(Kind::Single, &["inclination"]);
     let said = |verdict: &str, names: &[&str]| first(&twin, &TAKEN, &reported(verdict, names));
-    assert_eq!(said("ambiguous", &["valve-offset@drive[inclination@drive]"]), First::Ambiguous);
-    assert_eq!(said("named", &["inclination@drive"]), First::Right);
-    assert_eq!(said("named", &["inclination@drive", "valve-offset@drive"]), First::NotAlone);
-    assert_eq!(said("named", &["valve-offset@drive"]), First::Wrong);
-    assert_eq!(said("ambiguous", &["valve-offset@drive[inclination@load]"]), First::TruthNotAmong);
-    assert_eq!(said("nothing-missing", &[]), First::NoName);
-    assert_eq!(said("bad-data", &[]), First::Error);
-    let late = Taken { ended: Ended::TimedOut, ..TAKEN };
-    assert_eq!(first(&twin, &late, &reported("named", &["inclination@drive"])), First::Error);
+    assert_eq!(said("ambiguous", &["valve-offset@drive[inclination@drive]"]), FirstAnswer::Ambiguous);
+    assert_eq!(said("named", &["inclination@drive"]), FirstAnswer::Right);
+    assert_eq!(said("named", &["inclination@drive", "valve-offset@drive"]), FirstAnswer::NotAlone);
+    assert_eq!(said("named", &["valve-offset@drive"]), FirstAnswer::Wrong);
+    assert_eq!(said("ambiguous", &["valve-offset@drive[inclination@load]"]), FirstAnswer::TruthNotAmong);
+    assert_eq!(said("nothing-missing", &[]), FirstAnswer::NoName);
+    assert_eq!(said("bad-data", &[]), FirstAnswer::Error);
+    let late = Execution { ended: ProgramEnd::TimedOut, ..TAKEN };
+    assert_eq!(first(&twin, &late, &reported("named", &["inclination@drive"])), FirstAnswer::Error);
 }

@@ -190,7 +190,7 @@ pub(crate) struct TwinsArguments {
 
 /// What is done with a draw.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Deed {
+pub(crate) enum Action {
     /// Its records are made.
     Records,
     /// The program is let loose on them.
@@ -207,7 +207,7 @@ pub(crate) enum Deed {
 pub(crate) struct OneArguments {
     /// What is done.
     #[arg(value_enum)]
-    pub(crate) deed: Deed,
+    pub(crate) deed: Action,
     /// Folder of the study; begun if there is none.
     #[arg(long)]
     pub(crate) out: PathBuf,

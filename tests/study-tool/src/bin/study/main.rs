@@ -1,4 +1,4 @@
-//! The study's commands, for `scripts/study`: draws, limits, cosines, forms, twins, one, score, compare, curve, ledger, resolve.
+//! The commands of the study, for `scripts/study`: see [`cli::Command`].
 
 mod cli;
 mod one;
@@ -26,13 +26,13 @@ use study::twins::Twins;
 use study::twins::search::search;
 use study::{compute, document, forms};
 
-/// Exit code of a study that was asked to stop: everything that is done is kept.
+/// Exit code of an interrupted study: finished steps are kept.
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // A second one ends the study at once; its folder stays good.
+        // A second signal ends the study at once; its folder stays valid.
         let registered =
             signal_hook::flag::register_conditional_shutdown(signal, INTERRUPTED.into(), Arc::clone(&stop))
                 .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)));
@@ -77,7 +77,7 @@ fn committed(name: &str) -> PathBuf {
 const PAGE: &str = "docs/study.md";
 /// Seeds and their openings.
 const SEEDS_PAGE: &str = "docs/seeds.md";
-/// Tables that only studies of earlier programs have.
+/// Tables of studies of earlier programs.
 const EARLIER: &str = "docs/study-earlier.md";
 const FORMS_PAGE: &str = "docs/record-maker.md";
 const LIMITS: &str = "study/limits.json";
@@ -119,8 +119,8 @@ fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
 fn forms(arguments: &FormsArguments, stop: &AtomicBool) -> Done {
     let kinds = if arguments.far_only { &[Form::Far][..] } else { &OTHERS };
     let of = Selection { effects: &arguments.effects, place: arguments.place.as_deref(), forms: kinds };
-    let left = forms::left(&of, arguments.jobs, stop, &say)?;
-    let text = forms::table(&left);
+    let residuals = forms::residuals(&of, arguments.jobs, stop, &say)?;
+    let text = forms::table(&residuals);
     if stop.load(Ordering::Relaxed) {
         return Ok(());
     }
@@ -154,7 +154,7 @@ fn twins(arguments: &TwinsArguments, stop: &AtomicBool) -> Done {
         return Err(format!("{} has twins already: give another folder", out.display()).into());
     }
     let twins = search(*seed, *count, *jobs, stop, &say)?;
-    // A stopped search keeps the twins of its whole rounds.
+    // An interrupted search keeps the twins of its complete rounds.
     if !twins.twins.is_empty() {
         std::fs::create_dir_all(out)?;
         twins.save(out)?;

@@ -1,4 +1,4 @@
-//! The commands that score: one label as a page, several side by side, several over their noise.
+//! The commands that score: one label as a page, several labels as tables, several noise factors as curves.
 
 use crate::cli::{Column, CompareArguments, CurveArguments, ScoreArguments, WorldsArguments};
 use crate::{Done, EARLIER, EXPECTED, LIMITS, PAGE, committed, known_classes, read_if_there, say};
@@ -8,7 +8,7 @@ use study::curve::Curves;
 use study::folder::{Study, write_whole};
 use study::leave_out::Expectations;
 use study::limits::Limits;
-use study::score::{Known, Score};
+use study::score::{Score, ScoreInputs};
 use study::worlds::Worlds;
 use study::{compare, document, page, score};
 
@@ -26,7 +26,7 @@ pub(crate) fn score(arguments: &ScoreArguments) -> Done {
     Ok(())
 }
 
-/// Both worlds of a study, as far as it was run.
+/// Scores both worlds of a study; draws without a result are skipped.
 pub(crate) fn worlds(arguments: &WorldsArguments) -> Done {
     let WorldsArguments { folders, label, left_out, other, write } = arguments;
     let of_label = |label| scored(folders, label, true);
@@ -84,7 +84,7 @@ fn all(columns: &[Column]) -> Result<Vec<Score>, Box<dyn Error>> {
     columns.iter().map(|column| scored(&column.folders, &column.label, false)).collect()
 }
 
-/// Scores results with all that is committed about their draws.
+/// Scores results with the committed limits, classes and expectations.
 fn scored(folders: &[PathBuf], label: &str, partly: bool) -> Result<Score, Box<dyn Error>> {
     let limits: Option<Limits> = read_if_there(&committed(LIMITS))?;
     let expectations: Option<Expectations> = read_if_there(&committed(EXPECTED))?;
@@ -93,7 +93,7 @@ fn scored(folders: &[PathBuf], label: &str, partly: bool) -> Result<Score, Box<d
         draws.extend(Study::open(folder)?.draws);
     }
     let classes = known_classes(&draws)?;
-    let known = Known {
+    let known = ScoreInputs {
         limits: limits.as_ref(),
         classes: Some(&classes),
         expectations: expectations.as_ref(),
