@@ -7,8 +7,9 @@
 //! ```
 //!
 //! One thread, one poll over the bus's socket, the listener and all clients. No client delays another: one that does not read
-//! fills its queue and loses frames, which are counted and reported; one that never reads is disconnected. The gateway is one
-//! peer of the bus and therefore forwards the frames of a client to the other clients itself; the sender does not receive them.
+//! fills its queue and loses frames, which are counted and reported; one that reads nothing for 30 s is disconnected. The
+//! gateway is one peer of the bus and therefore forwards the frames of a client to the other clients itself; the sender does
+//! not receive them.
 //!
 //! | file | holds |
 //! |---|---|

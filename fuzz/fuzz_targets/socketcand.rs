@@ -1,4 +1,5 @@
-//! The gateway's clients: any bytes in any pieces end in answers, frames or a parting, the same ones however they are cut up.
+//! The gateway's clients: any bytes in any pieces end in answers, frames or the end of the connection, the same ones however they
+//! are cut up.
 #![no_main]
 
 use gateway::session::{Action, Session};

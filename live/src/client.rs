@@ -195,12 +195,12 @@ impl Client {
 /// # Errors
 /// The error of `poll`; a signal only ends the wait.
 pub fn wait<'a>(
-    door: &TcpListener,
+    listener: &TcpListener,
     clients: impl Iterator<Item = (&'a TcpStream, bool)>,
     other: Option<BorrowedFd<'a>>,
     milliseconds: i64,
 ) -> io::Result<(Vec<usize>, bool)> {
-    let mut polled = vec![PollFd::new(door, PollFlags::IN)];
+    let mut polled = vec![PollFd::new(listener, PollFlags::IN)];
     polled.extend(clients.map(|(stream, writes)| {
         PollFd::new(stream, if writes { PollFlags::IN | PollFlags::OUT } else { PollFlags::IN })
     }));

@@ -10,9 +10,9 @@ use runlog::timing::CycleTiming;
 use runlog::timing_recorder::WARM_UP_CYCLES;
 use std::time::{Duration, Instant};
 
-/// Time for answers to the last cycles after the first last tick.
+/// Time after the loop in which the rig announces its end and still takes answers to the last cycles.
 const LAST_TICKS_WITHIN: Duration = Duration::from_millis(30);
-/// Number of last ticks in that time: a frame may be lost.
+/// Number of announcements in that time: a frame may be lost.
 const LAST_TICKS: u32 = 3;
 /// Most frames between a cycle's start and the reading of a late loop; they belong to the next cycle.
 const EARLY_FRAMES: usize = 256;

@@ -1,4 +1,4 @@
-//! Starts of twins: an effect on one axis, its amplitude drawn between the smallest and the usual range.
+//! Starts of twins: an effect on one axis, its drawn amplitude moved towards the smallest of its range.
 //!
 //! [`crate::twins`] finds the other effect that explains a part of its record as well, and the noise.
 

@@ -207,7 +207,7 @@ pub(crate) enum Action {
 pub(crate) struct OneArguments {
     /// What is done.
     #[arg(value_enum)]
-    pub(crate) deed: Action,
+    pub(crate) action: Action,
     /// Folder of the study; begun if there is none.
     #[arg(long)]
     pub(crate) out: PathBuf,

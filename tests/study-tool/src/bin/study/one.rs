@@ -51,7 +51,7 @@ pub(crate) fn one(arguments: &OneArguments, stop: &AtomicBool) -> ExitCode {
 
 /// Runs the step; `None` when interrupted.
 fn run_step(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Box<dyn Error>> {
-    if arguments.deed == Action::Twins {
+    if arguments.action == Action::Twins {
         return twin(arguments, stop);
     }
     admit(arguments.plan.seed)?;
@@ -60,16 +60,16 @@ fn run_step(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>
     let draw = draw_of(&study, number)?;
     let classes = known_classes(std::slice::from_ref(draw))?;
     let mut step = step(arguments, &study, &make_record, (again, stop));
-    if arguments.deed == Action::Records {
+    if arguments.action == Action::Records {
         step.records(draw)?;
         return Ok(Some(json!({"kind": draw.kind})));
     }
     let program = program(arguments)?;
-    if arguments.deed == Action::Resolve {
+    if arguments.action == Action::Resolve {
         let found = resolve::run(&step, &program, draw)?;
         return Ok(found.map(|found| answer::of_proposal(&found, outcome(&step, draw, &found))));
     }
-    if arguments.deed == Action::LeaveOut {
+    if arguments.action == Action::LeaveOut {
         if draw.kind != Kind::Single {
             return Ok(Some(json!({"kind": draw.kind})));
         }
