@@ -7,7 +7,8 @@
 //! ```
 //!
 //! The cycle itself is that of [`rig_node`]. Missed cycles are computed with the command in effect before, so that a stall
-//! changes the inputs and never the physics. Nothing here allocates, locks, prints or blocks.
+//! changes the inputs and never the physics. Nothing here allocates, locks or prints; it blocks in
+//! `wait_for_writer` alone, after a stall.
 
 use crate::console::Command;
 use crate::event::{Event, EventKind, axis_of, of_hand};

@@ -9,13 +9,14 @@
 //! | as the next, and the other process was late in the same moment without waiting for a CPU | machine-stood-still |
 //! | the thread waited for the CPU for half of it or more, in the worst cycle or over all of the event | cpu-contention |
 //! | more page faults than 20, or faults that explain a third of it | page-faults |
-//! | the work was slow, nobody else was, and nothing else is known of it | unexplained |
-//! | the probe watched that CPU and saw it free all the time | unexplained |
+//! | slow work; another CPU stood still for half of it, or the other process was late in the same moment | machine-stood-still |
+//! | slow work, and neither holds | unexplained |
+//! | the probe watched that CPU and saw it taken for less than a quarter of it | unexplained |
 //! | the kernel does not tell how long threads wait | unexplained |
 //! | none of these | machine-stood-still, as what is left |
 //!
 //! A late timer interrupt leaves no trace in the scheduler: the thread was not yet ready, so it did not wait, and nobody was
-//! ahead of it. On a virtual machine that is how its host's doings look from inside. What another CPU wakes is ready at
+//! ahead of it. On a virtual machine an interruption by its host looks like that. What another CPU wakes is ready at
 //! once: there a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
 
 use crate::files::EMULATOR;
