@@ -186,8 +186,12 @@ impl Worlds {
                 let quantiles = self.wall_s[world].quantiles;
                 let time =
                     quantiles.map_or_else(String::new, |quantiles| format!("{:.0} s", quantiles[1 + 2 * at]));
-                let outcome = Outcome::of(&self.longer[at][world], self.longer_wanted(at));
-                format!("{time} | {} s | {}", limits_s[world], outcome_cell(outcome))
+                let outcome = match Outcome::of(&self.longer[at][world], self.longer_wanted(at)) {
+                    // The targets leave rehearsals out.
+                    Some(Outcome::Missed) => "missed with rehearsals".to_owned(),
+                    outcome => outcome_cell(outcome),
+                };
+                format!("{time} | {} s | {outcome}", limits_s[world])
             });
             let _ = writeln!(text, "| {name} of the wall time | {} |", cells.join(" | "));
         }
@@ -229,10 +233,13 @@ impl Worlds {
                     )
                 },
             );
+            let log_loss = reliability
+                .log_loss
+                .map_or_else(String::new, |log_loss| format!("; mean log loss {log_loss:.2}"));
             let _ = write!(
                 text,
                 "\nProbabilities, {world}, draws left out included: \
-                 the most probable explanation is right for {right} of {of};\n{error}.\n\n\
+                 the most probable explanation is right for {right} of {of};\n{error}{log_loss}.\n\n\
                  | said | explanations | mean said | right | band |\n|---|---|---|---|---|\n"
             );
             for bin in &reliability.bins {
@@ -383,6 +390,20 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
             |case| single(case) && !ordinary(case),
             |case| named(case) || case.judgement.resembled,
         ),
+        row(
+            "another form, within the drawn range: class named",
+            [Component; 2],
+            worlds,
+            |case| single(case) && case.foreign_form && !case.beyond_drawn,
+            named,
+        ),
+        row(
+            "beyond the drawn range, whatever the form: class named",
+            [Component; 2],
+            worlds,
+            |case| single(case) && case.beyond_drawn,
+            named,
+        ),
         row("one effect: name, place, nothing beside", [AtLeast(92), AtLeast(75)], worlds, single, |case| {
             case.judgement.alone && hidden(case).where_right
         }),
@@ -395,6 +416,9 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
         ),
         row("nothing hidden: a name, or no report", [NoneOf(200), AtMost(5)], worlds, null, |case| {
             !is_no_name(case)
+        }),
+        row("nothing hidden: said to be outside the catalogue", [Component; 2], worlds, null, |case| {
+            case.judgement.called == "outside"
         }),
         row(
             "nothing hidden: a parameter off that the file has right",
