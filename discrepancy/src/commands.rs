@@ -56,7 +56,7 @@ pub enum CommandError {
     UnknownEffect { name: String, known: String },
 }
 
-/// Runs a command.
+/// Runs a command, and returns its exit code: [`Exit`].
 ///
 /// # Errors
 /// [`CommandError`] with file, line, key and what to do.

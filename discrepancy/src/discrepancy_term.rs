@@ -104,8 +104,8 @@ pub struct Beside<'a> {
     pub factors: [f64; COUNT],
 }
 
-/// Groups by evidence, history variables behind what explains nearly as much without: at least [`MIN_LOG_EVIDENCE_RATIO`] of
-/// their log evidence, or what the choice among so many groups costs less.
+/// Groups by evidence. History variables come first only if the best group without them has less than
+/// [`MIN_LOG_EVIDENCE_RATIO`] of their log evidence, and less by ln(number of groups) at least.
 fn plain_first(groups: Vec<Group>) -> Vec<Group> {
     let choice = (groups.len() as f64).ln();
     let most = |groups: &[Group]| groups.first().map_or(0.0, |group| group.log_evidence);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   e      = readings - baseline                     what the baseline leaves
-//!   N      = (baseline with a factor - baseline) / change of the factor, for each parameter that may be wrong
+//!   N      = (with a factor 1 + h - with 1 - h) / 2 h, for each parameter that may be wrong
 //!   C_j    = effect j at a probe - baseline
 //! ```
 //!
@@ -152,7 +152,7 @@ impl<'a> Engine<'a> {
         &self.windows
     }
 
-    /// Numbers in a window.
+    /// Length of the residual vector of a window.
     pub fn rows(&self) -> usize {
         self.rows
     }
@@ -188,7 +188,7 @@ impl<'a> Engine<'a> {
         self.windows.iter().flat_map(|windows| windows.simulate(rig)).collect()
     }
 
-    /// The same with half the step, to estimate the error of integration.
+    /// Readings of `rig` in all windows, with half the step of [`Engine::simulate`], to estimate the error of integration.
     pub(crate) fn simulate_finely(&self, rig: &RigParameters) -> Vec<f64> {
         let simulate = |windows: &Windows<'a>| {
             if self.coarse { windows.simulate(rig) } else { windows.simulate_finely(rig) }
@@ -196,12 +196,12 @@ impl<'a> Engine<'a> {
         self.windows.iter().flat_map(simulate).collect()
     }
 
-    /// The same with longer steps, for differences.
+    /// Readings of `rig` in all windows, with the longer steps of the search and of its finite differences.
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.windows.iter().flat_map(|windows| windows.simulate_coarsely(rig)).collect()
     }
 
-    /// The same, kept for [`Engine::simulate_where`].
+    /// Runs of `rig` in all windows with the steps of the search, kept for [`Engine::simulate_where`].
     pub fn pass(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
         self.windows.par_iter().map(|windows| windows.pass(rig)).collect()
     }
@@ -217,7 +217,7 @@ impl<'a> Engine<'a> {
         windows.flat_map(|(windows, passed)| windows.simulate_where(rig, passed, &differs)).collect()
     }
 
-    /// The same for several rigs that differ in baseline numbers, on all cores and in batches.
+    /// Readings of several rigs that differ in baseline numbers, with the steps of the search, on all cores and in batches.
     fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
         // Rigs with other laws do not run in lanes and are distributed one by one.
         let alone = !rigs.iter().all(leave_laws_alone);

@@ -61,7 +61,7 @@ pub(crate) const TIME: usize = 10;
 /// Most points of a series in the report.
 const SERIES: usize = 1500;
 
-/// A variable that an unknown input may depend on.
+/// Regressor of an unknown input.
 #[derive(Clone, Copy, Debug)]
 pub struct WindowVariable {
     /// As reports have it.
@@ -98,7 +98,7 @@ pub struct UnknownSeries {
 
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownPoint {
-    /// Which window of it.
+    /// Index of its window of 20 ms in the record.
     pub(crate) window: usize,
     /// Estimate, in the series' unit; positive along the extension of the axis, or into the chamber.
     pub(crate) value: f64,

@@ -60,9 +60,10 @@ use start_states::{RefitWithInitialStates, refit_with_starts};
 const MAX_EFFECTS: usize = 3;
 /// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
-/// Mean log ratio of a window's chi2 to its degrees of freedom above which a model shows lack of fit (is inadequate).
+/// Loss J over the degrees of freedom of all windows above which a model shows lack of fit (is inadequate): an engineer's
+/// tolerance, many standard errors wide, and no test.
 const LACK_OF_FIT_PER_DOF: f64 = 0.08;
-/// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
+/// The same for linked rods, where micrometres decide when the rod end meets the carriage: the true model leaves up to 0.2.
 const LACK_OF_FIT_PER_DOF_LINKED: f64 = 0.3;
 /// Screened gain below which no candidate is fitted; also the least gain of an effect that joins, of a homogeneous one, and that
 /// of a detection limit. An empirical value, about twice what chance gives: of forty independent null gains (chi2 of one degree
@@ -328,7 +329,7 @@ fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &Refit) -> bool {
     engine.axis_by_axis() && (lacks_on([true, false]) || lacks_on([false, true]))
 }
 
-/// Mean log ratio of a window's chi2 to its degrees of freedom above which a model leaves more than noise.
+/// Loss J over the degrees of freedom of all windows above which a model leaves more than noise.
 pub(crate) fn lack_of_fit_per_dof(linked: bool) -> f64 {
     if linked { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF }
 }

@@ -69,7 +69,7 @@ impl Explanation {
     }
 }
 
-/// Divergences of an entry of the menu.
+/// T of each ordered pair of explanations in one entry of the menu.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentDivergences {
     pub name: &'static str,
@@ -77,7 +77,7 @@ pub struct ExperimentDivergences {
     pub pairs: Vec<(usize, usize, Divergence)>,
 }
 
-/// The proposed experiment.
+/// The proposed experiment and its file, and the rehearsed menu.
 #[derive(Clone, Debug)]
 pub struct Proposal {
     /// For the report; [`Next::experiment`] is the file's name.

@@ -35,7 +35,7 @@ const MIN_BIRGE_RATIO: f64 = 1.15;
 const MIN_SHIFT_Z: f64 = 7.0;
 /// Significance of a mean, in standard errors from the propagated noise (z test).
 const MIN_MEAN_Z: f64 = 6.0;
-/// Name of a term that is always there.
+/// Name of the constant term (the intercept).
 pub(crate) const CONSTANT: &str = "constant";
 /// Variables of a located term that come first.
 const LOCATED: usize = 2;

@@ -66,7 +66,7 @@ impl Columns {
         self.columns.len()
     }
 
-    /// Column of a probe.
+    /// Whitened response to a probe.
     pub fn column(&self, index: usize) -> &[f64] {
         &self.columns[index]
     }

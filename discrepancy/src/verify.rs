@@ -7,16 +7,15 @@
 //!
 //! Window figures are robust in two ways, alike for both models and the null draws:
 //!
-//! - *Trimming*: the 2 % of the windows, at least one, in which the extended model is worst are left out, since one window around
-//!   a break-away would outweigh all others. Both models leave out the same windows: those of the signal for a gap, those of all
-//!   signals together for chi2 and whiteness. The test of improvement uses all windows.
-//! - *Level*: the noise of a channel is known to some per cent only. The lowest decile of the windows, by the better of both
-//!   models, corrects it within [`VARIANCE_FACTOR_BOUNDS`].
+//! - *Trimming*: the 2 % of the windows, at least one, in which the smaller of both models' powers is largest are left out, since
+//!   one window around a break-away would outweigh all others. Both models leave out the same windows: those of the signal for a
+//!   gap, those of all signals together for chi2 and whiteness. The test of improvement uses all windows.
+//! - *Level*: the noise of a channel is known to some per cent only. The lowest decile over the windows of the smaller of both
+//!   models' powers corrects it within [`VARIANCE_FACTOR_BOUNDS`].
 //!
-//! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors: a paired
-//! t test of log-variance differences (Diebold-Mariano type) with windows taken as independent. Equal gains in m of n windows
-//! give t = sqrt(m (n - 1) / (n - m)), so that an effect in fewer than about nine windows (seven to eight in a short record)
-//! cannot pass, whatever its size.
+//! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors, with
+//! windows taken as independent (log-variance differences as in a Diebold-Mariano test). Equal gains in m of n windows give
+//! t = sqrt(m (n - 1) / (n - m)), so that an effect in fewer than 9 n / (n + 8) windows cannot pass, whatever its size.
 //!
 //! Expected power comes from drawn noise with the autocorrelation and jitter of the record. The null range of chi2 comes from
 //! synthetic records of the extended model, whose start states are estimated as those of the record are. Source:
@@ -55,7 +54,7 @@ const EXCESS_SPREADS: f64 = 10.0;
 pub(crate) struct Verified {
     /// The misfit of each signal, by its column.
     pub(crate) misfit: BTreeMap<String, Misfit>,
-    /// Everything else.
+    /// Chi2, whiteness, free run, and whether the extended model is confirmed.
     pub(crate) verification: Verification,
     /// Series for the page.
     pub(crate) traces: Vec<Trace>,
@@ -156,7 +155,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The column of a output, `drive_position_m`.
+/// The column of an output, `drive_position_m`.
 fn column(axis: usize, at: usize) -> String {
     debug_assert!(at < CHANNELS);
     Channel::Of(Axis::ALL[axis], SIGNALS[at]).column()

@@ -35,7 +35,7 @@ use whiten::{SPIKE, jitter_sensitivity_of};
 pub(crate) const WINDOW: usize = 400;
 /// Index of the force among the channels.
 pub(crate) const FORCE: usize = 1;
-/// Integration substeps of a period for differences.
+/// Integration substeps of a period in the search and in its finite differences.
 const COARSE_SUBSTEPS: u32 = 5;
 /// The same to estimate the error of integration: twice those of a plant.
 const FINE_SUBSTEPS: u32 = 20;
@@ -127,7 +127,7 @@ impl<'a> Windows<'a> {
         &self.outputs
     }
 
-    /// Numbers in a window.
+    /// Length of the residual vector of a window.
     pub fn rows(&self) -> usize {
         WINDOW * self.outputs.len()
     }
@@ -172,7 +172,7 @@ impl<'a> Windows<'a> {
         self.run(vec![self.plant(rig).with_substeps(FINE_SUBSTEPS)]).remove(0)
     }
 
-    /// The same with longer steps: half the cost, accurate enough for differences.
+    /// Readings with the longer steps of the search: half the cost.
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.simulate_side_by_side(std::slice::from_ref(rig)).remove(0)
     }

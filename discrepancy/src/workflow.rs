@@ -37,7 +37,7 @@ use proposal::proposal_for;
 use records::{ReadError, ReadOptions};
 use std::path::{Path, PathBuf};
 
-/// Inputs of the workflow.
+/// Files and options of `close`.
 #[derive(Clone, Debug, Default)]
 pub struct Task {
     pub rig: PathBuf,
@@ -54,7 +54,7 @@ pub struct Task {
     pub marginal_likelihoods: bool,
 }
 
-/// Outputs of the workflow.
+/// Report, extended rig file, series for the page, and proposed experiment.
 #[derive(Debug)]
 pub struct Outcome {
     pub report: Report,
@@ -144,7 +144,7 @@ pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<O
     Ok(Opened { checked, gridded })
 }
 
-/// Runs the whole workflow.
+/// Checks the records, selects effects, locates what is left, extends the rig file, then judges on the held-out record.
 ///
 /// # Errors
 /// [`WorkflowError`]; a record that cannot be used is a verdict, not an error.

@@ -46,7 +46,7 @@ pub struct Roles<'a> {
     pub outputs: &'a [String],
 }
 
-/// A model file that begins from a record.
+/// Text of a new model file, and what was guessed.
 #[derive(Clone, Debug)]
 pub struct NewModel {
     /// TOML with comments, as `close` reads it.

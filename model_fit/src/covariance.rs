@@ -15,7 +15,7 @@
 //! discrepancy term's prior [Kennedy, O'Hagan 2001, JRSS B 63(3); Brynjarsdóttir, O'Hagan 2014, Inverse Problems 30(11):
 //! without one, intervals do not hold].
 //!
-//! Sources: Künsch 1989, Annals of Statistics 17(3) (blocks); Bell, McCaffrey 2002, Survey Methodology 28(2) (few blocks).
+//! Sources: Künsch 1989, Annals of Statistics 17(3) (blocks).
 
 use super::bounds;
 use super::fit::What;

@@ -67,7 +67,7 @@ fn has_start(start: usize, record: &Measured) -> Result<(), JudgeError> {
     }
 }
 
-/// Judges both models.
+/// Rms and traces of both models on each held-out record.
 pub(crate) fn judge(
     found: &Found<'_>,
     records: &[Measured],

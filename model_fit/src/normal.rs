@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 /// Smallest eigenvalue of the scaled normal matrix, over its largest, of a direction that the records determine.
 const DETERMINED: f64 = 1e-10;
 
-/// Normal equations of some rows.
+/// Normal equations of rows: J'J, J'e and e'e.
 #[derive(Clone, Debug)]
 pub(crate) struct Normal {
     pub(crate) matrix: DMatrix<f64>,

@@ -75,7 +75,7 @@ pub struct ModelReport {
     pub declared: Vec<String>,
 }
 
-/// A number with its unit.
+/// A number: estimate, error, and the estimate without what was named.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Number {
     pub name: String,
@@ -138,7 +138,7 @@ pub struct Named {
     pub alternatives: Vec<String>,
 }
 
-/// How a suspect did.
+/// Likelihood gain, gates and probability of a suspect.
 #[derive(Clone, Debug, Serialize)]
 pub struct Judgement {
     pub suspect: String,

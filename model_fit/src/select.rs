@@ -25,10 +25,10 @@ use std::sync::OnceLock;
 
 /// Most terms that are taken.
 pub(super) const MOST_TERMS: usize = 3;
-/// Below this it says nothing at all.
+/// Difference of [`Evaluation::worth`] below which forms of one effect count as equally good.
 pub(super) const SAME: f64 = 2.0;
 
-/// A fitted model.
+/// A fitted model with its folds, its normal equations, and the effective size of its samples.
 #[derive(Clone)]
 pub(crate) struct Fitted<'a> {
     pub(crate) suspects: Vec<usize>,
@@ -51,7 +51,7 @@ pub(crate) struct Fitted<'a> {
     pub(crate) effective: Vec<f64>,
 }
 
-/// A suspect that was taken.
+/// An accepted suspect with its alternatives.
 pub(crate) struct Taken {
     pub(crate) evaluation: Evaluation,
     /// Others that explain the records as well.

@@ -48,7 +48,7 @@ pub struct Structure {
     pub advice: Vec<Advice>,
 }
 
-/// Two suspects that do the same.
+/// Two suspects with nearly equal responses.
 #[derive(Clone, Debug, Serialize)]
 pub struct Twins {
     pub suspects: [String; 2],
@@ -172,7 +172,7 @@ impl Seen {
     }
 }
 
-/// Of what two suspects do.
+/// Cosine of the projected responses of two suspects.
 pub(super) fn cosine(one: &Seen, other: &Seen) -> f64 {
     one.direction.dot(&other.direction).abs()
 }

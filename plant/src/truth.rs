@@ -128,7 +128,7 @@ impl Truth {
         let supply_pressure_pa = supply_pressure_pa(effects, state);
         let air = AirAt::of(integrator, &lanes);
         let edge_flow = edge_flows(integrator, effects, state, &lanes, &air);
-        let forces = Forces::at(integrator, effects, &lanes, hand_forces(inputs), state.linked);
+        let forces = TrueForces::at(integrator, effects, &lanes, hand_forces(inputs), state.linked);
 
         let axis = |i: usize| {
             let (axis_state, axis) = (&state.axes[i], &forces.axes[i]);
@@ -218,7 +218,7 @@ fn edge_flows(
 }
 
 /// Every force at an instant.
-pub(crate) struct Forces {
+pub(crate) struct TrueForces {
     axes: [AxisForces; 2],
     contact_n: f64,
     distance_m: f64,
@@ -247,7 +247,7 @@ impl AxisForces {
     }
 }
 
-impl Forces {
+impl TrueForces {
     /// Each force by its own law.
     pub(crate) fn at(
         integrator: &Integrator,
@@ -299,7 +299,7 @@ impl Forces {
                 effect_n,
             }
         };
-        Forces { axes: [axis(0), axis(1)], contact_n, distance_m }
+        TrueForces { axes: [axis(0), axis(1)], contact_n, distance_m }
     }
 
     /// Force on a piston without any friction, N.

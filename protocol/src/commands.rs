@@ -1,9 +1,9 @@
 //! Takes the valve commands of one axis from the bus and tells which opening acts.
 //!
-//! [`CommandIntake::take`] stores a command when it arrives; it acts from the start of the next cycle (bus.md, Time), unless
-//! [`CommandIntake::latch`] withdraws it there. Commands that must not act are counted and ignored: a frame whose echo is older
-//! than 20 cycles or answers no cycle that was sent; a command that two senders dispute; a command grown older than 20 cycles,
-//! for which the valve shuts until a fresh one comes.
+//! [`CommandIntake::take`] stores a command when it arrives; it acts from the start of the next cycle (bus.md, Time). There
+//! [`CommandIntake::latch`] drops one that has grown older than 20 cycles, and notes whether two senders dispute the valve;
+//! [`CommandIntake::opening`] is 0 in both cases. A frame whose echo is older than 20 cycles, or answers no cycle that was
+//! sent, is counted and never stored.
 
 use crate::frames::ValveCommand;
 use crate::live_cycles::LiveCycles;
@@ -31,7 +31,7 @@ pub struct CommandCounters {
     pub late: u64,
     /// Commands equal to the one before, counter and all; accepted all the same, and distinguished by the watch for two senders.
     pub duplicate: u64,
-    /// Times that the fault `two-sources` was latched.
+    /// Times that the fault `two-sources` began.
     pub two_sources: u64,
 }
 
@@ -63,7 +63,7 @@ pub struct CommandIntake {
 }
 
 impl CommandIntake {
-    /// Takes a well-formed command that arrived before the cycle that was sent last acts. True when it was accepted.
+    /// Takes a well-formed command that arrived before the start of the newest sent cycle. True when it was accepted.
     pub fn take(&mut self, command: ValveCommand, live: &LiveCycles) -> bool {
         let Some(age) = live.age(command.echo).filter(|age| *age <= STALE_AFTER_CYCLES) else {
             self.counters.refused_stale += 1;
@@ -85,7 +85,8 @@ impl CommandIntake {
         true
     }
 
-    /// Decides whether the command that `take` stored acts over the cycle that was sent last: withdraws a stale or disputed one.
+    /// Decides whether the command that `take` stored acts over the cycle that was sent last: drops a stale one, and notes a
+    /// dispute of two senders.
     pub fn latch(&mut self, live: &LiveCycles) -> Option<Change> {
         let too_old =
             |command: &ValveCommand| live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES);

@@ -12,14 +12,14 @@
 //!
 //! A sender that stood still answers several cycles at once, so the cycles that passed are those of the answers where these
 //! are more. Cycles are those that were sent: what a late rig skipped is no silence of a sender. Four breaks within 20
-//! cycles latch the fault; it goes when none was seen for 20 cycles, which is what one sender falling silent brings about
+//! cycles raise the fault; it ends when none was seen for 20 cycles, which is what one sender falling silent brings about
 //! (bus.md, Frames).
 
 use crate::frames::ALIVE_RANGE;
 
 /// Cycles that a break is remembered, and that a fault lasts without one.
 pub const SILENCE_CYCLES: u64 = 20;
-/// Breaks within [`SILENCE_CYCLES`] that latch the fault: a restart makes one, two in quick succession two.
+/// Breaks within [`SILENCE_CYCLES`] that raise the fault: a restart makes one, two in quick succession two.
 const BREAKS_TO_LATCH: usize = 4;
 
 /// What a frame's counter said.

@@ -55,7 +55,7 @@ pub enum Taken {
     Other(Frame),
 }
 
-/// What acts over a cycle on a valve.
+/// State of the command of an axis over a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Latched {
     /// What changed with it.
@@ -149,7 +149,8 @@ impl<R: SimulatedRig> RigNode<R> {
         Taken::Done
     }
 
-    /// Withdraws the command of an axis if it is stale or disputed in the cycle that was sent last, and reports what acts.
+    /// Drops the command of an axis that is stale in the cycle that was sent last, notes a dispute of two senders, and reports
+    /// both. The opening is that of [`RigNode::openings`].
     pub fn latch(&mut self, axis: Axis) -> Latched {
         let intake = &mut self.commands[axis.index()];
         let change = intake.latch(&self.live);

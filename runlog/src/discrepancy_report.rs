@@ -175,7 +175,7 @@ pub struct Quantity {
     /// One standard error; null when the records do not bound the number. Of the final model it is half of the half-width of a
     /// nominal 95.4 % interval: one-step jackknife with frozen window weights, widened by a Student t factor.
     pub standard_error: Option<f64>,
-    /// Value in the rig file; null where it has none.
+    /// Value in the rig file, else the one at which the effect is off; null where there is neither.
     pub before: Option<f64>,
 }
 

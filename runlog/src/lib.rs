@@ -1,4 +1,14 @@
 //! The files and records of a run, and the report of `discrepancy close`: each is written and read by one type.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`run_folder`], [`process`] | names of files and processes, writing without half a file |
+//! | [`summary`], [`controller_report`], [`conditions`], [`ping_pong`] | the JSON files of a run |
+//! | [`timing`], [`timing_recorder`], [`flight_dump`] | stamps of each cycle, what is recorded of them, the last second |
+//! | [`candump`], [`event`] | `bus.log`; events of a run |
+//! | [`telemetry`] | the stream to viewers |
+//! | [`discrepancy_report`] | `report.json` of `discrepancy close` |
+//! | [`golden`] | golden files for tests |
 
 #![warn(missing_docs)] // an interface of other crates
 

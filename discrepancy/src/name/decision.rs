@@ -6,14 +6,15 @@
 //!   a set of effects beyond the bar, none of these   outside the catalogue                               the model of the search
 //!   parameters, or no explanation                    the model of the search, unless it explains         the model of the search
 //!                                                    too little: then outside the catalogue
-//!   nothing                                          outside the catalogue                               parameters alone
+//!   nothing                                          outside the catalogue                               parameters, if adequate
 //! ```
 //!
 //! The bar: the amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; by [`MAX_CV_OF_PART`], beside at most
 //! [`MAX_PARAMETERS_OFF`] parameters that are moved, where the model of the search leaves more than noise, and the set more than
 //! [`MOST_LOSS_LEFT`] of the loss. The model of the search has no name either where more than [`MAX_PARAMETERS_OFF`] parameters
 //! are off beside it, unless an effect of it joined as a homogeneous one, or where its set is less probable than nothing or than
-//! [`LEAST_PROBABLE`]: so it is wherever nothing has one half. A set whose variation cannot be computed is beyond the bar.
+//! [`LEAST_PROBABLE`]: so it is wherever nothing has one half; parameters that are not
+//! adequate (leave more than noise) are outside the catalogue. A set whose variation cannot be computed is beyond the bar.
 
 use super::elimination::Selection;
 use super::explanations::Explanation;

@@ -15,7 +15,7 @@ const SWAPPED: usize = 3;
 pub(crate) const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;
 /// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
 const INDISTINGUISHABLE_LOSS_SHARE: f64 = 0.02;
-/// Multiple of the null threshold required of every further effect, since no model is exact.
+/// Multiple of the null threshold required of each effect while others remain, since no model is exact.
 const THRESHOLD_FACTOR_SEVERAL: f64 = 3.0;
 /// Share of the loss reduction of all effects together below which an effect is eliminated, whatever the threshold.
 const MIN_SHARE_OF_REDUCTION: f64 = 0.002;

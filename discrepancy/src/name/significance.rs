@@ -7,9 +7,9 @@
 //!
 //! A parametric bootstrap through the simulator: unlike signs drawn at random (`name/null_distribution.rs`), it knows
 //! effects that act to one side in few windows. The largest gain over all candidates accounts for the search (Westfall, Young).
-//! Refits are one Gauss-Newton step on the columns of the screening, on the safe side: refitted in the simulator, the best of a
-//! draw gained 15 in place of 31, -47 in place of 6 and 3 in place of 11 (draws of two null records at four times the noise,
-//! seed 18, those with the largest gains of twenty).
+//! Refits are one Gauss-Newton step on the columns of the screening. In three draws, those with the largest gains of twenty, that
+//! was on the safe side: refitted in the simulator, the best of a draw gained 15 in place of 31, -47 in place of 6 and 3 in place
+//! of 11 (two null records at four times the noise, seed 18). It is not shown in general.
 //!
 //! The tested set against another one: records are drawn with the other one, and both are refitted by one step on the
 //! sensitivities of their fits (Cox 1961; Williams 1970: simulated).
@@ -241,7 +241,7 @@ fn without_best(gains: &[f64]) -> f64 {
     ascending.iter().take(gains.len() - best_windows(gains.len())).sum()
 }
 
-/// Number of numbers of the effects.
+/// Count of fitted effect parameters.
 fn numbers(placed: &[EffectEstimate]) -> usize {
     placed.iter().map(|effect| effect.coordinates.len()).sum()
 }

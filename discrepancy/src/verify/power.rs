@@ -117,7 +117,8 @@ pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
         .collect()
 }
 
-/// Windows that remain after trimming; of two models, by the smaller of both: a fault of the record is one to both.
+/// Windows that remain after trimming. Of two models `squares` has the smaller power of both in each window, so that a fault of
+/// the record is trimmed and an error of one model alone is not.
 pub(super) fn kept(squares: &[Squares]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..squares.len()).filter(|at| squares[*at].expected > 0.0).collect();
     // A stable sort: equal windows stay in their order.
@@ -141,7 +142,7 @@ pub(super) fn pooled(squares: &[Squares], kept: &[bool]) -> f64 {
     if expected > 0.0 { sum / expected } else { 0.0 }
 }
 
-/// Lag-1 autocorrelation of a output in the remaining windows.
+/// Lag-1 autocorrelation of an output in the remaining windows.
 pub(super) fn neighbours(residual: &[f64], output: usize, outputs: usize, kept: &[bool]) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
     for (window, _) in residual.chunks_exact(WINDOW * outputs).zip(kept).filter(|(_, kept)| **kept) {

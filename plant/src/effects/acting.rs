@@ -22,7 +22,7 @@ use crate::lanes::{Axes, Choice, Mask, Pair};
 use crate::motion::{MotionSpan, Place, side};
 use crate::parameters::{LinkageParameters, RigParameters};
 use crate::state::State;
-use crate::truth::Forces;
+use crate::truth::TrueForces;
 
 /// What a rig has switched on, and what it remembers.
 #[derive(Debug, Clone)]
@@ -79,7 +79,7 @@ impl Effects {
         effects.baseline_friction = effects.has_baseline_friction();
         effects.baseline_laws = effects.has_baseline_laws();
         effects.move_with(of);
-        let forces = Forces::at(of, Some(&effects), &Lanes::load(state), Pair::both(0.0), state.linked);
+        let forces = TrueForces::at(of, Some(&effects), &Lanes::load(state), Pair::both(0.0), state.linked);
         for (axis, channels) in effects.memory.channels.iter_mut().enumerate() {
             channels[1].iter_mut().for_each(|history| history.fill(forces.sensor_n(of, axis)));
         }
@@ -478,7 +478,7 @@ impl Laws for Effects {
             }
         }
         if self.memory.channels.iter().any(|axis| axis[1].is_some()) {
-            let forces = Forces::at(of, Some(self), lanes, held.hand, held.linked);
+            let forces = TrueForces::at(of, Some(self), lanes, held.hand, held.linked);
             for (axis, channels) in self.memory.channels.iter_mut().enumerate() {
                 channels[1].iter_mut().for_each(|history| history.push(forces.sensor_n(of, axis)));
             }

@@ -8,7 +8,7 @@ use super::memory::seen_at;
 use super::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
-use crate::truth::Forces;
+use crate::truth::TrueForces;
 
 impl Effects {
     /// Where the plant begins: what the force sensors show there, and what terms keep of it.
@@ -28,7 +28,7 @@ impl Effects {
     /// Keeps what the force sensors should show, where a declared term is over it in a step.
     pub(super) fn see_forces(&mut self, of: &Integrator, lanes: &Lanes, hand: Pair, linked: bool) {
         if self.on.iter().any(|on| on.declared.follows_sensor()) {
-            let forces = Forces::at(of, Some(self), lanes, hand, linked);
+            let forces = TrueForces::at(of, Some(self), lanes, hand, linked);
             self.memory.sensor_force_n = [0, 1].map(|axis| forces.sensor_n(of, axis));
         }
     }

@@ -14,7 +14,7 @@ use super::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
 use crate::state::{Inputs, State};
-use crate::truth::{AirAt, Forces, hand_forces};
+use crate::truth::{AirAt, TrueForces, hand_forces};
 
 /// Terms that a rig with everything switched on has, and some room.
 const MOST_TERMS: usize = 160;
@@ -112,7 +112,7 @@ impl Effects {
     ) {
         let lanes = Lanes::load(state);
         let air = AirAt::of(of, &lanes);
-        let forces = Forces::at(of, Some(self), &lanes, hand_forces(inputs), state.linked);
+        let forces = TrueForces::at(of, Some(self), &lanes, hand_forces(inputs), state.linked);
         for (axis, part) in [Part::Drive, Part::Load].into_iter().enumerate() {
             let mut teller = Teller { effects: self, part, tell };
             let axis_states = &self.memory.moving.axes[axis];

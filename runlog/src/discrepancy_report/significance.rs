@@ -34,9 +34,9 @@ pub struct DrawnRecords {
     pub draws: usize,
     /// Draws that reach `observed`.
     pub reached: usize,
-    /// The largest gain of a draw: over parameters alone that of any set of as many effects.
+    /// The largest gain of a draw: over parameters alone that of at most as many effects, by forward selection.
     pub largest: f64,
-    /// Bound of the p-value.
+    /// Bound of the p-value; far above the draws an extrapolation by an exponential tail.
     pub p_value: f64,
     /// Why no more were drawn.
     pub ended: Ended,

@@ -66,8 +66,7 @@ fn times_are_missed_by_one_draw_that_is_longer_and_by_a_median_that_is_resolved(
     };
     let median = "| median of the wall time | 10 s | 12 s | reached | 20 s | 15 s | missed with rehearsals |";
     assert_eq!(row(all + 1, "| median of the wall time"), median);
-    let of_some =
-        "| longest of the wall time | 10 s | 60 s | not resolved (estimate reaches) | 91 s | 90 s | missed with rehearsals |";
+    let of_some = "| longest of the wall time | 10 s | 60 s | not resolved (estimate reaches) | 91 s | 90 s | missed with rehearsals |";
     assert_eq!(row(all + 1, "| longest of the wall time"), of_some);
     assert_eq!(
         row(all, "| longest of the wall time"),
