@@ -127,7 +127,7 @@ pub(crate) fn parameter_precisions() -> Vec<f64> {
 }
 
 /// Number of parameters off their file values, small deviations counted in part.
-fn parameters_off(factors: &[f64; COUNT]) -> f64 {
+fn soft_count_off(factors: &[f64; COUNT]) -> f64 {
     factors
         .iter()
         .map(|factor| (factor - 1.0).powi(2))
@@ -136,7 +136,7 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
 }
 
 pub(crate) fn model_penalty(effect_parameters: usize, factors: &[f64; COUNT]) -> f64 {
-    EFFECT_PARAMETER_PENALTY * effect_parameters as f64 + PARAMETER_COSTS * parameters_off(factors)
+    EFFECT_PARAMETER_PENALTY * effect_parameters as f64 + PARAMETER_COSTS * soft_count_off(factors)
 }
 
 /// Prior precision of a coordinate.

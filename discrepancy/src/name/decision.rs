@@ -10,11 +10,11 @@
 //! ```
 //!
 //! The bar: the amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; by [`MAX_CV_OF_PART`], beside at most
-//! [`MAX_PARAMETERS_OFF`] parameters that are moved, where the model of the search leaves more than noise, and the set more than
-//! [`MOST_LOSS_LEFT`] of the loss. The model of the search has no name either where more than [`MAX_PARAMETERS_OFF`] parameters
-//! are off beside it, unless an effect of it joined as a homogeneous one, or where its set is less probable than nothing or than
-//! [`LEAST_PROBABLE`]: so it is wherever nothing has one half; parameters that are not
-//! adequate (leave more than noise) are outside the catalogue. A set whose variation cannot be computed is beyond the bar.
+//! [`MAX_PARAMETERS_MOVED`] parameters that are moved, where the model of the search leaves more than noise, and the set more
+//! than [`MOST_LOSS_LEFT`] of the loss. The model of the search has no name either where more than [`MAX_SIGNIFICANTLY_OFF`]
+//! parameters are significantly off beside it, unless an effect of it joined as a homogeneous one, or where its set is less
+//! probable than nothing or than [`LEAST_PROBABLE`]: so it is wherever nothing has one half; parameters that are not adequate
+//! (leave more than noise) are outside the catalogue. A set whose variation cannot be computed is beyond the bar.
 
 use super::elimination::Selection;
 use super::explanations::Explanation;
@@ -49,7 +49,10 @@ const MOST_LOSS_LEFT: f64 = 0.5;
 const MIN_SHARE_BESIDE_SMALL: f64 = 0.2;
 /// Most baseline parameters that may be significantly off beside an effect: with more, it is an impostor that they carry.
 /// Chosen on draws of seed 4, a development seed.
-const MAX_PARAMETERS_OFF: usize = 3;
+const MAX_SIGNIFICANTLY_OFF: usize = 3;
+/// Most parameters moved, by the soft count `parameters_moved` of the features, beside a set that leaves more than
+/// [`MOST_LOSS_LEFT`].
+const MAX_PARAMETERS_MOVED: f64 = 3.0;
 
 /// Why a model with effects is no explanation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,7 +127,7 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
             let leaves_much = lacks_fit && features.share < 1.0 - MOST_LOSS_LEFT;
             let most = if leaves_much { MAX_CV_OF_PART } else { MAX_CV_WHEN_PROBABLE };
             features.amplitude_variation.is_none_or(|variation| variation > most)
-                || leaves_much && features.parameters_moved > MAX_PARAMETERS_OFF as f64
+                || leaves_much && features.parameters_moved > MAX_PARAMETERS_MOVED
         })
     };
     // Noise alone tells no other set from that of the search, which comes first.
@@ -167,7 +170,7 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
     } else {
         let explained = with_needed(engine, &selection.model);
         let may_need_many = is_likely || any_homogeneous || selection.model.placed.is_empty();
-        if !may_need_many && parameters_off(engine, &explained) > MAX_PARAMETERS_OFF {
+        if !may_need_many && significantly_off_count(engine, &explained) > MAX_SIGNIFICANTLY_OFF {
             Err(NotExplained::TooManyParametersOff)
         } else {
             Ok(explained)
@@ -193,7 +196,7 @@ fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Op
 }
 
 /// Number of parameters that a model has significantly off.
-fn parameters_off(engine: &Engine<'_>, model: &Refit) -> usize {
+fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
     let spread = parameter_spread(engine, &linearise(engine, model), model).unwrap_or([0.0; COUNT]);
     off(engine, &model.widened(&spread)).into_iter().filter(|off| *off).count()
 }
