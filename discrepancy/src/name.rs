@@ -47,7 +47,7 @@ use heterogeneity::{
     Heterogeneity, eliminate_heterogeneous, heterogeneity, parameter_spread, prefer_homogeneous, prefer_large,
 };
 use model_fit::estimator::RELINEARISED;
-pub(crate) use needed_parameters::off;
+pub(crate) use needed_parameters::significantly_off;
 use needed_parameters::with_needed;
 use null_distribution::NullDistribution;
 use plant::effects::sheet::Part;

@@ -19,7 +19,7 @@
 use super::elimination::Selection;
 use super::explanations::Explanation;
 use super::heterogeneity::parameter_spread;
-use super::needed_parameters::{off, with_needed};
+use super::needed_parameters::{significantly_off, with_needed};
 use super::{axes_of, is_large, loss_on, same};
 use crate::engine::Engine;
 use crate::parameters::COUNT;
@@ -198,7 +198,7 @@ fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Op
 /// Number of parameters that a model has significantly off.
 fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
     let spread = parameter_spread(engine, &linearise(engine, model), model).unwrap_or([0.0; COUNT]);
-    off(engine, &model.widened(&spread)).into_iter().filter(|off| *off).count()
+    significantly_off(engine, &model.widened(&spread)).into_iter().filter(|is_off| *is_off).count()
 }
 
 /// Whether the effects of the search's model are less probable than nothing, or hardly probable at all.

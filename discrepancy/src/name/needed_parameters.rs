@@ -25,15 +25,15 @@ const OFF_SHIFTS: f64 = 3.0;
 
 /// Which parameters of a model are significantly off the rig file's values: beyond their standard errors, and beyond what the
 /// error of integration shifts them by.
-pub(crate) fn off(engine: &Engine<'_>, model: &Refit) -> [bool; COUNT] {
+pub(crate) fn significantly_off(engine: &Engine<'_>, model: &Refit) -> [bool; COUNT] {
     let errors = &model.errors[model.errors.len() - COUNT..];
     let by = model.factors.map(|factor| (factor - 1.0).abs());
-    let off: [bool; COUNT] = std::array::from_fn(|at| is_significant(by[at], errors[at]));
-    if !off.contains(&true) {
-        return off;
+    let beyond_errors: [bool; COUNT] = std::array::from_fn(|at| is_significant(by[at], errors[at]));
+    if !beyond_errors.contains(&true) {
+        return beyond_errors;
     }
     let shifts = integration_shifts(engine, model).unwrap_or([0.0; COUNT]);
-    std::array::from_fn(|at| off[at] && by[at] > OFF_ERRORS * errors[at] + OFF_SHIFTS * shifts[at])
+    std::array::from_fn(|at| beyond_errors[at] && by[at] > OFF_ERRORS * errors[at] + OFF_SHIFTS * shifts[at])
 }
 
 /// Whether a relative deviation with this standard error makes a parameter off.

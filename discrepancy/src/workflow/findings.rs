@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{SelectionResult, is_large, off, same, share_removed};
+use crate::name::{SelectionResult, is_large, same, share_removed, significantly_off};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
@@ -130,11 +130,11 @@ fn named_effect(
 /// Parameters that are significantly off, and those that the model moved by less.
 fn parameters(engine: &Engine<'_>, found: &SelectionResult) -> (Vec<Quantity>, Vec<Quantity>) {
     let model = found.reported.widened(&found.parameter_spread);
-    let is_off = off(engine, &model);
-    let (off, insignificant): (Vec<usize>, Vec<usize>) =
+    let is_off = significantly_off(engine, &model);
+    let (significant, insignificant): (Vec<usize>, Vec<usize>) =
         (0..COUNT).filter(|at| model.factors[*at] != 1.0).partition(|at| is_off[*at]);
     let quantities = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, &model)).collect();
-    (quantities(off), quantities(insignificant))
+    (quantities(significant), quantities(insignificant))
 }
 
 fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
