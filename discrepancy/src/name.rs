@@ -39,7 +39,7 @@ use crate::screen::{Columns, Screened};
 pub use decision::NotExplained;
 use decision::{Decision, Searched, decide};
 use elimination::Selection;
-pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, same};
+pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, is_same_effect};
 pub use explanations::Explanation;
 use explanations::{Fits, explanations};
 use gauss_newton::{fit_selected, shrink_parameters};

@@ -20,7 +20,7 @@ use super::elimination::Selection;
 use super::explanations::Explanation;
 use super::heterogeneity::parameter_spread;
 use super::needed_parameters::{significantly_off, with_needed};
-use super::{axes_of, is_large, loss_on, same};
+use super::{axes_of, is_large, is_same_effect, loss_on};
 use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit, linearise};
@@ -189,7 +189,7 @@ fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Op
     let effects = explanations.iter().filter(|one| one.kind == ExplanationKind::Effects);
     let probable = effects.max_by(|left, right| left.probability.total_cmp(&right.probability));
     let is_in = |single: &&Refit, set: &[EffectEstimate]| {
-        single.placed.iter().all(|placed| set.iter().any(|other| same(placed, other)))
+        single.placed.iter().all(|placed| set.iter().any(|other| is_same_effect(placed, other)))
     };
     let of_set = probable.and_then(|one| one.sets.first());
     of_set.and_then(|set| singles.iter().find(|single| is_in(single, set))).or_else(|| singles.first())
@@ -205,7 +205,8 @@ fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
 fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
     let large: Vec<_> = model.placed.iter().filter(|placed| is_large(placed)).collect();
     let is_it = |set: &Vec<EffectEstimate>| {
-        set.len() == large.len() && large.iter().all(|placed| set.iter().any(|other| same(placed, other)))
+        set.len() == large.len()
+            && large.iter().all(|placed| set.iter().any(|other| is_same_effect(placed, other)))
     };
     let null = explanations.iter().find(|one| one.kind == ExplanationKind::Null);
     let least = null.map_or(LEAST_PROBABLE, |null| null.probability.max(LEAST_PROBABLE));

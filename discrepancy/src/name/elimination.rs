@@ -40,7 +40,7 @@ impl Selection {
         for (at, refits) in rounds.iter().enumerate().take(model.placed.len() - 1) {
             for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
                 let Some(other) = other.placed.last() else { continue };
-                if model.placed.iter().any(|placed| same(placed, other)) {
+                if model.placed.iter().any(|placed| is_same_effect(placed, other)) {
                     continue;
                 }
                 let mut placed = model.placed.clone();
@@ -70,7 +70,8 @@ impl Selection {
     pub(super) fn close_alternatives(&self, fit: &Refit, others: &[Refit]) -> Vec<Refit> {
         let (most, last) = (self.alike(fit), fit.placed.last());
         let is_close = |other: &&Refit| {
-            let is_it = other.placed.last().zip(last).is_some_and(|(other, last)| same(other, last));
+            let is_it =
+                other.placed.last().zip(last).is_some_and(|(other, last)| is_same_effect(other, last));
             !is_it && (other.loss - fit.loss).abs() < most
         };
         others.iter().filter(is_close).cloned().collect()
@@ -122,13 +123,18 @@ impl Selection {
     pub(super) fn alternatives(&self, placed: &EffectEstimate, share: f64) -> Vec<Alternative> {
         // The round in which it joined.
         let Some(refits) = self.rounds.iter().find(|refits| {
-            refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
+            refits
+                .first()
+                .and_then(|best| best.placed.last())
+                .is_some_and(|joined| is_same_effect(joined, placed))
         }) else {
             return Vec::new();
         };
         let best = &refits[0];
         let is_new = |fit: &Refit| {
-            fit.placed.last().is_some_and(|other| !self.model.placed.iter().any(|placed| same(placed, other)))
+            fit.placed
+                .last()
+                .is_some_and(|other| !self.model.placed.iter().any(|placed| is_same_effect(placed, other)))
         };
         refits[1..]
             .iter()
@@ -169,6 +175,6 @@ impl Selection {
 }
 
 /// Whether two are the same effect at the same place.
-pub(crate) fn same(left: &EffectEstimate, right: &EffectEstimate) -> bool {
+pub(crate) fn is_same_effect(left: &EffectEstimate, right: &EffectEstimate) -> bool {
     left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
 }

@@ -12,7 +12,9 @@
 //! log-likelihood of the windows, priors and penalties included.
 
 use super::probabilities::probabilities;
-use super::{amplitude_ratio, axes_of, heterogeneity::heterogeneity, is_large, loss_on, same, share_removed};
+use super::{
+    amplitude_ratio, axes_of, heterogeneity::heterogeneity, is_large, is_same_effect, loss_on, share_removed,
+};
 use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -162,7 +164,7 @@ fn classes<'a>(
 /// Whether a model has all large effects of another one among its own.
 fn has_all(model: &Refit, other: &Refit) -> bool {
     let large_of_model = large(model);
-    large(other).iter().all(|effect| large_of_model.iter().any(|placed| same(placed, effect)))
+    large(other).iter().all(|effect| large_of_model.iter().any(|placed| is_same_effect(placed, effect)))
 }
 
 fn differ_by_alike(
@@ -172,7 +174,10 @@ fn differ_by_alike(
 ) -> bool {
     let only = |of: &Refit, other: &Refit| -> Vec<EffectEstimate> {
         let others = large(other);
-        large(of).into_iter().filter(|placed| !others.iter().any(|other| same(placed, other))).collect()
+        large(of)
+            .into_iter()
+            .filter(|placed| !others.iter().any(|other| is_same_effect(placed, other)))
+            .collect()
     };
     match (&only(left, right)[..], &only(right, left)[..]) {
         ([left], [right]) => are_alike(left, right),

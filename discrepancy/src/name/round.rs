@@ -5,7 +5,7 @@
 //!                                                                                     pitch, with re-estimated start states
 //! ```
 
-use super::elimination::same;
+use super::elimination::is_same_effect;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
 use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_starts};
@@ -65,7 +65,8 @@ impl Contenders {
         model: &Refit,
         threshold: f64,
     ) -> [Option<Self>; 2] {
-        let taken = |screened: &Screened| model.placed.iter().any(|placed| same(placed, &screened.start));
+        let taken =
+            |screened: &Screened| model.placed.iter().any(|placed| is_same_effect(placed, &screened.start));
         let mut all: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
         all.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let (large, small): (Vec<Screened>, Vec<Screened>) =
@@ -219,7 +220,7 @@ impl<'a> Round<'a> {
         let restarted = refit_with_starts(engine, &relinearise(engine, fit));
         // The fit from the screened width is the same effect, not an alternative.
         let is_backlash =
-            |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &backlash.start));
+            |other: &Refit| other.placed.last().is_some_and(|placed| is_same_effect(placed, &backlash.start));
         if self.fits.iter().filter(|other| is_backlash(other)).all(|other| restarted.fit.loss < other.loss) {
             self.fits.retain(|other| !is_backlash(other));
             self.fits.push(restarted.fit.clone());

@@ -20,7 +20,7 @@
 mod sequential;
 
 use super::explanations::Explanation;
-use super::{MIN_LOSS_REDUCTION, is_large, lacks_fit, same};
+use super::{MIN_LOSS_REDUCTION, is_large, is_same_effect, lacks_fit};
 use crate::engine::Engine;
 use crate::fit::{LEAST, Products, loss};
 use crate::refit::{
@@ -118,7 +118,8 @@ impl Fitted<'_> {
         ranked.sort_by(|left, right| right.probability.total_cmp(&left.probability));
         let large: Vec<&EffectEstimate> = model.placed.iter().filter(|placed| is_large(placed)).collect();
         let is_model = |set: &Vec<EffectEstimate>| {
-            set.len() == large.len() && large.iter().all(|placed| set.iter().any(|other| same(placed, other)))
+            set.len() == large.len()
+                && large.iter().all(|placed| set.iter().any(|other| is_same_effect(placed, other)))
         };
         let is_other =
             |one: &&Explanation| one.kind == ExplanationKind::Effects && !one.sets.iter().any(is_model);

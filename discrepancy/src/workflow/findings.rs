@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::{SelectionResult, is_large, same, share_removed, significantly_off};
+use crate::name::{SelectionResult, is_large, is_same_effect, share_removed, significantly_off};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit};
 use crate::report::{
@@ -146,7 +146,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
         .map(|screened| {
             let placed = &screened.start;
             let candidate = &placed.candidate;
-            let is_it = |other: &EffectEstimate| same(other, placed);
+            let is_it = |other: &EffectEstimate| is_same_effect(other, placed);
             let is_last = |fit: &&Refit| fit.placed.last().is_some_and(is_it);
             let alone = found.fitted.iter().filter(|fit| fit.placed.len() == 1).find(is_last);
             let of_model = found.model.placed.iter().position(is_it);
