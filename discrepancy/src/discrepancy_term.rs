@@ -99,7 +99,7 @@ struct Group {
 
 /// The model that a term is sought beside.
 pub struct Beside<'a> {
-    pub placed: &'a [EffectEstimate],
+    pub effects: &'a [EffectEstimate],
     /// Of the baseline parameters, in the order of [`crate::parameters::PARAMETERS`].
     pub factors: [f64; COUNT],
 }
@@ -177,11 +177,11 @@ struct Term {
 
 impl Term {
     fn new(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<Self> {
-        let rig = rig_of(engine.rig(), beside.placed, &beside.factors)?;
+        let rig = rig_of(engine.rig(), beside.effects, &beside.factors)?;
         let simulated = engine.simulate(&rig);
         let residual = engine.residual(&simulated);
-        let mut columns = linearise_at(engine, beside.placed, beside.factors).columns;
-        columns.extend(coordinate_columns(engine, &beside.factors, beside.placed, &simulated)?);
+        let mut columns = linearise_at(engine, beside.effects, beside.factors).columns;
+        columns.extend(coordinate_columns(engine, &beside.factors, beside.effects, &simulated)?);
         let all: Vec<&[f64]> = std::iter::once(&residual).chain(&columns).map(Vec::as_slice).collect();
         let mut windows = Vec::new();
         let mut places: Vec<(&GriddedRecord, usize)> = Vec::new();
@@ -197,8 +197,8 @@ impl Term {
         simulated_forces(engine, &simulated, &mut values);
         Some(Term {
             nuisance: engine.products(&residual, &columns),
-            precisions: prior_precisions(beside.placed),
-            offsets: prior_deviations(&beside.factors, beside.placed),
+            precisions: prior_precisions(beside.effects),
+            offsets: prior_deviations(&beside.factors, beside.effects),
             windows,
             axis_by_axis: engine.axis_by_axis(),
             measured: places.first().map_or([false; 2], |(record, _)| record.measured),

@@ -230,14 +230,14 @@ pub fn name(
         with_needed(restarted.as_ref().unwrap_or(engine), &selection.calibrated)
     });
     let at_reported = linearise(here, &reported);
-    let heterogeneity = if not_explained.is_none() && !reported.placed.is_empty() {
+    let heterogeneity = if not_explained.is_none() && !reported.effects.is_empty() {
         heterogeneity(here, &at_reported, &reported).unwrap_or_default()
     } else {
         Vec::new()
     };
     let parameter_spread = parameter_spread(here, &at_reported, &reported).unwrap_or([0.0; COUNT]);
-    let with_shares = selection.model.placed.iter().zip(&shares);
-    let alternatives = with_shares.map(|(placed, share)| selection.alternatives(placed, *share)).collect();
+    let with_shares = selection.model.effects.iter().zip(&shares);
+    let alternatives = with_shares.map(|(effect, share)| selection.alternatives(effect, *share)).collect();
     let Selection { calibrated, model, .. } = selection;
     SelectionResult {
         calibrated,
@@ -268,7 +268,7 @@ pub fn weigh_by_marginal_likelihood(engine: &Engine<'_>, found: &mut SelectionRe
 
 /// Refits the reported model on all of the records, where the search used a part of them.
 pub(crate) fn on_all(engine: &Engine<'_>, found: &mut SelectionResult) {
-    let Some(rig) = rig_of(engine.rig(), &found.reported.placed, &found.reported.factors) else { return };
+    let Some(rig) = rig_of(engine.rig(), &found.reported.effects, &found.reported.factors) else { return };
     let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
     let needed = found.reported.factors.map(|factor| factor != 1.0);
     if let Some(reported) = fit_selected(restarted.as_ref().unwrap_or(engine), &found.reported, &needed) {
@@ -284,15 +284,15 @@ fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
 /// Whether a model's last effect removes the required share of the loss before it.
 fn gains_enough(engine: &Engine<'_>, before: &Refit, after: &Refit) -> bool {
     let gain = before.loss - after.loss;
-    let share = if before.placed.is_empty() { MIN_LOSS_SHARE_FIRST } else { MIN_LOSS_SHARE_FURTHER };
+    let share = if before.effects.is_empty() { MIN_LOSS_SHARE_FIRST } else { MIN_LOSS_SHARE_FURTHER };
     gain > (share * loss_where_last_acts(engine, before, after)).max(MIN_LOSS_REDUCTION)
 }
 
 /// The axes that effects act on; both where there is none.
-fn axes_of(placed: &[EffectEstimate]) -> [bool; 2] {
+fn axes_of(effects: &[EffectEstimate]) -> [bool; 2] {
     [Part::Drive, Part::Load].map(|axis| {
-        placed.is_empty()
-            || placed.iter().any(|effect| {
+        effects.is_empty()
+            || effects.iter().any(|effect| {
                 let part = effect.candidate.place.part;
                 part == axis || matches!(part, Part::Linkage | Part::Supply)
             })
@@ -307,7 +307,7 @@ fn loss_on(engine: &Engine<'_>, axes: [bool; 2], fit: &Refit) -> f64 {
 
 /// The loss of a model on the axes that the last effect of another one acts on.
 fn loss_where_last_acts(engine: &Engine<'_>, model: &Refit, other: &Refit) -> f64 {
-    loss_on(engine, axes_of(other.placed.last().map_or(&[], std::slice::from_ref)), model)
+    loss_on(engine, axes_of(other.effects.last().map_or(&[], std::slice::from_ref)), model)
 }
 
 /// Share of a loss that a model removes; 0 where there was none to remove.
@@ -335,27 +335,27 @@ pub(crate) fn lack_of_fit_per_dof(linked: bool) -> f64 {
 }
 
 /// Whether one of an effect's amplitudes is above the floor.
-pub fn is_large(placed: &EffectEstimate) -> bool {
-    amplitude_ratio(placed) >= 1.0
+pub fn is_large(effect: &EffectEstimate) -> bool {
+    amplitude_ratio(effect) >= 1.0
 }
 
 /// The largest of an effect's amplitudes over its floor.
-fn amplitude_ratio(placed: &EffectEstimate) -> f64 {
-    amplitude_ratios(placed).map(|(_, ratio)| ratio).fold(0.0, f64::max)
+fn amplitude_ratio(effect: &EffectEstimate) -> f64 {
+    amplitude_ratios(effect).map(|(_, ratio)| ratio).fold(0.0, f64::max)
 }
 
 /// The key with the largest amplitude over its floor.
-fn leading_key(placed: &EffectEstimate) -> usize {
-    amplitude_ratios(placed).max_by(|left, right| left.1.total_cmp(&right.1)).map_or(0, |(key, _)| key)
+fn leading_key(effect: &EffectEstimate) -> usize {
+    amplitude_ratios(effect).max_by(|left, right| left.1.total_cmp(&right.1)).map_or(0, |(key, _)| key)
 }
 
 /// The keys that are amplitudes, each over its floor.
-fn amplitude_ratios(placed: &EffectEstimate) -> impl Iterator<Item = (usize, f64)> {
-    let candidate = &placed.candidate;
-    let keys = if candidate.sheet.defined_by_first { 1 } else { placed.coordinates.len() };
+fn amplitude_ratios(effect: &EffectEstimate) -> impl Iterator<Item = (usize, f64)> {
+    let candidate = &effect.candidate;
+    let keys = if candidate.sheet.defined_by_first { 1 } else { effect.coordinates.len() };
     (0..keys)
         .filter(|key| !candidate.is_shape(*key))
-        .map(|key| (key, placed.coordinates[key].abs() / least_coordinate(candidate, key)))
+        .map(|key| (key, effect.coordinates[key].abs() / least_coordinate(candidate, key)))
 }
 
 /// Amplitude floor of a key, as a coordinate.
@@ -385,12 +385,12 @@ fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<
 /// Screens all candidates against a model's residual, with the derivatives of its effects as extra columns.
 fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<Screened>) {
     let linearisation = linearise(engine, model);
-    let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
+    let rig = rig_of(engine.rig(), &model.effects, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);
     let residual = engine.residual(&simulated);
-    let model_sensitivities: Vec<Vec<f64>> = coordinates(&model.placed)
+    let model_sensitivities: Vec<Vec<f64>> = coordinates(&model.effects)
         .into_par_iter()
-        .filter_map(|(at, key)| derivative(engine, &model.factors, &model.placed, &simulated, at, key))
+        .filter_map(|(at, key)| derivative(engine, &model.factors, &model.effects, &simulated, at, key))
         .collect();
     columns.screen(engine, &linearisation, &residual, &model_sensitivities)
 }

@@ -40,7 +40,7 @@ pub struct EffectEstimate {
 /// A fitted model: effects and parameters.
 #[derive(Clone, Debug)]
 pub struct Refit {
-    pub placed: Vec<EffectEstimate>,
+    pub effects: Vec<EffectEstimate>,
     pub factors: [f64; COUNT],
     /// The loss with priors and, of fits that are compared, a penalty for each number of an effect and each parameter that is
     /// off; a reported model (`name::gauss_newton::fit_selected`) has no penalties in it.
@@ -72,7 +72,7 @@ impl Iterate for Refit {
     }
 
     fn is_at_bound(&self) -> bool {
-        is_at_bound(&self.placed) || has_factor_at_bound(&self.factors)
+        is_at_bound(&self.effects) || has_factor_at_bound(&self.factors)
     }
 }
 
@@ -82,8 +82,8 @@ pub(crate) fn has_factor_at_bound(factors: &[f64; COUNT]) -> bool {
 }
 
 /// Whether a coordinate is at the end of its range.
-pub(crate) fn is_at_bound(placed: &[EffectEstimate]) -> bool {
-    placed.iter().any(|effect| {
+pub(crate) fn is_at_bound(effects: &[EffectEstimate]) -> bool {
+    effects.iter().any(|effect| {
         let coordinates = effect.coordinates.iter().enumerate();
         coordinates.into_iter().any(|(key, at)| effect.candidate.fit_bounds(key).contains(at))
     })
@@ -113,11 +113,11 @@ impl Linearisation {
 /// The rig with effects and factors; `None` where the numbers are inconsistent.
 pub(crate) fn rig_of(
     rig: &RigParameters,
-    placed: &[EffectEstimate],
+    effects: &[EffectEstimate],
     factors: &[f64; COUNT],
 ) -> Option<RigParameters> {
-    placed.iter().try_fold(with_factors(rig, factors), |rig, placed| {
-        placed.candidate.rig(&rig, &placed.coordinates).ok()
+    effects.iter().try_fold(with_factors(rig, factors), |rig, effect| {
+        effect.candidate.rig(&rig, &effect.coordinates).ok()
     })
 }
 
@@ -146,33 +146,33 @@ pub(crate) fn coordinate_precision(candidate: &Candidate, key: usize) -> f64 {
 }
 
 /// Prior precisions of the parameters, then of all coordinates of the effects.
-pub(crate) fn prior_precisions(placed: &[EffectEstimate]) -> Vec<f64> {
+pub(crate) fn prior_precisions(effects: &[EffectEstimate]) -> Vec<f64> {
     let of_effect = |effect: &EffectEstimate| {
         (0..effect.coordinates.len())
             .map(|key| coordinate_precision(&effect.candidate, key))
             .collect::<Vec<_>>()
     };
-    parameter_precisions().into_iter().chain(placed.iter().flat_map(of_effect)).collect()
+    parameter_precisions().into_iter().chain(effects.iter().flat_map(of_effect)).collect()
 }
 
 /// Deviations from the prior means in the same order.
-pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[EffectEstimate]) -> Vec<f64> {
-    let coordinates = placed.iter().flat_map(|effect| effect.coordinates.iter().copied());
+pub(crate) fn prior_deviations(factors: &[f64; COUNT], effects: &[EffectEstimate]) -> Vec<f64> {
+    let coordinates = effects.iter().flat_map(|effect| effect.coordinates.iter().copied());
     factors.iter().map(|factor| factor - 1.0).chain(coordinates).collect()
 }
 
-/// All coordinates of the effects: place in `placed`, and key.
-pub(crate) fn coordinates(placed: &[EffectEstimate]) -> Vec<(usize, usize)> {
-    placed
+/// All coordinates of the effects: place in `effects`, and key.
+pub(crate) fn coordinates(effects: &[EffectEstimate]) -> Vec<(usize, usize)> {
+    effects
         .iter()
         .enumerate()
-        .flat_map(|(at, placed)| (0..placed.coordinates.len()).map(move |key| (at, key)))
+        .flat_map(|(at, effect)| (0..effect.coordinates.len()).map(move |key| (at, key)))
         .collect()
 }
 
 /// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
-pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed: &[EffectEstimate]) -> f64 {
-    let Some(rig) = rig_of(engine.rig(), placed, &linearisation.factors) else { return f64::INFINITY };
+pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, effects: &[EffectEstimate]) -> f64 {
+    let Some(rig) = rig_of(engine.rig(), effects, &linearisation.factors) else { return f64::INFINITY };
     let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &linearisation.columns);
     let parameters: Vec<usize> = (0..COUNT).collect();
     let off = linearisation.deviations();
@@ -181,7 +181,7 @@ pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed
 
 /// Effects at some coordinates, simulated, with the parameters fitted linearly.
 struct Projected {
-    placed: Vec<EffectEstimate>,
+    effects: Vec<EffectEstimate>,
     simulated: Vec<f64>,
     residual: Vec<f64>,
     fit: Fit,
@@ -195,7 +195,7 @@ impl Iterate for Projected {
     }
 
     fn is_at_bound(&self) -> bool {
-        is_at_bound(&self.placed)
+        is_at_bound(&self.effects)
     }
 }
 
@@ -220,16 +220,16 @@ pub(crate) fn refit_steps(
     let coordinates = coordinates(start);
     let most = [vec![MOST_OFF; COUNT], vec![f64::INFINITY; coordinates.len()]].concat();
     let mut parameter_products: Option<Products> = None;
-    let prior = |placed: &[EffectEstimate]| -> f64 {
+    let prior = |effects: &[EffectEstimate]| -> f64 {
         coordinates
             .iter()
             .map(|(at, key)| {
-                coordinate_precision(&placed[*at].candidate, *key) * placed[*at].coordinates[*key].powi(2)
+                coordinate_precision(&effects[*at].candidate, *key) * effects[*at].coordinates[*key].powi(2)
             })
             .sum()
     };
-    let mut evaluate = |placed: Vec<EffectEstimate>| -> Option<Projected> {
-        let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &linearisation.factors)?);
+    let mut evaluate = |effects: Vec<EffectEstimate>| -> Option<Projected> {
+        let simulated = engine.simulate(&rig_of(engine.rig(), &effects, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
             Some(products) => {
@@ -239,12 +239,12 @@ pub(crate) fn refit_steps(
             none => none.insert(engine.products(&residual, &linearisation.columns)),
         };
         let fit = products.fit_within(&parameters, &precisions, &off, &[MOST_OFF; COUNT]);
-        let prior = prior(&placed);
-        Some(Projected { placed, simulated, residual, fit, prior })
+        let prior = prior(&effects);
+        Some(Projected { effects, simulated, residual, fit, prior })
     };
     let products_at = |iterate: &Projected| -> Option<Products> {
         let columns =
-            coordinate_columns(engine, &linearisation.factors, &iterate.placed, &iterate.simulated)?;
+            coordinate_columns(engine, &linearisation.factors, &iterate.effects, &iterate.simulated)?;
         let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&columns).collect();
         Some(engine.products(&iterate.residual, &all))
     };
@@ -255,20 +255,20 @@ pub(crate) fn refit_steps(
     let (iterate, convergence) = Estimator::new(options).descend(first, |estimator, iterate| {
         last = products_at(iterate);
         let Some(products) = &last else { return Step::Impossible };
-        let from = prior_deviations(&linearisation.factors, &iterate.placed);
+        let from = prior_deviations(&linearisation.factors, &iterate.effects);
         let joint = products.fit_within(&chosen, &all_precisions, &from, &most);
         let promised = iterate.loss() - joint.loss;
         if promised < estimator.tolerance(iterate.loss()) {
             return Step::Refused { promised };
         }
         estimator.backtrack(iterate, promised, options.fractions, |share| {
-            let mut placed = iterate.placed.clone();
+            let mut effects = iterate.effects.clone();
             for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
-                let [least, most] = placed[*at].candidate.fit_bounds(*key);
-                let coordinate = &mut placed[*at].coordinates[*key];
+                let [least, most] = effects[*at].candidate.fit_bounds(*key);
+                let coordinate = &mut effects[*at].coordinates[*key];
                 *coordinate = (*coordinate + share * change).clamp(least, most);
             }
-            evaluate(placed)
+            evaluate(effects)
         })
     });
     if convergence.outcome == Outcome::StepLimit {
@@ -298,29 +298,29 @@ pub(crate) fn refit_steps(
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
     let loss = iterate.loss() + model_penalty(coordinates.len(), &factors);
-    let Projected { placed, fit, .. } = iterate;
-    Some(Refit { placed, factors, loss, squares: fit.squares, errors, design_effect, convergence })
+    let Projected { effects, fit, .. } = iterate;
+    Some(Refit { effects, factors, loss, squares: fit.squares, errors, design_effect, convergence })
 }
 
 /// Parameter sensitivities linearised at a model.
 pub(crate) fn linearise(engine: &Engine<'_>, model: &Refit) -> Linearisation {
-    linearise_at(engine, &model.placed, model.factors)
+    linearise_at(engine, &model.effects, model.factors)
 }
 
 /// The same at effects and factors.
 pub(crate) fn linearise_at(
     engine: &Engine<'_>,
-    placed: &[EffectEstimate],
+    effects: &[EffectEstimate],
     factors: [f64; COUNT],
 ) -> Linearisation {
-    let rig = rig_of(engine.rig(), placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
+    let rig = rig_of(engine.rig(), effects, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
     Linearisation { columns: engine.parameter_columns(&rig, &factors), factors }
 }
 
 /// Refits a model with the parameters linearised anew at its own values; `None` where the loss does not fall, an error where no
 /// rig can have it.
 fn linearised_anew(engine: &Engine<'_>, model: &Refit) -> Result<Option<Refit>, ()> {
-    let next = refit(engine, &linearise(engine, model), &model.placed).ok_or(())?;
+    let next = refit(engine, &linearise(engine, model), &model.effects).ok_or(())?;
     let convergence = model.convergence.then(next.convergence);
     Ok((next.loss < model.loss).then_some(Refit { convergence, ..next }))
 }
@@ -349,12 +349,12 @@ pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, options: Options) -
 pub(crate) fn coordinate_columns(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
-    placed: &[EffectEstimate],
+    effects: &[EffectEstimate],
     simulated: &[f64],
 ) -> Option<Vec<Vec<f64>>> {
-    coordinates(placed)
+    coordinates(effects)
         .iter()
-        .map(|(at, key)| derivative(engine, factors, placed, simulated, *at, *key))
+        .map(|(at, key)| derivative(engine, factors, effects, simulated, *at, *key))
         .collect()
 }
 
@@ -370,15 +370,15 @@ pub(crate) fn difference_step(effect: &EffectEstimate, key: usize) -> f64 {
 pub(crate) fn derivative(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
-    placed: &[EffectEstimate],
+    effects: &[EffectEstimate],
     simulated: &[f64],
     at: usize,
     key: usize,
 ) -> Option<Vec<f64>> {
-    let change = difference_step(&placed[at], key);
-    let mut placed = placed.to_vec();
-    placed[at].coordinates[key] += change;
-    let readings = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);
+    let change = difference_step(&effects[at], key);
+    let mut effects = effects.to_vec();
+    effects[at].coordinates[key] += change;
+    let readings = engine.simulate(&rig_of(engine.rig(), &effects, factors)?);
     let mut column = engine.difference(&readings, simulated);
     column.iter_mut().for_each(|value| *value /= change);
     Some(column)
@@ -394,7 +394,7 @@ mod tests {
             let mut factors = [1.0; COUNT];
             factors[2] = factor;
             Refit {
-                placed: Vec::new(),
+                effects: Vec::new(),
                 factors,
                 loss: 0.0,
                 squares: Vec::new(),

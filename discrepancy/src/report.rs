@@ -13,8 +13,8 @@ pub fn place_of(place: Place) -> Where {
 }
 
 /// An effect of a fit without its numbers.
-pub(crate) fn effect_place(placed: &EffectEstimate) -> EffectPlace {
-    EffectPlace { effect: placed.candidate.sheet.name.to_owned(), place: place_of(placed.candidate.place) }
+pub(crate) fn effect_place(effect: &EffectEstimate) -> EffectPlace {
+    EffectPlace { effect: effect.candidate.sheet.name.to_owned(), place: place_of(effect.candidate.place) }
 }
 
 /// The words in a sentence: `a`, `a and b`, `a, b and c`.

@@ -210,8 +210,8 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     if report.adequate == Some(false)
         && let Some(model) = remaining_beside(&report, &found)
     {
-        let beside = Beside { placed: &model.placed, factors: model.factors };
-        let rig = rig_of(rig, &model.placed, &model.factors);
+        let beside = Beside { effects: &model.effects, factors: model.factors };
+        let rig = rig_of(rig, &model.effects, &model.factors);
         let unknowns = rig.filter(|_| linked).map(|rig| locate(&rig, &records, progress).unknowns);
         report.remaining = term_beside(&engine, &beside, &unknowns.unwrap_or_default(), progress);
     }
@@ -249,7 +249,7 @@ pub(crate) fn term_of_rig_file(
     unknowns: &[UnknownSeries],
     progress: &mut dyn FnMut(&str),
 ) -> Option<LocatedTerm> {
-    term_beside(engine, &Beside { placed: &[], factors: [1.0; COUNT] }, unknowns, progress)
+    term_beside(engine, &Beside { effects: &[], factors: [1.0; COUNT] }, unknowns, progress)
 }
 
 /// Which balance disagrees beside a model, and on what it depends. The contact of linked rods is no input of an axis: the unknown

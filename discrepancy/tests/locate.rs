@@ -92,7 +92,7 @@ fn term(effects: &[Hidden<'_>]) -> Option<(String, Vec<String>)> {
     let rig = RigParameters::baseline();
     let records = [gridded(&hiding(effects), &rig)];
     let engine = Engine::new(&records, &rig);
-    let term = located_term(&engine, &Beside { placed: &[], factors: [1.0; 9] })?;
+    let term = located_term(&engine, &Beside { effects: &[], factors: [1.0; 9] })?;
     Some((term.balance, term.variables.into_iter().take(2).map(|variable| variable.variable).collect()))
 }
 

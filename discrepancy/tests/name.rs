@@ -22,7 +22,7 @@ fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -
 }
 
 fn names(found: &SelectionResult) -> Vec<String> {
-    found.model.placed.iter().map(|placed| placed.candidate.name()).collect()
+    found.model.effects.iter().map(|effect| effect.candidate.name()).collect()
 }
 
 /// The explanation that is most probable by the marginal likelihoods, which sum to one.
@@ -122,9 +122,9 @@ fn limit(found: &SelectionResult, name: &str) -> f64 {
 fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     let found = found(&hiding(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 4.0)])]), &[]);
     assert_eq!(names(&found), ["rod-leakage drive.b"]);
-    let placed = &found.model.placed[0];
-    let leakage = placed.candidate.effect_parameters(&placed.coordinates)[0];
-    let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
+    let effect = &found.model.effects[0];
+    let leakage = effect.candidate.effect_parameters(&effect.coordinates)[0];
+    let error = found.model.errors[0] * effect.candidate.slope(0, effect.coordinates[0]).abs();
     assert!((leakage - 4.0).abs() < 4.0 * error + 0.05, "{leakage} +- {error}");
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
     let tests = found.significance.as_ref().expect("it was to be named");
@@ -158,13 +158,13 @@ fn what_is_missing_is_named_beside_what_is_too_small_for_a_name() {
         ("piston-leakage", "drive", &[("leakage_nl_per_min", 3.2)]),
     ]);
     let found = found(&hidden, &[]);
-    let (large, small): (Vec<_>, Vec<_>) = found.reported.placed.iter().partition(|placed| is_large(placed));
+    let (large, small): (Vec<_>, Vec<_>) = found.reported.effects.iter().partition(|effect| is_large(effect));
     assert_eq!(
-        large.iter().map(|placed| placed.candidate.name()).collect::<Vec<_>>(),
+        large.iter().map(|effect| effect.candidate.name()).collect::<Vec<_>>(),
         ["piston-leakage drive"]
     );
     assert_eq!(
-        small.iter().map(|placed| placed.candidate.name()).collect::<Vec<_>>(),
+        small.iter().map(|effect| effect.candidate.name()).collect::<Vec<_>>(),
         ["heat-exchange drive"]
     );
     assert_eq!(found.not_explained, None);
@@ -179,10 +179,10 @@ fn an_effect_that_the_rig_file_has_is_named_where_it_is_off_and_only_there() {
     for truth in [0.0, 6.0] {
         let found = found_beside(&rig, &leaking(truth), &[]);
         assert_eq!(names(&found), ["piston-leakage drive"], "{truth}");
-        let placed = &found.reported.placed[0];
-        let reported = placed.candidate.effect_parameters(&placed.coordinates)[0];
+        let effect = &found.reported.effects[0];
+        let reported = effect.candidate.effect_parameters(&effect.coordinates)[0];
         assert!((reported - truth).abs() < 0.3, "{reported}, in truth {truth}");
-        assert_eq!(placed.candidate.baseline(0), Some(3.0));
+        assert_eq!(effect.candidate.baseline(0), Some(3.0));
     }
 }
 
@@ -263,9 +263,9 @@ fn a_law_of_a_library_is_screened_beside_a_rig_and_named() {
     let engine = Engine::new(&records, &rig);
     let found = name(&engine, Candidate::of_suspects(&rig, [true, false], &suspects), &mut |_| ());
     assert_eq!(names(&found), ["position-dependent drive"]);
-    let placed = &found.model.placed[0];
-    let slope = placed.candidate.effect_parameters(&placed.coordinates)[0];
-    let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
+    let effect = &found.model.effects[0];
+    let slope = effect.candidate.effect_parameters(&effect.coordinates)[0];
+    let error = found.model.errors[0] * effect.candidate.slope(0, effect.coordinates[0]).abs();
     assert!((slope - 120.0).abs() < 4.0 * error + 1.0, "{slope} +- {error}");
     // What keeps values, or is no term that is added, is not for a rig.
     for used in ["friction/presliding", "friction/stick-slip", "sensor/gain", "stiffness/play"] {

@@ -151,11 +151,11 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
     // From here on of the model that is reported.
     let lacks_fit = super::lacks_fit(engine, selection.model.loss);
     let mut shares = selection.shares(engine);
-    let only_large = selection.model.placed.iter().all(is_large);
-    let named = |(placed, share): (_, &f64)| {
-        is_large(placed) && (is_likely || only_large || *share >= MIN_SHARE_BESIDE_SMALL)
+    let only_large = selection.model.effects.iter().all(is_large);
+    let named = |(effect, share): (_, &f64)| {
+        is_large(effect) && (is_likely || only_large || *share >= MIN_SHARE_BESIDE_SMALL)
     };
-    let mut is_named: Vec<bool> = selection.model.placed.iter().zip(&shares).map(named).collect();
+    let mut is_named: Vec<bool> = selection.model.effects.iter().zip(&shares).map(named).collect();
     let too_little = !is_likely
         && lacks_fit
         && (is_outside || !is_named.contains(&true) || share_left(engine, &selection) > MOST_LOSS_LEFT);
@@ -163,13 +163,13 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
         selection.rounds = vec![vec![nearest.clone()]];
         selection.model = nearest.clone();
         shares = selection.shares(engine);
-        is_named = vec![false; selection.model.placed.len()];
+        is_named = vec![false; selection.model.effects.len()];
     }
     let explained = if too_little {
         Err(NotExplained::TooLittle)
     } else {
         let explained = with_needed(engine, &selection.model);
-        let may_need_many = is_likely || any_homogeneous || selection.model.placed.is_empty();
+        let may_need_many = is_likely || any_homogeneous || selection.model.effects.is_empty();
         if !may_need_many && significantly_off_count(engine, &explained) > MAX_SIGNIFICANTLY_OFF {
             Err(NotExplained::TooManyParametersOff)
         } else {
@@ -189,7 +189,7 @@ fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Op
     let effects = explanations.iter().filter(|one| one.kind == ExplanationKind::Effects);
     let probable = effects.max_by(|left, right| left.probability.total_cmp(&right.probability));
     let is_in = |single: &&Refit, set: &[EffectEstimate]| {
-        single.placed.iter().all(|placed| set.iter().any(|other| is_same_effect(placed, other)))
+        single.effects.iter().all(|effect| set.iter().any(|other| is_same_effect(effect, other)))
     };
     let of_set = probable.and_then(|one| one.sets.first());
     of_set.and_then(|set| singles.iter().find(|single| is_in(single, set))).or_else(|| singles.first())
@@ -203,10 +203,10 @@ fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
 
 /// Whether the effects of the search's model are less probable than nothing, or hardly probable at all.
 fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
-    let large: Vec<_> = model.placed.iter().filter(|placed| is_large(placed)).collect();
+    let large: Vec<_> = model.effects.iter().filter(|effect| is_large(effect)).collect();
     let is_it = |set: &Vec<EffectEstimate>| {
         set.len() == large.len()
-            && large.iter().all(|placed| set.iter().any(|other| is_same_effect(placed, other)))
+            && large.iter().all(|effect| set.iter().any(|other| is_same_effect(effect, other)))
     };
     let null = explanations.iter().find(|one| one.kind == ExplanationKind::Null);
     let least = null.map_or(LEAST_PROBABLE, |null| null.probability.max(LEAST_PROBABLE));
@@ -217,7 +217,7 @@ fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
 impl Selection {
     /// The rounds in which the effects of a fit joined: it is the best of the last one, beside others that are hardly worse.
     fn rounds_of(&self, fit: &Refit, all_rounds: &[Vec<Refit>]) -> Vec<Vec<Refit>> {
-        let last = fit.placed.len().saturating_sub(1);
+        let last = fit.effects.len().saturating_sub(1);
         let others = all_rounds.get(last).map_or(&[][..], Vec::as_slice);
         let mut rounds: Vec<Vec<Refit>> = all_rounds.iter().take(last).cloned().collect();
         rounds.push([vec![fit.clone()], self.close_alternatives(fit, others)].concat());
@@ -227,7 +227,7 @@ impl Selection {
 
 /// Share of the loss after calibration that a model leaves on the axes that its effects act on.
 fn share_left(engine: &Engine<'_>, Selection { calibrated, model, .. }: &Selection) -> f64 {
-    let [left, before] = [model, calibrated].map(|fit| loss_on(engine, axes_of(&model.placed), fit));
+    let [left, before] = [model, calibrated].map(|fit| loss_on(engine, axes_of(&model.effects), fit));
     left / before.max(1e-9)
 }
 
@@ -238,7 +238,7 @@ mod tests {
     use crate::parameters::COUNT;
     use plant::RigParameters;
 
-    fn placed(name: &str, amplitude: f64) -> EffectEstimate {
+    fn effect(name: &str, amplitude: f64) -> EffectEstimate {
         let all = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]);
         let candidate = *all.iter().find(|candidate| candidate.sheet.name == name).unwrap();
         let mut coordinates = candidate.origin();
@@ -246,9 +246,9 @@ mod tests {
         EffectEstimate { candidate, coordinates }
     }
 
-    fn model_of(placed: Vec<EffectEstimate>) -> Refit {
+    fn model_of(effects: Vec<EffectEstimate>) -> Refit {
         Refit {
-            placed,
+            effects,
             factors: [1.0; COUNT],
             loss: 0.0,
             squares: Vec::new(),
@@ -264,16 +264,16 @@ mod tests {
 
     #[test]
     fn what_is_outside_resembles_the_most_probable_effect_and_without_one_that_of_the_best_fit() {
-        let single = |name| model_of(vec![placed(name, 1.0)]);
+        let single = |name| model_of(vec![effect(name, 1.0)]);
         let rounds =
             [vec![single("valve-offset"), single("inclination"), single("piston-leakage")], Vec::new()];
         let none = explanation(ExplanationKind::NoneOfThese, Vec::new(), 0.6);
         let set = |names: &[&str], probability| {
-            let set = names.iter().map(|name| placed(name, 0.5)).collect();
+            let set = names.iter().map(|name| effect(name, 0.5)).collect();
             explanation(ExplanationKind::Effects, vec![set], probability)
         };
         let named = |explanations: &[Explanation]| {
-            nearest(&rounds, explanations).unwrap().placed[0].candidate.sheet.name
+            nearest(&rounds, explanations).unwrap().effects[0].candidate.sheet.name
         };
         let likely = set(&["piston-leakage", "inclination"], 0.3);
         assert_eq!(named(&[set(&["valve-offset"], 0.1), likely, none.clone()]), "inclination");
@@ -284,9 +284,9 @@ mod tests {
 
     #[test]
     fn what_is_less_probable_than_nothing_or_hardly_probable_has_no_name() {
-        let model = model_of(vec![placed("inclination", 1.0), placed("valve-offset", 1e-3)]);
+        let model = model_of(vec![effect("inclination", 1.0), effect("valve-offset", 1e-3)]);
         let improbable = |null: f64, set: f64| {
-            let sets = vec![vec![placed("piston-leakage", 1.0)], vec![placed("inclination", 0.9)]];
+            let sets = vec![vec![effect("piston-leakage", 1.0)], vec![effect("inclination", 0.9)]];
             is_improbable(
                 &model,
                 &[

@@ -37,21 +37,23 @@ impl Selection {
         let Self { model, rounds, .. } = self;
         let point = linearise(engine, model);
         let mut tried = Vec::new();
-        for (at, refits) in rounds.iter().enumerate().take(model.placed.len() - 1) {
+        for (at, refits) in rounds.iter().enumerate().take(model.effects.len() - 1) {
             for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
-                let Some(other) = other.placed.last() else { continue };
-                if model.placed.iter().any(|placed| is_same_effect(placed, other)) {
+                let Some(other) = other.effects.last() else { continue };
+                if model.effects.iter().any(|effect| is_same_effect(effect, other)) {
                     continue;
                 }
-                let mut placed = model.placed.clone();
-                placed[at] = other.clone();
-                tried.push((at, rank, placed));
+                let mut effects = model.effects.clone();
+                effects[at] = other.clone();
+                tried.push((at, rank, effects));
             }
         }
         progress(&format!("trying {} other combinations", tried.len()));
         let best = tried
             .par_iter()
-            .filter_map(|(at, rank, placed)| Some((*at, *rank, refit_steps(engine, &point, placed, STEPS)?)))
+            .filter_map(|(at, rank, effects)| {
+                Some((*at, *rank, refit_steps(engine, &point, effects, STEPS)?))
+            })
             .collect::<Vec<_>>()
             .into_iter()
             .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
@@ -68,10 +70,10 @@ impl Selection {
 
     /// Those of other fits whose loss differs from that of a fit by hardly anything.
     pub(super) fn close_alternatives(&self, fit: &Refit, others: &[Refit]) -> Vec<Refit> {
-        let (most, last) = (self.alike(fit), fit.placed.last());
+        let (most, last) = (self.alike(fit), fit.effects.last());
         let is_close = |other: &&Refit| {
             let is_it =
-                other.placed.last().zip(last).is_some_and(|(other, last)| is_same_effect(other, last));
+                other.effects.last().zip(last).is_some_and(|(other, last)| is_same_effect(other, last));
             !is_it && (other.loss - fit.loss).abs() < most
         };
         others.iter().filter(is_close).cloned().collect()
@@ -86,19 +88,19 @@ impl Selection {
     /// Eliminates effects whose removal raises the loss by less than a multiple of the null threshold.
     pub(super) fn eliminate_backward(&mut self, engine: &Engine<'_>, columns: &Columns) {
         let Self { calibrated, model, rounds } = self;
-        while !model.placed.is_empty() {
+        while !model.effects.is_empty() {
             let linearisation = linearise(engine, model);
             let left = NullDistribution::new(engine, columns, &linearisation, model);
             let threshold = left.threshold();
-            let without: Vec<Option<Refit>> = (0..model.placed.len())
+            let without: Vec<Option<Refit>> = (0..model.effects.len())
                 .into_par_iter()
                 .map(|at| {
-                    let mut placed = model.placed.clone();
-                    placed.remove(at);
-                    if placed.is_empty() {
+                    let mut effects = model.effects.clone();
+                    effects.remove(at);
+                    if effects.is_empty() {
                         return Some(calibrated.clone());
                     }
-                    refit_steps(engine, &linearisation, &placed, 4)
+                    refit_steps(engine, &linearisation, &effects, 4)
                 })
                 .collect();
             let least = without
@@ -109,7 +111,7 @@ impl Selection {
             let Some((at, fit)) = least else { break };
             let loss_rise = left.loss_rise(engine, &fit, model);
             let safety =
-                if fit.placed.is_empty() { THRESHOLD_FACTOR_SINGLE } else { THRESHOLD_FACTOR_SEVERAL };
+                if fit.effects.is_empty() { THRESHOLD_FACTOR_SINGLE } else { THRESHOLD_FACTOR_SEVERAL };
             let share = loss_rise / (calibrated.loss - model.loss).max(1e-9);
             if loss_rise > safety * threshold && share > MIN_SHARE_OF_REDUCTION {
                 break;
@@ -120,21 +122,21 @@ impl Selection {
     }
 
     /// Alternatives to an effect of the model; `share` is the share of the excess that the effect removes.
-    pub(super) fn alternatives(&self, placed: &EffectEstimate, share: f64) -> Vec<Alternative> {
+    pub(super) fn alternatives(&self, effect: &EffectEstimate, share: f64) -> Vec<Alternative> {
         // The round in which it joined.
         let Some(refits) = self.rounds.iter().find(|refits| {
             refits
                 .first()
-                .and_then(|best| best.placed.last())
-                .is_some_and(|joined| is_same_effect(joined, placed))
+                .and_then(|best| best.effects.last())
+                .is_some_and(|joined| is_same_effect(joined, effect))
         }) else {
             return Vec::new();
         };
         let best = &refits[0];
         let is_new = |fit: &Refit| {
-            fit.placed
+            fit.effects
                 .last()
-                .is_some_and(|other| !self.model.placed.iter().any(|placed| is_same_effect(placed, other)))
+                .is_some_and(|other| !self.model.effects.iter().any(|own| is_same_effect(own, other)))
         };
         refits[1..]
             .iter()
@@ -153,13 +155,13 @@ impl Selection {
         let whole = (excess / calibrated.loss.max(1e-9)).clamp(0.0, 1.0);
         let mut before = calibrated.loss;
         model
-            .placed
+            .effects
             .iter()
             .enumerate()
-            .map(|(at, placed)| {
+            .map(|(at, effect)| {
                 let after =
                     rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |fit| fit.loss);
-                let on_axes = loss_on(engine, axes_of(std::slice::from_ref(placed)), calibrated);
+                let on_axes = loss_on(engine, axes_of(std::slice::from_ref(effect)), calibrated);
                 let removed = before - after;
                 // A loss below what noise gives, of all axes or of those of the effect, is no measure of what was there.
                 let share = if calibrated.loss > 0.0 && on_axes > 0.0 {

@@ -95,7 +95,7 @@ pub(super) fn explanations(
     all.extend(classes.iter().map(|class| {
         let best = class[0];
         let variations = heterogeneity(engine, &at_model, best).map(|all| {
-            let of_large = all.into_iter().zip(&best.placed).filter(|(_, placed)| is_large(placed));
+            let of_large = all.into_iter().zip(&best.effects).filter(|(_, effect)| is_large(effect));
             of_large.map(|(effect, _)| effect.variation).fold(0.0, f64::max)
         });
         let named = large(best);
@@ -106,7 +106,7 @@ pub(super) fn explanations(
             share: share_removed(before, left),
             amplitude_variation: variations,
             smallest_amplitude: Some(named.iter().map(amplitude_ratio).fold(f64::INFINITY, f64::min)),
-            small_beside: best.placed.len() - named.len(),
+            small_beside: best.effects.len() - named.len(),
             ..features(best.loss, &best.factors)
         };
         Explanation {
@@ -134,7 +134,7 @@ fn parameters_moved(factors: &[f64; COUNT]) -> f64 {
 
 /// Its effects that are large enough to be named.
 fn large(fit: &Refit) -> Vec<EffectEstimate> {
-    fit.placed.iter().filter(|placed| is_large(placed)).cloned().collect()
+    fit.effects.iter().filter(|effect| is_large(effect)).cloned().collect()
 }
 
 /// The best fit of each set of large effects, alike ones together: the model's class first, then by loss.
@@ -164,7 +164,7 @@ fn classes<'a>(
 /// Whether a model has all large effects of another one among its own.
 fn has_all(model: &Refit, other: &Refit) -> bool {
     let large_of_model = large(model);
-    large(other).iter().all(|effect| large_of_model.iter().any(|placed| is_same_effect(placed, effect)))
+    large(other).iter().all(|effect| large_of_model.iter().any(|own| is_same_effect(own, effect)))
 }
 
 fn differ_by_alike(
@@ -176,7 +176,7 @@ fn differ_by_alike(
         let others = large(other);
         large(of)
             .into_iter()
-            .filter(|placed| !others.iter().any(|other| is_same_effect(placed, other)))
+            .filter(|effect| !others.iter().any(|other| is_same_effect(effect, other)))
             .collect()
     };
     match (&only(left, right)[..], &only(right, left)[..]) {
@@ -248,7 +248,7 @@ mod tests {
             EffectEstimate { candidate, coordinates }
         };
         Refit {
-            placed: names.iter().map(effect).collect(),
+            effects: names.iter().map(effect).collect(),
             factors: [1.0; COUNT],
             loss,
             squares: Vec::new(),

@@ -32,7 +32,7 @@ const SHRINK_FACTORS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = SHRINK_FACTORS.map(|shrink| model.factors.map(|factor| 1.0 + shrink * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {
-        iterate(engine, model.placed.clone(), *factors).map_or(f64::INFINITY, |iterate| iterate.loss)
+        iterate(engine, model.effects.clone(), *factors).map_or(f64::INFINITY, |iterate| iterate.loss)
     };
     let losses: Vec<f64> = tried.par_iter().map(loss).collect();
     let best = (0..SHRINK_FACTORS.len()).min_by(|one, other| losses[*one].total_cmp(&losses[*other]));
@@ -43,13 +43,13 @@ pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COU
 /// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(mut fit) = fit_for_comparison(engine, model) else { return model.clone() };
-    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors);
+    fit.loss += model_penalty(coordinates(&fit.effects), &fit.factors);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 
 /// A simulated model.
 struct Simulated {
-    placed: Vec<EffectEstimate>,
+    effects: Vec<EffectEstimate>,
     factors: [f64; COUNT],
     simulated: Vec<f64>,
     residual: Vec<f64>,
@@ -65,7 +65,7 @@ impl Iterate for Simulated {
     }
 
     fn is_at_bound(&self) -> bool {
-        is_at_bound(&self.placed) || has_factor_at_bound(&self.factors)
+        is_at_bound(&self.effects) || has_factor_at_bound(&self.factors)
     }
 }
 
@@ -85,34 +85,34 @@ fn fit_within(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT], option
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
         *factor = 1.0;
     }
-    let start = iterate(engine, model.placed.clone(), factors)?;
+    let start = iterate(engine, model.effects.clone(), factors)?;
     let chosen: Vec<usize> =
-        (0..COUNT + coordinates(&start.placed)).filter(|at| *at >= COUNT || needed[*at]).collect();
+        (0..COUNT + coordinates(&start.effects)).filter(|at| *at >= COUNT || needed[*at]).collect();
     let (iterate, convergence) = Estimator::new(options).descend(start, |estimator, iterate| {
         linearised(engine, iterate).map_or(Step::Impossible, |linearisation| {
             stepped(engine, estimator, iterate, &linearisation, &chosen)
         })
     });
     let errors = errors(engine, &linearised(engine, &iterate)?, &iterate);
-    let Simulated { placed, factors, squares, loss, .. } = iterate;
-    Some(Refit { placed, factors, loss, squares, errors, design_effect: model.design_effect, convergence })
+    let Simulated { effects, factors, squares, loss, .. } = iterate;
+    Some(Refit { effects, factors, loss, squares, errors, design_effect: model.design_effect, convergence })
 }
 
-fn iterate(engine: &Engine<'_>, placed: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Simulated> {
-    let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
+fn iterate(engine: &Engine<'_>, effects: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Simulated> {
+    let simulated = engine.simulate(&rig_of(engine.rig(), &effects, &factors)?);
     let residual = engine.residual(&simulated);
     let squares = engine.squares(&residual);
-    let (precisions, off) = (prior_precisions(&placed), prior_deviations(&factors, &placed));
+    let (precisions, off) = (prior_precisions(&effects), prior_deviations(&factors, &effects));
     let prior: Vec<f64> = precisions.iter().zip(&off).map(|(precision, off)| precision * off * off).collect();
     let loss = loss(&squares, engine.scaled_dof())
         + prior[..COUNT].iter().sum::<f64>()
         + prior[COUNT..].iter().sum::<f64>();
-    Some(Simulated { placed, factors, simulated, residual, squares, loss })
+    Some(Simulated { effects, factors, simulated, residual, squares, loss })
 }
 
 /// Number of coordinates of the effects.
-fn coordinates(placed: &[EffectEstimate]) -> usize {
-    placed.iter().map(|effect| effect.coordinates.len()).sum()
+fn coordinates(effects: &[EffectEstimate]) -> usize {
+    effects.iter().map(|effect| effect.coordinates.len()).sum()
 }
 
 /// Linearisation at a point.
@@ -138,11 +138,11 @@ impl JointLinearisation {
 }
 
 fn linearised(engine: &Engine<'_>, iterate: &Simulated) -> Option<JointLinearisation> {
-    let rig = rig_of(engine.rig(), &iterate.placed, &[1.0; COUNT])?;
+    let rig = rig_of(engine.rig(), &iterate.effects, &[1.0; COUNT])?;
     let mut columns = engine.parameter_columns(&rig, &iterate.factors);
-    columns.extend(coordinate_columns(engine, &iterate.factors, &iterate.placed, &iterate.simulated)?);
+    columns.extend(coordinate_columns(engine, &iterate.factors, &iterate.effects, &iterate.simulated)?);
     let (precisions, from) =
-        (prior_precisions(&iterate.placed), prior_deviations(&iterate.factors, &iterate.placed));
+        (prior_precisions(&iterate.effects), prior_deviations(&iterate.factors, &iterate.effects));
     Some(JointLinearisation { columns, precisions, from })
 }
 
@@ -221,21 +221,21 @@ fn step_by(
     step: &Fit,
     share: f64,
 ) -> Option<Simulated> {
-    let (mut placed, mut factors) = (from.placed.clone(), from.factors);
-    let mut changes = vec![0.0; COUNT + coordinates(&placed)];
+    let (mut effects, mut factors) = (from.effects.clone(), from.factors);
+    let mut changes = vec![0.0; COUNT + coordinates(&effects)];
     chosen.iter().zip(&step.coefficients).for_each(|(at, coefficient)| changes[*at] = share * coefficient);
     for (factor, change) in factors.iter_mut().zip(&changes) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
     let mut changes = changes[COUNT..].iter();
-    for effect in &mut placed {
+    for effect in &mut effects {
         for key in 0..effect.coordinates.len() {
             let [least, most] = effect.candidate.fit_bounds(key);
             effect.coordinates[key] =
                 (effect.coordinates[key] + changes.next().expect("one each")).clamp(least, most);
         }
     }
-    iterate(engine, placed, factors)
+    iterate(engine, effects, factors)
 }
 
 /// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.

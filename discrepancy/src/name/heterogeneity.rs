@@ -74,7 +74,7 @@ pub(super) fn prefer_homogeneous(
 /// Leaves the fits above the amplitude floor, where one of them is adequate or the model before them is.
 pub(super) fn prefer_large(engine: &Engine<'_>, before: &Refit, fits: &mut Vec<Refit>) {
     let is_adequate = |fit: &Refit| !lacks_fit(engine, fit.loss);
-    let is_large = |fit: &Refit| fit.placed.last().is_some_and(is_large);
+    let is_large = |fit: &Refit| fit.effects.last().is_some_and(is_large);
     if is_adequate(before) || fits.iter().any(|fit| is_large(fit) && is_adequate(fit)) {
         fits.retain(is_large);
     }
@@ -83,18 +83,18 @@ pub(super) fn prefer_large(engine: &Engine<'_>, before: &Refit, fits: &mut Vec<R
 /// Eliminates effects on whose amplitude the windows do not agree, the worst first.
 pub(super) fn eliminate_heterogeneous(engine: &Engine<'_>, selection: &mut Selection) {
     let Selection { calibrated, model, rounds } = selection;
-    while !model.placed.is_empty() {
+    while !model.effects.is_empty() {
         let linearisation = linearise(engine, model);
         let Some(variation) = amplitude_variation(engine, &linearisation, model) else { break };
         let worst = variation.iter().copied().enumerate().max_by(|left, right| left.1.total_cmp(&right.1));
         let Some((at, _)) = worst.filter(|(_, variation)| *variation > MAX_CV_IN_SEARCH) else { break };
-        let mut placed = model.placed.clone();
-        placed.remove(at);
+        let mut effects = model.effects.clone();
+        effects.remove(at);
         rounds.remove(at.min(rounds.len() - 1));
-        *model = if placed.is_empty() {
+        *model = if effects.is_empty() {
             calibrated.clone()
         } else {
-            let fit = refit_steps(engine, &linearisation, &placed, STEPS);
+            let fit = refit_steps(engine, &linearisation, &effects, STEPS);
             let Some(fit) = fit else { break };
             relinearise(engine, fit)
         };
@@ -128,12 +128,12 @@ pub(super) fn heterogeneity(
 ) -> Option<Vec<Heterogeneity>> {
     let windows = Windows::new(engine, linearisation, model)?;
     let mut column = linearisation.columns.len();
-    (0..model.placed.len())
+    (0..model.effects.len())
         .map(|at| {
-            let placed = &model.placed[at];
-            let columns = column..column + placed.coordinates.len();
+            let effect = &model.effects[at];
+            let columns = column..column + effect.coordinates.len();
             column = columns.end;
-            let scale = windows.with_response(engine, model, at, columns.start + leading_key(placed))?;
+            let scale = windows.with_response(engine, model, at, columns.start + leading_key(effect))?;
             let variation = spread_of(&informative(&scale));
             let spread = columns.map(|column| Some(significant_spread(&windows.changes(column)?)));
             Some(Heterogeneity { variation, spread: spread.collect::<Option<_>>()? })
@@ -172,13 +172,13 @@ struct Windows {
 
 impl Windows {
     fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
-        let simulated = engine.simulate(&rig_of(engine.rig(), &model.placed, &model.factors)?);
+        let simulated = engine.simulate(&rig_of(engine.rig(), &model.effects, &model.factors)?);
         let residual = engine.residual(&simulated);
         let mut columns = linearisation.columns.clone();
-        columns.extend(coordinate_columns(engine, &model.factors, &model.placed, &simulated)?);
+        columns.extend(coordinate_columns(engine, &model.factors, &model.effects, &simulated)?);
         let products = engine.products(&residual, &columns);
         let weights = products.weights(&engine.squares(&residual));
-        let precisions = prior_precisions(&model.placed);
+        let precisions = prior_precisions(&model.effects);
         Some(Windows { simulated, residual, columns, products, weights, precisions })
     }
 
@@ -191,7 +191,7 @@ impl Windows {
         effect: usize,
         column: usize,
     ) -> Option<Vec<(f64, f64)>> {
-        let mut without = model.placed.clone();
+        let mut without = model.effects.clone();
         without.remove(effect);
         let other = engine.simulate(&rig_of(engine.rig(), &without, &model.factors)?);
         let mut columns: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();

@@ -77,9 +77,9 @@ fn marginals(
         .map(|one| {
             let are_exact = one.kind == ExplanationKind::Null;
             let alone = if are_exact { [1.0; COUNT] } else { calibrated.factors };
-            let (placed, factors) =
-                one.fit.as_ref().map_or((&[][..], alone), |fit| (&fit.placed[..], fit.factors));
-            Model::of(Placed { engine, placed, factors }, &sensitivities, are_exact)
+            let (effects, factors) =
+                one.fit.as_ref().map_or((&[][..], alone), |fit| (&fit.effects[..], fit.factors));
+            Model::of(Estimates { engine, effects, factors }, &sensitivities, are_exact)
         })
         .collect::<Option<_>>()?;
     let (grams, places) = inputs(engine, &sensitivities, &models)?;
@@ -127,23 +127,23 @@ fn probabilities(priors: &[f64], logs: &[f64]) -> Vec<f64> {
 }
 
 /// Effects and factors of an explanation.
-struct Placed<'a> {
+struct Estimates<'a> {
     engine: &'a Engine<'a>,
-    placed: &'a [EffectEstimate],
+    effects: &'a [EffectEstimate],
     factors: [f64; COUNT],
 }
 
-impl Placed<'_> {
-    fn residual(&self, placed: &[EffectEstimate]) -> Option<Vec<f64>> {
-        let rig = rig_of(self.engine.rig(), placed, &self.factors)?;
+impl Estimates<'_> {
+    fn residual(&self, effects: &[EffectEstimate]) -> Option<Vec<f64>> {
+        let rig = rig_of(self.engine.rig(), effects, &self.factors)?;
         Some(self.engine.residual(&self.engine.simulate(&rig)))
     }
 
     /// The residual with the leading amplitude of an effect elsewhere.
     fn residual_at(&self, effect: usize, z: f64) -> Option<Vec<f64>> {
-        let mut placed = self.placed.to_vec();
-        placed[effect].coordinates[0] = z;
-        self.residual(&placed)
+        let mut effects = self.effects.to_vec();
+        effects[effect].coordinates[0] = z;
+        self.residual(&effects)
     }
 }
 
@@ -178,11 +178,11 @@ struct Model<'a> {
 
 impl<'a> Model<'a> {
     /// `None` where no rig can have the model or its neighbours.
-    fn of(at: Placed<'_>, sensitivities: &'a [Vec<f64>], are_exact: bool) -> Option<Self> {
-        let Placed { engine, placed, factors } = at;
-        let simulated = engine.simulate(&rig_of(engine.rig(), placed, &factors)?);
+    fn of(at: Estimates<'_>, sensitivities: &'a [Vec<f64>], are_exact: bool) -> Option<Self> {
+        let Estimates { engine, effects, factors } = at;
+        let simulated = engine.simulate(&rig_of(engine.rig(), effects, &factors)?);
         let residual = engine.residual(&simulated);
-        let columns = coordinate_columns(engine, &factors, placed, &simulated)?;
+        let columns = coordinate_columns(engine, &factors, effects, &simulated)?;
         let all: Vec<&Vec<f64>> = sensitivities.iter().chain(&columns).collect();
         let of_effect = |effect: &'_ EffectEstimate| {
             let candidate = effect.candidate;
@@ -196,7 +196,7 @@ impl<'a> Model<'a> {
             columns,
             deviations: factors.iter().map(|factor| factor - 1.0).collect(),
             are_exact,
-            coordinates: placed.iter().flat_map(of_effect).collect(),
+            coordinates: effects.iter().flat_map(of_effect).collect(),
             nodes: None,
         };
         model.nodes = model.nodes(&at);
@@ -204,12 +204,12 @@ impl<'a> Model<'a> {
     }
 
     /// Nodes along the first leading amplitude that needs them.
-    fn nodes(&self, at: &Placed<'_>) -> Option<Nodes> {
+    fn nodes(&self, at: &Estimates<'_>) -> Option<Nodes> {
         let mut coordinate = 0;
-        for (effect, placed) in at.placed.iter().enumerate() {
+        for (effect, estimate) in at.effects.iter().enumerate() {
             let deviation = self.posterior_deviation(at.engine, coordinate)?;
-            let z = placed.coordinates[0];
-            let [least, most] = placed.candidate.fit_bounds(0);
+            let z = estimate.coordinates[0];
+            let [least, most] = estimate.candidate.fit_bounds(0);
             let is_near_bound = (z - least).min(most - z) < NEAR_BOUND * deviation;
             if is_near_bound || !self.is_parabolic(at, effect, coordinate, deviation) {
                 let ends = [(z - COVERED * deviation).max(least), (z + COVERED * deviation).min(most)];
@@ -222,13 +222,13 @@ impl<'a> Model<'a> {
                 let nodes = quadrature(ends).into_iter().map(node).collect::<Option<_>>()?;
                 return Some(Nodes { coordinate, nodes });
             }
-            coordinate += placed.coordinates.len();
+            coordinate += estimate.coordinates.len();
         }
         None
     }
 
     /// Whether the simulated loss rises on both sides of an amplitude about as a parabola does, all else refitted linearly.
-    fn is_parabolic(&self, at: &Placed<'_>, effect: usize, coordinate: usize, deviation: f64) -> bool {
+    fn is_parabolic(&self, at: &Estimates<'_>, effect: usize, coordinate: usize, deviation: f64) -> bool {
         let (prior, z) = self.coordinates[coordinate];
         let twice_minus_log = |z: f64, residual: &[f64]| {
             POWER * self.refitted_loss(at.engine, residual, coordinate) - 2.0 * prior.log_density(z)

@@ -44,14 +44,14 @@ fn is_significant(by: f64, error: f64) -> bool {
 /// Size of the change of each parameter when the model is fitted to itself simulated with half the step. `None` where it cannot
 /// be linearised.
 fn integration_shifts(engine: &Engine<'_>, model: &Refit) -> Option<[f64; COUNT]> {
-    let rig = rig_of(engine.rig(), &model.placed, &model.factors)?;
+    let rig = rig_of(engine.rig(), &model.effects, &model.factors)?;
     let simulated = engine.simulate(&rig);
     let mut columns = linearise(engine, model).columns;
-    columns.extend(coordinate_columns(engine, &model.factors, &model.placed, &simulated)?);
+    columns.extend(coordinate_columns(engine, &model.factors, &model.effects, &simulated)?);
     let difference = engine.difference(&engine.simulate_finely(&rig), &simulated);
     let products = engine.products(&difference, &columns);
     let all: Vec<usize> = (0..columns.len()).collect();
-    let precisions = prior_precisions(&model.placed);
+    let precisions = prior_precisions(&model.effects);
     let weights = products.weights(&engine.squares(&engine.residual(&simulated)));
     let shifts = products.weighted_solution(&all, &weights, &precisions, &vec![0.0; all.len()])?;
     Some(std::array::from_fn(|at| shifts[at].abs()))
@@ -72,8 +72,8 @@ pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
 /// Needed parameters by the linearised model; `None` where all are needed, or where no derivative exists.
 fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
     let linearisation = linearise(engine, model);
-    let simulated = engine.simulate(&rig_of(engine.rig(), &model.placed, &model.factors)?);
-    let coordinates = coordinate_columns(engine, &model.factors, &model.placed, &simulated)?;
+    let simulated = engine.simulate(&rig_of(engine.rig(), &model.effects, &model.factors)?);
+    let coordinates = coordinate_columns(engine, &model.factors, &model.effects, &simulated)?;
     let mut residual = engine.residual(&simulated);
     // Shifts the residual to the rig file's values, so that the coefficients are deviations from them.
     for (column, factor) in linearisation.columns.iter().zip(model.factors) {
@@ -81,7 +81,7 @@ fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
     }
     let columns: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&coordinates).collect();
     let products = engine.products(&residual, &columns);
-    let precisions = prior_precisions(&model.placed);
+    let precisions = prior_precisions(&model.effects);
     let loss = |needed: &[bool; COUNT]| {
         let chosen: Vec<usize> = (0..columns.len()).filter(|at| *at >= COUNT || needed[*at]).collect();
         let precisions: Vec<f64> = chosen.iter().map(|at| precisions[*at]).collect();

@@ -40,7 +40,7 @@ impl NullDistribution {
         model: &Refit,
     ) -> Self {
         let rig =
-            rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
+            rig_of(engine.rig(), &model.effects, &model.factors).expect("a model that was fitted is a rig");
         let residual = engine.residual(&engine.simulate(&rig));
         let of: Vec<(usize, f64, usize)> = columns
             .probes

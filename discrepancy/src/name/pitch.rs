@@ -26,10 +26,10 @@ pub(super) fn at_best_pitch(engine: &Engine<'_>, model: &Refit) -> Refit {
 }
 
 fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
-    let candidate = model.placed.last()?.candidate;
+    let candidate = model.effects.last()?.candidate;
     let key_of = |name: &str| candidate.sheet.keys.iter().position(|key| key.name == name);
     let (ripple, pitch) = (key_of("ripple_n")?, key_of("pitch_mm")?);
-    let mut plain = model.placed.clone();
+    let mut plain = model.effects.clone();
     let last = plain.len() - 1;
     plain[last].coordinates[ripple] = 0.0;
     let rig = rig_of(engine.rig(), &plain, &model.factors)?;
@@ -38,10 +38,10 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
     let step = (1.0 / least - 1.0 / most) / f64::from(PITCHES - 1);
     let pitches: Vec<f64> = (0..PITCHES).map(|at| 1.0 / (1.0 / most + f64::from(at) * step)).collect();
     let with = |amplitude: f64, at: f64| {
-        let mut placed = plain.clone();
-        placed[last].coordinates[ripple] = amplitude;
-        placed[last].coordinates[pitch] = candidate.coordinate(pitch, at);
-        placed
+        let mut effects = plain.clone();
+        effects[last].coordinates[ripple] = amplitude;
+        effects[last].coordinates[pitch] = candidate.coordinate(pitch, at);
+        effects
     };
     let ripples: Vec<Vec<f64>> = pitches
         .par_iter()

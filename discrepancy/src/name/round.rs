@@ -66,7 +66,7 @@ impl Contenders {
         threshold: f64,
     ) -> [Option<Self>; 2] {
         let taken =
-            |screened: &Screened| model.placed.iter().any(|placed| is_same_effect(placed, &screened.start));
+            |screened: &Screened| model.effects.iter().any(|effect| is_same_effect(effect, &screened.start));
         let mut all: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
         all.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let (large, small): (Vec<Screened>, Vec<Screened>) =
@@ -81,7 +81,7 @@ impl Contenders {
         let backlash = if engine.is_linked() { large.iter().find(is_backlash).cloned() } else { None };
         let share = if lacks_fit(engine, null_loss) { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
         let most = [&large, &small].map(|all| all.first().map_or(0.0, gain));
-        let count = if model.placed.len() < 2 { CONTENDERS } else { CONTENDERS_LATE };
+        let count = if model.effects.len() < 2 { CONTENDERS } else { CONTENDERS_LATE };
         let best = |mut all: Vec<Screened>, count: usize, least: f64| {
             all.retain(|screened| gain(screened) > least);
             all.truncate(count);
@@ -121,7 +121,7 @@ impl<'a> Round<'a> {
     ) -> Option<Self> {
         let [large, small] = Contenders::of(screening, engine, columns, model, threshold);
         let mut fitted = |contenders: &Contenders| {
-            let number = model.placed.len() + 1;
+            let number = model.effects.len() + 1;
             progress(&format!("fitting {} candidates, round {number}", contenders.best.len()));
             Round::fitted(engine, linearisation, model, contenders, progress)
         };
@@ -155,7 +155,7 @@ impl<'a> Round<'a> {
         let mut fits: Vec<Refit> = best
             .par_iter()
             .filter_map(|screened| {
-                let start = best_start(engine, linearisation, &model.placed, screened, *null_loss);
+                let start = best_start(engine, linearisation, &model.effects, screened, *null_loss);
                 refit_steps(engine, linearisation, &start, STEPS)
             })
             .collect();
@@ -180,7 +180,7 @@ impl<'a> Round<'a> {
         round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
         let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
         if let Some(backlash) = backlash
-            && model.placed.len() < BACKLASH_BESIDE
+            && model.effects.len() < BACKLASH_BESIDE
             && least > LACK_OF_FIT_PER_DOF * engine.scaled_dof().iter().sum::<f64>()
         {
             progress("trying other gaps");
@@ -213,14 +213,15 @@ impl<'a> Round<'a> {
         model: &Refit,
         backlash: &Screened,
     ) {
-        let start = backlash_start(engine, linearisation, &model.placed, &backlash.start);
+        let start = backlash_start(engine, linearisation, &model.effects, &backlash.start);
         let Some(fit) = refit_steps(engine, linearisation, &start, STEPS) else {
             return;
         };
         let restarted = refit_with_starts(engine, &relinearise(engine, fit));
         // The fit from the screened width is the same effect, not an alternative.
-        let is_backlash =
-            |other: &Refit| other.placed.last().is_some_and(|placed| is_same_effect(placed, &backlash.start));
+        let is_backlash = |other: &Refit| {
+            other.effects.last().is_some_and(|effect| is_same_effect(effect, &backlash.start))
+        };
         if self.fits.iter().filter(|other| is_backlash(other)).all(|other| restarted.fit.loss < other.loss) {
             self.fits.retain(|other| !is_backlash(other));
             self.fits.push(restarted.fit.clone());
@@ -252,11 +253,11 @@ fn best_start(
     null_loss: f64,
 ) -> Vec<EffectEstimate> {
     let with = |amplitude: f64| {
-        let mut placed = model.to_vec();
+        let mut effects = model.to_vec();
         let mut effect = screened.start.clone();
         effect.coordinates[0] = amplitude;
-        placed.push(effect);
-        placed
+        effects.push(effect);
+        effects
     };
     let screened_z = screened.start.coordinates[0];
     let loss = loss_at(engine, linearisation, &with(screened_z));

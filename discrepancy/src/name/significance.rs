@@ -63,7 +63,7 @@ impl Fitted<'_> {
     /// Tests a model whose effects are to be named.
     pub(super) fn significance(&self, model: &Refit) -> Option<Significance> {
         let gains = window_gains(self.engine.scaled_dof(), &self.calibrated.squares, &model.squares);
-        let charged = COLUMN_PENALTY * numbers(&model.placed) as f64;
+        let charged = COLUMN_PENALTY * numbers(&model.effects) as f64;
         let gain = gains.iter().sum::<f64>() - charged;
         // Draws say how much chance gives without the best windows, which is far less than with them. Where there are none, what
         // any gain has to exceed counts; a threshold from a residual that is signal is no measure of chance.
@@ -80,7 +80,7 @@ impl Fitted<'_> {
         let left = DRAWS - chance.as_ref().map_or(DRAWS, |chance| chance.draws);
         let other = self.other(model).filter(|_| left >= AT_ONCE);
         Some(Significance {
-            effects: places(&model.placed),
+            effects: places(&model.effects),
             gain,
             best_windows: best_windows(gains.len()),
             gain_without_best,
@@ -99,7 +99,7 @@ impl Fitted<'_> {
         let linearisation = Linearisation { columns, factors };
         let all = self.columns.beside(&linearisation, &[]);
         let products = engine.products(&truth.simulated, &all);
-        let count = model.placed.len();
+        let count = model.effects.len();
         let draw = |number: usize| {
             let (drawn, residual) = truth.drawn(SEED, number);
             let products = products.of_residual(&residual, &all, drawn.rows());
@@ -116,10 +116,10 @@ impl Fitted<'_> {
     fn other(&self, model: &Refit) -> Option<&Refit> {
         let mut ranked: Vec<&Explanation> = self.explanations.iter().collect();
         ranked.sort_by(|left, right| right.probability.total_cmp(&left.probability));
-        let large: Vec<&EffectEstimate> = model.placed.iter().filter(|placed| is_large(placed)).collect();
+        let large: Vec<&EffectEstimate> = model.effects.iter().filter(|effect| is_large(effect)).collect();
         let is_model = |set: &Vec<EffectEstimate>| {
             set.len() == large.len()
-                && large.iter().all(|placed| set.iter().any(|other| is_same_effect(placed, other)))
+                && large.iter().all(|effect| set.iter().any(|other| is_same_effect(effect, other)))
         };
         let is_other =
             |one: &&Explanation| one.kind == ExplanationKind::Effects && !one.sets.iter().any(is_model);
@@ -139,7 +139,7 @@ impl Fitted<'_> {
             other_step.loss(&residual, drawn.rows()) - model_step.loss(&of_model, drawn.rows())
         };
         let ahead = loss(&other.squares, dof) - loss(&model.squares, dof);
-        Some(drawn_records(places(&other.placed), ahead, draws, true, draw))
+        Some(drawn_records(places(&other.effects), ahead, draws, true, draw))
     }
 }
 
@@ -152,7 +152,7 @@ struct Truth<'a> {
 
 impl<'a> Truth<'a> {
     fn new(engine: &'a Engine<'a>, model: &Refit) -> Option<Self> {
-        let rig = rig_of(engine.rig(), &model.placed, &model.factors)?;
+        let rig = rig_of(engine.rig(), &model.effects, &model.factors)?;
         let simulated = engine.simulate(&rig);
         Some(Truth { engine, rig, simulated })
     }
@@ -177,13 +177,13 @@ struct OneStep {
 
 impl OneStep {
     fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
-        let rig = rig_of(engine.rig(), &model.placed, &model.factors)?;
+        let rig = rig_of(engine.rig(), &model.effects, &model.factors)?;
         let simulated = engine.simulate(&rig);
         let mut columns = linearisation.columns.clone();
-        columns.extend(coordinate_columns(engine, &model.factors, &model.placed, &simulated)?);
+        columns.extend(coordinate_columns(engine, &model.factors, &model.effects, &simulated)?);
         let products = engine.products(&simulated, &columns);
         let (precisions, from) =
-            (prior_precisions(&model.placed), prior_deviations(&model.factors, &model.placed));
+            (prior_precisions(&model.effects), prior_deviations(&model.factors, &model.effects));
         Some(OneStep { rig, columns, products, precisions, from })
     }
 
@@ -243,12 +243,12 @@ fn without_best(gains: &[f64]) -> f64 {
 }
 
 /// Count of fitted effect parameters.
-fn numbers(placed: &[EffectEstimate]) -> usize {
-    placed.iter().map(|effect| effect.coordinates.len()).sum()
+fn numbers(effects: &[EffectEstimate]) -> usize {
+    effects.iter().map(|effect| effect.coordinates.len()).sum()
 }
 
-fn places(placed: &[EffectEstimate]) -> Vec<EffectPlace> {
-    placed.iter().map(effect_place).collect()
+fn places(effects: &[EffectEstimate]) -> Vec<EffectPlace> {
+    effects.iter().map(effect_place).collect()
 }
 
 #[cfg(test)]

@@ -20,9 +20,9 @@ pub(super) struct RefitWithInitialStates<'a> {
 pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit) -> RefitWithInitialStates<'a> {
     let mut best = RefitWithInitialStates { engine: None, fit: model.clone() };
     for _ in 0..if engine.is_linked() { MAX_ALTERNATIONS } else { 0 } {
-        let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
+        let Some(rig) = rig_of(engine.rig(), &best.fit.effects, &best.fit.factors) else { break };
         let restarted = engine.with_starts_under(&rig);
-        let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.placed) else {
+        let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.effects) else {
             break;
         };
         let converged =
@@ -60,9 +60,9 @@ pub(super) fn backlash_start(
         .collect();
     let losses: Vec<f64> = tried
         .par_iter()
-        .map(|placed| {
-            rig_of(engine.rig(), placed, &linearisation.factors)
-                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), linearisation, placed))
+        .map(|effects| {
+            rig_of(engine.rig(), effects, &linearisation.factors)
+                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), linearisation, effects))
         })
         .collect();
     let best = (0..tried.len()).min_by(|left, right| losses[*left].total_cmp(&losses[*right]));

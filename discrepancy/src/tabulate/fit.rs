@@ -219,7 +219,7 @@ impl Iterate {
         }
         let factors = self.model.factors;
         Refit {
-            placed: Vec::new(),
+            effects: Vec::new(),
             factors,
             loss: self.loss,
             squares: Vec::new(),

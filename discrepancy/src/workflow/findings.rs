@@ -61,32 +61,32 @@ fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
     let (mut named, mut small) = (Vec::new(), Vec::new());
     // What is not explained has no names, and the nearest effect.
     let model = if found.not_explained.is_some() { &found.model } else { &found.reported };
-    let all = model.placed.iter().zip(&found.shares).zip(&found.alternatives);
-    for (index, ((placed, share), alternatives)) in all.enumerate() {
+    let all = model.effects.iter().zip(&found.shares).zip(&found.alternatives);
+    for (index, ((effect, share), alternatives)) in all.enumerate() {
         let disagreement = found.heterogeneity.get(index);
-        let within = &model.errors[at..at + placed.coordinates.len()];
+        let within = &model.errors[at..at + effect.coordinates.len()];
         let errors: Vec<f64> = match disagreement {
             Some(windows) => {
                 within.iter().zip(&windows.spread).map(|(one, other)| one.hypot(*other)).collect()
             }
             None => within.to_vec(),
         };
-        at += placed.coordinates.len();
+        at += effect.coordinates.len();
         let alternatives = alternatives
             .iter()
             .filter_map(|other| {
-                let placed = other.fit.placed.last()?;
-                let from = other.fit.errors.len() - COUNT - placed.coordinates.len();
-                Some(named_effect(placed, &other.fit.errors[from..], other.share, Vec::new()))
+                let effect = other.fit.effects.last()?;
+                let from = other.fit.errors.len() - COUNT - effect.coordinates.len();
+                Some(named_effect(effect, &other.fit.errors[from..], other.share, Vec::new()))
             })
             .collect();
         let amplitude_variation = disagreement.filter(|_| found.lacks_fit).map(|windows| windows.variation);
-        let effect =
-            NamedEffect { amplitude_variation, ..named_effect(placed, &errors, *share, alternatives) };
+        let reported =
+            NamedEffect { amplitude_variation, ..named_effect(effect, &errors, *share, alternatives) };
         if found.not_explained.is_some() || found.is_named[index] {
-            named.push(effect)
+            named.push(reported)
         } else {
-            small.push(effect)
+            small.push(reported)
         }
     }
     for all in [&mut named, &mut small] {
@@ -96,13 +96,13 @@ fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
 }
 
 fn named_effect(
-    placed: &EffectEstimate,
+    effect: &EffectEstimate,
     errors: &[f64],
     share: f64,
     alternatives: Vec<NamedEffect>,
 ) -> NamedEffect {
-    let candidate = &placed.candidate;
-    let numbers = candidate.effect_parameters(&placed.coordinates);
+    let candidate = &effect.candidate;
+    let numbers = candidate.effect_parameters(&effect.coordinates);
     let parameters = candidate
         .sheet
         .keys
@@ -112,7 +112,7 @@ fn named_effect(
             name: key.name.to_owned(),
             value: numbers[at],
             unit: key.unit.name().to_owned(),
-            standard_error: Some(candidate.standard_error(at, placed.coordinates[at], errors[at]))
+            standard_error: Some(candidate.standard_error(at, effect.coordinates[at], errors[at]))
                 .filter(|error| error.is_finite()),
             before: candidate.baseline(at),
         })
@@ -144,26 +144,26 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
         .screened
         .iter()
         .map(|screened| {
-            let placed = &screened.start;
-            let candidate = &placed.candidate;
-            let is_it = |other: &EffectEstimate| is_same_effect(other, placed);
-            let is_last = |fit: &&Refit| fit.placed.last().is_some_and(is_it);
-            let alone = found.fitted.iter().filter(|fit| fit.placed.len() == 1).find(is_last);
-            let of_model = found.model.placed.iter().position(is_it);
+            let effect = &screened.start;
+            let candidate = &effect.candidate;
+            let is_it = |other: &EffectEstimate| is_same_effect(other, effect);
+            let is_last = |fit: &&Refit| fit.effects.last().is_some_and(is_it);
+            let alone = found.fitted.iter().filter(|fit| fit.effects.len() == 1).find(is_last);
+            let of_model = found.model.effects.iter().position(is_it);
             let is_alike = found.alternatives.iter().flatten().any(|alternative| is_last(&&alternative.fit));
-            let shown = alone.map_or(placed, |fit| &fit.placed[0]);
+            let shown = alone.map_or(effect, |fit| &fit.effects[0]);
             let share = alone.map(|fit| share_removed(found.calibrated.loss, fit.loss));
             let decision = if let Some(reason) = of_model.and(found.not_explained) {
                 reason.reason()
             } else if let Some(at) = of_model {
                 if found.is_named[at] { "named" } else { "part of the model, and too small to be named" }
             } else if let Some((_, objection)) =
-                objection.filter(|(tests, _)| tests.effects.contains(&effect_place(placed)))
+                objection.filter(|(tests, _)| tests.effects.contains(&effect_place(effect)))
             {
                 objection
             } else if is_alike && found.not_explained.is_none() {
                 "explains as much as what is named"
-            } else if alone.is_some_and(|fit| !is_large(&fit.placed[0])) {
+            } else if alone.is_some_and(|fit| !is_large(&fit.effects[0])) {
                 "fitted, and below the smallest amplitude that is named"
             } else if alone.is_some() {
                 "fitted, and others explain more"

@@ -32,7 +32,7 @@ pub(super) fn prior_of(explanation: &Explanation, candidates: usize) -> f64 {
         ExplanationKind::Parameters => PRIOR_PARAMETERS,
         ExplanationKind::NoneOfThese => PRIOR_NONE_OF_THESE,
         ExplanationKind::Effects => {
-            let effects = explanation.fit.as_ref().map_or(1, |fit| fit.placed.len()).clamp(1, OF_SETS.len());
+            let effects = explanation.fit.as_ref().map_or(1, |fit| fit.effects.len()).clamp(1, OF_SETS.len());
             let number: f64 = (0..effects).map(|at| (candidates - at) as f64 / (at + 1) as f64).product();
             PRIOR_EFFECTS * OF_SETS[effects - 1] * explanation.sets.len() as f64 / number.max(1.0)
         }
@@ -95,12 +95,12 @@ mod tests {
     fn all_sets_of_as_many_effects_share_one_prior() {
         let of = |effects: usize, sets: usize| {
             let all = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]);
-            let placed = |candidate: &Candidate| EffectEstimate {
+            let effect = |candidate: &Candidate| EffectEstimate {
                 candidate: *candidate,
                 coordinates: candidate.origin(),
             };
             let fit = Refit {
-                placed: all[..effects].iter().map(placed).collect(),
+                effects: all[..effects].iter().map(effect).collect(),
                 factors: [1.0; COUNT],
                 loss: 0.0,
                 squares: Vec::new(),
@@ -108,7 +108,7 @@ mod tests {
                 design_effect: 1.0,
                 convergence: Default::default(),
             };
-            let sets = vec![fit.placed.clone(); sets];
+            let sets = vec![fit.effects.clone(); sets];
             let one = Explanation {
                 kind: ExplanationKind::Effects,
                 sets,

@@ -99,7 +99,7 @@ fn a_strong_effect_is_significant_after_five_draws_with_any_number_of_threads() 
     let [model, other] = ["inclination", "dead-volume"].map(|name| case.fitted(Some(name)));
     let explanations = [&model, &other].map(|fit| Explanation {
         kind: ExplanationKind::Effects,
-        sets: vec![fit.placed.clone()],
+        sets: vec![fit.effects.clone()],
         features: None,
         fit: Some(fit.clone()),
         probability: 0.5,
