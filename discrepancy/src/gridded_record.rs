@@ -22,7 +22,7 @@ use memory::Memory;
 use model_fit::stats::{mean, mean_and_variance, median};
 use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
 use records::{Channel, Record, Signal};
-use rest::{Rate, Still};
+use rest::{Rate, RestClassifier};
 pub(crate) use subsample::searched_share;
 
 /// Simulated channels of an axis: position, force, pressures a and b.
@@ -275,16 +275,16 @@ impl GriddedRecord {
         let positions = column(0);
         let position = parabolas(&positions, POSITION_HALF_WIDTH);
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
-        let mut still = Still::new(&position, &positions, self.noise[i][0]);
+        let mut classifier = RestClassifier::new(&position, &positions, self.noise[i][0]);
         // Autocorrelation widens the error of a mean.
-        let share = lag1_autocorrelation(&positions, &still.resting(), self.noise[i][0]);
+        let share = lag1_autocorrelation(&positions, &classifier.resting(), self.noise[i][0]);
         if share > 0.0 {
             let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
-            still = Still::new(&position, &positions, lasting_m);
+            classifier = RestClassifier::new(&position, &positions, lasting_m);
         }
         for place in 0..self.len() {
             let pressures = pressures.each_ref().map(|column| column[place].map(|parabola| parabola.value));
-            let (Some(rate), [Some(a), Some(b)]) = (still.rate(place), pressures) else {
+            let (Some(rate), [Some(a), Some(b)]) = (classifier.rate(place), pressures) else {
                 self.excluded_periods[place] = true;
                 continue;
             };
@@ -298,7 +298,7 @@ impl GriddedRecord {
                 pressures_pa: [a, b],
             };
         }
-        let resting = still.resting();
+        let resting = classifier.resting();
         for at in 0..CHANNELS {
             self.lag1_autocorrelation[i][at] = lag1_autocorrelation(&column(at), &resting, self.noise[i][at]);
         }

@@ -23,8 +23,8 @@ pub(super) fn mean_variance() -> f64 {
     1.0 / (2 * REST_REACH + 1) as f64
 }
 
-/// Positions of an axis and where they rest.
-pub(super) struct Still<'a> {
+/// Classifies the periods of an axis by its positions.
+pub(super) struct RestClassifier<'a> {
     parabolas: &'a [Option<Parabola>],
     positions: &'a [Option<f64>],
     noise_m: f64,
@@ -42,15 +42,15 @@ pub(super) struct Rate {
     pub(super) alternative_velocity_m_per_s: Option<f64>,
 }
 
-impl<'a> Still<'a> {
+impl<'a> RestClassifier<'a> {
     /// `noise_m` is the effective noise of means, larger than that of readings where noise is autocorrelated.
     pub(super) fn new(parabolas: &'a [Option<Parabola>], positions: &'a [Option<f64>], noise_m: f64) -> Self {
         let error = noise_m * slope_error(POSITION_HALF_WIDTH);
         let slow = |parabola: &Parabola| parabola.slope.abs() < SLOW_ERRORS * error;
         let slow: Vec<bool> = parabolas.iter().map(|parabola| parabola.as_ref().is_some_and(slow)).collect();
-        let mut still = Still { parabolas, positions, noise_m, slow, rests: Vec::new() };
-        still.rests = (0..positions.len()).map(|place| still.rest(place)).collect();
-        still
+        let mut classifier = RestClassifier { parabolas, positions, noise_m, slow, rests: Vec::new() };
+        classifier.rests = (0..positions.len()).map(|place| classifier.rest(place)).collect();
+        classifier
     }
 
     /// Periods that seem at rest.
@@ -67,7 +67,7 @@ impl<'a> Still<'a> {
         let Some(rest_m) = self.rests[place] else {
             return rate_of(value, slope / PERIOD_S, self.slow[place].then_some(0.0));
         };
-        match CREEP_REACHES.into_iter().find_map(|reach| self.creep_evenly(place, reach)) {
+        match CREEP_REACHES.into_iter().find_map(|reach| self.steady_creep(place, reach)) {
             Some(creep_m_per_s) => rate_of(value, creep_m_per_s, Some(0.0)),
             None => rate_of(rest_m, 0.0, self.creep(place)),
         }
@@ -86,28 +86,29 @@ impl<'a> Still<'a> {
     }
 
     /// Rate of a steady motion before, around and after a period, m/s.
-    fn creep_evenly(&self, place: usize, reach: usize) -> Option<f64> {
+    fn steady_creep(&self, place: usize, reach: usize) -> Option<f64> {
         let most_m = CREEP_FASTEST_M_PER_S * reach as f64 * PERIOD_S;
-        let ways = [
-            self.way(place.checked_sub(reach)?, reach)?,
-            self.way(place, reach)?,
-            self.way(place + reach, reach)?,
+        let displacements_m = [
+            self.displacement_m(place.checked_sub(reach)?, reach)?,
+            self.displacement_m(place, reach)?,
+            self.displacement_m(place + reach, reach)?,
         ];
-        let evenly = ways.iter().all(|way| {
-            way.signum() == ways[1].signum() && (self.least_m(reach)..most_m).contains(&way.abs())
+        let is_steady = displacements_m.iter().all(|displacement_m| {
+            displacement_m.signum() == displacements_m[1].signum()
+                && (self.least_m(reach)..most_m).contains(&displacement_m.abs())
         });
-        evenly.then(|| ways[1] / (reach as f64 * PERIOD_S))
+        is_steady.then(|| displacements_m[1] / (reach as f64 * PERIOD_S))
     }
 
     /// Rate of possible creep over the shortest stretch, m/s.
     fn creep(&self, place: usize) -> Option<f64> {
         let [reach, _] = CREEP_REACHES;
-        let way = self.way(place, reach)?;
-        (way.abs() > self.least_m(reach)).then(|| way / (reach as f64 * PERIOD_S))
+        let displacement_m = self.displacement_m(place, reach)?;
+        (displacement_m.abs() > self.least_m(reach)).then(|| displacement_m / (reach as f64 * PERIOD_S))
     }
 
     /// Mean of the stretch after a place minus that before; `None` at the ends of the record.
-    fn way(&self, place: usize, reach: usize) -> Option<f64> {
+    fn displacement_m(&self, place: usize, reach: usize) -> Option<f64> {
         let stretch = |from: usize| {
             let near: Vec<f64> = self.positions.get(from..from + reach)?.iter().flatten().copied().collect();
             (!near.is_empty()).then(|| mean(&near))
@@ -133,7 +134,7 @@ mod tests {
         let positions: Vec<_> =
             (0..600).map(f64::from).map(|at| Some(way(at - 300.0) + scatter(at))).collect();
         let parabolas = parabolas(&positions, POSITION_HALF_WIDTH);
-        Still::new(&parabolas, &positions, 20e-6).rate(300).unwrap()
+        RestClassifier::new(&parabolas, &positions, 20e-6).rate(300).unwrap()
     }
 
     #[test]
