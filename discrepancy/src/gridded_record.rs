@@ -1,14 +1,14 @@
 //! A record on a grid of 1 ms: inputs, samples and smoothed states of every period.
 //!
 //! ```text
-//!   record ──► grid of 1 ms ──► inputs held over each period, samples or None, points (x, v, p_a, p_b) by local parabolas
+//!   record ──► grid of 1 ms ──► inputs held over each period, samples or None, states (x, v, p_a, p_b) by local parabolas
 //! ```
 //!
 //! Rows go to their nearest millisecond. A period without a row has no samples and keeps the command before. A window with a
 //! run of more than [`HELD_LONGEST`] periods without a command, or a period without a smoothed state, is not simulated
 //! ([`GriddedRecord::excluded_periods`]).
 //!
-//! Windows start at the points; their remaining errors are estimated with each window. At rest the speed is exactly zero
+//! Windows start at the smoothed states; their remaining errors are estimated with each window. At rest the speed is exactly zero
 //! (`gridded_record/rest.rs`).
 //!
 //! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
@@ -57,7 +57,7 @@ pub struct GriddedRecord {
     /// Readings at the start of each period, in the order of [`SIGNALS`], rig coordinates, the load's offset taken off.
     pub samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
     /// Smoothed state of each axis at the start of each period.
-    pub points: Vec<[AxisState; 2]>,
+    pub smoothed_states: Vec<[AxisState; 2]>,
     /// What each axis remembers at the start of each period.
     pub(crate) memories: Vec<[Memory; 2]>,
     /// Standard deviation of each reading, its rounding included.
@@ -164,7 +164,7 @@ impl GriddedRecord {
             measured,
             inputs: vec![Inputs::default(); length],
             samples: vec![[[None; CHANNELS]; 2]; length],
-            points: vec![[AxisState::default(); 2]; length],
+            smoothed_states: vec![[AxisState::default(); 2]; length],
             excluded_periods: vec![false; length],
             ..GriddedRecord::default()
         };
@@ -238,7 +238,7 @@ impl GriddedRecord {
     /// A record of simulated samples: inputs, samples, noise and measured axes are given.
     pub(crate) fn of_samples(given: GriddedRecord, rig: &RigParameters) -> GriddedRecord {
         let mut gridded = GriddedRecord {
-            points: vec![[AxisState::default(); 2]; given.len()],
+            smoothed_states: vec![[AxisState::default(); 2]; given.len()],
             excluded_periods: vec![false; given.len()],
             ..given
         };
@@ -250,9 +250,9 @@ impl GriddedRecord {
         gridded
     }
 
-    /// Standard errors of an axis' point from the noise of its samples, in the order of [`AxisState::NUDGES`]; 0 of the
+    /// Standard errors of an axis' smoothed state from the noise of its samples, in the order of [`AxisState::NUDGES`]; 0 of the
     /// rate of an axis at rest.
-    pub(crate) fn point_errors(&self, axis: usize, rests: bool) -> [f64; 4] {
+    pub(crate) fn state_errors(&self, axis: usize, rests: bool) -> [f64; 4] {
         let error = |channel: usize, variance: f64| {
             let share = self.lag1_autocorrelation[axis][channel];
             self.noise[axis][channel] * (variance * (1.0 + share) / (1.0 - share)).sqrt()
@@ -291,7 +291,7 @@ impl GriddedRecord {
             let Rate { position_m, rate_m_per_s, alternative_velocity_m_per_s } = rate;
             let (out_m, out) =
                 if axis == Axis::Load { (stroke_m - position_m, -1.0) } else { (position_m, 1.0) };
-            self.points[place][i] = AxisState {
+            self.smoothed_states[place][i] = AxisState {
                 extension_m: out_m.clamp(0.0, stroke_m),
                 rod_velocity_m_per_s: out * rate_m_per_s,
                 alternative_velocity_m_per_s: alternative_velocity_m_per_s.map(|rate| out * rate),

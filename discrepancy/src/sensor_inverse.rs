@@ -83,7 +83,8 @@ impl SensorInverse {
             let i = axis.index();
             let [position, a, b] = self.axes[i];
             let later = |reading: Reading, of: &dyn Fn(&AxisState) -> f64| {
-                let (then, now) = (at(record, i, period, reading.delay_s, of), of(&record.points[period][i]));
+                let (then, now) =
+                    (at(record, i, period, reading.delay_s, of), of(&record.smoothed_states[period][i]));
                 of(&starts[i]) + then - now
             };
             let extension_m = later(position, &|point| point.extension_m);
@@ -101,7 +102,7 @@ impl SensorInverse {
         for term in &self.declared {
             let i = term.axis().index();
             let at = |period: usize| {
-                let (point, inputs) = (&record.points[period][i], &record.inputs[period]);
+                let (point, inputs) = (&record.smoothed_states[period][i], &record.inputs[period]);
                 let ([a, b], valve) = (point.pressures_pa, inputs.valve[i]);
                 let time_s = record.since_start(period) as f64 * PERIOD_S;
                 term.value(&[point.extension_m, point.rod_velocity_m_per_s, a, b, valve, valve, time_s, 0.0])
@@ -135,7 +136,7 @@ fn at(
     let place = (period as f64 + delay_s / PERIOD_S).min((record.len() - 1) as f64);
     let (before, share) = (place.floor() as usize, place.fract());
     let after = (before + 1).min(record.len() - 1);
-    let [before, after] = [before, after].map(|place| of(&record.points[place][axis]));
+    let [before, after] = [before, after].map(|place| of(&record.smoothed_states[place][axis]));
     // Rest and motion are not interpolated.
     if share == 0.0 || before == 0.0 || after == 0.0 {
         return if share < 0.5 { before } else { after };

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Spool, lagged flows and the internal states of effects continue from window to window. Mechanical states and pressures restart
-//! from the record's points, whose errors M_k projects out to first order. A direction is projected out if one prior standard
-//! deviation of the start state changes the whitened window by a norm above 1; at rest the speed is zero.
+//! from the record's smoothed states, whose errors M_k projects out to first order. A direction is projected out if one prior
+//! standard deviation of the start state changes the whitened window by a norm above 1; at rest the speed is zero.
 //!
 //! The force jumps where a piston stops, breaks away or reverses, and microseconds decide on which side of a sample. A force
 //! residual, or difference of two simulations, that deviates from its neighbours' median by more than noise is replaced by it
@@ -93,7 +93,8 @@ impl<'a> Windows<'a> {
                 }
             }
         }
-        let points = (0..record.len() / WINDOW).map(|window| record.points[window * WINDOW]).collect();
+        let points =
+            (0..record.len() / WINDOW).map(|window| record.smoothed_states[window * WINDOW]).collect();
         let mut jitter_sensitivity = Vec::with_capacity(readings.len());
         for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
             jitter_sensitivity.extend(

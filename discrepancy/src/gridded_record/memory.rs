@@ -41,7 +41,7 @@ impl GriddedRecord {
     pub(super) fn remember(&mut self, axis: usize) {
         let commands: Vec<f64> = self.inputs.iter().map(|inputs| inputs.valve[axis]).collect();
         let of = |value: &dyn Fn(&super::AxisState) -> f64| -> Vec<f64> {
-            self.points.iter().map(|point| value(&point[axis])).collect()
+            self.smoothed_states.iter().map(|states| value(&states[axis])).collect()
         };
         let pressures = [0, 1].map(|chamber| of(&|state| state.pressures_pa[chamber]));
         let speeds = of(&|state| state.rod_velocity_m_per_s.abs());

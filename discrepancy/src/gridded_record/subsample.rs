@@ -33,7 +33,7 @@ impl GriddedRecord {
         let mut part = GriddedRecord {
             inputs: Vec::new(),
             samples: Vec::new(),
-            points: Vec::new(),
+            smoothed_states: Vec::new(),
             memories: Vec::new(),
             excluded_periods: Vec::new(),
             blocks: Vec::new(),
@@ -46,7 +46,7 @@ impl GriddedRecord {
             part.blocks.push(places.start);
             part.inputs.extend_from_slice(&self.inputs[places.clone()]);
             part.samples.extend_from_slice(&self.samples[places.clone()]);
-            part.points.extend_from_slice(&self.points[places.clone()]);
+            part.smoothed_states.extend_from_slice(&self.smoothed_states[places.clone()]);
             part.memories.extend(self.memories.get(places.clone()).into_iter().flatten());
             part.excluded_periods.extend_from_slice(&self.excluded_periods[places]);
             let began = part.excluded_periods.len() - BLOCK * WINDOW;
@@ -73,7 +73,7 @@ mod tests {
             measured: [true, true],
             inputs: (0..periods).map(inputs).collect(),
             samples: vec![[[None; super::super::CHANNELS]; 2]; periods],
-            points: vec![[super::super::AxisState::default(); 2]; periods],
+            smoothed_states: vec![[super::super::AxisState::default(); 2]; periods],
             excluded_periods: vec![false; periods],
             ..GriddedRecord::default()
         }

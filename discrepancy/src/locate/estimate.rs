@@ -292,7 +292,7 @@ impl LinearisedWindow<'_> {
     /// A reading's sensitivities and residual over its noise.
     fn row(&self, at: usize, channel: usize) -> Option<(Theta, f64)> {
         let sample = self.gridded.samples[self.from + at][self.axis][channel]?;
-        let rests = self.gridded.points[self.from][self.axis].rod_velocity_m_per_s == 0.0;
+        let rests = self.gridded.smoothed_states[self.from][self.axis].rod_velocity_m_per_s == 0.0;
         let weight = 1.0 / self.noise(channel);
         let baseline = self.runs.baseline[self.axis][at][channel];
         let mut row = Theta::zeros();
@@ -428,12 +428,12 @@ pub(crate) fn variables(
     from: usize,
     kind: UnknownKind,
 ) -> [f64; VARIABLES.len()] {
-    let points = &gridded.points[from..from + WINDOW];
+    let states = &gridded.smoothed_states[from..from + WINDOW];
     let n = WINDOW as f64;
     let mean = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(of).sum::<f64>() / n;
-    let x = mean(&|at| points[at][axis].extension_m);
-    let v = mean(&|at| points[at][axis].rod_velocity_m_per_s);
-    let [a, b] = [0, 1].map(|chamber| mean(&|at| points[at][axis].pressures_pa[chamber]));
+    let x = mean(&|at| states[at][axis].extension_m);
+    let v = mean(&|at| states[at][axis].rod_velocity_m_per_s);
+    let [a, b] = [0, 1].map(|chamber| mean(&|at| states[at][axis].pressures_pa[chamber]));
     let command = |at: usize| gridded.inputs[at].valve[axis];
     let u = mean(&|at| command(from + at));
     let before = from.saturating_sub(1);
@@ -441,9 +441,9 @@ pub(crate) fn variables(
     let forces: Vec<f64> =
         gridded.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][FORCE]).collect();
     let force = if forces.is_empty() { 0.0 } else { forces.iter().sum::<f64>() / forces.len() as f64 };
-    let end = &gridded.points[(from + WINDOW).min(gridded.points.len() - 1)][axis];
+    let end = &gridded.smoothed_states[(from + WINDOW).min(gridded.smoothed_states.len() - 1)][axis];
     let slope =
-        |chamber: usize| (end.pressures_pa[chamber] - points[0][axis].pressures_pa[chamber]) / (n * PERIOD_S);
+        |chamber: usize| (end.pressures_pa[chamber] - states[0][axis].pressures_pa[chamber]) / (n * PERIOD_S);
     let dp = match kind {
         UnknownKind::FlowA => slope(0),
         UnknownKind::FlowB => slope(1),

@@ -25,7 +25,8 @@ pub(crate) struct Regimes {
 impl Regimes {
     /// The regimes of an axis in a window that starts at a period.
     pub(super) fn of(rig: &RigParameters, record: &GriddedRecord, axis: usize, from: usize) -> Self {
-        let point = |period: usize| -> &AxisState { &record.points[period.min(record.len() - 1)][axis] };
+        let point =
+            |period: usize| -> &AxisState { &record.smoothed_states[period.min(record.len() - 1)][axis] };
         let rests = |period: usize| point(period).rod_velocity_m_per_s == 0.0;
         let hold = (from..=from + WINDOW).all(rests);
         let onset = !hold && (from.saturating_sub(ONSET)..from + WINDOW).any(rests);

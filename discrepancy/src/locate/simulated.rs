@@ -1,9 +1,9 @@
 //! Simulates a window with perturbed start state and unknown inputs.
 //!
-//! Windows start at the record's points; spool, lagged flows and internal states of effects continue. When linked, the measured
-//! contact force is an input of both axes, since positions do not determine it at 2 N per micrometre. It acts as a hand force, so
-//! that the force sensors read it as on the rig [rig-model.md, Masses and linkage]. The axes are then independent, and one run
-//! perturbs both.
+//! Windows start at the record's smoothed states; spool, lagged flows and internal states of effects continue. When linked, the
+//! measured contact force is an input of both axes, since positions do not determine it at 2 N per micrometre. It acts as a hand
+//! force, so that the force sensors read it as on the rig [rig-model.md, Masses and linkage]. The axes are then independent, and
+//! one run perturbs both.
 //!
 //! An unknown force acts as a hand force, without its reading by the sensor. An unknown flow is added to the stored air at the
 //! end of each period.
@@ -59,7 +59,7 @@ impl<'a> Pass<'a> {
     pub(super) fn run(&self, from: usize, nudge: &Nudge) -> Option<Readings> {
         let mut plant = self.plant.clone();
         let points = [0, 1].map(|axis| {
-            let mut point = self.record.points[from][axis];
+            let mut point = self.record.smoothed_states[from][axis];
             let [x, v, a, b] = nudge.start[axis];
             point.extension_m += x;
             point.rod_velocity_m_per_s += v;
@@ -89,7 +89,7 @@ impl<'a> Pass<'a> {
     /// Advances to the next window from the state of the record.
     pub(super) fn advance(&mut self, from: usize, periods: usize) {
         if !self.record.excluded_periods[from] {
-            let start = state_at(&self.plant, &self.record.points[from], self.record.measured);
+            let start = state_at(&self.plant, &self.record.smoothed_states[from], self.record.measured);
             // Impossible points come from a broken record; the plant then continues from its state.
             let _ = self.plant.go_on_in(&start);
         }
@@ -132,6 +132,6 @@ fn contact_forces(rig: &RigParameters, record: &GriddedRecord) -> Vec<f64> {
 /// Acceleration of the drive from the speeds 5 ms before and after, m/s^2.
 fn acceleration(record: &GriddedRecord, at: usize) -> f64 {
     let (from, to) = (at.saturating_sub(5), (at + 5).min(record.len() - 1));
-    let speed = |at: usize| record.points[at][0].rod_velocity_m_per_s;
+    let speed = |at: usize| record.smoothed_states[at][0].rod_velocity_m_per_s;
     (speed(to) - speed(from)) / ((to - from) as f64 * PERIOD_S)
 }

@@ -24,7 +24,7 @@ pub(super) struct FreeRun {
 pub(super) fn free_run(record: &GriddedRecord, rig: &RigParameters) -> FreeRun {
     let mut plant =
         Plant::in_state(rig, &first_state(record, rig)).expect("a start state is one of the rig's");
-    let at_rest = record.points[0].map(|point| AxisState { rod_velocity_m_per_s: 0.0, ..point });
+    let at_rest = record.smoothed_states[0].map(|state| AxisState { rod_velocity_m_per_s: 0.0, ..state });
     set_state(&mut plant, record, 0, &at_rest);
     let stroke_m = rig.cylinder().stroke_m;
     let highest_pa = HIGHEST * plant.supply_pressure_pa();

@@ -21,7 +21,7 @@ pub(crate) fn record_over(
         name: "made".to_owned(),
         measured: [true, false],
         inputs: vec![Inputs::default(); periods],
-        points: vec![[AxisState { extension_m: 0.1, ..AxisState::default() }; 2]],
+        smoothed_states: vec![[AxisState { extension_m: 0.1, ..AxisState::default() }; 2]],
         noise: [noise_with_rounding(baseline), [0.0; CHANNELS]],
         excluded_periods: vec![false; periods],
         ..GriddedRecord::default()
@@ -32,7 +32,7 @@ pub(crate) fn record_over(
     }
     let mut plant = Plant::in_state(rig, &first_state(&record, rig)).unwrap();
     let mut sampled = Sensors::new(rig, seed);
-    record.points.clear();
+    record.smoothed_states.clear();
     for inputs in &record.inputs {
         let axis = plant.truth(inputs).axes[0];
         let reading = sampled.sample(&plant, inputs)[0];
@@ -45,7 +45,7 @@ pub(crate) fn record_over(
             alternative_velocity_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         };
-        record.points.push([point, AxisState::default()]);
+        record.smoothed_states.push([point, AxisState::default()]);
         plant.step(inputs);
     }
     record
@@ -183,7 +183,7 @@ fn start_states_of_axes_that_do_not_act_on_each_other_are_nudged_together() {
     record.noise[1] = record.noise[0];
     record.inputs.iter_mut().for_each(|inputs| inputs.valve[1] = inputs.valve[0]);
     record.samples.iter_mut().for_each(|samples| samples[1] = samples[0]);
-    record.points.iter_mut().for_each(|points| points[1] = points[0]);
+    record.smoothed_states.iter_mut().for_each(|states| states[1] = states[0]);
     let together = Windows::new(&record, &rig).sensitivities();
     // A regulator that hardly gives way feeds both axes: each is nudged by itself.
     let droop = [("droop_bar", 1e-6), ("volume_cm3", 1000.0)];

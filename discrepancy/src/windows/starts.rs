@@ -45,7 +45,7 @@ impl Windows<'_> {
     fn estimate_starts_by<'s>(&mut self, passes: usize, sensitivities: impl Fn(&Self) -> Sensitivities<'s>) {
         self.choose_rates();
         if self.record.linked {
-            // A micrometre of the eye in its gap is two newtons, so the record's points are too coarse. A grid search finds the
+            // A micrometre of the eye in its gap is two newtons, so the smoothed states are too coarse. A grid search finds the
             // side of the gap, then Gauss-Newton starts there.
             for shifts_m in SHIFTS_M {
                 self.shift_linked(&shifts_m);
@@ -182,7 +182,7 @@ impl Windows<'_> {
     }
 
     /// A synthetic record of this rig in the same windows: `simulated` plus drawn noise. Its start states are estimated anew from
-    /// the record's points, by Gauss-Newton with these `sensitivities` of the windows.
+    /// the record's smoothed states, by Gauss-Newton with these `sensitivities` of the windows.
     pub(crate) fn redrawn(
         &self,
         simulated: &[f64],
@@ -191,7 +191,8 @@ impl Windows<'_> {
     ) -> Self {
         let noise = self.raw_noise(random);
         let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + noise).collect();
-        let points = (0..self.points.len()).map(|window| self.record.points[window * WINDOW]).collect();
+        let points =
+            (0..self.points.len()).map(|window| self.record.smoothed_states[window * WINDOW]).collect();
         let mut windows = Windows { points, readings, ..self.clone() };
         windows.estimate_starts_by(START_PASSES, |_| Cow::Borrowed(sensitivities));
         windows
@@ -214,7 +215,7 @@ impl Windows<'_> {
     }
 
     /// The same without estimates: `simulated` plus drawn noise of `variance_factor` times the power, with start states that are
-    /// off by drawn errors of the record's points.
+    /// off by drawn errors of the smoothed states.
     pub(crate) fn drawn(&self, simulated: &[f64], variance_factor: f64, random: &mut Pcg64) -> Self {
         let size = variance_factor.sqrt();
         let noise = self.raw_noise(random);
@@ -225,7 +226,7 @@ impl Windows<'_> {
                 let point = &mut points[axis];
                 let rests = point.rod_velocity_m_per_s == 0.0;
                 let [way_m, rate_m_per_s, a_pa, b_pa] =
-                    self.record.point_errors(axis, rests).map(|error| size * error * gaussian(random));
+                    self.record.state_errors(axis, rests).map(|error| size * error * gaussian(random));
                 point.extension_m += way_m;
                 point.rod_velocity_m_per_s += rate_m_per_s;
                 point.pressures_pa[0] += a_pa;
@@ -317,7 +318,7 @@ impl Windows<'_> {
 /// Initial state of a simulation of a record: that of a run with the record's set-up.
 pub(crate) fn first_state(record: &GriddedRecord, rig: &RigParameters) -> State {
     let stroke_m = rig.cylinder().stroke_m;
-    let drive_m = if record.measured[0] { record.points[0][0].extension_m } else { 0.1 };
+    let drive_m = if record.measured[0] { record.smoothed_states[0][0].extension_m } else { 0.1 };
     let setup = Setup {
         carriage_position_m: drive_m.clamp(0.0, stroke_m),
         linked: record.linked,

@@ -125,7 +125,7 @@ pub(super) fn jitter_sensitivity_of(record: &GriddedRecord, at: usize, axis: usi
         let change = after.zip(before).map_or(0.0, |(after, before)| after - before);
         return change / (2.0 * PERIOD_S) * record.jitter_s / record.noise[axis][FORCE];
     }
-    let [before, here, after] = [before, at, after].map(|at| record.points[at][axis]);
+    let [before, here, after] = [before, at, after].map(|at| record.smoothed_states[at][axis]);
     let rate = match channel {
         0 if axis == 0 => here.rod_velocity_m_per_s,
         0 => -here.rod_velocity_m_per_s,
