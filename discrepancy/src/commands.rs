@@ -298,7 +298,7 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
         let _ = writeln!(
             text,
             "{}: {:.2} times its noise, rms {:.4} {}",
-            bar.balance, bar.over_noise, bar.rms, bar.unit
+            bar.balance, bar.birge_ratio, bar.rms, bar.unit
         );
     }
     if let Some(term) = &dependence {

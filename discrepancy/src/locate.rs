@@ -113,22 +113,22 @@ pub struct UnknownPoint {
 
 impl UnknownPoint {
     /// The estimate over its standard deviation.
-    pub(crate) fn over_noise(&self) -> f64 {
+    pub(crate) fn z_score(&self) -> f64 {
         self.value / self.deviation
     }
 }
 
 impl UnknownSeries {
-    /// rms of the estimates over their standard deviations; 1 for a closed balance. `None` without a point.
-    pub fn over_noise(&self) -> Option<f64> {
-        over_noise(self.points.iter())
+    /// As in [`BalanceBar::birge_ratio`]. `None` without a point.
+    pub fn birge_ratio(&self) -> Option<f64> {
+        birge_ratio(self.points.iter())
     }
 }
 
-fn over_noise<'a>(points: impl Iterator<Item = &'a UnknownPoint>) -> Option<f64> {
+fn birge_ratio<'a>(points: impl Iterator<Item = &'a UnknownPoint>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
     for point in points {
-        sum += point.over_noise().powi(2);
+        sum += point.z_score().powi(2);
         count += 1;
     }
     (count > 0).then(|| (sum / f64::from(count)).sqrt())
@@ -164,11 +164,11 @@ fn seconds(periods: usize) -> f64 {
 }
 
 fn bar(series: &UnknownSeries) -> Option<BalanceBar> {
-    let over_noise = series.over_noise()?;
+    let birge_ratio = series.birge_ratio()?;
     let squares: f64 = series.points.iter().map(|point| point.value.powi(2)).sum();
     Some(BalanceBar {
         balance: series.balance.clone(),
-        over_noise,
+        birge_ratio,
         rms: (squares / series.points.len() as f64).sqrt(),
         unit: series.unit.to_owned(),
     })
@@ -181,7 +181,7 @@ fn cells(series: &UnknownSeries) -> Vec<RegimeCell> {
             balance: series.balance.clone(),
             regime: (*regime).to_owned(),
             windows: within().count(),
-            over_noise: over_noise(within())?,
+            birge_ratio: birge_ratio(within())?,
         })
     };
     REGIMES.iter().filter_map(cell).collect()

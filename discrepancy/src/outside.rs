@@ -28,10 +28,10 @@ const MIN_PAIR_R2_GAIN: f64 = 0.15;
 const MIN_MARGINAL_R2: f64 = -0.1;
 /// R2 above which a variable precedes the constant: a law through 0 has a mean too.
 const R2_BEFORE_CONSTANT: f64 = 0.5;
-/// over_noise that is significant by itself.
+/// Birge ratio that is significant by itself.
 const MIN_BIRGE_RATIO: f64 = 1.15;
-/// Significance of R2 against shifted series where over_noise is not significant, in standard deviations. One-sided, a normal
-/// variable exceeds it with probability 1.3e-12; the margin is for some hundred tests and for tails that are not normal.
+/// Significance of R2 against shifted series where the Birge ratio is not significant, in standard deviations. One-sided, a
+/// normal variable exceeds it with probability 1.3e-12; the margin is for some hundred tests and for tails that are not normal.
 const MIN_SHIFT_Z: f64 = 7.0;
 /// Significance of a mean, in standard errors from the propagated noise (z test).
 const MIN_MEAN_Z: f64 = 6.0;
@@ -65,7 +65,7 @@ pub fn outside(
         // Whether there is a term is judged without history variables: more tests would find more by chance.
         let plain = VARIABLES.iter().zip(&tests).filter(|(variable, _)| variable.complexity < MEMORY);
         let stands_out = plain.map(|(_, test)| test.2).fold(0.0, f64::max);
-        let lifted = series.over_noise().is_some_and(|over| over > MIN_BIRGE_RATIO);
+        let lifted = series.birge_ratio().is_some_and(|ratio| ratio > MIN_BIRGE_RATIO);
         let is_located = located.is_some_and(|located| located.balance == series.balance);
         if !is_located && !lifted && stands_out < MIN_SHIFT_Z && sample.mean_over_error().abs() < MIN_MEAN_Z {
             continue;

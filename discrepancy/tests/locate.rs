@@ -16,9 +16,9 @@ fn located(effects: &[Hidden<'_>]) -> (Located, Option<Outside>) {
     (located, outside)
 }
 
-fn over_noise(located: &Located, balance: &str) -> f64 {
+fn birge_ratio(located: &Located, balance: &str) -> f64 {
     let bar = located.location.balances.iter().find(|bar| bar.balance == balance);
-    bar.unwrap_or_else(|| panic!("{balance} is told")).over_noise
+    bar.unwrap_or_else(|| panic!("{balance} is told")).birge_ratio
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn where_nothing_is_missing_every_balance_is_noise_and_nothing_is_outside() {
     let (located, outside) = located(&[]);
     for bar in &located.location.balances {
         // Some 500 windows: three standard errors of an rms are 0.1; the deviations themselves are good to a tenth.
-        assert!((0.85..1.15).contains(&bar.over_noise), "{bar:?}");
+        assert!((0.85..1.15).contains(&bar.birge_ratio), "{bar:?}");
     }
     assert!(outside.is_none(), "{outside:?}");
     assert_eq!(located.location.sensor_ratio, None);
@@ -35,9 +35,9 @@ fn where_nothing_is_missing_every_balance_is_noise_and_nothing_is_outside() {
 #[test]
 fn a_hidden_inclination_lifts_the_force_alone_and_is_a_constant() {
     let (located, outside) = located(&[("inclination", "drive", &[("force_n", 20.0)])]);
-    assert!(over_noise(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
+    assert!(birge_ratio(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
     for flow in ["drive.flow-a", "drive.flow-b"] {
-        assert!(over_noise(&located, flow) < 1.15, "{:?}", located.location.balances);
+        assert!(birge_ratio(&located, flow) < 1.15, "{:?}", located.location.balances);
     }
     let outside = outside.expect("something is missing");
     assert_eq!(outside.balance, "drive.force");
@@ -53,9 +53,9 @@ fn a_hidden_inclination_lifts_the_force_alone_and_is_a_constant() {
 #[test]
 fn a_hidden_leak_lifts_its_chamber_and_not_the_force() {
     let (located, outside) = located(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)])]);
-    assert!(over_noise(&located, "drive.flow-b") > 1.5, "{:?}", located.location.balances);
-    assert!(over_noise(&located, "drive.flow-a") < 1.15, "{:?}", located.location.balances);
-    assert!(over_noise(&located, "drive.force") < 1.15, "{:?}", located.location.balances);
+    assert!(birge_ratio(&located, "drive.flow-b") > 1.5, "{:?}", located.location.balances);
+    assert!(birge_ratio(&located, "drive.flow-a") < 1.15, "{:?}", located.location.balances);
+    assert!(birge_ratio(&located, "drive.force") < 1.15, "{:?}", located.location.balances);
     assert_eq!(outside.expect("something is missing").balance, "drive.flow-b");
 }
 
@@ -63,7 +63,7 @@ fn a_hidden_leak_lifts_its_chamber_and_not_the_force() {
 fn a_hidden_spring_is_a_force_over_x() {
     let numbers = [("spring_n", 40.0)];
     let (located, outside) = located(&[("position-dependent-force", "drive", &numbers)]);
-    assert!(over_noise(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
+    assert!(birge_ratio(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
     let outside = outside.expect("something is missing");
     assert_eq!((outside.balance.as_str(), outside.variables[0].variable.as_str()), ("drive.force", "x"));
     let curve = outside.curve.expect("there is a variable");

@@ -11,13 +11,13 @@ const MAPS: usize = 2;
 const SURFACE: [usize; 2] = [10, 3];
 /// Fewest points of a bin.
 const LEAST: usize = 5;
-/// Smallest over_noise of a drawn balance.
+/// Smallest Birge ratio of a drawn balance.
 const DRAWN: f64 = 1.1;
 
 /// Maps of all significant balances over their strongest variables that are no history variables, which may follow by chance.
 pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
     let mut maps = Vec::new();
-    for series in series.iter().filter(|series| series.over_noise().is_some_and(|over| over > DRAWN)) {
+    for series in series.iter().filter(|series| series.birge_ratio().is_some_and(|ratio| ratio > DRAWN)) {
         let present = (0..VARIABLES.len()).filter(|variable| VARIABLES[*variable].complexity < MEMORY);
         let mut ranked: Vec<(usize, f64)> =
             present.map(|variable| (variable, between(series, variable))).collect();

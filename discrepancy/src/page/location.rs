@@ -50,13 +50,13 @@ fn balances(location: &Location) -> String {
         .iter()
         .map(|one| Bar {
             label: words::balance(&one.balance),
-            value: one.over_noise,
+            value: one.birge_ratio,
             text: format!(
                 "{} ({})",
-                words::short(one.over_noise),
+                words::short(one.birge_ratio),
                 words::with_unit(&words::short(one.rms), &one.unit)
             ),
-            is_full: one.over_noise > CLEAR,
+            is_full: one.birge_ratio > CLEAR,
         })
         .collect();
     figure(
@@ -91,10 +91,10 @@ fn regimes(location: &Location) -> String {
     let row = |balance: &&str| {
         let shaded = |name: &&str| {
             let cell = cells.iter().find(|cell| cell.balance == *balance && cell.regime == *name);
-            match cell.filter(|cell| cell.windows > 0 && cell.over_noise.is_finite()) {
+            match cell.filter(|cell| cell.windows > 0 && cell.birge_ratio.is_finite()) {
                 // A hundred times the noise is as dark as it gets.
                 Some(cell) => {
-                    Cell::Shaded(cell.over_noise.max(1.0).log10() / 2.0, words::short(cell.over_noise))
+                    Cell::Shaded(cell.birge_ratio.max(1.0).log10() / 2.0, words::short(cell.birge_ratio))
                 }
                 None => Cell::Shaded(0.0, words::NOT_MEASURED.to_owned()),
             }

@@ -155,7 +155,7 @@ fn location(size: f64) -> Location {
         balances: balances
             .map(|(balance, value)| BalanceBar {
                 balance: balance.to_owned(),
-                over_noise: over(value, 1.0),
+                birge_ratio: over(value, 1.0),
                 rms: 0.08 * over(value, 1.0),
                 unit: if balance.contains("flow") { "Nl/min" } else { "N" }.to_owned(),
             })
@@ -167,7 +167,7 @@ fn location(size: f64) -> Location {
                     balance: (*balance).to_owned(),
                     regime: regime.to_owned(),
                     windows: if regime == "onset" && balance.contains("sensor") { 0 } else { windows },
-                    over_noise: over(*value, share),
+                    birge_ratio: over(*value, share),
                 })
             })
             .collect(),

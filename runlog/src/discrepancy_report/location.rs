@@ -29,8 +29,10 @@ pub struct Location {
 pub struct BalanceBar {
     /// `drive.flow-a`, `drive.flow-b`, `drive.force`, `drive.force-sensor`, the load's, `linkage`.
     pub balance: String,
-    /// rms of the unknown input over its propagated noise; 1 for a closed balance.
-    pub over_noise: f64,
+    /// Birge ratio about 0, the root of chi2 per window: rms of the unknown input over its propagated noise; 1 for a closed
+    /// balance.
+    #[serde(rename = "over_noise")]
+    pub birge_ratio: f64,
     /// rms of the unknown input, in `unit`.
     pub rms: f64,
     /// N or Nl/min.
@@ -46,8 +48,9 @@ pub struct RegimeCell {
     pub regime: String,
     /// Number of its windows.
     pub windows: usize,
-    /// As in [`BalanceBar::over_noise`].
-    pub over_noise: f64,
+    /// As in [`BalanceBar::birge_ratio`].
+    #[serde(rename = "over_noise")]
+    pub birge_ratio: f64,
 }
 
 /// The unknown input of a balance over time.
