@@ -126,11 +126,11 @@ struct JointLinearisation {
 
 impl JointLinearisation {
     /// Normal equations with the sensitivities of some windows set to zero.
-    fn products(&self, engine: &Engine<'_>, iterate: &Simulated, out: &[usize]) -> Products {
+    fn products(&self, engine: &Engine<'_>, iterate: &Simulated, excluded: &[usize]) -> Products {
         let mut columns = Cow::from(&self.columns);
-        if !out.is_empty() {
+        if !excluded.is_empty() {
             for column in columns.to_mut() {
-                out.iter().for_each(|at| column[at * engine.rows()..][..engine.rows()].fill(0.0));
+                excluded.iter().for_each(|at| column[at * engine.rows()..][..engine.rows()].fill(0.0));
             }
         }
         engine.products(&iterate.residual, &columns)
@@ -154,12 +154,12 @@ fn stepped(
     linearisation: &JointLinearisation,
     chosen: &[usize],
 ) -> Step<Simulated> {
-    let far: Vec<usize> = above_outlier_limit(&iterate.squares, engine.scaled_dof()).collect();
+    let outliers: Vec<usize> = above_outlier_limit(&iterate.squares, engine.scaled_dof()).collect();
     let with_all = line_search(engine, estimator, iterate, linearisation, chosen, &[]);
-    if far.is_empty() {
+    if outliers.is_empty() {
         return with_all;
     }
-    match (with_all, line_search(engine, estimator, iterate, linearisation, chosen, &far)) {
+    match (with_all, line_search(engine, estimator, iterate, linearisation, chosen, &outliers)) {
         (Step::Taken(all), Step::Taken(fewer)) => {
             Step::Taken(if fewer.loss.total_cmp(&all.loss).is_lt() { fewer } else { all })
         }
@@ -168,23 +168,23 @@ fn stepped(
     }
 }
 
-/// A Gauss-Newton step that lowers the loss, without the windows `out`. Windows whose squares exceed the linearised prediction,
-/// as around a break-away, are excluded too; then the step is shortened.
+/// A Gauss-Newton step that lowers the loss, without the windows `excluded`. Windows whose squares exceed the linearised
+/// prediction, as around a break-away, are excluded too; then the step is shortened.
 fn line_search(
     engine: &Engine<'_>,
     estimator: &mut Estimator,
     iterate: &Simulated,
     linearisation: &JointLinearisation,
     chosen: &[usize],
-    out: &[usize],
+    excluded: &[usize],
 ) -> Step<Simulated> {
     let part = |of: &[f64]| chosen.iter().map(|at| of[*at]).collect::<Vec<_>>();
     let (precisions, from) = (part(&linearisation.precisions), part(&linearisation.from));
     let [whole, shorter @ ..] = JOINT.fractions else { unreachable!("a whole step is tried first") };
-    let mut out = out.to_vec();
+    let mut excluded = excluded.to_vec();
     let mut promised = 0.0;
     for _ in 0..EXCLUSIONS {
-        let fit = linearisation.products(engine, iterate, &out).fit_from(chosen, &precisions, &from);
+        let fit = linearisation.products(engine, iterate, &excluded).fit_from(chosen, &precisions, &from);
         promised = iterate.loss - fit.loss;
         estimator.count();
         let Some(tried) = step_by(engine, iterate, chosen, &fit, *whole) else {
@@ -200,11 +200,11 @@ fn line_search(
             tried.squares[*window] - fit.squares[*window]
                 > NONLINEAR_EXCESS * engine.scaled_dof()[*window].sqrt()
         };
-        let before = out.len();
-        out.extend((0..engine.scaled_dof().len()).filter(nonlinear));
-        out.sort_unstable();
-        out.dedup();
-        if out.len() == before {
+        let before = excluded.len();
+        excluded.extend((0..engine.scaled_dof().len()).filter(nonlinear));
+        excluded.sort_unstable();
+        excluded.dedup();
+        if excluded.len() == before {
             return estimator.backtrack(iterate, promised, shorter, |fraction| {
                 step_by(engine, iterate, chosen, &fit, fraction)
             });

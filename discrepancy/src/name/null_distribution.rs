@@ -27,7 +27,8 @@ pub(super) const MAX_OUTLIER_SHARE: f64 = 0.05;
 
 /// Window scores of all candidates against a model's residual.
 pub(super) struct NullDistribution {
-    far: Vec<usize>,
+    /// Outlying windows.
+    outliers: Vec<usize>,
     /// For each probe: candidate, coordinate of the amplitude, window scores, information.
     probes: Vec<(usize, f64, Vec<f64>, f64)>,
 }
@@ -56,16 +57,16 @@ impl NullDistribution {
         let parameters: Vec<usize> = (0..COUNT).collect();
         let weights = &products.fit_from(&parameters, &precisions, &linearisation.deviations()).weights;
         let scores = products.efficient_scores(&parameters, weights, &precisions);
-        let far = outliers(&engine.squares(&residual), engine.scaled_dof());
+        let outliers = outliers(&engine.squares(&residual), engine.scaled_dof());
         let probes = of
             .into_iter()
             .zip(scores)
             .map(|((at, z, _), (mut scores, information))| {
-                far.iter().for_each(|window| scores[*window] = 0.0);
+                outliers.iter().for_each(|window| scores[*window] = 0.0);
                 (at, z, scores, information)
             })
             .collect();
-        NullDistribution { far, probes }
+        NullDistribution { outliers, probes }
     }
 
     /// Rise of the loss of a reduced model, without the outlying windows.
@@ -74,7 +75,7 @@ impl NullDistribution {
             let [without, with] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
             engine.scaled_dof()[*window] * (without / with).ln()
         };
-        without.loss - model.loss - self.far.iter().map(of).sum::<f64>()
+        without.loss - model.loss - self.outliers.iter().map(of).sum::<f64>()
     }
 
     /// Quantile of the largest gain of any candidate when the sign of each window is drawn at random. Sign flips keep the
@@ -114,15 +115,15 @@ impl NullDistribution {
 
 /// Outlying windows; none where they are more than a few.
 fn outliers(squares: &[f64], dof: &[f64]) -> Vec<usize> {
-    let far: Vec<usize> = above_outlier_limit(squares, dof).collect();
+    let outliers: Vec<usize> = above_outlier_limit(squares, dof).collect();
     let most = (MAX_OUTLIER_SHARE * dof.len() as f64).max(1.0);
-    if far.len() as f64 <= most { far } else { Vec::new() }
+    if outliers.len() as f64 <= most { outliers } else { Vec::new() }
 }
 
 /// Windows beyond [`OUTLIER_CHI2_PER_DOF`], however many.
 pub(super) fn above_outlier_limit(squares: &[f64], dof: &[f64]) -> impl Iterator<Item = usize> {
-    let off = squares.iter().zip(dof).enumerate();
-    off.filter(|(_, (square, dof))| **square > OUTLIER_CHI2_PER_DOF * **dof).map(|(at, _)| at)
+    let windows = squares.iter().zip(dof).enumerate();
+    windows.filter(|(_, (square, dof))| **square > OUTLIER_CHI2_PER_DOF * **dof).map(|(at, _)| at)
 }
 
 #[cfg(test)]
@@ -133,10 +134,10 @@ mod tests {
     fn windows_that_are_far_off_are_left_out_only_where_they_are_few() {
         let squares =
             |off: usize| -> Vec<f64> { (0..40).map(|at| if at < off { 40.0 } else { 10.0 }).collect() };
-        let far = |off: usize| outliers(&squares(off), &[10.0; 40]);
-        assert_eq!(far(0), Vec::<usize>::new());
-        assert_eq!(far(2), [0, 1]);
+        let excluded = |off: usize| outliers(&squares(off), &[10.0; 40]);
+        assert_eq!(excluded(0), Vec::<usize>::new());
+        assert_eq!(excluded(2), [0, 1]);
         // A model that leaves so many is wrong in them.
-        assert_eq!(far(3), Vec::<usize>::new());
+        assert_eq!(excluded(3), Vec::<usize>::new());
     }
 }
