@@ -141,7 +141,7 @@ pub(super) fn gained(before: &Folds, after: &Folds, reference: &Fitted<'_>) -> V
 }
 
 /// Mean over its standard error, of differences that are one for each fold and taken as independent.
-pub(super) fn clustered_t(differences: &[f64]) -> f64 {
+pub(super) fn fold_t(differences: &[f64]) -> f64 {
     let count = differences.len() as f64;
     let mean = mean(differences);
     let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
@@ -150,13 +150,13 @@ pub(super) fn clustered_t(differences: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::clustered_t;
+    use super::fold_t;
 
     #[test]
     fn blocks_that_differ_are_no_gain_beyond_their_error() {
         let alternating: Vec<f64> = (0..10).map(|at| if at % 2 == 0 { 1.1 } else { -0.9 }).collect();
         // A mean of 0.1, and a standard error of 1 / sqrt(10 - 1).
-        assert!((clustered_t(&alternating) - 0.3).abs() < 1e-9);
-        assert!(clustered_t(&[1.0; 10]) > 1e6);
+        assert!((fold_t(&alternating) - 0.3).abs() < 1e-9);
+        assert!(fold_t(&[1.0; 10]) > 1e6);
     }
 }

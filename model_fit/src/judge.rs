@@ -6,9 +6,9 @@
 //! |---|---|---|
 //! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n is what the residual of the best fit is worth |
 //! | folds in time | at least a tenth of the power that the model leaves | size |
-//! | folds in time | 5 clustered standard errors, or half of the power | an error of the model that no suspect describes |
+//! | folds in time | 5 standard errors over folds, or half of the power | an error of the model that no suspect describes |
 //! | folds in time | a gain without the block that gains most, too | an event that is none of the plant's |
-//! | folds in bands of `[rows.folds]` | half of that share, at 2 clustered standard errors | what does not hold elsewhere |
+//! | folds in bands of `[rows.folds]` | half of that share, at 2 standard errors over folds | what does not hold elsewhere |
 //!
 //! A mean over its standard error asked of all terms would ask that each acts in every block: a tank overflows in two of ten. A
 //! small one must, since a suspect that resembles an error of the model explains some of it in some blocks.
@@ -17,23 +17,22 @@
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
 use super::fit::What;
-use super::folds::{Folds, clustered_t, gained, in_units};
+use super::folds::{Folds, fold_t, gained, in_units};
 use super::select::Fitted;
 use crate::estimator::Convergence;
 use model::Model;
 
 /// Least share of the power that the model leaves on held-out folds that a term must explain on folds in time; on bands half of it.
 pub(super) const SHARE_FLOOR: f64 = 0.1;
-/// Share from which a term may act in some blocks of time alone, more than all else that is left, and clustered standard errors
+/// Share from which a term may act in some blocks of time alone, more than all else that is left, and standard errors over folds
 /// that a smaller one needs. Of 58 null records of seeds 1, 3 and 5 of the study of any plant, whose background leaves up to as
 /// much power as the noise, ten had a suspect with a share of 0.12 to 0.35, at 1.5 to 3.6 standard errors; hidden terms have 0.9.
 const SHARE_LARGE: f64 = 0.5;
 const T_SMALL: f64 = 5.0;
-/// Clustered standard errors that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
-/// Grandvalet 2004, JMLR 5]; for the five bands 2 is 5.8 % one-sided (Student t with 4
-/// degrees of freedom).
+/// Standard errors over folds that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
+/// Grandvalet 2004, JMLR 5]; for the five bands 2 is 5.8 % one-sided (Student t with 4 degrees of freedom).
 const T_BANDS: f64 = 2.0;
-/// Clustered standard errors of a difference between two suspects that tells them apart.
+/// Standard errors over folds of a difference between two suspects that tells them apart.
 const T_APART: f64 = 3.0;
 /// Difference of [`Evaluation::worth`] (twice the log likelihood, less the penalty) that does the same. "Very strong" is 10 for twice
 /// the log Bayes factor [Kass, Raftery 1995, JASA 90(430)].
@@ -124,7 +123,7 @@ fn judge_by_folds(
         differences.iter().sum::<f64>() / plain.max(f64::MIN_POSITIVE)
     };
     let share = share_of(&differences, &baseline.folds);
-    let t = clustered_t(&differences);
+    let t = fold_t(&differences);
     let best_fold = differences.iter().copied().fold(0.0, f64::max);
     let without_best = differences.iter().sum::<f64>() - best_fold;
     let mut gates = vec![
@@ -151,7 +150,7 @@ fn judge_by_folds(
         all_bands.filter(|_| !model.suspects[suspect].is_local)
     {
         let differences = gained(before_bands, after_bands, before);
-        let (share, t) = (share_of(&differences, plain), clustered_t(&differences));
+        let (share, t) = (share_of(&differences, plain), fold_t(&differences));
         let (floor, over) = (SHARE_FLOOR / 2.0, &over.text);
         let words = share_in_words(share);
         gates.push((share / floor, format!("folds over {over}: {words}, {:.0} % asked", floor * 100.0)));
@@ -244,7 +243,7 @@ pub(super) fn apart(model: &Model, best: &Evaluation, other: &Evaluation) -> boo
     }
     let differences: Vec<f64> =
         best.differences.iter().zip(&other.differences).map(|(best, other)| best - other).collect();
-    clustered_t(&differences) > T_APART
+    fold_t(&differences) > T_APART
 }
 
 #[cfg(test)]

@@ -150,7 +150,9 @@ pub struct Judgement {
     pub penalty: f64,
     /// Share of what the model leaves, on folds in time.
     pub share: f64,
-    pub clustered_t: f64,
+    /// Mean gain of a fold over its standard error.
+    #[serde(rename = "clustered_t")]
+    pub fold_t: f64,
     pub decision: String,
     pub numbers: Vec<Number>,
 }
@@ -476,7 +478,7 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
         gain: evaluation.gain,
         penalty: evaluation.penalty,
         share: evaluation.share,
-        clustered_t: evaluation.t,
+        fold_t: evaluation.t,
         decision,
         numbers,
     }
