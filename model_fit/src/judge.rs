@@ -22,7 +22,8 @@ use super::select::Fitted;
 use crate::estimator::Convergence;
 use model::Model;
 
-/// Least share of the power that the model leaves on held-out folds that a term must explain on folds in time; on bands half of it.
+/// Least share of the power that the model leaves on held-out folds that a term must explain on folds in time; on bands half of
+/// it.
 pub(super) const SHARE_FLOOR: f64 = 0.1;
 /// Share from which a term may act in some blocks of time alone, more than all else that is left, and standard errors over folds
 /// that a smaller one needs. Of 58 null records of seeds 1, 3 and 5 of the study of any plant, whose background leaves up to as
@@ -34,8 +35,8 @@ const T_SMALL: f64 = 5.0;
 const T_BANDS: f64 = 2.0;
 /// Standard errors over folds of a difference between two suspects that tells them apart.
 const T_APART: f64 = 3.0;
-/// Difference of [`Evaluation::worth`] (twice the log likelihood, less the penalty) that does the same. "Very strong" is 10 for twice
-/// the log Bayes factor [Kass, Raftery 1995, JASA 90(430)].
+/// Difference of [`Evaluation::worth`] (twice the log likelihood, less the penalty) that does the same. "Very strong" is 10 for
+/// twice the log Bayes factor [Kass, Raftery 1995, JASA 90(430)].
 pub(super) const GAIN_APART: f64 = 10.0;
 
 /// How a suspect did in a round.
