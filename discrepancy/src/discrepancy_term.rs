@@ -93,8 +93,8 @@ struct Group {
     kinds: &'static [UnknownKind],
     over: Over,
     log_evidence: f64,
-    /// Fall of the loss at the best size.
-    loss_fall: f64,
+    /// Reduction of the loss at the best size.
+    loss_reduction: f64,
 }
 
 /// The model that a term is sought beside.
@@ -138,7 +138,7 @@ pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedT
             groups.insert(usize::from(ratio <= SIMPLER), constant);
         }
     }
-    let total = groups.iter().map(|group| group.loss_fall).fold(best.loss_fall, f64::max).max(1e-9);
+    let total = groups.iter().map(|group| group.loss_reduction).fold(best.loss_reduction, f64::max).max(1e-9);
     let mut variables: Vec<LocatedVariable> = Vec::new();
     let of_balance = groups.iter().filter(|group| group.axis == best.axis && group.kinds == best.kinds);
     for group in of_balance.filter(|group| group.log_evidence > 0.0) {
@@ -147,7 +147,7 @@ pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedT
                 variables.push(LocatedVariable {
                     variable: name.to_owned(),
                     log_evidence: Some(group.log_evidence),
-                    share: (group.loss_fall / total).clamp(0.0, 1.0),
+                    share: (group.loss_reduction / total).clamp(0.0, 1.0),
                 });
             }
         }
@@ -231,7 +231,7 @@ impl Term {
                     let (with, with_determinant) = self.fitted(&products, &precisions);
                     let spread = -(count as f64) * precision.ln();
                     let log_evidence = -0.5 * (with - loss + spread + with_determinant - log_determinant);
-                    Group { axis, kinds, over, log_evidence, loss_fall: loss - with }
+                    Group { axis, kinds, over, log_evidence, loss_reduction: loss - with }
                 };
                 SIZES
                     .into_iter()
@@ -384,7 +384,7 @@ mod tests {
         let place = |name: &str| VARIABLES.iter().position(|known| known.name == name).expect("in the table");
         let group = |name, log_evidence| {
             let over = Over::Variable(place(name));
-            Group { axis: 0, kinds: BALANCES[0], over, log_evidence, loss_fall: 2.0 * log_evidence }
+            Group { axis: 0, kinds: BALANCES[0], over, log_evidence, loss_reduction: 2.0 * log_evidence }
         };
         let first = |memory, plain| {
             let mut groups =

@@ -257,11 +257,11 @@ pub(crate) fn refit_steps(
         let Some(products) = &last else { return Step::Impossible };
         let from = prior_deviations(&linearisation.factors, &iterate.effects);
         let joint = products.fit_within(&chosen, &all_precisions, &from, &most);
-        let promised = iterate.loss() - joint.loss;
-        if promised < estimator.tolerance(iterate.loss()) {
-            return Step::Refused { promised };
+        let predicted_reduction = iterate.loss() - joint.loss;
+        if predicted_reduction < estimator.tolerance(iterate.loss()) {
+            return Step::Refused { predicted_reduction };
         }
-        estimator.backtrack(iterate, promised, options.fractions, |share| {
+        estimator.backtrack(iterate, predicted_reduction, options.fractions, |share| {
             let mut effects = iterate.effects.clone();
             for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
                 let [least, most] = effects[*at].candidate.fit_bounds(*key);
@@ -336,7 +336,7 @@ pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, options: Options) -
         Estimator::new(options).descend(model, |_, best| match linearised_anew(engine, best) {
             Err(()) => Step::Impossible,
             Ok(Some(next)) => Step::Taken(next),
-            Ok(None) => Step::Refused { promised: 0.0 },
+            Ok(None) => Step::Refused { predicted_reduction: 0.0 },
         });
     if outer.outcome == Outcome::StepLimit {
         return Refit { convergence: Convergence { outcome: outer.outcome, ..fit.convergence }, ..fit };

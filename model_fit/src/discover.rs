@@ -130,13 +130,13 @@ pub(super) fn search<'a>(
     Ok(Discovery { found, terms: taken, note })
 }
 
-/// Where the fit of a model with more terms begins: at what the smaller one gave, and at the coefficients that straight lines
-/// promise, by their parameters.
-fn start(fitting: &Fitting<'_>, before: &Fitted<'_>, promised_si: impl Fn(usize) -> Option<f64>) -> Vec<f64> {
+/// Where the fit of a model with more terms begins: at what the smaller one gave, and at the coefficients of the linear
+/// screening, by their parameters.
+fn start(fitting: &Fitting<'_>, before: &Fitted<'_>, screened_si: impl Fn(usize) -> Option<f64>) -> Vec<f64> {
     let known = |what: What| before.fitting.unknowns.iter().position(|unknown| unknown.what == what);
     let value = |unknown: &Unknown| match (unknown.what, known(unknown.what)) {
         (_, Some(place)) => before.point.values_si[place],
-        (What::Shared(index), None) => promised_si(index).unwrap_or(unknown.start_si),
+        (What::Shared(index), None) => screened_si(index).unwrap_or(unknown.start_si),
         _ => unknown.start_si,
     };
     fitting.unknowns.iter().map(value).collect()
@@ -155,8 +155,8 @@ fn round<'a>(
         let suspect = first + term;
         let suspects: Vec<usize> = before.suspects.iter().copied().chain([suspect]).collect();
         let coefficient = coefficient(model, Some(suspect));
-        let promised = |index: usize| (Some(index) == coefficient).then(|| screen.coefficient_si(*term));
-        let start = |fitting: &Fitting<'a>| vec![start(fitting, before, promised)];
+        let screened_si = |index: usize| (Some(index) == coefficient).then(|| screen.coefficient_si(*term));
+        let start = |fitting: &Fitting<'a>| vec![start(fitting, before, screened_si)];
         fitted_from(model, before.fitting.records, &suspects, (start, OPTIONS.steps))
             .ok()
             .map(|fit| (suspect, fit))

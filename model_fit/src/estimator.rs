@@ -5,7 +5,7 @@
 //!   linearise at the iterate ──► full step, then shorter ones, until the simulated loss falls ──► next iterate
 //!                                          │ none does
 //!                                          ▼
-//!                converged if the linearised model promises less than the tolerance, else stalled
+//!                converged if the linearised model predicts less than the tolerance, else stalled
 //! ```
 //!
 //! Backtracking on the simulated loss (fits of model files damp a step in place of shortening it, see `fit`): a step counts only
@@ -76,8 +76,8 @@ pub trait Iterate {
 pub enum Step<P> {
     /// The first fraction whose loss is below that of the iterate before.
     Taken(P),
-    /// No fraction lowers the loss, though the linearised model promises this fall.
-    Refused { promised: f64 },
+    /// No fraction lowers the loss, though the linearised model predicts this reduction.
+    Refused { predicted_reduction: f64 },
     /// No linearisation: a neighbouring rig does not exist.
     Impossible,
 }
@@ -103,7 +103,7 @@ impl Estimator {
     pub fn backtrack<P: Iterate>(
         &mut self,
         from: &P,
-        promised: f64,
+        predicted_reduction: f64,
         fractions: &[f64],
         mut at: impl FnMut(f64) -> Option<P>,
     ) -> Step<P> {
@@ -115,7 +115,7 @@ impl Estimator {
                 return Step::Taken(tried);
             }
         }
-        Step::Refused { promised }
+        Step::Refused { predicted_reduction }
     }
 
     /// Counts a simulation outside [`Estimator::backtrack`].
@@ -139,7 +139,9 @@ impl Estimator {
         while iterations < self.options.steps {
             let next = match step(&mut self, &point) {
                 Step::Taken(next) => next,
-                Step::Refused { promised } if promised <= self.tolerance(point.loss()) => {
+                Step::Refused { predicted_reduction }
+                    if predicted_reduction <= self.tolerance(point.loss()) =>
+                {
                     outcome = Outcome::Converged;
                     break;
                 }
@@ -189,8 +191,8 @@ mod tests {
     fn fitted(loss: fn(f64) -> f64, start: f64, slope: fn(f64) -> f64, curvature: f64) -> (At, Convergence) {
         Estimator::new(OPTIONS).descend(At(start, loss), |estimator, at| {
             let step = -slope(at.0) / curvature;
-            let promised = 0.5 * slope(at.0) * slope(at.0) / curvature;
-            estimator.backtrack(at, promised, OPTIONS.fractions, |fraction| {
+            let predicted_reduction = 0.5 * slope(at.0) * slope(at.0) / curvature;
+            estimator.backtrack(at, predicted_reduction, OPTIONS.fractions, |fraction| {
                 Some(At((at.0 + fraction * step).clamp(0.0, 10.0), loss))
             })
         })

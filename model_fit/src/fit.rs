@@ -27,8 +27,8 @@ pub(super) const OPTIONS: Options = Options {
 };
 /// What a sample adds to the fall of the loss that counts: a change of the residual by half of it, relatively.
 const CONVERGED_PER_SAMPLE: f64 = 1e-4;
-/// Share of the fall that a step promises from which it is taken without another.
-const KEPT_PROMISE: f64 = 0.75;
+/// Share of the predicted reduction of the loss from which a step is taken without another.
+const SUFFICIENT_REDUCTION_RATIO: f64 = 0.75;
 /// Noise of an output is at least this share of its size: a fit that leaves nothing has no likelihood.
 const LEAST_NOISE: f64 = 1e-9;
 
@@ -438,22 +438,22 @@ impl<'a> Fitting<'a> {
         Ok(Estimator::new(options).descend(start, |estimator, point| {
             let Ok(normals) = here.normals(&point.values_si, &cut) else { return Step::Impossible };
             let sum = here.sum(&normals, point);
-            let promised = sum.slope.dot(&here.step(&sum, &point.values_si, 0.0));
-            match here.best_step(estimator, point, &sum, promised) {
+            let predicted_reduction = sum.slope.dot(&here.step(&sum, &point.values_si, 0.0));
+            match here.best_step(estimator, point, &sum, predicted_reduction) {
                 Some(best) => Step::Taken(best),
-                None => Step::Refused { promised },
+                None => Step::Refused { predicted_reduction },
             }
         }))
     }
 
-    /// The damped step with the least loss: shorter ones are tried until one is worse than the one before. One that keeps most of
-    /// what the linearised model promises is taken as it is [Conn, Gould, Toint 2000, Trust-Region Methods, 6.1].
+    /// The damped step with the least loss: shorter ones are tried until one is worse than the one before. One that has most of
+    /// the predicted reduction is taken as it is [Conn, Gould, Toint 2000, Trust-Region Methods, 6.1].
     fn best_step(
         &self,
         estimator: &mut Estimator,
         point: &Point,
         sum: &Normal,
-        promised: f64,
+        predicted_reduction: f64,
     ) -> Option<Point> {
         let mut best: Option<Point> = None;
         for fraction in OPTIONS.fractions {
@@ -466,7 +466,11 @@ impl<'a> Fitting<'a> {
             let tried = self.at(moved.collect()).ok();
             let least = best.as_ref().map_or(point.loss, |best| best.loss);
             match tried.filter(|tried| tried.loss < least) {
-                Some(better) if point.loss - better.loss >= KEPT_PROMISE * promised => return Some(better),
+                Some(better)
+                    if point.loss - better.loss >= SUFFICIENT_REDUCTION_RATIO * predicted_reduction =>
+                {
+                    return Some(better);
+                }
                 Some(better) => best = Some(better),
                 None if best.is_some() => break,
                 None => {}

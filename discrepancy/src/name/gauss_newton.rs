@@ -182,14 +182,14 @@ fn line_search(
     let (precisions, from) = (part(&linearisation.precisions), part(&linearisation.from));
     let [whole, shorter @ ..] = JOINT.fractions else { unreachable!("a whole step is tried first") };
     let mut excluded = excluded.to_vec();
-    let mut promised = 0.0;
+    let mut predicted_reduction = 0.0;
     for _ in 0..EXCLUSIONS {
         let fit = linearisation.products(engine, iterate, &excluded).fit_from(chosen, &precisions, &from);
-        promised = iterate.loss - fit.loss;
+        predicted_reduction = iterate.loss - fit.loss;
         estimator.count();
         let Some(tried) = step_by(engine, iterate, chosen, &fit, *whole) else {
             // No rig has the whole step: a shorter one may be possible.
-            return estimator.backtrack(iterate, promised, shorter, |fraction| {
+            return estimator.backtrack(iterate, predicted_reduction, shorter, |fraction| {
                 step_by(engine, iterate, chosen, &fit, fraction)
             });
         };
@@ -205,12 +205,12 @@ fn line_search(
         excluded.sort_unstable();
         excluded.dedup();
         if excluded.len() == before {
-            return estimator.backtrack(iterate, promised, shorter, |fraction| {
+            return estimator.backtrack(iterate, predicted_reduction, shorter, |fraction| {
                 step_by(engine, iterate, chosen, &fit, fraction)
             });
         }
     }
-    Step::Refused { promised }
+    Step::Refused { predicted_reduction }
 }
 
 /// The point after a fraction of a step.

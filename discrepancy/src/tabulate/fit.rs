@@ -374,9 +374,9 @@ pub(super) fn fit(engine: &Engine<'_>, start: Iterate, steps: usize) -> Iterate 
         estimator.count_all(within);
         match within {
             Convergence { iterations: 0, outcome: Outcome::Stalled, .. } => {
-                Step::Refused { promised: f64::INFINITY }
+                Step::Refused { predicted_reduction: f64::INFINITY }
             }
-            Convergence { iterations: 0, .. } => Step::Refused { promised: 0.0 },
+            Convergence { iterations: 0, .. } => Step::Refused { predicted_reduction: 0.0 },
             _ => Step::Taken(next),
         }
     });
@@ -395,11 +395,11 @@ fn steps_within(engine: &Engine<'_>, start: Iterate, linearisation: &[&[f64]]) -
     Estimator::new(TABLES_WITHIN).descend(start, |estimator, point| {
         products.set_residual(&point.residual, linearisation, engine.rows());
         let joint = products.fit_from(&all, &precisions, &point.model.deviations());
-        let promised = point.loss - point.model.penalty_for_points() - joint.loss;
-        if promised < estimator.tolerance(point.loss) {
-            return Step::Refused { promised };
+        let predicted_reduction = point.loss - point.model.penalty_for_points() - joint.loss;
+        if predicted_reduction < estimator.tolerance(point.loss) {
+            return Step::Refused { predicted_reduction };
         }
-        estimator.backtrack(point, promised, TABLES_WITHIN.fractions, |fraction| {
+        estimator.backtrack(point, predicted_reduction, TABLES_WITHIN.fractions, |fraction| {
             let changes = coordinates.iter().zip(&joint.coefficients);
             let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {
                 model.perturbed(*coordinate, fraction * change)

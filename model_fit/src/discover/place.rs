@@ -116,8 +116,8 @@ impl Group {
     }
 }
 
-/// Share of what is left that some terms explain, fitted together with all that the model leaves open from what straight lines
-/// promise, and what the residual is worth in independent samples then; `None` where that cannot be simulated.
+/// Share of what is left that some terms explain, fitted together with all that the model leaves open from the coefficients of
+/// the linear screening, and what the residual is worth in independent samples then; `None` where that cannot be simulated.
 fn refit(
     (grown, first): (&Model, usize),
     baseline: &Fitted<'_>,
@@ -132,8 +132,9 @@ fn refit(
         place.map(|place| coefficients_si[place])
     };
     let fitting = Fitting::new(grown, Program::new(grown, &suspects).ok()?, before.records, &suspects);
-    // All of the promise, or nothing: a strong term may be far from straight.
-    let start = |share: f64| start(&fitting, baseline, |index| of(index).map(|promised| share * promised));
+    // All of the screened coefficients, or nothing: a strong term may be far from straight.
+    let start =
+        |share: f64| start(&fitting, baseline, |index| of(index).map(|screened_si| share * screened_si));
     let (point, _) = fitting.near(&baseline.point).fit_from(vec![start(1.0), start(0.0)], STEPS).ok()?;
     let scaled = |squares: &[f64]| -> f64 {
         let outputs = squares.iter().zip(&baseline.point.squares).enumerate();

@@ -6,12 +6,12 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// The last step lowered the loss by less than the tolerance, or none promised more.
+    /// The last step lowered the loss by less than the tolerance, or none was predicted to lower it by more.
     #[default]
     Converged,
     /// No step leads further, and a number is at the end of its range.
     Bound,
-    /// The linearised model promised more, and no step lowered the simulated loss or was possible.
+    /// The linearised model predicted more, and no step lowered the simulated loss or was possible.
     Stalled,
     /// The steps were used up.
     StepLimit,

@@ -173,9 +173,9 @@ impl<'a> RigProblem<'a> {
         let (fit, _) = Estimator::new(options).descend(first, |estimator, iterate| {
             let Some(columns) = self.columns(iterate) else { return Step::Impossible };
             let Some(step) = Self::step(&columns, &iterate.residual) else { return Step::Impossible };
-            let promised =
+            let predicted_reduction =
                 2.0 * step.dot(&columns.tr_mul(&iterate.residual)) - (&columns * &step).norm_squared();
-            estimator.backtrack(iterate, promised, options.fractions, |share| {
+            estimator.backtrack(iterate, predicted_reduction, options.fractions, |share| {
                 let mut terms = iterate.terms.clone();
                 let mut changes = step.iter();
                 for term in &mut terms {
@@ -244,12 +244,12 @@ impl Problem for RigProblem<'_> {
         self.descend(terms, ROUGH)
     }
 
-    fn promises(&self, at: &Fit) -> Vec<(Term, f64)> {
+    fn predicted_gains(&self, at: &Fit) -> Vec<(Term, f64)> {
         let (Some(rig), Some(plain)) = (self.rig(&at.terms), self.with_effects(&at.terms)) else {
             return Vec::new();
         };
         let coarse = self.engine.simulate_coarsely(&rig);
-        let mut promises = Vec::new();
+        let mut gains = Vec::new();
         for candidate in &self.candidates {
             for (key, z) in Self::starts(candidate) {
                 let mut coordinates = candidate.origin();
@@ -262,17 +262,17 @@ impl Problem for RigProblem<'_> {
                 let range = if z > 0.0 { [LEAST_START, most] } else { [least, -LEAST_START] };
                 let Some((amplitude, gain)) = Self::linear(at, &column, range) else { continue };
                 coordinates[key] = if candidate.vanishes_at_zero_amplitude() { amplitude } else { z };
-                promises.push((Term::Effect { candidate: *candidate, coordinates }, gain));
+                gains.push((Term::Effect { candidate: *candidate, coordinates }, gain));
             }
         }
         let factors = Self::factors(&at.terms);
         for (parameter, column) in self.engine.parameter_columns(&plain, &factors).iter().enumerate() {
             if let Some((change, gain)) = Self::linear(at, column, [-MOST_OFF, MOST_OFF]) {
-                promises.push((Term::Parameter { at: parameter, factor: 1.0 + change }, gain));
+                gains.push((Term::Parameter { at: parameter, factor: 1.0 + change }, gain));
             }
         }
-        promises.retain(|(term, _)| !at.terms.iter().any(|there| Self::is_same(there, term)));
-        promises
+        gains.retain(|(term, _)| !at.terms.iter().any(|there| Self::is_same(there, term)));
+        gains
     }
 
     fn squares(fit: &Fit) -> f64 {

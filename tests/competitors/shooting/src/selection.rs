@@ -8,7 +8,7 @@
 //! without; it ends where no term lowers it. The variance of the noise is unknown, so that what no term describes counts as
 //! noise. Source: Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978).
 
-/// Terms fitted in a step: the first ones by what a linear fit promises.
+/// Terms fitted in a step: the first ones by the gain that a linear fit predicts.
 const TRIED: usize = 5;
 /// Most terms of a model.
 const MOST_TERMS: usize = 6;
@@ -27,8 +27,8 @@ pub(crate) trait Problem {
     fn fit(&self, terms: &[Self::Term]) -> Option<Self::Fit>;
     /// The same in a few steps, for comparing many.
     fn fit_roughly(&self, terms: &[Self::Term]) -> Option<Self::Fit>;
-    /// Terms that can be added, with the residual sum of squares that a linear fit promises to remove.
-    fn promises(&self, at: &Self::Fit) -> Vec<(Self::Term, f64)>;
+    /// Terms that can be added, each with the fall of the residual sum of squares that a linear fit predicts.
+    fn predicted_gains(&self, at: &Self::Fit) -> Vec<(Self::Term, f64)>;
     /// Residual sum of squares.
     fn squares(fit: &Self::Fit) -> f64;
     /// Its terms, with the numbers that were fitted.
@@ -48,12 +48,12 @@ pub(crate) fn criterion<P: Problem>(problem: &P, fit: &P::Fit) -> f64 {
 
 /// The best of some terms beside others, the criterion beside each.
 fn tried<P: Problem>(problem: &P, beside: &P::Fit) -> Vec<(f64, P::Fit)> {
-    let mut promises = problem.promises(beside);
+    let mut terms = problem.predicted_gains(beside);
     let count = problem.count();
-    let promised = |(term, gain): &(P::Term, f64)| gain - P::numbers(term) as f64 * count.ln();
-    promises.sort_by(|one, other| promised(other).total_cmp(&promised(one)));
+    let net_gain = |(term, gain): &(P::Term, f64)| gain - P::numbers(term) as f64 * count.ln();
+    terms.sort_by(|one, other| net_gain(other).total_cmp(&net_gain(one)));
     let mut firsts: Vec<P::Term> = Vec::new();
-    for (term, _) in promises {
+    for (term, _) in terms {
         if firsts.len() < TRIED && !firsts.iter().any(|first| P::is_same(first, &term)) {
             firsts.push(term);
         }
@@ -149,7 +149,7 @@ mod tests {
             self.fit(terms)
         }
 
-        fn promises(&self, at: &Fitted) -> Vec<(usize, f64)> {
+        fn predicted_gains(&self, at: &Fitted) -> Vec<(usize, f64)> {
             let gain = |term: usize| {
                 let column = self.columns.column(term);
                 (term, column.dot(&at.residual).powi(2) / column.dot(&column))
