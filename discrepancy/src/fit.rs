@@ -291,7 +291,7 @@ impl Products {
             };
             let tried_squares = self.squares(chosen, &tried);
             let tried_loss = self.loss(&tried_squares) + prior_loss(&tried);
-            if tried_loss > loss - CONVERGED && tried_loss >= loss {
+            if tried_loss >= loss {
                 break;
             }
             let converged = loss - tried_loss < CONVERGED;
