@@ -2,7 +2,7 @@
 //! is given and writes down what it hears.
 
 use crate::launch::Pace;
-use crate::records::{Table, bus_log, json};
+use crate::records::Table;
 use crate::scene::Scene;
 use protocol::can::CanFrame;
 use protocol::frames::{Frame, RigStatus, ValveCommand};
@@ -115,14 +115,13 @@ impl Plan<'_> {
             }
         });
         let _ = emulator.wait().expect_code(0);
-        let measurement = Table::read(&scene.path("emulator/measurement.csv"));
-        measurement.expect_no_hole();
+        let measurement = scene.measurement();
         assert_eq!(measurement.len(), self.cycles);
         Left {
             measurement,
-            truth: Table::read(&scene.path("emulator/truth.csv")),
-            summary: json(&scene.path("emulator/summary.json")),
-            log: bus_log(&scene.path("emulator/bus.log")),
+            truth: scene.truth(),
+            summary: scene.summary(),
+            log: scene.bus_log(),
             received,
             scene,
         }

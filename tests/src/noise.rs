@@ -10,10 +10,9 @@
 //!
 //! What was obeyed is judged by what the controllers themselves recorded of their commands, not by what the rig made of the bus.
 
-use crate::axis_table::AxisTable;
 use crate::launch::Pace;
 use crate::peer::Peer;
-use crate::records::{self, Table, count};
+use crate::records::count;
 use crate::scene::{RESTLESS, Scene};
 use protocol::can::{CanFrame, EXTENDED_FLAG, REMOTE_FLAG};
 use protocol::frames::{DecodeError, Frame};
@@ -173,8 +172,8 @@ pub fn run(seconds: u32, per_second: u32, seed: u64) -> Outcome {
 }
 
 fn outcome(scene: &Scene, sent: Sent) -> Outcome {
-    let summary = records::json(&scene.path("emulator/summary.json"));
-    let reported = records::json(&scene.path("controller/controller.json"));
+    let summary = scene.summary();
+    let reported = scene.report();
     let of = |pointer: &str| count(&summary, pointer);
     let mut obeyed = Obeyed::default();
     Axis::NAMES.iter().for_each(|axis| obeyed.add(scene, axis));
@@ -207,8 +206,8 @@ pub struct Obeyed {
 impl Obeyed {
     /// Adds those of an axis. The load's controller holds its valve shut throughout, so whatever acts there is wrong.
     fn add(&mut self, scene: &Scene, axis: &str) {
-        let acted = Table::read(&scene.path("emulator/measurement.csv")).column(&format!("{axis}_valve"));
-        let reported = AxisTable::read(&scene.path(&format!("controller/controller-{axis}.csv")));
+        let acted = scene.measurement().column(&format!("{axis}_valve"));
+        let reported = scene.axis_table(axis);
         let (cycles, openings, enabled) =
             (reported.cycles(), reported.numbers("opening"), reported.numbers("enabled"));
         let mut answered = 0;

@@ -1,9 +1,13 @@
 //! A folder of its own for each test, with everything that a run needs and everything that it leaves.
 
+use crate::axis_table::AxisTable;
 use crate::binaries::{Program, workspace};
 use crate::launch::{Launch, Pace};
 use crate::peer::Peer;
 use crate::process::{Running, wait_until};
+use crate::records::{self, Table, json};
+use protocol::can::CanFrame;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -136,6 +140,40 @@ impl Scene {
     /// Waits until the emulator has recorded so many more rows than now: it still runs, and goes on.
     pub fn wait_for_more_rows(&self, folder: &str, more: usize) {
         self.wait_for_rows(folder, rows(&self.path(folder).join("measurement.csv")) + more);
+    }
+
+    /// summary.json of the emulator's folder; below, the other files that a run leaves where nothing else is said.
+    pub fn summary(&self) -> Value {
+        json(&self.path("emulator/summary.json"))
+    }
+
+    pub fn run_description(&self) -> Value {
+        json(&self.path("emulator/run.json"))
+    }
+
+    /// With a row for each cycle.
+    pub fn measurement(&self) -> Table {
+        let table = Table::read(&self.path("emulator/measurement.csv"));
+        table.expect_no_hole();
+        table
+    }
+
+    pub fn truth(&self) -> Table {
+        Table::read(&self.path("emulator/truth.csv"))
+    }
+
+    pub fn bus_log(&self) -> Vec<CanFrame> {
+        records::bus_log(&self.path("emulator/bus.log"))
+    }
+
+    /// controller.json of the controller's folder.
+    pub fn report(&self) -> Value {
+        json(&self.path("controller/controller.json"))
+    }
+
+    /// The table of an axis in the controller's folder.
+    pub fn axis_table(&self, axis: &str) -> AxisTable {
+        AxisTable::read(&self.path("controller").join(format!("controller-{axis}.csv")))
     }
 
     pub fn same(&self, one: &Path, other: &Path) -> bool {

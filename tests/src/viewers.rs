@@ -3,7 +3,7 @@
 use crate::launch::Pace;
 use crate::onlooker::LivePage;
 use crate::process::{PATIENCE, Running};
-use crate::records::{count, json};
+use crate::records::count;
 use crate::scene::{RESTLESS, Scene};
 use std::io::Read;
 use std::net::TcpStream;
@@ -45,7 +45,7 @@ pub fn run(seconds: u32, with: bool) -> Outcome {
     if let Some(page) = page {
         page.close();
     }
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let of = |pointer: &str| count(&summary, pointer);
     Outcome {
         missed: of("/skipped"),

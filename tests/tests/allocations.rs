@@ -9,7 +9,7 @@ use protocol::can::CanFrame;
 use rustix::process::Signal;
 use system_tests::onlooker::Viewer;
 use system_tests::xcp::{self, Talk};
-use system_tests::{AxisTable, Build, LINKED, Pace, Peer, RESTLESS, Scene, count, json, run_both, turn};
+use system_tests::{Build, LINKED, Pace, Peer, RESTLESS, Scene, count, run_both, turn};
 
 /// Faults that begin and end after the warm-up, mild enough for the run to go on as it does.
 const FAULTS: &str = include_str!("../scenes/faults/allocations.toml");
@@ -54,9 +54,9 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     let _ = emulator.wait().expect_code(130);
     let _ = controller.wait().expect_code(0);
     let seen = reading.join().expect("the viewer does not panic");
-    assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], true);
-    let summary = json(&scene.path("emulator/summary.json"));
-    let controller = json(&scene.path("controller/controller.json"));
+    assert_eq!(scene.run_description()["counts_allocations"], true);
+    let summary = scene.summary();
+    let controller = scene.report();
     assert!(count(&summary, "/cycles") > 11_000);
     assert!(
         seen.cycles.len() as u64 + seen.lost > 10_000,
@@ -128,7 +128,7 @@ fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
         &scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat"),
     );
     // Past the warm-up of 1 s both axes have been through every state of the way, and into the next repetition.
-    let load = AxisTable::read(&scene.path("controller/controller-load.csv"));
+    let load = scene.axis_table("load");
     let late = load.cycles().iter().position(|cycle| *cycle >= 1500).expect("rows after the warm-up");
     for (column, state) in [
         ("main_chain", "preparing"),
@@ -141,8 +141,8 @@ fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
     ] {
         assert!(load.texts(column)[late..].contains(&state), "{state} after the warm-up");
     }
-    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/allocations_in_cycle"), 0);
-    assert_eq!(count(&json(&scene.path("controller/controller.json")), "/allocations_in_cycle"), 0);
+    assert_eq!(count(&scene.summary(), "/allocations_in_cycle"), 0);
+    assert_eq!(count(&scene.report(), "/allocations_in_cycle"), 0);
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn programs_that_do_not_count_say_so() {
         &scene.emulator(Pace::Real).with("--seconds 1.2"),
         &scene.controller(Pace::Real).with("--repeat"),
     );
-    assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], false);
-    assert!(json(&scene.path("emulator/summary.json"))["allocations_in_cycle"].is_null());
-    assert!(json(&scene.path("controller/controller.json"))["allocations_in_cycle"].is_null());
+    assert_eq!(scene.run_description()["counts_allocations"], false);
+    assert!(scene.summary()["allocations_in_cycle"].is_null());
+    assert!(scene.report()["allocations_in_cycle"].is_null());
 }

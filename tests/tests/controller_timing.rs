@@ -50,7 +50,7 @@ fn expect_one_account(scene: &Scene, process: u32, name: &str, waking_axis: &str
     assert!(rows.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1 + pair[1].skipped), "{name}");
     assert_eq!(count(&report, "/timing_dropped"), 0, "{name}");
     let of_axis = |key| count(&report, &format!("/axes/{waking_axis}/{key}"));
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let dropped = dropped_at_queue(&summary, process, if waking_axis == "drive" { "120" } else { "121" });
     assert_eq!(of_axis("sensors_lost"), dropped, "{name}: what its full queue did not take, and no more");
     let waited = of_axis("sensors_received") - count(&report, "/sensors_before_start");
@@ -100,9 +100,9 @@ fn rows_of_both_processes_join_to_the_time_on_the_way_each_way() {
     let _ = controller.wait().expect_code(0);
     let answered = expect_one_account(&scene, process, "controller", "drive");
     let rig = table(&scene.path("emulator/emulator-timing.csv"));
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!(rig.len() as u64, count(&summary, "/cycles") - count(&summary, "/skipped"));
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     let arrivals = report["arrivals"].as_array().expect("a list");
     let sensors = arrivals.iter().find(|arrivals| arrivals["frame"] == "DriveSensors").expect("they came");
     assert_eq!(count(sensors, "/count"), count(&report, "/axes/drive/sensors_received"));
@@ -166,7 +166,7 @@ fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() 
         "told in {reported:?}, stopped at {stopped}"
     );
     assert_eq!(rows[reported[0]].vitals.continued, 1, "{:?}", rows[reported[0]]);
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert_eq!(count(&report, "/vitals/continued"), 1);
     let max_ns = count(&report, "/wakeup_ns/max");
     assert!(max_ns >= 25_000_000, "{max_ns} ns, the wait of the oldest sensors");

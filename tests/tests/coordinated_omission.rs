@@ -56,7 +56,7 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait().expect_code(0);
 
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let (cycles, skipped) = (count(&summary, "/cycles"), count(&summary, "/skipped"));
     assert_eq!((cycles, count(&summary, "/records_dropped")), (4000, 0));
     let table = rows(&scene.path("emulator/emulator-timing.csv"));
@@ -129,7 +129,7 @@ fn a_dump_can_be_asked_for_and_changes_nothing() {
     assert!(at - from >= 1000 * MS, "a second before: {event}");
     let _ = emulator.interrupt();
     let _ = controller.wait();
-    assert!(count(&json(&scene.path("emulator/summary.json")), "/flight/dumps") >= 1);
+    assert!(count(&scene.summary(), "/flight/dumps") >= 1);
 }
 
 #[test]
@@ -148,7 +148,7 @@ fn without_a_recorder_nobody_is_dumped_and_what_an_earlier_run_left_is_gone() {
     let _ = controller.wait();
     assert!(!earlier.exists() && !scene.path("emulator/emulator-timing.csv").exists());
     assert!(of_another.exists(), "a controller may have started before the rig");
-    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/flight/dumps"), 0);
+    assert_eq!(count(&scene.summary(), "/flight/dumps"), 0);
 }
 
 #[test]

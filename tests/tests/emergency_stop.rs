@@ -2,7 +2,7 @@
 
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
 use system_tests::exit::BOUND_BROKEN;
-use system_tests::{Pace, RESTLESS, Scene, Table, json};
+use system_tests::{Pace, RESTLESS, Scene};
 
 /// The carriage moves by then.
 const TRIP: u32 = 900;
@@ -40,8 +40,8 @@ fn run() -> Scene {
 #[test]
 fn a_stop_is_released_by_its_sender_alone_and_the_record_shows_the_valve_that_acts() {
     let scene = run();
-    let truth = Table::read(&scene.path("emulator/truth.csv"));
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    let truth = scene.truth();
+    let measurement = scene.measurement();
     let (supply, valve) = (truth.column("supply_pressure_Pa"), measurement.column("drive_valve"));
     // Said in cycle k, heard at k + 1 (bus.md, Lockstep).
     let (tripped, released) = (TRIP as usize + 1, RELEASE as usize + 1);
@@ -67,7 +67,7 @@ fn the_controllers_end_an_aborted_experiment_by_themselves() {
     scene.peer().be_console(|cycle| (cycle == TRIP).then(|| Frame::ConsoleEmergencyStop(stop(false))));
     let _ = controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
     let _ = emulator.wait();
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert_eq!(report["axes"]["drive"]["chain_state"], "aborted");
     assert_eq!(report["ended_well"], false);
 }

@@ -235,7 +235,7 @@ fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release
     emulator.signal(Signal::INT);
     let _ = emulator.wait();
     for (axis, ended) in [("drive", "fault"), ("load", "aborted")] {
-        let table = AxisTable::read(&scene.path("controller").join(format!("controller-{axis}.csv")));
+        let table = scene.axis_table(axis);
         let states = table.states("main_chain");
         assert!(states.contains(&ended), "{axis}: {states:?}");
         assert_eq!(states.iter().filter(|state| **state == "experiment").count(), 2, "{axis}: {states:?}");

@@ -4,7 +4,7 @@
 use plant::RigParameters;
 use std::path::Path;
 use system_tests::discrepancy::{discrepancy, rig};
-use system_tests::{Pace, SHORT, Scene, Table, json, workspace};
+use system_tests::{Pace, SHORT, Scene, json, workspace};
 
 /// Periods after the valve's edge that are compared: the valve stays at its limit.
 const COMPARED: usize = 50;
@@ -28,8 +28,8 @@ fn step(rig: &str) -> Step {
     // Whether the step passes is not asked: what is missing may well spoil it.
     let _ = controller.wait();
     let _ = emulator.wait();
-    let truth = Table::read(&scene.path("emulator/truth.csv"));
-    let valve = Table::read(&scene.path("emulator/measurement.csv")).column("drive_valve");
+    let truth = scene.truth();
+    let valve = scene.measurement().column("drive_valve");
     let edge = (1..valve.len()).find(|at| valve[*at] - valve[at - 1] > EDGE).expect("an edge of the valve");
     let changes = ["drive_rod_velocity_m_per_s", "drive_pressure_a_Pa", "drive_pressure_b_Pa"].map(|name| {
         let column = truth.column(name);

@@ -8,9 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use system_tests::account::of_sensors;
 use system_tests::events::{self, expect_valve_shut_between};
-use system_tests::{
-    Pace, RESTLESS, Running, SHORT, Scene, Table, bus_log, count, count_of_id, json, run_both, turn,
-};
+use system_tests::{Pace, RESTLESS, Running, SHORT, Scene, count, count_of_id, json, run_both, turn};
 
 const UNDER_WAY: usize = 900;
 
@@ -38,8 +36,8 @@ fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
     scene.wait_for_more_rows("emulator", 600);
     let _ = emulator.interrupt();
     first.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
-    let summary = json(&scene.path("emulator/summary.json"));
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    let summary = scene.summary();
+    let measurement = scene.measurement();
     expect_valve_shut_between(&summary, &measurement, "two-sources", "one-source");
     for axis in ["drive", "load"] {
         assert!(count(&summary, &format!("/{axis}_commands/two_sources")) >= 1, "{axis}");
@@ -61,9 +59,9 @@ fn controllers_that_know_of_each_other_take_a_second_one_for_a_fault_and_stop() 
     let _ = first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
     let _ = second.wait().expect_code(1);
     let _ = emulator.interrupt();
-    let reported = events::all(&json(&scene.path("emulator/summary.json")));
+    let reported = events::all(&scene.summary());
     assert!(events::times(&reported, "emergency-stop") >= 1, "{reported:?}");
-    let valve = Table::read(&scene.path("emulator/measurement.csv")).column("drive_valve");
+    let valve = scene.measurement().column("drive_valve");
     assert!(valve[valve.len() - 1000..].iter().all(|opening| *opening == 0.0), "the valve stays shut");
 }
 
@@ -89,9 +87,9 @@ fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the
     drop(never);
 
     let report: serde_json::Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let of_peer = |index: usize| &report["peers"][index]["dropped_at_queue"];
-    let log = bus_log(&scene.path("emulator/bus.log"));
+    let log = scene.bus_log();
     for id in [0x110_u16, 0x111, 0x120, 0x121, 0x130, 0x140, 0x150, 0x151, 0x152] {
         let of_id = |frames: &[CanFrame]| {
             frames.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
@@ -129,20 +127,18 @@ fn a_bus_that_stays_away_ends_both_with_complete_files() {
     emulator.wait_for("the bus is gone");
     let _ = emulator.wait().expect_code(3).expect_said(&["--bus-grace"]);
     let _ = controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
-    let summary = json(&scene.path("emulator/summary.json"));
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
-    measurement.expect_no_hole();
+    let summary = scene.summary();
+    let measurement = scene.measurement();
     assert_eq!(count(&summary, "/cycles"), measurement.len() as u64);
     assert_eq!(count(&summary, "/bus/disconnects"), 1);
     assert!(count(&summary, "/bus/dropped_on_send") > 1000, "a second of frames was dropped, and counted");
     assert_eq!(summary["passed"], false);
     // Frames that the bus did not take were on no bus.
     assert!(
-        count(&summary, "/frames_sent") + count(&summary, "/frames_received")
-            == bus_log(&scene.path("emulator/bus.log")).len() as u64
+        count(&summary, "/frames_sent") + count(&summary, "/frames_received") == scene.bus_log().len() as u64
     );
-    let _ = Table::read(&scene.path("emulator/truth.csv"));
-    assert_eq!(count(&json(&scene.path("controller/controller.json")), "/bus/disconnects"), 1);
+    let _ = scene.truth();
+    assert_eq!(count(&scene.report(), "/bus/disconnects"), 1);
 }
 
 #[test]
@@ -191,11 +187,10 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
     let _ = emulator.interrupt();
     let _ = controller.wait().expect_code(0);
     drop(host);
-    let summary = json(&scene.path("emulator/summary.json"));
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
-    measurement.expect_no_hole();
+    let summary = scene.summary();
+    let measurement = scene.measurement();
     expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     for counted in [&summary, &report] {
         assert_eq!((count(counted, "/bus/disconnects"), count(counted, "/bus/reconnects")), (1, 1));
     }
@@ -211,10 +206,7 @@ fn the_socket_of_a_host_that_was_killed_is_taken_over() {
     assert!(scene.socket().exists(), "a killed host leaves its socket");
     // In lockstep: a machine that stalls for a second would make the controller stop the rig, and the emulator wait for another.
     let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
-    assert!(
-        json(&scene.path("emulator/summary.json"))["bus_host"].is_object(),
-        "the emulator hosted the bus"
-    );
+    assert!(scene.summary()["bus_host"].is_object(), "the emulator hosted the bus");
     assert!(!scene.socket().exists(), "a host that ends removes its socket");
 }
 
@@ -238,5 +230,5 @@ fn a_second_host_is_refused_and_a_second_rig_leaves_while_the_first_goes_on() {
     first.wait_for("another rig is on this bus; stop one of them");
     let _ = first.interrupt();
     assert!(json(&scene.path("second/summary.json"))["bus_host"].is_null());
-    assert!(count(&json(&scene.path("emulator/summary.json")), "/frames_ignored/second_rig") > 0);
+    assert!(count(&scene.summary(), "/frames_ignored/second_rig") > 0);
 }

@@ -2,12 +2,11 @@
 
 use rustix::process::Signal;
 use system_tests::exit::{BUS_FAILED, LOCKSTEP_TIMEOUT};
-use system_tests::{Pace, RESTLESS, SHORT, Scene, Table, count, expect_whole_lines, json};
+use system_tests::{Pace, RESTLESS, SHORT, Scene, count, expect_whole_lines};
 
 fn expect_complete(scene: &Scene) {
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
-    measurement.expect_no_hole();
-    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/cycles"), measurement.len() as u64);
+    let measurement = scene.measurement();
+    assert_eq!(count(&scene.summary(), "/cycles"), measurement.len() as u64);
 }
 
 #[test]
@@ -31,7 +30,7 @@ fn a_barrier_that_nobody_joins_is_given_up() {
     let scene = Scene::new(SHORT);
     let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 0.3").start();
     let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined", "--members"]);
-    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/cycles"), 0);
+    assert_eq!(count(&scene.summary(), "/cycles"), 0);
 }
 
 #[test]
@@ -59,7 +58,7 @@ fn an_emulator_that_is_killed_ends_the_member() {
     let _ = emulator.kill();
     let _ = controller.wait().expect_code(BUS_FAILED);
     let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
-    assert_eq!(count(&json(&scene.path("controller/controller.json")), "/cycles_answered"), rows as u64);
+    assert_eq!(count(&scene.report(), "/cycles_answered"), rows as u64);
 }
 
 #[test]
@@ -86,5 +85,5 @@ fn a_second_emulator_on_the_bus_does_not_take_the_first_ones_place() {
     assert_eq!(second.code, Some(BUS_FAILED), "the second is refused; it said:\n{}", second.stderr);
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait().expect_code(0);
-    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/cycles"), 60_000);
+    assert_eq!(count(&scene.summary(), "/cycles"), 60_000);
 }

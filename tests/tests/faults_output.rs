@@ -31,7 +31,7 @@ fn an_emulator_whose_file_cannot_grow_ends_the_run_and_keeps_whole_lines() {
         assert!(rows > 100, "what fitted was written: {rows} rows, {pace:?}");
         let _ = expect_whole_lines(&scene.path("emulator/truth.csv"));
         let _ = expect_whole_lines(&scene.path("emulator/bus.log"));
-        let summary = json(&scene.path("emulator/summary.json"));
+        let summary = scene.summary();
         assert_eq!(summary["passed"], false);
     }
 }
@@ -45,7 +45,7 @@ fn a_controller_whose_file_cannot_grow_ends_and_the_rig_shuts_its_valve() {
     expect_told(controller.wait(), &scene.path("controller"));
     emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
     assert!(expect_whole_lines(&scene.path("controller/controller-drive.csv")) > 100);
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert_eq!(report["ended_because"], "the output could not be written");
 }
 
@@ -98,5 +98,5 @@ fn an_emulator_that_is_killed_leaves_files_that_read_to_their_last_whole_line() 
     let frames = bus_log_to_last_whole_line(&scene.path("emulator/bus.log")).len() as u64;
     assert!(frames > 4 * (last - MOST_CYCLES_MISSING), "bus.log holds {frames} frames of {last} cycles");
     assert!(!scene.path("emulator/summary.json").exists(), "no summary of a run that did not end");
-    assert!(count(&json(&scene.path("emulator/run.json")), "/schema_version") >= 1);
+    assert!(count(&scene.run_description(), "/schema_version") >= 1);
 }

@@ -2,7 +2,7 @@
 
 use std::os::unix::fs::{PermissionsExt, chown};
 use system_tests::exit::{BOUND_BROKEN, BUS_FAILED};
-use system_tests::{Pace, SHORT, Scene, count, json, turn};
+use system_tests::{Pace, SHORT, Scene, count, turn};
 
 const NOBODY: u32 = 65534;
 /// Limits under which no user but root may have FIFO priority or locked memory.
@@ -36,11 +36,11 @@ fn a_user_without_privileges_is_told_the_remedy_and_the_run_succeeds() {
         assert!(is_late || controller.stderr.contains(NOT_DONE), "{}", controller.stderr);
         let _ = controller.expect_code(if is_late { BOUND_BROKEN } else { BUS_FAILED });
     }
-    let run = json(&scene.path("emulator/run.json"));
+    let run = scene.run_description();
     let refused: Vec<&str> =
         run["realtime_refused"].as_array().expect("a list").iter().filter_map(|line| line.as_str()).collect();
     assert!(refused.iter().any(|line| line.contains("FIFO priority")), "the record knows too: {refused:?}");
-    assert!(count(&json(&scene.path("emulator/summary.json")), "/cycles") > 1500);
+    assert!(count(&scene.summary(), "/cycles") > 1500);
 }
 
 #[test]
@@ -53,5 +53,5 @@ fn who_asks_for_no_privileges_is_warned_of_none() {
         let ended = running.wait().expect_code(0);
         assert!(!ended.stderr.contains("warning"), "{}", ended.stderr);
     }
-    assert_eq!(json(&scene.path("emulator/run.json"))["realtime_granted"], serde_json::json!([]));
+    assert_eq!(scene.run_description()["realtime_granted"], serde_json::json!([]));
 }

@@ -22,9 +22,8 @@ fn under_way(scene: &Scene) -> (Running, Running) {
 fn end(scene: &Scene, emulator: Running) -> (Value, Table) {
     scene.wait_for_more_rows("emulator", 600);
     let _ = emulator.interrupt();
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
-    measurement.expect_no_hole();
-    let summary = json(&scene.path("emulator/summary.json"));
+    let measurement = scene.measurement();
+    let summary = scene.summary();
     assert_eq!(count(&summary, "/cycles"), measurement.len() as u64, "a row for each cycle");
     assert_eq!(count(&summary, "/records_dropped"), 0);
     (summary, measurement)
@@ -62,7 +61,7 @@ fn an_emulator_that_is_killed_and_restarted_is_found_again_and_the_chain_starts_
     controller.wait_for("the rig started anew; starting over");
     let _ = second.wait().expect_code(0).expect_said(&["the controllers are done"]);
     let _ = controller.wait().expect_code(0);
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert!(count(&report, "/bus/disconnects") >= 1 && count(&report, "/bus/reconnects") >= 1);
     let news = report["news"].as_array().expect("news");
     let anew = news.iter().position(|item| item == "rig-restarted").expect("the restart is told");
@@ -102,7 +101,7 @@ fn a_controller_that_stands_still_has_its_valve_shut_and_its_losses_counted_at_b
         assert!(count(&summary, "/drive_commands/expired") >= 1);
         assert_eq!(count(&summary, "/frames_lost_at_rig"), 0, "what was never sent is not lost");
         assert!(count(&summary, "/stale_commands") >= 2, "both axes went stale");
-        let report = json(&scene.path("controller/controller.json"));
+        let report = scene.report();
         let peers = summary["bus_host"]["peers"].as_array().expect("peers");
         let peer =
             peers.iter().find(|peer| peer["name"] == name.as_str()).expect("the controller was a peer");
@@ -135,7 +134,7 @@ fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost
     assert!(skipped >= 150, "{skipped} cycles skipped");
     assert!(count(&summary, "/overruns") >= 1);
     assert_eq!(count(&summary, "/frames_lost_at_rig"), 0, "nothing was lost at the rig");
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert_eq!(count(&report, "/rig_cycles_skipped"), skipped, "the controller knows of every skipped cycle");
     for axis in ["drive", "load"] {
         assert_eq!(count(&report, &format!("/axes/{axis}/sensors_lost")), 0, "{axis}: skipped is not lost");

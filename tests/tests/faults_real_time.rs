@@ -1,7 +1,7 @@
 //! A handful of faults in real time: by the script that means the same in lockstep, and by hand while the run goes on.
 
 use system_tests::broken::{Row, rows};
-use system_tests::{Pace, RESTLESS, Scene, Table, bus_log, count, count_of_id, events, json, run_both, turn};
+use system_tests::{Pace, RESTLESS, Scene, count, count_of_id, events, run_both, turn};
 
 /// By time, so that real time and lockstep can be held against each other; one by a condition that is soon met.
 const SCRIPT: &str = include_str!("../scenes/faults/real-time.toml");
@@ -30,12 +30,12 @@ fn the_same_script_breaks_the_same_in_real_time_and_in_lockstep() {
     assert_eq!(by_time(&real), by_time(&lockstep), "cycle by cycle, missed ones too");
     assert_eq!(by_time(&real).len(), 10);
     for scene in [&real, &lockstep] {
-        let summary = json(&scene.path("emulator/summary.json"));
+        let summary = scene.summary();
         assert_eq!(events::times(&events::all(&summary), "fault"), 11);
-        let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+        let measurement = scene.measurement();
         let stuck = &measurement.column("load_pressure_a_Pa")[700..1200];
         assert!(stuck.iter().all(|pressure| pressure == &stuck[0]), "the sensor shows one value");
-        let truth = Table::read(&scene.path("emulator/truth.csv"));
+        let truth = scene.truth();
         let spool = &truth.column("load_spool")[600..=1400];
         assert!(spool.iter().all(|own| own.to_bits() == spool[0].to_bits()), "the spool does not move");
         let faults = &summary["bus_host"]["faults"];
@@ -44,12 +44,12 @@ fn the_same_script_breaks_the_same_in_real_time_and_in_lockstep() {
             assert!(count_of_id(&faults[name], id) > 0, "{name}: {faults}");
         }
         let babble = count_of_id(&faults["babbling-node"], "010");
-        let received = bus_log(&scene.path("emulator/bus.log"));
+        let received = scene.bus_log();
         let received = received.iter().filter(|frame| frame.standard_id() == Some(16)).count() as u64;
         assert_eq!(received, babble, "what it says is heard");
         let drive = |row: &Row| row.fault == "friction-rise";
         assert!(marks(scene).iter().any(|row| drive(row) && row.what == "begins"), "the condition was met");
-        assert!(json(&scene.path("emulator/run.json"))["faults_toml"].as_str() == Some(SCRIPT));
+        assert!(scene.run_description()["faults_toml"].as_str() == Some(SCRIPT));
     }
 }
 
@@ -84,9 +84,9 @@ fn people_break_and_mend_things_while_the_run_goes_on() {
     let what: Vec<_> = marks(&scene).into_iter().map(|row| (row.number, row.what, row.cause)).collect();
     let expected = [(1, "begins"), (2, "begins"), (3, "begins"), (1, "ends"), (2, "ends"), (3, "ends")];
     assert_eq!(what, expected.map(|(number, what)| (number, what.to_owned(), "console".to_owned())));
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert!(count_of_id(&summary["bus_host"]["faults"]["bus-loss"], "153") > 0);
     assert!(count(&summary, "/event_count") >= 6);
-    let supply = Table::read(&scene.path("emulator/truth.csv")).column("supply_pressure_Pa");
+    let supply = scene.truth().column("supply_pressure_Pa");
     assert!(supply.iter().any(|pressure| *pressure < 6.8e5), "the supply sags");
 }

@@ -2,7 +2,7 @@
 
 use rustix::process::Signal;
 use system_tests::exit::INTERRUPTED;
-use system_tests::{Pace, RESTLESS, Running, Scene, Table, bus_log, count, expect_whole_lines, json, turn};
+use system_tests::{Pace, RESTLESS, Running, Scene, count, expect_whole_lines, turn};
 
 const SIGNALS: [Signal; 2] = [Signal::INT, Signal::TERM];
 const PACES: [Pace; 2] = [Pace::Real, Pace::Lockstep];
@@ -15,18 +15,13 @@ fn under_way(pace: Pace) -> (Scene, Running, Running) {
 
 fn expect_complete(scene: &Scene, pace: Pace, signal: Signal) {
     let at = format!("{pace:?}, {signal:?}");
-    let summary = json(&scene.path("emulator/summary.json"));
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
-    measurement.expect_no_hole();
+    let summary = scene.summary();
+    let measurement = scene.measurement();
     assert_eq!(count(&summary, "/cycles"), measurement.len() as u64, "rows of measurement.csv, {at}");
-    assert_eq!(
-        Table::read(&scene.path("emulator/truth.csv")).len(),
-        measurement.len(),
-        "rows of truth.csv, {at}"
-    );
+    assert_eq!(scene.truth().len(), measurement.len(), "rows of truth.csv, {at}");
     let frames = count(&summary, "/frames_sent") + count(&summary, "/frames_received");
-    assert_eq!(bus_log(&scene.path("emulator/bus.log")).len() as u64, frames, "lines of bus.log, {at}");
-    let report = json(&scene.path("controller/controller.json"));
+    assert_eq!(scene.bus_log().len() as u64, frames, "lines of bus.log, {at}");
+    let report = scene.report();
     let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
     // Of the drive: on a loaded machine its sensors of a cycle may be overtaken while the load's are answered.
     let answered = count(&report, "/axes/drive/cycles_answered");

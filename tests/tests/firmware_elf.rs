@@ -13,9 +13,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned_in};
 use system_tests::foreign_python::{light_path, run_script_of, tools_path};
-use system_tests::{
-    Build, Pace, Program, Running, Scene, bus_log, count, count_of_id, executable, json, workspace,
-};
+use system_tests::{Build, Pace, Program, Running, Scene, count, count_of_id, executable, json, workspace};
 
 /// The approach, 1 s, settling, 2 s, and the first of two repetitions, 8 s: the shortest run with all bounds in it.
 const ONE_REPETITION_S: f64 = 11.01;
@@ -79,14 +77,14 @@ fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
             "{file} differs in a second run"
         );
     }
-    let summary = json(&one.path("emulator/summary.json"));
+    let summary = one.summary();
     let cycles = count(&summary, "/cycles");
     assert_eq!((count(&summary, "/frames_malformed"), count(&summary, "/stale_commands")), (0, 0));
     assert_eq!(count(&summary, "/drive_commands/accepted"), cycles);
     for what in ["lost", "late", "duplicate", "breaks", "refused_stale"] {
         assert_eq!(count(&summary, &format!("/drive_commands/{what}")), 0, "{what}");
     }
-    let done = positioned_in(&bus_log(&one.path("emulator/bus.log")), 1);
+    let done = positioned_in(&one.bus_log(), 1);
     eprintln!("{done:?}");
     assert_eq!((done.cycles, done.left_out), (8_000, 0));
     assert!(done.set_points > 790 && done.set_point_error_m < 2e-5, "{done:?}");
@@ -182,7 +180,7 @@ fn noise_does_not_move_it_and_sensor_loss_and_the_emergency_stop_shut_its_valve_
         .filter(|(_, frame)| matches!(frame, Frame::DriveEmergencyStop(stop) if !stop.release))
         .map(|(cycle, _)| *cycle)
         .collect();
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let report = json(&scene.path("mcu.json"));
     eprintln!("{states:?}\n{tripped:?}\n{}\n{report}", summary["bus_host"]["faults"]);
 

@@ -12,7 +12,7 @@ use system_tests::firmware::{DYNAMIC_M, Positioned, STATIC_M, build, positioned_
 use system_tests::foreign_python::{python, tools_path};
 use system_tests::stalls::Stalls;
 use system_tests::{
-    Build, PATIENCE, Pace, Packet, Program, Running, Scene, bus_log, count, executable, json, turn, workspace,
+    Build, PATIENCE, Pace, Packet, Program, Running, Scene, count, executable, turn, workspace,
 };
 
 /// The first of two repetitions: out, a rest, back, a rest.
@@ -100,11 +100,11 @@ fn positions(elf: &Path) -> Option<Positioned> {
     }
     // Its bus has gone with the rig.
     let _ = ended.expect_code(0);
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!(count(&summary, "/frames_malformed"), 0);
     eprintln!("{}", summary["drive_commands"]);
     assert_eq!(count(&summary, "/drive_commands/breaks"), 0, "its counters go up by one");
-    let done = positioned_where_it_ran(&bus_log(&scene.path("emulator/bus.log")), 1);
+    let done = positioned_where_it_ran(&scene.bus_log(), 1);
     eprintln!("{done:?}");
     (done.rests > 0 && done.cycles > done.left_out).then_some(done)
 }

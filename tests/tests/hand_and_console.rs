@@ -6,7 +6,7 @@ use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
 use rehearsal::{Rehearsal, RehearsalParts};
 use std::path::Path;
 use system_tests::events::{Event, all, times};
-use system_tests::{Build, Pace, Running, SHORT, Scene, Table, bus_log, count, json, turn, wait_until};
+use system_tests::{Build, Pace, Running, SHORT, Scene, bus_log, count, turn, wait_until};
 
 /// The experiment of the other tests, with more in its `[rig]`.
 fn with_people(rig: &str) -> Scene {
@@ -39,7 +39,7 @@ fn rig_calls(log: &Path) -> Vec<(usize, bool)> {
 }
 
 fn reported(scene: &Scene) -> Vec<Event> {
-    all(&json(&scene.path("emulator/summary.json")))
+    all(&scene.summary())
 }
 
 fn cycles_of(events: &[Event], kind: &str) -> Vec<usize> {
@@ -58,14 +58,14 @@ fn a_scripted_stop_is_called_out_every_100_ms_and_empties_the_supply() {
     let events = reported(&scene);
     assert_eq!(cycles_of(&events, "emergency-stop"), [400]);
     assert_eq!(cycles_of(&events, "emergency-stop-released"), [950]);
-    let supply = Table::read(&scene.path("emulator/truth.csv")).column("supply_pressure_Pa");
+    let supply = scene.truth().column("supply_pressure_Pa");
     assert_eq!(supply[400], 700_000.0);
     // Discharge with 0.05 s: after 70 ms 6 bar e^-1.4 above 1 bar; after 0.55 s 10 Pa. Recovery with 0.3 s.
     assert!((240_000.0..260_000.0).contains(&supply[470]), "{} Pa", supply[470]);
     assert!((supply[950] - 101_325.0).abs() < 50.0, "{} Pa", supply[950]);
     assert!(supply[1799] > 650_000.0, "{} Pa", supply[1799]);
     // What was done stands in run.json, in the experiment's own words.
-    let setup = &json(&scene.path("emulator/run.json"))["rig_setup"];
+    let setup = &scene.run_description()["rig_setup"];
     assert_eq!(setup["event"][0]["do"], "emergency-stop");
     assert_eq!(setup["event"][1]["at_s"], 0.95);
 }
@@ -75,7 +75,7 @@ fn the_rig_says_the_same_in_lockstep_and_in_a_rehearsal() {
     const CYCLES: usize = 1000;
     let scene = with_people(STOP_AND_RELEASE);
     lockstep(&scene, CYCLES, |_| None);
-    let logged = bus_log(&scene.path("emulator/bus.log"));
+    let logged = scene.bus_log();
 
     let rig = RigParameters::baseline();
     let people = plant::Scene::from_toml(STOP_AND_RELEASE, "people", &rig).expect("a scene");
@@ -154,7 +154,7 @@ fn the_hand_of_the_script_adds_to_that_of_the_bus() {
         let hand = protocol::frames::HandForce { carriage_n: 12.0, load_eye_n: -8.0 };
         (cycle == 199).then_some(Frame::HandForce(hand))
     });
-    let truth = Table::read(&scene.path("emulator/truth.csv"));
+    let truth = scene.truth();
     let (carriage, load) = (truth.column("drive_hand_force_N"), truth.column("load_hand_force_N"));
     // A step of the wire is 0.061 N; the load's own extension grows against +x.
     for (row, expected_n) in [(99, [0.0, 0.0]), (100, [20.0, 0.0]), (200, [32.0, 8.0]), (400, [12.0, 8.0])] {
@@ -169,7 +169,7 @@ fn way_of_the_eye(besides: &str) -> f64 {
     let hand = "[[rig.hand]]\non = \"load-eye\"\nfrom_s = 0.5\nto_s = 6.5\nguide_to_m = 0.3\n";
     let scene = with_people(&format!("{hand}{besides}"));
     lockstep(&scene, 6500, |_| None);
-    let truth = Table::read(&scene.path("emulator/truth.csv"));
+    let truth = scene.truth();
     let (force, eye) = (truth.column("load_hand_force_N"), truth.column("load_position_m"));
     let most = force.iter().fold(0.0, |most: f64, force| most.max(force.abs()));
     assert!(most <= 150.0, "{most} N");
@@ -233,11 +233,11 @@ fn what_is_typed_is_done_told_and_recorded() {
         });
         calls.collect()
     };
-    let logged = releases(&bus_log(&scene.path("emulator/bus.log")));
+    let logged = releases(&scene.bus_log());
     assert_eq!((logged.first(), logged.last()), (Some(&false), Some(&true)));
     assert_eq!(logged.iter().filter(|release| **release).count(), 1);
     assert_eq!(releases(&received), logged);
-    let truth = Table::read(&scene.path("emulator/truth.csv"));
+    let truth = scene.truth();
     let last = truth.len() - 1;
     assert_eq!(truth.column("drive_hand_force_N")[last], -80.0);
     assert_eq!(truth.column("load_hand_force_N")[last], -30.0);
@@ -264,7 +264,7 @@ fn people_allocate_nothing_in_the_1_ms_path() {
     emulator.wait_for("weights on the carriage: 1 kg");
     emulator.type_line("quit");
     let _ = emulator.wait().expect_code(0);
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!(times(&all(&summary), "emergency-stop"), 2);
     assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
 }

@@ -1,6 +1,6 @@
 //! Parameters that change while running: planned by the experiment, to the cycle; and by a person who edits a program file.
 
-use system_tests::{AxisTable, Pace, RESTLESS, Running, SHORT, Scene, json, turn};
+use system_tests::{AxisTable, Pace, RESTLESS, Running, SHORT, Scene, turn};
 
 /// Without feed-forward, so that the wanted velocity is gain times error.
 const PROGRAM: &str = "title = \"gain alone\"\n[algorithm]\nname = \"position-p\"\ngain_per_s = 20.0\n\
@@ -15,7 +15,7 @@ fn run(change: &str) -> (Scene, AxisTable) {
     let emulator = scene.emulator(Pace::Lockstep).start();
     let _ = scene.controller(Pace::Lockstep).start().wait().expect_code(0);
     let _ = emulator.wait().expect_code(0);
-    let table = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let table = scene.axis_table("drive");
     (scene, table)
 }
 
@@ -59,7 +59,7 @@ fn a_planned_change_acts_in_its_cycle_and_is_taken_back_for_the_next_repetition(
         expect_gain(&with, start + AT_MS..start + 400, 30.0);
     }
     expect_gain(&without, first..first + 400, 20.0);
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert_eq!(report["axes"]["drive"]["variables"]["algorithm.gain_per_s"], 30.0, "at the end");
 }
 
@@ -86,7 +86,7 @@ fn edit(scene: &Scene, from: &str, to: &str) {
 }
 
 fn gain_of(scene: &Scene) -> f64 {
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     report["axes"]["drive"]["variables"]["algorithm.gain_per_s"].as_f64().expect("a number")
 }
 
@@ -126,7 +126,7 @@ fn a_number_edited_while_running_is_taken_over_and_a_bad_edit_changes_nothing() 
     let said = end(&scene, emulator, controller);
     assert_eq!(said.matches("gain_per_s is ").count(), 1, "{said}");
     assert_eq!(gain_of(&scene), 15.0, "the last good number stays");
-    let table = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let table = scene.axis_table("drive");
     let seen = gains(&table, 10..table.len());
     let is = |gain: f64| move |seen: &&f64| (*seen - gain).abs() < 1e-6 * gain;
     let (old, new) = (seen.iter().filter(is(20.0)).count(), seen.iter().filter(is(15.0)).count());

@@ -4,7 +4,7 @@ use protocol::frames::{Frame, ValveCommand};
 use rustix::process::Signal;
 use std::time::Duration;
 use system_tests::load::BusyLoops;
-use system_tests::{Pace, SHORT, Scene, Table, bus_log, json};
+use system_tests::{Pace, SHORT, Scene};
 
 /// Files of emulator and controller that must be the same.
 const FILES: [&str; 4] =
@@ -56,11 +56,10 @@ fn run(circumstance: Circumstance, options: &str) -> Scene {
 #[test]
 fn two_runs_give_the_same_files_to_the_byte_whatever_the_circumstances() {
     let first = run(Circumstance::EmulatorFirst, "");
-    let rows = Table::read(&first.path("emulator/measurement.csv"));
-    rows.expect_no_hole();
+    let rows = first.measurement();
     // 0.5 s to the start, 0.2 s settling, 0.65 s experiment, 0.2 s settling: fewer rows would compare nothing.
     assert!(rows.len() > 1500, "{} rows", rows.len());
-    assert!(bus_log(&first.path("emulator/bus.log")).len() > 4 * rows.len());
+    assert!(first.bus_log().len() > 4 * rows.len());
     for circumstance in [
         Circumstance::EmulatorFirst,
         Circumstance::ControllerFirst,
@@ -73,9 +72,7 @@ fn two_runs_give_the_same_files_to_the_byte_whatever_the_circumstances() {
             assert!(first.same(&first.path(file), &again.path(file)), "{file} differs with {circumstance:?}");
         }
         for figure in ["position_error_dynamic_m", "position_error_static_m"] {
-            let of = |scene: &Scene| {
-                json(&scene.path("controller/controller.json"))["axes"]["drive"][figure].clone()
-            };
+            let of = |scene: &Scene| scene.report()["axes"]["drive"][figure].clone();
             assert_eq!(of(&first), of(&again), "{figure} with {circumstance:?}");
             assert!(of(&first).is_number(), "{figure} was measured");
         }
@@ -95,7 +92,7 @@ fn an_answer_to_the_last_cycle_is_logged_however_long_it_takes() {
         peer.say(&Frame::DriveValveCommand(command));
     });
     let _ = emulator.wait().expect_code(0);
-    let log = bus_log(&scene.path("emulator/bus.log"));
+    let log = scene.bus_log();
     let answers = log.iter().filter(|frame| matches!(Frame::decode(frame), Ok(Frame::DriveValveCommand(_))));
     assert_eq!(answers.count(), CYCLES as usize);
 }
@@ -113,5 +110,5 @@ fn the_log_knows_no_wall_clock() {
     let scene = run(Circumstance::EmulatorFirst, "");
     let log = std::fs::read_to_string(scene.path("emulator/bus.log")).expect("a log");
     assert!(log.starts_with("(0000000000.000000) bus0 120#"), "{:?}", log.lines().next());
-    assert!(json(&scene.path("emulator/run.json"))["started_unix_s"].is_null());
+    assert!(scene.run_description()["started_unix_s"].is_null());
 }

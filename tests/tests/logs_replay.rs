@@ -97,7 +97,7 @@ fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
     assert_eq!((count(&report, "/frames_sent"), count(&report, "/frames_left_out")), (1, 4));
     emulator.signal(Signal::INT);
     let _ = emulator.wait();
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!(count(&summary, "/stale_commands"), 0);
     let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the rig's own log");
     assert!(log.contains(" 7F0#01") && !log.contains(" 110#"), "what was left out is not on the bus");

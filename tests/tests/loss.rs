@@ -115,8 +115,8 @@ fn run_in_lockstep(wire: &str) -> (Scene, Counted) {
     let _ = emulator.wait().expect_code(0);
     // Good, unless the wire lost the rig's farewell.
     let _ = controller.wait();
-    let summary = json(&scene.path("emulator/summary.json"));
-    let controller = json(&scene.path("controller/controller.json"));
+    let summary = scene.summary();
+    let controller = scene.report();
     let counted = Counted { received, host: summary["bus_host"].clone(), summary, controller };
     (scene, counted)
 }

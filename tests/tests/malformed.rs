@@ -76,7 +76,7 @@ fn each_malformed_frame_is_counted_where_it_belongs_and_changes_nothing() {
 fn the_sums_over_all_kinds_hold_what_each_kind_counted() {
     let injections = table();
     let scene = run(Some(&mut |peer, cycle| inject(&injections, peer, cycle)));
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let sent =
         |wanted: &[Counter]| injections.iter().filter(|one| wanted.contains(&one.counter)).count() as u64;
     assert_eq!(count(&summary, "/frames_malformed"), sent(&[Counter::Malformed]));
@@ -115,7 +115,7 @@ fn a_tick_from_elsewhere_is_counted_as_a_second_rig() {
             peer.say(&tick);
         }
     }));
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!(count(&summary, "/frames_ignored/second_rig"), 1);
     assert_eq!(count(&summary, "/frames_malformed"), 0);
 }

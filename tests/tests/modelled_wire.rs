@@ -6,7 +6,7 @@ use protocol::response_time::rig::{RigAnalysis, RigFrame};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
-use system_tests::{Ended, LINKED, Pace, SHORT, Scene, bus_log, count, json, shipped_experiments, turn};
+use system_tests::{Ended, LINKED, Pace, SHORT, Scene, bus_log, count, shipped_experiments, turn};
 
 /// Runs emulator and controller over a bus with these options; the emulator ends well with the controllers, or after some time.
 fn run(scene: &Scene, pace: Pace, wire: &str, options: &str) -> (Value, Ended) {
@@ -15,7 +15,7 @@ fn run(scene: &Scene, pace: Pace, wire: &str, options: &str) -> (Value, Ended) {
     let controller = scene.controller(pace).start();
     let ended = emulator.wait().expect_code(0);
     let _ = controller.wait();
-    (json(&scene.path("emulator/summary.json")), ended)
+    (scene.summary(), ended)
 }
 
 fn wire_time(summary: &Value) -> &Value {
@@ -126,7 +126,7 @@ fn in_lockstep_every_shipped_experiment_keeps_the_plain_bound_and_what_it_assume
         let controller = scene.controller(Pace::Lockstep).experiment(&path).start();
         let _ = emulator.wait().expect_code(0);
         let _ = controller.wait();
-        let summary = json(&scene.path("emulator/summary.json"));
+        let summary = scene.summary();
         let widened = expect_below_the_bounds(wire_time(&summary));
         assert!(widened.is_empty(), "{experiment}: not as declared: {widened:#?}");
         expect_arrivals_as_declared(&experiment, &scene.path("emulator/bus.log"));
@@ -156,7 +156,7 @@ fn a_node_that_goes_off_the_bus_recovers_and_the_valve_is_shut_meanwhile() {
     let said = summary["events"].to_string();
     assert!(said.contains("command-stale") && said.contains("command-fresh"), "{said}");
     // Passive, off the bus and restarted: three error frames for its programs.
-    let controller = json(&scene.path("controller/controller.json"));
+    let controller = scene.report();
     assert_eq!(count(&controller, "/bus/error_frames"), 3);
 }
 

@@ -2,7 +2,7 @@
 
 use protocol::frames::{EmergencyStopReason, Frame};
 use system_tests::bus_cycles::read;
-use system_tests::{AxisTable, Ended, Pace, SHORT, Scene, Table, json, own, turn};
+use system_tests::{Ended, Pace, SHORT, Scene, own, turn};
 
 /// A scene whose drive is controlled by the scene's own_algorithm.so.
 fn scene() -> Scene {
@@ -27,13 +27,13 @@ fn the_example_in_c_drives_the_experiment() {
     let tuned = "integral_time_s = 2.0\ndead_zone_m = 0.001\n";
     scene.write("program.toml", &format!("{}{tuned}", own::PROGRAM));
     let _ = run(&scene).expect_code(0);
-    let drive = &json(&scene.path("controller/controller.json"))["axes"]["drive"];
+    let drive = &scene.report()["axes"]["drive"];
     assert_eq!(drive["chain_state"], "done");
     assert_eq!(drive["variables"]["algorithm.dead_zone_m"], 0.001, "its own parameter, by its own name");
     let error_m = drive["position_error_dynamic_m"].as_f64().expect("a figure");
     // 0.05 m in 0.4 s at 20 /s; it would be 0.05 m if nobody drove, and done needs 2 mm at rest.
     assert!(error_m < 0.03, "{error_m} m");
-    let measured = Table::read(&scene.path("emulator/measurement.csv"));
+    let measured = scene.measurement();
     let last = measured.column("drive_position_m")[measured.len() - 1];
     assert!((last - 0.15).abs() < 0.002, "{last} m");
 }
@@ -45,7 +45,7 @@ fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the
     own::failing(&scene, "count > 200 && ready->set_velocity_m_per_s > 0.1", &[]);
     let ended = run(&scene).expect_code(1);
     let _ = ended.expect_said(&["stopped before the end: drive: controller-fault", "gave no number"]);
-    let table = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let table = scene.axis_table("drive");
     let (velocity, enabled) = (table.numbers("set_velocity_m_per_s"), table.numbers("enabled"));
     let failed = velocity.iter().position(|velocity| *velocity > 0.1).expect("it got that far");
     assert_eq!(table.texts("main_chain")[failed], "experiment");
@@ -60,10 +60,10 @@ fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the
     let (cycle, stop) = stop.expect("the drive trips the emergency stop");
     assert_eq!(cycle, table.cycles()[failed] as u64, "in the same cycle");
     assert_eq!((stop.reason, stop.release), (EmergencyStopReason::ControllerFault, false));
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     let fault = report["axes"]["drive"]["algorithm_fault"].as_str().expect("it is named");
     assert!(fault.contains("is not a number"), "{fault}");
-    let valve = Table::read(&scene.path("emulator/measurement.csv")).column("drive_valve");
+    let valve = scene.measurement().column("drive_valve");
     let acts = cycle as usize + 1;
     assert!(valve[acts..].iter().all(|opening| *opening == 0.0), "what acts is shut a cycle later");
 }
@@ -73,7 +73,7 @@ fn an_infinite_result_during_the_approach_is_latched_too() {
     let scene = scene();
     own::failing(&scene, "count == 300", &["-DRESULT=INFINITY"]);
     let _ = run(&scene).expect_code(1).expect_said(&["drive: controller-fault"]);
-    let table = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let table = scene.axis_table("drive");
     let fault = table.first("main_chain", "fault", 0);
     assert_eq!(table.states("main_chain"), ["waiting-for-rig", "initial-positioning", "fault"]);
     assert!(table.numbers("enabled")[fault..].iter().all(|enabled| *enabled == 0.0));
@@ -89,7 +89,7 @@ fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
     let _ = ended.expect_said(&["drive: controller-fault", "missed its time"]);
-    let table = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let table = scene.axis_table("drive");
     let state = table.texts("main_chain")[table.first("main_chain", "fault", 0) - 1];
     assert_eq!(state, "initial-positioning", "latched where it became slow");
     drop(emulator);
@@ -103,10 +103,10 @@ fn a_library_that_never_returns_ends_the_controller_with_what_was_recorded() {
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
     let _ = ended.expect_said(&["has not returned for 2 s"]);
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert!(report["ended_because"].as_str().expect("a reason").contains("has not returned"));
     // All that was answered before is on disk.
-    assert!(AxisTable::read(&scene.path("controller/controller-drive.csv")).cycles().len() > 150);
+    assert!(scene.axis_table("drive").cycles().len() > 150);
     drop(emulator);
 }
 

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use system_tests::bus_cycles::{Logged, read, read_to_last_whole_line};
 use system_tests::exit::BOUND_BROKEN;
 use system_tests::{
-    AxisTable, Ended, LINKED, Pace, Running, SHORT, Scene, Table, count, events, json, run_both, turn,
+    AxisTable, Ended, LINKED, Pace, Running, SHORT, Scene, count, events, json, run_both, turn,
 };
 
 /// Range of the echo as rig.dbc has it, not as the code does.
@@ -126,8 +126,8 @@ fn a_controller_that_is_killed_is_noticed_by_the_other_which_shuts_its_valve_and
         let report = json(&scene.path("controller").join(format!("controller-{other}.json")));
         assert_eq!(report["axes"][other]["chain_state"], "fault");
         assert_eq!(report["axes"][other]["emergency_stop_state"], "waiting-for-release");
-        let measurement = Table::read(&scene.path("emulator/measurement.csv"));
-        let supply = Table::read(&scene.path("emulator/truth.csv")).column("supply_pressure_Pa");
+        let measurement = scene.measurement();
+        let supply = scene.truth().column("supply_pressure_Pa");
         // Discharge with 0.05 s, for the 2 s that the controller keeps its valve shut.
         assert!((supply[supply.len() - 1] - 101_325.0).abs() < 1.0, "the supply is discharged");
         for valve in ["drive_valve", "load_valve"] {
@@ -164,7 +164,7 @@ fn a_controller_whose_partner_never_comes_gives_up_after_10_s_and_says_what_to_d
         let ended = controller.wait().expect_code(BOUND_BROKEN);
         let _ = ended.expect_said(&["partner-missing", "was not heard", "start it, or use --alone"]);
         let _ = emulator.wait();
-        let table = AxisTable::read(&scene.path("controller").join(format!("controller-{axis}.csv")));
+        let table = scene.axis_table(axis);
         let fault = table.cycles()[table.first("main_chain", "fault", 0)];
         // Ten seconds of the rig's time from the first sensors and status on.
         assert!((10_000..10_020).contains(&fault), "given up in cycle {fault}");
@@ -204,7 +204,7 @@ fn controllers_with_different_experiments_do_not_move_the_rig() {
         report["axes"][axis]["chain_cause"].as_str().expect("a cause").to_owned()
     });
     assert!(said.iter().any(|cause| cause.contains("give both the same file")), "{said:?}");
-    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    let measurement = scene.measurement();
     for valve in ["drive_valve", "load_valve"] {
         assert!(measurement.column(valve).iter().all(|opening| *opening == 0.0), "{valve}");
     }
@@ -218,7 +218,7 @@ fn frames_lost_on_the_wire_do_not_stop_a_run() {
     let controllers = ["drive", "load"].map(|axis| scene.axis_controller(Pace::Lockstep, axis).start());
     let _ = emulator.wait().expect_code(0);
     controllers.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let lost = |id: &str| count(&summary, &format!("/bus_host/injected_loss/{id}"));
     // Of some 500 each: status of both chains.
     assert!(lost("150") > 10 && lost("152") > 10, "{:#}", summary["bus_host"]["injected_loss"]);
@@ -241,7 +241,7 @@ fn run_control(command: RunControlCommand, experiment: u8) -> Option<Frame> {
 }
 
 fn table(scene: &Scene, axis: &str) -> AxisTable {
-    AxisTable::read(&scene.path("controller").join(format!("controller-{axis}.csv")))
+    scene.axis_table(axis)
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
     let stops =
         log.iter().filter(|logged| ["drive", "load"].iter().any(|axis| stop(&logged.frame, axis).is_some()));
     assert_eq!(stops.count(), 0, "no emergency stop");
-    let supply = Table::read(&scene.path("emulator/truth.csv")).column("supply_pressure_Pa");
+    let supply = scene.truth().column("supply_pressure_Pa");
     assert!(supply.iter().all(|pressure| *pressure == 700_000.0), "the supply stays");
 }
 

@@ -197,7 +197,7 @@ fn an_empty_seal_changes_no_byte() {
     for file in ["bus.log", "measurement.csv", "truth.csv"] {
         assert!(scene.same(&scene.path("emulator").join(file), &sealed.path(file)), "{file} differs");
     }
-    assert_eq!(json(&scene.path("emulator/run.json"))["sealed"], false);
+    assert_eq!(scene.run_description()["sealed"], false);
 }
 
 #[test]

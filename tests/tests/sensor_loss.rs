@@ -5,7 +5,7 @@
 
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, MainChainState, RigStatus, Sensors, Tick};
 use std::time::Duration;
-use system_tests::{PATIENCE, Pace, Packet, Peer, SHORT, Scene, json};
+use system_tests::{PATIENCE, Pace, Packet, Peer, SHORT, Scene};
 
 const SILENT_FROM: u64 = 800;
 /// Five ticks, one every ten cycles.
@@ -111,7 +111,7 @@ fn an_axis_without_sensors_trips_the_emergency_stop_after_five_ticks_of_the_rig(
         let aborted = received.aborted.expect("the other axis aborts");
         assert!(aborted - cycle <= 2, "{silent}: the other axis aborts {} cycles later", aborted - cycle);
         assert!(received.opened.is_empty(), "{silent}: opened without sensors in {:?}", received.opened);
-        let report = json(&scene.path("controller/controller.json"));
+        let report = scene.report();
         assert_eq!(report["axes"][silent]["chain_state"], "fault");
         let other = if silent == "drive" { "load" } else { "drive" };
         assert_eq!(report["axes"][other]["chain_state"], "aborted", "{other} follows");

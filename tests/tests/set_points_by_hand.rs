@@ -2,7 +2,7 @@
 //! else.
 
 use protocol::frames::{Frame, HandSetPoint, HandSetPointAxis, MainChainState};
-use system_tests::{AxisTable, LINKED, Pace, Scene};
+use system_tests::{LINKED, Pace, Scene};
 
 /// Both axes at rest for three seconds, linked, for a hand to lead.
 fn experiment(drive: &str, load: &str) -> String {
@@ -39,7 +39,7 @@ fn led(experiment: &str, asks: &[HandSetPoint]) -> [Vec<f64>; 2] {
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait().expect_code(0);
     [("drive", "set_position_m"), ("load", "set_force_N")].map(|(axis, column)| {
-        let table = AxisTable::read(&scene.path("controller").join(format!("controller-{axis}.csv")));
+        let table = scene.axis_table(axis);
         // Where nothing is asked for, a cell is empty.
         table.numbers(column).into_iter().filter(|value| value.is_finite()).collect()
     })

@@ -6,9 +6,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 use system_tests::foreign_python::python;
 use system_tests::socketcan::{built, guest, shell};
-use system_tests::{
-    PATIENCE, Pace, Packet, Peer, RESTLESS, Running, SHORT, Scene, count, json, turn, wait_until,
-};
+use system_tests::{PATIENCE, Pace, Packet, Peer, RESTLESS, Running, SHORT, Scene, count, turn, wait_until};
 
 /// Rows of the rig's record that must follow: it goes on.
 const GOES_ON: usize = 200;
@@ -53,7 +51,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     drop(listener);
     let _ = controller.interrupt();
     let _ = emulator.interrupt();
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     // What the flood cost is told as a loss at a peer's queue, if it cost anything; the rig's own commands were never disputed.
     assert_eq!(count(&summary, "/drive_commands/two_sources"), 0);
     assert_eq!(count(&summary, "/frames_malformed"), 0);

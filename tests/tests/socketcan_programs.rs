@@ -55,7 +55,7 @@ fn the_firmware_for_socketcan_controls_the_rig_on_the_embedded_bus() {
     let _ = emulator.wait().expect_code(0);
     // Its bus has gone with the rig.
     let _ = running.wait().expect_code(0);
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!(count(&summary, "/frames_malformed"), 0);
     // It answers from its first sensors on; a machine that stands still skips cycles, and those need no answer.
     let (accepted, cycles) = (count(&summary, "/drive_commands/accepted"), count(&summary, "/cycles"));

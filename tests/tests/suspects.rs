@@ -5,7 +5,7 @@ use plant::RigParameters;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use system_tests::discrepancy::{discrepancy, rig};
-use system_tests::{Build, Pace, Scene, Table, count, json, run_both, turn};
+use system_tests::{Build, Pace, Scene, count, json, run_both, turn};
 
 /// An eddy brake on the carriage that grows along the stroke.
 const HIDDEN: &str = include_str!("../scenes/terms/hidden.toml");
@@ -78,13 +78,13 @@ fn a_suspect_in_a_file_is_named_over_the_bus_and_runs_in_real_time_in_the_extend
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).rig(&extended).build(Build::CountingAllocations);
     run_both(&emulator, &scene.controller(Pace::Real));
-    let truth = Table::read(&scene.path("emulator/truth.csv"));
+    let truth = scene.truth();
     let [brake, velocity] =
         ["drive_force_declared_N", "drive_rod_velocity_m_per_s"].map(|name| truth.column(name));
     let most = brake.iter().zip(&velocity).map(|(force, speed)| force * speed).fold(0.0, f64::min);
     assert!(most < -1.0, "the brake takes power: {most} W");
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert!(count(&summary, "/cycles") > 1000);
-    assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], true);
+    assert_eq!(scene.run_description()["counts_allocations"], true);
     assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
 }

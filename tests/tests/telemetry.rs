@@ -134,9 +134,9 @@ fn a_viewer_that_stands_still_or_dies_costs_the_run_nothing() {
     assert!(lost.is_some_and(|lost| lost > 1000), "{lost:?} lost");
     assert!(cycles.windows(2).all(|pair| pair[1] == pair[0] + 1), "until it was full nothing was lost");
     assert!(cycles.len() > 2000, "more than a second of 1 kHz fits: {}", cycles.len());
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!(summary["records_dropped"], 0);
-    let rows = Table::read(&scene.path("emulator/measurement.csv")).len();
+    let rows = scene.measurement().len();
     assert_eq!(summary["cycles"], rows, "the files have every cycle");
 }
 
@@ -152,7 +152,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
     drop(one);
     let _ = emulator.interrupt();
     // A late wake-up may stand there; nothing that was asked for does.
-    let events = all(&json(&scene.path("emulator/summary.json")));
+    let events = all(&scene.summary());
     assert_eq!(times(&events, "emergency-stop"), 0, "{events:?}");
 
     let emulator = with_telemetry(&scene, Pace::Real).with("--seconds 60 --console").start();

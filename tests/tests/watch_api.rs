@@ -9,8 +9,8 @@ use std::process::{Command, Stdio};
 use system_tests::foreign_python::python;
 use system_tests::onlooker::LivePage;
 use system_tests::{
-    Build, LINKED, Pace, Program, RESTLESS, Running, Scene, Table, bus_log, count, executable, json, turn,
-    wait_until, workspace,
+    Build, LINKED, Pace, Program, RESTLESS, Running, Scene, Table, count, executable, json, turn, wait_until,
+    workspace,
 };
 
 /// Emulator and controller of a scene, watched with controls.
@@ -286,7 +286,7 @@ fn orders_reach_rig_controllers_and_folder() {
     events.wait_for("state", |state| state["emergency_stop"] == value!({ "active": false, "senders": [] }));
 
     let scene = watched.end();
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     let mut events = summary["events"].as_array().expect("events").iter();
     let weights = events.find(|event| event["kind"]["weights"].is_object()).expect("they were put on");
     let cycle = (record_s[0] * 1000.0).round() as u64;
@@ -294,8 +294,7 @@ fn orders_reach_rig_controllers_and_folder() {
     let kinds = summary["events"].to_string();
     assert!(kinds.contains("\"emergency-stop\"") && kinds.contains("emergency-stop-released"), "{kinds}");
     // Called out again every 100 ms until it was released, once.
-    let frames: Vec<String> =
-        bus_log(&scene.path("emulator/bus.log")).iter().map(ToString::to_string).collect();
+    let frames: Vec<String> = scene.bus_log().iter().map(ToString::to_string).collect();
     assert_eq!(
         frames.iter().filter(|frame| frame.starts_with("184#")).collect::<Vec<_>>(),
         ["184#0099990000"]
@@ -331,7 +330,7 @@ fn viewers_that_hang_or_talk_nonsense_cost_nobody_anything() {
     events.wait_for("state", |state| state["viewers"] == 1);
     assert!(!watched.page.running().stderr().contains("panicked"));
     let scene = watched.end();
-    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/records_dropped"), 0);
+    assert_eq!(count(&scene.summary(), "/records_dropped"), 0);
 }
 
 #[test]
@@ -357,7 +356,7 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     scene.wait_for_more_rows("emulator", 500);
     let _ = emulator.interrupt();
     let _ = controller.wait();
-    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/records_dropped"), 0);
+    assert_eq!(count(&scene.summary(), "/records_dropped"), 0);
 }
 
 #[test]

@@ -6,7 +6,7 @@
 use serde_json::Value;
 use std::collections::BTreeMap;
 use system_tests::xcp::{Foreign, config, wait_for_a2l, xcp_packet};
-use system_tests::{AxisTable, Pace, RESTLESS, Running, Scene, Table, bus_log, count, json, turn};
+use system_tests::{AxisTable, Pace, RESTLESS, Running, Scene, count, turn};
 
 /// pyXCP takes its time to start, on a busy machine more than a controller waits for those that are missing.
 const PATIENT: &str = "--bus-grace 60";
@@ -65,7 +65,7 @@ fn pyxcp_reads_writes_is_refused_measures_without_a_gap_and_triggers() {
     wait_for_a2l(&scene, "controller", "drive");
     let seen = Foreign::start(&scene, "whole", "controller", "drive", true).wait();
     end(emulator, vec![controller]);
-    let drive = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let drive = scene.axis_table("drive");
 
     let identity = &seen["identity"];
     assert_eq!([&identity["slave"]["maxCto"], &identity["slave"]["maxDto"]], ["8", "8"]);
@@ -113,7 +113,7 @@ fn pyxcp_reads_writes_is_refused_measures_without_a_gap_and_triggers() {
     assert_eq!(gaps, 0, "from cycle {} to {}", rows[0].0, rows[rows.len() - 1].0);
     expect_rows_of(&drive, &rows);
 
-    let xcp = &json(&scene.path("controller/controller.json"))["axes"]["drive"]["xcp"];
+    let xcp = &scene.report()["axes"]["drive"]["xcp"];
     for (key, least) in
         [("sessions", 3), ("wrong_keys", 1), ("unlocked", 1), ("changed", 3), ("daq_packets", 20_000)]
     {
@@ -133,7 +133,7 @@ fn expect_trace(scene: &Scene, drive: &AxisTable, trace: &Value) {
     assert!(cycles.iter().zip(trigger - 60..).all(|(cycle, expected)| *cycle == expected), "{cycles:?}");
     // A sensor may read -0, and the wire has one zero only: 0 is added to both, which makes one of them and changes nothing else.
     let bits = |values: &[f64]| values.iter().map(|value| (value + 0.0).to_bits()).collect::<Vec<_>>();
-    let rig = Table::read(&scene.path("emulator/measurement.csv"));
+    let rig = scene.measurement();
     // A row of the emulator's table for each cycle from 0 on.
     let of_rig = |name: &str| {
         let column = rig.column(name);
@@ -196,7 +196,7 @@ fn in_real_time_every_cycle_that_was_answered_in_10_s_was_measured() {
     scene.wait_for_rows("emulator", 100);
     let seen = Foreign::start(&scene, "watch", "controller", "drive", false).wait();
     end(emulator, vec![controller]);
-    let drive = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let drive = scene.axis_table("drive");
     let rows = daq_rows(&seen["daq"]);
     expect_rows_of(&drive, &rows);
     assert!(rows.len() >= 10_000, "{} rows", rows.len());
@@ -211,7 +211,7 @@ fn in_real_time_every_cycle_that_was_answered_in_10_s_was_measured() {
 
 /// Cycles of the drive's DAQ packets on the bus, by their time stamps: the low 16 bits of ever later cycles.
 fn measured_cycles(scene: &Scene) -> Vec<usize> {
-    let frames = bus_log(&scene.path("emulator/bus.log")).into_iter();
+    let frames = scene.bus_log().into_iter();
     let mut cycle = 0;
     frames
         .filter_map(|frame| xcp_packet(&frame).filter(|packet| packet[0] == 0))

@@ -3,7 +3,7 @@
 
 use protocol::can::CanFrame;
 use system_tests::xcp::{SECRET, command, config, xcp_packet};
-use system_tests::{AxisTable, PROGRAM, Pace, SHORT, Scene, count, json, run_both};
+use system_tests::{PROGRAM, Pace, SHORT, Scene, count, json, run_both};
 
 /// Cycle of the first command: the experiment moves.
 const START: u32 = 852;
@@ -94,7 +94,7 @@ fn a_value_that_is_written_acts_from_the_next_cycle_on_and_the_session_is_the_sa
         let answers = run(&scene, &options, axes, &write_gain);
         assert_eq!(answers.len(), 8, "{answers:02X?}");
         assert!(answers.iter().all(|answer| answer[0] == 0xFF), "{answers:02X?}");
-        let drive = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+        let drive = scene.axis_table("drive");
         let [wanted, set, is, speed] =
             ["wanted_velocity_m_per_s", "set_position_m", "position_m", "set_velocity_m_per_s"]
                 .map(|name| drive.numbers(name));
@@ -127,7 +127,7 @@ fn measuring_leaves_the_run_as_it_is() {
         let answers = run(&scene, options, &["both"], &measure);
         if options.is_empty() {
             assert!(answers.is_empty(), "off unless told: {answers:02X?}");
-            assert!(json(&scene.path("controller/controller.json"))["axes"]["drive"].get("xcp").is_none());
+            assert!(scene.report()["axes"]["drive"].get("xcp").is_none());
         } else {
             let (measured, answered): (Vec<_>, Vec<_>) =
                 answers.into_iter().partition(|answer| answer[0] < 0xFC);
@@ -144,7 +144,7 @@ fn measuring_leaves_the_run_as_it_is() {
 /// One packet for each cycle after the start, with the low bits of its number and the position of its row.
 #[track_caller]
 fn expect_measured(scene: &Scene, packets: &[[u8; 8]]) {
-    let drive = AxisTable::read(&scene.path("controller/controller-drive.csv"));
+    let drive = scene.axis_table("drive");
     let positions = drive.numbers("position_m");
     assert!(packets.len() > 1000, "{} packets", packets.len());
     let first = usize::from(u16::from_le_bytes([packets[0][1], packets[0][2]]));
@@ -176,7 +176,7 @@ fn without_a_key_in_the_configuration_nothing_is_ever_unlocked() {
     let answers = run(&scene, "--xcp", &["both"], &write);
     let heads: Vec<_> = answers.iter().map(|answer| [answer[0], answer[1]]).collect();
     assert_eq!(heads[1..], [[0xFE, 0x24], [0xFE, 0x29], [0xFF, 0], [0xFE, 0x25]]);
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     assert_eq!(report["axes"]["drive"]["variables"]["algorithm.gain_per_s"], 40.0);
 }
 
@@ -198,13 +198,13 @@ fn a_flood_of_commands_is_dropped_and_counted_and_the_valve_is_served() {
     });
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait().expect_code(0);
-    let report = json(&scene.path("controller/controller.json"));
+    let report = scene.report();
     let xcp = &report["axes"]["drive"]["xcp"];
     let (answered, dropped) = (count(xcp, "/answered"), count(xcp, "/commands_dropped"));
     assert_eq!(answered + dropped, sent, "each is answered or counted: {xcp}");
     assert!(answered as usize >= received && received > 7000 && dropped > 10_000, "{received} heard: {xcp}");
     // What the flood leaves of the run: everything.
-    let summary = json(&scene.path("emulator/summary.json"));
+    let summary = scene.summary();
     assert_eq!((count(&summary, "/stale_commands"), count(&summary, "/frames_lost")), (0, 0));
 }
 
@@ -220,7 +220,7 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
     let options = format!("--parameters {}", set.display());
     let _ = scene.rehearsal().with(&options).start().wait().expect_code(0);
     let gain = |scene: &Scene| {
-        let report = json(&scene.path("controller/controller.json"));
+        let report = scene.report();
         report["axes"]["drive"]["variables"]["algorithm.gain_per_s"].as_f64().expect("a number")
     };
     assert_eq!(gain(&scene), 33.5);
