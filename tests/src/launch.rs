@@ -19,8 +19,13 @@ pub enum Pace {
 
 /// Runs emulator and controller until both have ended well.
 pub fn run_both(emulator: &Launch, controller: &Launch) -> [Ended; 2] {
-    let (emulator, controller) = (emulator.start(), controller.start());
-    [emulator.wait(), controller.wait()].map(|ended| ended.expect_code(0))
+    both_good(emulator.start(), controller.start())
+}
+
+/// Waits until both have ended well, the emulator first.
+#[track_caller]
+pub fn both_good(emulator: Running, other: Running) -> [Ended; 2] {
+    [emulator.wait().expect_code(0), other.wait().expect_code(0)]
 }
 
 /// A program about to be started; each method changes one thing and hands it back.

@@ -160,8 +160,7 @@ pub struct Outcome {
 /// Runs rig and controllers in real time for so long, with so many frames of noise each second.
 pub fn run(seconds: u32, per_second: u32, seed: u64) -> Outcome {
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Real).with(&format!("--seconds {seconds}")).start();
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    let (emulator, controller) = scene.start(Pace::Real, &format!("--seconds {seconds}"), "--repeat");
     scene.wait_for_rows("emulator", 200);
     let noise = (per_second > 0).then(|| Noise::start(&scene.socket(), per_second, seed));
     let limit = Duration::from_secs(u64::from(seconds)) + crate::process::PATIENCE;

@@ -111,12 +111,16 @@ impl Scene {
         Peer::connect(&self.socket())
     }
 
+    /// Emulator and controller, each with further options.
+    pub fn start(&self, pace: Pace, emulator: &str, controller: &str) -> (Running, Running) {
+        (self.emulator(pace).with(emulator).start(), self.controller(pace).with(controller).start())
+    }
+
     /// Emulator and controller, whose experiment repeats, once the emulator has recorded so many rows.
     pub fn under_way(&self, pace: Pace, rows: usize) -> (Running, Running) {
-        let emulator = self.emulator(pace).start();
-        let controller = self.controller(pace).with("--repeat").start();
+        let both = self.start(pace, "", "--repeat");
         self.wait_for_rows("emulator", rows);
-        (emulator, controller)
+        both
     }
 
     /// Waits until so many peers are connected to the scene's bus, as the kernel's list of sockets shows.

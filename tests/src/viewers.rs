@@ -33,8 +33,7 @@ pub fn run(seconds: u32, with: bool) -> Outcome {
     if with {
         options += &format!(" --telemetry {}", scene.path("telemetry").display());
     }
-    let emulator = scene.emulator(Pace::Real).with(&options).start();
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    let (emulator, controller) = scene.start(Pace::Real, &options, "--repeat");
     let page = with.then(|| LivePage::open(&scene, ""));
     let audience = page.as_ref().map(|page| Audience::gather(&scene, page));
     scene.wait_for_rows("emulator", seconds as usize * 500);

@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
-use system_tests::{Pace, RESTLESS, Scene, count, count_of_id, json, turn};
+use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, json, turn};
 
 fn table(path: &Path) -> Vec<CycleTiming> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -96,8 +96,7 @@ fn rows_of_both_processes_join_to_the_time_on_the_way_each_way() {
     let emulator = scene.emulator(Pace::Real).with("--seconds 4 --full-timing").start();
     let controller = scene.controller(Pace::Real).with("--repeat --full-timing").start();
     let process = controller.number();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     let answered = expect_one_account(&scene, process, "controller", "drive");
     let rig = table(&scene.path("emulator/emulator-timing.csv"));
     let summary = scene.summary();
@@ -142,8 +141,7 @@ fn events(scene: &Scene) -> Vec<(String, Value)> {
 fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
-    let mut controller = scene.controller(Pace::Real).with("--repeat --full-timing").start();
+    let (emulator, mut controller) = scene.start(Pace::Real, "--seconds 4", "--repeat --full-timing");
     scene.wait_for_rows("emulator", 1200);
     controller.signal(Signal::STOP);
     std::thread::sleep(Duration::from_millis(30));
@@ -153,8 +151,7 @@ fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() 
     controller.signal(Signal::USR1);
     controller.wait_for("asked for the last seconds");
     let process = controller.number();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     let rows = expect_one_account(&scene, process, "controller", "drive");
     let stopped =
         rows.iter().position(|row| row.skipped >= 25).expect("a row that skips the cycles of the stop");

@@ -10,13 +10,12 @@ use rustix::process::Signal;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use system_tests::{Pace, RESTLESS, Running, Scene, bus_log, count, json, turn, wait_until};
+use system_tests::{Pace, RESTLESS, Running, Scene, both_good, bus_log, count, json, turn, wait_until};
 
 const MS: u64 = 1_000_000;
 
 fn under_way(scene: &Scene, options: &str) -> (Running, Running) {
-    let emulator = scene.emulator(Pace::Real).with(options).start();
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    let (emulator, controller) = scene.start(Pace::Real, options, "--repeat");
     scene.wait_for_rows("emulator", 1500);
     (emulator, controller)
 }
@@ -53,8 +52,7 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     emulator.stop();
     std::thread::sleep(Duration::from_millis(50));
     emulator.signal(Signal::CONT);
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
 
     let summary = scene.summary();
     let (cycles, skipped) = (count(&summary, "/cycles"), count(&summary, "/skipped"));

@@ -29,8 +29,7 @@ fn run() -> Scene {
     let scene = Scene::new(RESTLESS);
     let seconds = CYCLES as f64 * 1e-3;
     let options = format!("--members 2 --seconds {seconds}");
-    let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
-    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
+    let (emulator, controller) = scene.start(Pace::Lockstep, &options, "--repeat");
     scene.peer().be_console(said_in);
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait();
@@ -62,8 +61,7 @@ fn a_stop_is_released_by_its_sender_alone_and_the_record_shows_the_valve_that_ac
 #[test]
 fn the_controllers_end_an_aborted_experiment_by_themselves() {
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Lockstep).with("--members 2 --seconds 10").start();
-    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
+    let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2 --seconds 10", "--repeat");
     scene.peer().be_console(|cycle| (cycle == TRIP).then(|| Frame::ConsoleEmergencyStop(stop(false))));
     let _ = controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
     let _ = emulator.wait();

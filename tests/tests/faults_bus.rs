@@ -120,8 +120,7 @@ fn a_bus_that_stays_away_ends_both_with_complete_files() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let host = scene.bus_host("");
-    let mut emulator = scene.emulator(Pace::Real).with("--bus-grace 1").start();
-    let controller = scene.controller(Pace::Real).with("--repeat --bus-grace 1").start();
+    let (mut emulator, controller) = scene.start(Pace::Real, "--bus-grace 1", "--repeat --bus-grace 1");
     scene.wait_for_rows("emulator", UNDER_WAY);
     let _ = host.kill();
     emulator.wait_for("the bus is gone");
@@ -146,8 +145,7 @@ fn a_rig_that_was_killed_is_missed_while_others_still_talk() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let host = scene.bus_host("");
-    let emulator = scene.emulator(Pace::Real).start();
-    let mut controller = scene.controller(Pace::Real).with("--repeat --bus-grace 2").start();
+    let (emulator, mut controller) = scene.start(Pace::Real, "", "--repeat --bus-grace 2");
     let stranger = scene.peer();
     scene.wait_for_rows("emulator", UNDER_WAY);
     let _ = emulator.kill();
@@ -172,8 +170,7 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let host = scene.bus_host("");
-    let mut emulator = scene.emulator(Pace::Real).with("--bus-grace 30").start();
-    let mut controller = scene.controller(Pace::Real).with("--repeat --bus-grace 30").start();
+    let (mut emulator, mut controller) = scene.start(Pace::Real, "--bus-grace 30", "--repeat --bus-grace 30");
     scene.wait_for_rows("emulator", UNDER_WAY);
     let _ = host.kill();
     emulator.wait_for("the bus is gone");

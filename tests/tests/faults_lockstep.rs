@@ -2,7 +2,7 @@
 
 use rustix::process::Signal;
 use system_tests::exit::{BUS_FAILED, LOCKSTEP_TIMEOUT};
-use system_tests::{Pace, RESTLESS, SHORT, Scene, count, expect_whole_lines};
+use system_tests::{Pace, RESTLESS, SHORT, Scene, both_good, count, expect_whole_lines};
 
 fn expect_complete(scene: &Scene) {
     let measurement = scene.measurement();
@@ -36,8 +36,7 @@ fn a_barrier_that_nobody_joins_is_given_up() {
 #[test]
 fn a_barrier_that_one_of_two_joins_is_given_up_and_the_one_ends_too() {
     let scene = Scene::new(SHORT);
-    let emulator = scene.emulator(Pace::Lockstep).with("--members 2 --join-timeout 0.5").start();
-    let controller = scene.controller(Pace::Lockstep).start();
+    let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2 --join-timeout 0.5", "");
     let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined"]);
     let _ = controller.wait().expect_code(BUS_FAILED);
 }
@@ -65,8 +64,7 @@ fn an_emulator_that_is_killed_ends_the_member() {
 fn a_bus_without_a_barrier_is_given_up() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
-    let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 0.3").start();
-    let controller = scene.controller(Pace::Lockstep).with("--bus-grace 0.5").start();
+    let (emulator, controller) = scene.start(Pace::Lockstep, "--join-timeout 0.3", "--bus-grace 0.5");
     let _ = emulator.wait().expect_code(BUS_FAILED);
     let _ = controller.wait().expect_code(BUS_FAILED);
     drop(host);
@@ -77,13 +75,11 @@ fn a_bus_without_a_barrier_is_given_up() {
 #[test]
 fn a_second_emulator_on_the_bus_does_not_take_the_first_ones_place() {
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Lockstep).with("--seconds 60").start();
-    let mut controller = scene.controller(Pace::Lockstep).with("--repeat").start();
+    let (emulator, mut controller) = scene.start(Pace::Lockstep, "--seconds 60", "--repeat");
     controller.wait_for(": drive experiment");
     let second = scene.emulator(Pace::Lockstep).out(&scene.path("second")).with("--join-timeout 1").start();
     let second = second.wait();
     assert_eq!(second.code, Some(BUS_FAILED), "the second is refused; it said:\n{}", second.stderr);
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     assert_eq!(count(&scene.summary(), "/cycles"), 60_000);
 }

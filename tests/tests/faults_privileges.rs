@@ -47,8 +47,7 @@ fn a_user_without_privileges_is_told_the_remedy_and_the_run_succeeds() {
 fn who_asks_for_no_privileges_is_warned_of_none() {
     let _machine = turn::take();
     let scene = Scene::new(SHORT);
-    let emulator = scene.emulator(Pace::Real).with("--no-realtime").start();
-    let controller = scene.controller(Pace::Real).with("--no-realtime").start();
+    let (emulator, controller) = scene.start(Pace::Real, "--no-realtime", "--no-realtime");
     for running in [emulator, controller] {
         let ended = running.wait().expect_code(0);
         assert!(!ended.stderr.contains("warning"), "{}", ended.stderr);

@@ -1,7 +1,7 @@
 //! A handful of faults in real time: by the script that means the same in lockstep, and by hand while the run goes on.
 
 use system_tests::broken::{Row, rows};
-use system_tests::{Pace, RESTLESS, Scene, count, count_of_id, events, run_both, turn};
+use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, events, run_both, turn};
 
 /// By time, so that real time and lockstep can be held against each other; one by a condition that is soon met.
 const SCRIPT: &str = include_str!("../scenes/faults/real-time.toml");
@@ -57,8 +57,7 @@ fn the_same_script_breaks_the_same_in_real_time_and_in_lockstep() {
 fn people_break_and_mend_things_while_the_run_goes_on() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let mut emulator = scene.emulator(Pace::Real).with("--console --bus-grace 20").start();
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    let (mut emulator, controller) = scene.start(Pace::Real, "--console --bus-grace 20", "--repeat");
     scene.wait_for_rows("emulator", 700);
     for (line, answer) in [
         ("fault valve-stuck load", "fault 1 begins: valve-stuck at load (console)"),
@@ -79,8 +78,7 @@ fn people_break_and_mend_things_while_the_run_goes_on() {
     emulator.wait_for("fault 2 ends");
     emulator.wait_for("fault 3 ends");
     emulator.type_line("quit");
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     let what: Vec<_> = marks(&scene).into_iter().map(|row| (row.number, row.what, row.cause)).collect();
     let expected = [(1, "begins"), (2, "begins"), (3, "begins"), (1, "ends"), (2, "ends"), (3, "ends")];
     assert_eq!(what, expected.map(|(number, what)| (number, what.to_owned(), "console".to_owned())));

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned};
-use system_tests::{Pace, Running, Scene, bus_cycles, bus_log, count, json, workspace};
+use system_tests::{Pace, Running, Scene, both_good, bus_cycles, bus_log, count, json, workspace};
 
 fn built() -> &'static Path {
     static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();
@@ -30,8 +30,7 @@ fn run(scene: &Scene, out: &str, seconds: f64) -> PathBuf {
     let emulator = scene.emulator(Pace::Lockstep).with(&options).out(&folder).start();
     let mut command = Command::new(built().join("firmware-embedded"));
     let firmware = Running::start("firmware", command.arg(scene.socket()));
-    let _ = emulator.wait().expect_code(0);
-    let _ = firmware.wait().expect_code(0);
+    let _ = both_good(emulator, firmware);
     folder
 }
 

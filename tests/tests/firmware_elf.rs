@@ -13,7 +13,9 @@ use std::process::Command;
 use std::sync::OnceLock;
 use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned_in};
 use system_tests::foreign_python::{light_path, run_script_of, tools_path};
-use system_tests::{Build, Pace, Program, Running, Scene, count, count_of_id, executable, json, workspace};
+use system_tests::{
+    Build, Pace, Program, Running, Scene, both_good, count, count_of_id, executable, json, workspace,
+};
 
 /// The approach, 1 s, settling, 2 s, and the first of two repetitions, 8 s: the shortest run with all bounds in it.
 const ONE_REPETITION_S: f64 = 11.01;
@@ -59,8 +61,7 @@ fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
         let options = format!("--members 1 --join-timeout 300 --seconds {seconds}");
         let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
         let mcu = mcu(&scene);
-        let _ = emulator.wait().expect_code(0);
-        let _ = mcu.wait().expect_code(0);
+        let _ = both_good(emulator, mcu);
         scene
     };
     let [one, other] = std::thread::scope(|threads| {
@@ -151,8 +152,7 @@ fn noise_does_not_move_it_and_sensor_loss_and_the_emergency_stop_shut_its_valve_
         STARTED => Some(Frame::RunControl(start)),
         _ => None,
     });
-    let _ = emulator.wait().expect_code(0);
-    let _ = mcu.wait().expect_code(0);
+    let _ = both_good(emulator, mcu);
 
     let frames = by_cycle(&scene);
     let commands: BTreeMap<u64, ValveCommand> = frames
@@ -276,8 +276,7 @@ fn gdb_stops_the_core_while_the_rig_waits_and_the_run_is_the_same_to_the_byte() 
                 "Value returned is",
             ]);
         }
-        let _ = emulator.wait().expect_code(0);
-        let _ = mcu.wait().expect_code(0);
+        let _ = both_good(emulator, mcu);
         scene
     };
     let [plain, debugged] = [run(false), run(true)];

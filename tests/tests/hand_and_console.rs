@@ -130,8 +130,7 @@ fn a_run_with_people_in_it_is_the_same_to_the_byte() {
     );
     let run = |people: &str| {
         let scene = with_people(people);
-        let emulator = scene.emulator(Pace::Lockstep).with("--seconds 1.6").start();
-        let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
+        let (emulator, controller) = scene.start(Pace::Lockstep, "--seconds 1.6", "--repeat");
         let _ = emulator.wait().expect_code(0);
         let _ = controller.wait();
         scene

@@ -93,8 +93,7 @@ fn gain_of(scene: &Scene) -> f64 {
 fn under_way(options: &str) -> (Scene, Running, Running) {
     let scene = Scene::new(RESTLESS);
     scene.write("program.toml", PROGRAM);
-    let emulator = scene.emulator(Pace::Real).start();
-    let mut controller = scene.controller(Pace::Real).with(&format!("--repeat {options}")).start();
+    let (emulator, mut controller) = scene.start(Pace::Real, "", &format!("--repeat {options}"));
     controller.wait_for("drive experiment");
     scene.wait_for_rows("emulator", 900);
     (scene, emulator, controller)

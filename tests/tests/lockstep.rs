@@ -4,7 +4,7 @@ use protocol::frames::{Frame, ValveCommand};
 use rustix::process::Signal;
 use std::time::Duration;
 use system_tests::load::BusyLoops;
-use system_tests::{Pace, SHORT, Scene};
+use system_tests::{Pace, SHORT, Scene, both_good};
 
 /// Files of emulator and controller that must be the same.
 const FILES: [&str; 4] =
@@ -48,8 +48,7 @@ fn run(circumstance: Circumstance, options: &str) -> Scene {
         std::thread::sleep(Duration::from_millis(300));
         controller.signal(Signal::CONT);
     }
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     scene
 }
 

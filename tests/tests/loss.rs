@@ -15,7 +15,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use std::path::Path;
 use system_tests::account::{command_counters, gaps, of_sensors};
-use system_tests::{Pace, RESTLESS, Scene, count, count_of_id, json, turn};
+use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, json, turn};
 
 const WIRE: &str = "loss=0.01&seed=7";
 
@@ -160,8 +160,7 @@ fn in_real_time_both_sums_agree_for_each_identifier() {
     let controller = scene.controller(Pace::Real).with("--repeat").start();
     scene.wait_for_peers(2);
     let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     host.signal(Signal::INT);
     let host = host.wait().expect_code(130);
     let host: Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");

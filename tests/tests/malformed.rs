@@ -6,7 +6,7 @@
 use crate::malformed_table::{COUNTERS, Counter, Injection, table};
 use protocol::frames::{Frame, Tick, ValveCommand};
 use serde_json::Value;
-use system_tests::{Pace, Peer, SHORT, Scene, count, json};
+use system_tests::{Pace, Peer, SHORT, Scene, both_good, count, json};
 
 /// The carriage moves from here on; before, an open valve would show as well, but later is closer to what matters.
 const FIRST_CYCLE: u32 = 750;
@@ -20,13 +20,11 @@ type Act<'a> = &'a mut dyn FnMut(&Peer, u32);
 fn run(act: Option<Act<'_>>) -> Scene {
     let scene = Scene::new(SHORT);
     let members = if act.is_some() { 2 } else { 1 };
-    let emulator = scene.emulator(Pace::Lockstep).with(&format!("--members {members}")).start();
-    let controller = scene.controller(Pace::Lockstep).start();
+    let (emulator, controller) = scene.start(Pace::Lockstep, &format!("--members {members}"), "");
     if let Some(act) = act {
         scene.peer().take_part("injector", |peer, cycle, _| act(peer, cycle));
     }
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     scene
 }
 

@@ -13,7 +13,7 @@ use plant::effects::sheet::Switched;
 use plant::effects::{SHEETS, sheet};
 use protocol::frames::{DRIVE_SENSORS, MESSAGES};
 use system_tests::hidden::{Extreme, LIVELY, drawn, everything, rig_with};
-use system_tests::{Pace, Program, Running, Scene, Table, bus_log, json, run_both, turn};
+use system_tests::{Pace, Program, Running, Scene, Table, both_good, bus_log, json, run_both, turn};
 
 const SEALED_RUNS: u64 = 20;
 /// Shorter texts of numbers stand anywhere by chance.
@@ -251,8 +251,7 @@ fn a_controller_takes_the_nominal_numbers_of_a_rig_file_with_effects() {
     let start = |launch: system_tests::Launch, name: &str| launch.out(&folder.join(name)).start();
     let emulator = start(scene.emulator(Pace::Lockstep).rig(&rig).with("--seconds 1.3"), "emulator");
     let controller = start(scene.controller(Pace::Lockstep).with("--repeat"), "controller");
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     for file in ["emulator/bus.log", "controller/controller-drive.csv", "controller/controller-load.csv"] {
         assert!(scene.same(&both.join(file), &folder.join(file)), "{file} differs");
     }

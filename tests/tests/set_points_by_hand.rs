@@ -2,7 +2,7 @@
 //! else.
 
 use protocol::frames::{Frame, HandSetPoint, HandSetPointAxis, MainChainState};
-use system_tests::{LINKED, Pace, Scene};
+use system_tests::{LINKED, Pace, Scene, both_good};
 
 /// Both axes at rest for three seconds, linked, for a hand to lead.
 fn experiment(drive: &str, load: &str) -> String {
@@ -19,8 +19,7 @@ fn experiment(drive: &str, load: &str) -> String {
 /// that the drive was asked for, m, and the forces that the load was asked for, N.
 fn led(experiment: &str, asks: &[HandSetPoint]) -> [Vec<f64>; 2] {
     let scene = Scene::new(experiment);
-    let emulator = scene.emulator(Pace::Lockstep).with("--members 2 --seconds 60").start();
-    let controller = scene.controller(Pace::Lockstep).start();
+    let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2 --seconds 60", "");
     let mut began = None;
     scene.peer().take_part("bench", |peer, cycle, frames| {
         for frame in frames.iter().filter_map(|frame| Frame::decode(frame).ok()) {
@@ -36,8 +35,7 @@ fn led(experiment: &str, asks: &[HandSetPoint]) -> [Vec<f64>; 2] {
             }
         }
     });
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     [("drive", "set_position_m"), ("load", "set_force_N")].map(|(axis, column)| {
         let table = scene.axis_table(axis);
         // Where nothing is asked for, a cell is empty.

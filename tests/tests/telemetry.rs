@@ -5,7 +5,7 @@ use serde_json::{Value, json as value};
 use std::os::unix::fs::PermissionsExt;
 use system_tests::events::{all, times};
 use system_tests::onlooker::{Told, Viewer};
-use system_tests::{Launch, Pace, RESTLESS, SHORT, Scene, Table, json, turn};
+use system_tests::{Launch, Pace, RESTLESS, SHORT, Scene, Table, both_good, json, turn};
 
 fn with_telemetry(scene: &Scene, pace: Pace) -> Launch {
     scene.emulator(pace).with(&format!("--telemetry {}", scene.path("telemetry").display()))
@@ -50,8 +50,7 @@ fn a_viewer_is_told_what_the_files_hold() {
     assert_eq!(socket.permissions().mode() & 0o777, 0o600, "for this user alone");
     let reading = std::thread::spawn(|| viewer.to_the_end());
     let controller = scene.controller(Pace::Real).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     let reported = reading.join().expect("the viewer does not panic");
 
     assert_eq!(reported.description["experiment"], value!({ "name": "experiment", "title": "restless" }));
@@ -93,8 +92,7 @@ fn lockstep_leaves_the_same_bytes_whoever_looks_on() {
         let viewers = telemetry.then(|| (viewer(&scene), viewer(&scene)));
         let controller = scene.controller(Pace::Lockstep).start();
         let reported = viewers.map(|(reads, still)| (reads.to_the_end(), still));
-        let _ = emulator.wait().expect_code(0);
-        let _ = controller.wait().expect_code(0);
+        let _ = both_good(emulator, controller);
         (scene, reported.map(|(reported, _)| reported))
     };
     let (alone, watched) = (run(false), run(true));

@@ -364,8 +364,7 @@ fn without_telemetry_the_page_shows_what_is_on_the_bus() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let page = LivePage::open(&scene, "");
-    let emulator = scene.emulator(Pace::Real).with("--seconds 60").start();
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    let (emulator, controller) = scene.start(Pace::Real, "--seconds 60", "--repeat");
     let rows = page.events().wait_for("rows", |rows| rows["columns"]["drive_set_point_m"][0].is_number());
     assert!(rows["columns"]["drive_position_m"][0].is_number(), "{rows}");
     assert!(rows["columns"]["drive_true_position_m"][0].is_null(), "{rows}");

@@ -3,7 +3,7 @@
 
 use protocol::can::CanFrame;
 use system_tests::xcp::{SECRET, command, config, xcp_packet};
-use system_tests::{PROGRAM, Pace, SHORT, Scene, count, json, run_both};
+use system_tests::{PROGRAM, Pace, SHORT, Scene, both_good, count, json, run_both};
 
 /// Cycle of the first command: the experiment moves.
 const START: u32 = 852;
@@ -183,8 +183,7 @@ fn without_a_key_in_the_configuration_nothing_is_ever_unlocked() {
 #[test]
 fn a_flood_of_commands_is_dropped_and_counted_and_the_valve_is_served() {
     let scene = Scene::new(SHORT);
-    let emulator = scene.emulator(Pace::Lockstep).with("--members 2").start();
-    let controller = scene.controller(Pace::Lockstep).with("--xcp").start();
+    let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2", "--xcp");
     let client = scene.peer();
     let (mut sent, mut received) = (0, 0);
     client.take_part("client", |peer, cycle, frames| {
@@ -196,8 +195,7 @@ fn a_flood_of_commands_is_dropped_and_counted_and_the_valve_is_served() {
             sent += 21;
         }
     });
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = both_good(emulator, controller);
     let report = scene.report();
     let xcp = &report["axes"]["drive"]["xcp"];
     let (answered, dropped) = (count(xcp, "/answered"), count(xcp, "/commands_dropped"));
