@@ -114,7 +114,7 @@ impl Plan<'_> {
                 peer.say(&frame);
             }
         });
-        let _ = emulator.wait().expect_code(0);
+        emulator.wait().expect_code(0);
         let measurement = scene.measurement();
         assert_eq!(measurement.len(), self.cycles);
         Left {

@@ -102,8 +102,8 @@ pub fn run(disturbance: Disturbance, after: Duration) -> Named {
     inject(disturbance, &scene, &emulator, &controller);
     scene.wait_for_rows("run", ROWS);
     // The rig says farewell, which the lossy wire may lose: then the controllers end by its silence.
-    let _ = emulator.interrupt();
-    let _ = controller.wait();
+    emulator.interrupt();
+    controller.wait();
     name_cause(&out)
 }
 
@@ -160,7 +160,7 @@ fn step_the_clock(scene: &Scene) {
 
 fn name_cause(out: &Path) -> Named {
     let report = out.join("report");
-    let _ = Program::Bench.start(&[&"report", &out, &"--out", &report]).wait().expect_code(0);
+    Program::Bench.start(&[&"report", &out, &"--out", &report]).wait().expect_code(0);
     let file = report.join("report.json");
     let named = Program::Bench.start(&[&"cause", &file]).wait().expect_code(0);
     let report = records::json(&file);

@@ -46,7 +46,7 @@ impl Door {
     }
 
     pub fn close(self) -> Value {
-        let _ = self.running.interrupt();
+        self.running.interrupt();
         json(&self.report)
     }
 

@@ -101,7 +101,7 @@ pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> Live {
     let rig = rig_with(scene, effects);
     let folder = scene.path("run");
     let options = format!("--seconds {seconds} --full-timing --no-flight");
-    let _ = run_both(
+    run_both(
         &scene.emulator(Pace::Real).rig(&rig).out(&folder).with(&options),
         &scene.controller(Pace::Real).out(&folder).with("--repeat"),
     );

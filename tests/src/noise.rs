@@ -164,9 +164,9 @@ pub fn run(seconds: u32, per_second: u32, seed: u64) -> Outcome {
     scene.wait_for_rows("emulator", 200);
     let noise = (per_second > 0).then(|| Noise::start(&scene.socket(), per_second, seed));
     let limit = Duration::from_secs(u64::from(seconds)) + crate::process::PATIENCE;
-    let _ = emulator.wait_within(limit).expect_code(0);
+    emulator.wait_within(limit).expect_code(0);
     let sent = noise.map(Noise::end).unwrap_or_default();
-    let _ = controller.wait();
+    controller.wait();
     outcome(&scene, sent)
 }
 

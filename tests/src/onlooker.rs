@@ -184,7 +184,7 @@ impl LivePage {
     }
 
     pub fn close(self) {
-        let _ = self.running.interrupt();
+        self.running.interrupt();
     }
 }
 

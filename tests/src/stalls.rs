@@ -97,7 +97,7 @@ mod tests {
             waited_so_far(thread.as_ref()).expect("the kernel counts it") > Duration::ZERO
         });
         sleeper.type_line("end");
-        let _ = sleeper.wait().expect_code(0);
+        sleeper.wait().expect_code(0);
         assert!(programs_with("word-of-stalls").is_empty());
     }
 }

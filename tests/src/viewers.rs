@@ -38,8 +38,8 @@ pub fn run(seconds: u32, with: bool) -> Outcome {
     let audience = page.as_ref().map(|page| Audience::gather(&scene, page));
     scene.wait_for_rows("emulator", seconds as usize * 500);
     let viewers = page.as_ref().map_or(0, |page| count(&page.state(), "/viewers"));
-    let _ = emulator.wait_within(Duration::from_secs(u64::from(seconds)) + PATIENCE).expect_code(0);
-    let _ = controller.wait();
+    emulator.wait_within(Duration::from_secs(u64::from(seconds)) + PATIENCE).expect_code(0);
+    controller.wait();
     drop(audience);
     if let Some(page) = page {
         page.close();

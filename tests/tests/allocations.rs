@@ -51,8 +51,8 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     scene.wait_for_rows("emulator", 11_000);
     scene.wait_for_more_rows("emulator", 100);
     emulator.signal(Signal::TERM);
-    let _ = emulator.wait().expect_code(130);
-    let _ = controller.wait().expect_code(0);
+    emulator.wait().expect_code(130);
+    controller.wait().expect_code(0);
     let seen = reading.join().expect("the viewer does not panic");
     assert_eq!(scene.run_description()["counts_allocations"], true);
     let summary = scene.summary();
@@ -123,7 +123,7 @@ fn tune(peer: &Peer, row: usize) {
 fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
     let _machine = turn::take();
     let scene = Scene::new(LINKED);
-    let _ = run_both(
+    run_both(
         &scene.emulator(Pace::Real).build(Build::CountingAllocations).with("--seconds 14 --full-timing"),
         &scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat"),
     );
@@ -149,7 +149,7 @@ fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
 fn programs_that_do_not_count_say_so() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let _ = run_both(
+    run_both(
         &scene.emulator(Pace::Real).with("--seconds 1.2"),
         &scene.controller(Pace::Real).with("--repeat"),
     );

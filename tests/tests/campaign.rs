@@ -68,7 +68,7 @@ fn row(text: &str, run: usize) -> BTreeMap<String, String> {
 
 /// What one start did without being disturbed, for others to be compared with.
 fn undisturbed(place: &Place) -> String {
-    let _ = place.run("run", &["--out", "whole", "--jobs", "2"]).expect_code(GOOD);
+    place.run("run", &["--out", "whole", "--jobs", "2"]).expect_code(GOOD);
     place.text("whole/runs.csv")
 }
 
@@ -80,7 +80,7 @@ fn a_row_is_what_the_runs_folder_says_to_the_bit() {
     for run in [1, 10] {
         assert_eq!(row(&table, run)["ended"], "done");
         let number = run.to_string();
-        let _ = place.run("repeat", &[&number, "--out", "again"]).expect_code(GOOD);
+        place.run("repeat", &[&number, "--out", "again"]).expect_code(GOOD);
         let summary = json(&place.path("again/summary.json"));
         let row = row(&table, run);
         let mut compared = 0;
@@ -104,21 +104,21 @@ fn shards_in_any_order_and_number_give_the_same_bytes() {
     assert_eq!(whole.lines().count(), 13);
     for shard in ["2/3", "0/3", "1/3"] {
         let out = format!("shard-{}", &shard[..1]);
-        let _ = place.run("run", &["--out", &out, "--shard", shard, "--jobs", "1"]).expect_code(GOOD);
+        place.run("run", &["--out", &out, "--shard", shard, "--jobs", "1"]).expect_code(GOOD);
     }
     let folders = ["shard-0", "shard-1", "shard-2"];
     let merge = |folders: &[&str]| place.run("merge", &[folders, &["--to", "merged"]].concat());
-    let _ = merge(&folders).expect_code(GOOD);
+    merge(&folders).expect_code(GOOD);
     assert!(place.text("merged/runs.csv") == whole, "three shards give other bytes than one start");
-    let _ = merge(&folders[..2]).expect_code(BAD_INPUT).expect_said(&["2 of 6 parts are missing", "part 2"]);
+    merge(&folders[..2]).expect_code(BAD_INPUT).expect_said(&["2 of 6 parts are missing", "part 2"]);
     let doubled = [&folders[..], &["whole"]].concat();
-    let _ = merge(&doubled).expect_code(BAD_INPUT).expect_said(&["twice", "shard-0", "whole"]);
+    merge(&doubled).expect_code(BAD_INPUT).expect_said(&["twice", "shard-0", "whole"]);
     // An array of Slurm and an indexed job tell the index; both counts fill one folder.
     for (variable, index, count) in [("SLURM_ARRAY_TASK_ID", "0", "2"), ("JOB_COMPLETION_INDEX", "1", "2")] {
         let mut start = place.command("run", &["--out", "told", "--shard", count]);
-        let _ = Running::start("campaign", start.env(variable, index)).wait().expect_code(GOOD);
+        Running::start("campaign", start.env(variable, index)).wait().expect_code(GOOD);
     }
-    let _ = place.run("merge", &["told"]).expect_code(GOOD);
+    place.run("merge", &["told"]).expect_code(GOOD);
     assert!(place.text("told/runs.csv") == whole);
 }
 
@@ -148,7 +148,7 @@ fn an_interrupted_start_says_so_and_goes_on() {
     let mut start = Running::start("campaign", &mut place.command("run", &["--out", "out"]));
     start.wait_for("runs, ");
     start.signal(Signal::INT);
-    let _ = start.wait().expect_code(INTERRUPTED).expect_said(&["stopped", "the same command goes on"]);
+    start.wait().expect_code(INTERRUPTED).expect_said(&["stopped", "the same command goes on"]);
     assert!(!place.path("out/runs.csv").exists(), "there is no half table");
 }
 
@@ -166,16 +166,13 @@ fn parts_that_are_not_whole_or_not_ours_are_told_and_never_merged() {
         (good.replacen("\n4,", "\n5,", 1), "not as it was written"),
     ] {
         fs::write(&path, bad).expect("it can be spoiled");
-        let _ = merge().expect_said(&["000002.csv", words]);
+        merge().expect_said(&["000002.csv", words]);
     }
     // One that cannot be read is made again; strangers are left alone.
-    let _ = place
-        .run("run", &["--out", "whole"])
-        .expect_code(GOOD)
-        .expect_said(&["it is made again", "; 2 to do"]);
+    place.run("run", &["--out", "whole"]).expect_code(GOOD).expect_said(&["it is made again", "; 2 to do"]);
     assert!(place.text("whole/runs.csv") == whole);
     fs::write(&path, good.replace("made by ", "made by 0123")).expect("it can be spoiled");
-    let _ = place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_said(&["another version"]);
+    place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_said(&["another version"]);
 }
 
 #[test]
@@ -210,7 +207,7 @@ fn what_a_program_answers_becomes_a_table_and_a_confusion_matrix() {
     let script = "#!/bin/sh\nread line\ncase $line in *crash*) echo broken >&2; exit 3;; *leak*) n=leak;; *) n=leak;; esac\n\
                   echo \"{\\\"named\\\": \\\"$n\\\", \\\"score\\\": 0.5}\"\n";
     install(script.as_bytes(), &place.path("judge.sh"));
-    let _ = place.run("run", &["--out", "out", "--expect-passed"]).expect_code(BOUND_BROKEN);
+    place.run("run", &["--out", "out", "--expect-passed"]).expect_code(BOUND_BROKEN);
     let table = place.text("out/runs.csv");
     let cell = |run: usize, name: &str| row(&table, run)[name].clone();
     assert_eq!((cell(0, "named"), cell(0, "ended")), ("leak".to_owned(), "done".to_owned()));
@@ -232,12 +229,12 @@ fn a_table_of_set_points_is_of_the_campaign_and_goes_with_a_run() {
     fs::write(place.path("way.toml"), experiment).expect("an experiment");
     fs::write(place.path("way.csv"), "time_s,position_m\n0,0.1\n1,0.2\n2,0.15\n").expect("a table");
     let table = undisturbed(&place);
-    let _ = place.run("repeat", &["1", "--out", "again"]).expect_code(GOOD);
+    place.run("repeat", &["1", "--out", "again"]).expect_code(GOOD);
     let summary = json(&place.path("again/summary.json"));
     let error = row(&table, 1)["position_error_dynamic_m"].parse::<f64>().ok();
     assert!(error.is_some() && error == summary["position_error_dynamic_m"].as_f64(), "{table}");
     fs::write(place.path("way.csv"), "time_s,position_m\n0,0.1\n1,0.3\n2,0.15\n").expect("a table");
-    let _ = place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_said(&["another campaign"]);
+    place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_said(&["another campaign"]);
 }
 
 #[test]
@@ -250,7 +247,7 @@ fn every_shipped_campaign_is_one_and_faults_run_as_processes() {
     }
     let faults = fs::read_to_string(workspace().join("campaign/campaigns/faults.toml")).expect("the faults");
     let place = Place::new(&faults.replace("draws = 4", "draws = 1\nruns_per_part = 3"));
-    let _ = place.run("run", &["--out", "out"]).expect_code(GOOD);
+    place.run("run", &["--out", "out"]).expect_code(GOOD);
     let table = place.text("out/runs.csv");
     let errors: Vec<f64> =
         (0..3).map(|run| row(&table, run)["position_error_dynamic_m"].parse().expect("a figure")).collect();
@@ -261,7 +258,7 @@ fn every_shipped_campaign_is_one_and_faults_run_as_processes() {
 #[test]
 fn the_page_is_whole_and_asks_for_nothing_from_elsewhere() {
     let place = Place::new(SMALL);
-    let _ = undisturbed(&place);
+    undisturbed(&place);
     let page = place.text("whole/report.html");
     let document = roxmltree::Document::parse_with_options(
         &page,
@@ -295,7 +292,7 @@ fn dask_gives_the_same_bytes_when_a_worker_is_killed() {
     let worker = worker_at_work(driver.number());
     rustix::process::kill_process(worker, Signal::KILL).expect("a worker can be killed");
     assert!(place.parts("out") < 32, "it was done before anybody could be killed");
-    let _ = driver.wait().expect_code(GOOD);
+    driver.wait().expect_code(GOOD);
     assert!(place.text("out/runs.csv") == whole, "with a worker killed the bytes are others");
     let pages = ["out", "whole"].map(|folder| place.text(&format!("{folder}/report.html")));
     assert!(pages[0] == pages[1], "with a worker killed the page is another");

@@ -182,7 +182,7 @@ fn a_controller_without_a_rig_gives_up_after_its_grace_and_says_what_to_start() 
     let scene = Scene::new(SHORT);
     for pace in [Pace::Real, Pace::Lockstep] {
         let controller = scene.controller(pace).with("--bus-grace 0.3").start();
-        let _ = controller.wait().expect_code(BUS_FAILED).expect_said(&["emulator run", "--bus-grace"]);
+        controller.wait().expect_code(BUS_FAILED).expect_said(&["emulator run", "--bus-grace"]);
     }
 }
 
@@ -209,7 +209,7 @@ fn a_wrong_command_line_tells_what_is_allowed() {
         let mut command = Command::new(executable(program, Build::Shipped));
         let ended =
             Running::start(&format!("{} {line}", program.name()), command.args(line.split(' '))).wait();
-        let _ = ended.expect_code(BAD_INPUT).expect_said(&[hint]);
+        ended.expect_code(BAD_INPUT).expect_said(&[hint]);
     }
 }
 

@@ -40,7 +40,7 @@ fn nothing_is_written_outside_the_folders_that_are_given() {
     );
     let config = xcp::config(&scene);
     let logs = [scene.path("emulator.strace"), scene.path("controller.strace")];
-    let _ = run_both(
+    run_both(
         &scene
             .emulator(Pace::Lockstep)
             .with(&format!("--faults {}", faults.display()))

@@ -96,7 +96,7 @@ fn rows_of_both_processes_join_to_the_time_on_the_way_each_way() {
     let emulator = scene.emulator(Pace::Real).with("--seconds 4 --full-timing").start();
     let controller = scene.controller(Pace::Real).with("--repeat --full-timing").start();
     let process = controller.number();
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     let answered = expect_one_account(&scene, process, "controller", "drive");
     let rig = table(&scene.path("emulator/emulator-timing.csv"));
     let summary = scene.summary();
@@ -151,7 +151,7 @@ fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() 
     controller.signal(Signal::USR1);
     controller.wait_for("asked for the last seconds");
     let process = controller.number();
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     let rows = expect_one_account(&scene, process, "controller", "drive");
     let stopped =
         rows.iter().position(|row| row.skipped >= 25).expect("a row that skips the cycles of the stop");
@@ -183,10 +183,10 @@ fn a_process_for_each_axis_has_files_and_tags_of_its_own() {
         let controller = scene.axis_controller(Pace::Real, axis);
         (axis, controller.with("--repeat --full-timing --no-flight").start())
     });
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     for (axis, controller) in controllers {
         let process = controller.number();
-        let _ = controller.wait().expect_code(0);
+        controller.wait().expect_code(0);
         let rows = expect_one_account(&scene, process, &format!("controller-{axis}"), axis);
         let other = |row: &CycleTiming| if axis == "drive" { row.load } else { row.drive };
         assert!(rows.iter().all(|row| other(row) == Exchange::default()), "{axis} times itself alone");

@@ -52,7 +52,7 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     emulator.stop();
     std::thread::sleep(Duration::from_millis(50));
     emulator.signal(Signal::CONT);
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
 
     let summary = scene.summary();
     let (cycles, skipped) = (count(&summary, "/cycles"), count(&summary, "/skipped"));
@@ -125,8 +125,8 @@ fn a_dump_can_be_asked_for_and_changes_nothing() {
     let event: Value = json(&dump.join("event.json"));
     let (from, at) = (count(&event, "/window_from_ns"), count(&event, "/at_monotonic_ns"));
     assert!(at - from >= 1000 * MS, "a second before: {event}");
-    let _ = emulator.interrupt();
-    let _ = controller.wait();
+    emulator.interrupt();
+    controller.wait();
     assert!(count(&scene.summary(), "/flight/dumps") >= 1);
 }
 
@@ -142,8 +142,8 @@ fn without_a_recorder_nobody_is_dumped_and_what_an_earlier_run_left_is_gone() {
     std::fs::write(scene.path("emulator/emulator-timing.csv"), "of an earlier run").expect("written");
     let (emulator, controller) = under_way(&scene, "--seconds 3 --no-flight --flight-late-us 1");
     emulator.signal(Signal::USR1);
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait();
+    emulator.wait().expect_code(0);
+    controller.wait();
     assert!(!earlier.exists() && !scene.path("emulator/emulator-timing.csv").exists());
     assert!(of_another.exists(), "a controller may have started before the rig");
     assert_eq!(count(&scene.summary(), "/flight/dumps"), 0);
@@ -156,7 +156,7 @@ fn a_rig_that_is_killed_leaves_its_histograms_but_for_the_last_second() {
     let (emulator, controller) = under_way(&scene, "--seconds 60");
     scene.wait_for_rows("emulator", 4000);
     emulator.signal(Signal::KILL);
-    let _ = emulator.wait();
+    emulator.wait();
     drop(controller);
     let path = scene.path("emulator/emulator.hlog");
     assert!(std::fs::read(&path).expect("the log").ends_with(b"\n"));

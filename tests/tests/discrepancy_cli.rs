@@ -167,8 +167,8 @@ fn the_extended_rig_is_one(rig: &Path) {
     let text = fs::read_to_string(rig).expect("the extended rig");
     assert!(text.contains(&format!("[effects.{EFFECT}.drive]")), "{text}");
     let scene = Scene::new(SHORT);
-    let _ = scene.rehearsal().rig(rig).start().wait().expect_code(GOOD);
-    let _ = scene.emulator(Pace::Real).rig(rig).with("--seconds 0.5").start().wait().expect_code(GOOD);
+    scene.rehearsal().rig(rig).start().wait().expect_code(GOOD);
+    scene.emulator(Pace::Real).rig(rig).with("--seconds 0.5").start().wait().expect_code(GOOD);
 }
 
 /// `extend`, `verify` and `next` from what a close left.
@@ -314,10 +314,10 @@ fn what_is_read_is_never_written_over_and_no_record_is_both_trained_on_and_held_
         all.extend(more);
         discrepancy(&all).expect_code(BAD_INPUT)
     };
-    let _ = close(&[]).expect_said(&["rig.toml", "would be written over", "another --out"]);
+    close(&[]).expect_said(&["rig.toml", "would be written over", "another --out"]);
     assert_eq!(fs::read(&own).expect("the rig file"), fs::read(rig()).expect("the rig file"));
-    let _ = close(&[&train]).expect_said(&["--train", "given twice"]);
-    let _ = close(&[&"--test", &train]).expect_said(&["--test", "a training record as well"]);
+    close(&[&train]).expect_said(&["--train", "given twice"]);
+    close(&[&"--test", &train]).expect_said(&["--test", "a training record as well"]);
     assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "only the rig file");
 }
 
@@ -335,7 +335,7 @@ fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves
     fs::write(&record, text.replace("drive_pressure_b_Pa", "drive_presure_b_Pa")).expect("room");
     let check = on("check", &record, &out, &[]).expect_code(BAD_INPUT);
     check.expect_printed(&["cannot be used", "column drive_presure_b_Pa", "no column drive_pressure_b_Pa"]);
-    let _ = on("close", &record, &out, &[]).expect_code(BAD_INPUT);
+    on("close", &record, &out, &[]).expect_code(BAD_INPUT);
     assert_eq!(json(&out.join("report.json"))["verdict"], "bad-data");
     assert!(!out.join("rig.toml").exists() && !out.join("next-chirps.toml").exists());
     assert!(out.join("notes.txt").exists(), "foreign files stay");
@@ -376,19 +376,19 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
     ] {
         for step in ["close", "check", "calibrate", "locate", "name"] {
             let ended = on(step, record, &path("out"), &[]).expect_code(BAD_INPUT);
-            let _ = ended.expect_said(words);
+            ended.expect_said(words);
         }
     }
-    let _ = on("close", &headless, &path("out"), &[]).expect_code(BAD_INPUT);
+    on("close", &headless, &path("out"), &[]).expect_code(BAD_INPUT);
     let train = &records().train;
     // What is missing is missed before anything is computed.
     let nowhere = missing.to_str().expect("a path in ASCII");
     let began = std::time::Instant::now();
-    let _ = on("close", train, &path("out"), &["--test", nowhere])
+    on("close", train, &path("out"), &["--test", nowhere])
         .expect_code(BAD_INPUT)
         .expect_said(&["nowhere.csv"]);
     assert!(began.elapsed().as_secs_f64() < 2.0, "a missing --test is told after {:?}", began.elapsed());
-    let _ = on("close", train, &path("out"), &["--without", "no-such-effect"])
+    on("close", train, &path("out"), &["--without", "no-such-effect"])
         .expect_code(BAD_INPUT)
         .expect_said(&["no-such-effect", "inclination"]);
 
@@ -404,14 +404,14 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
         let step =
             |step: &str| discrepancy(&[&step, &"--rig", &model, &"--train", &train, &"--out", &path("out")]);
         for name in ["close", "check", "locate"] {
-            let _ = step(name).expect_code(BAD_INPUT).expect_said(words);
+            step(name).expect_code(BAD_INPUT).expect_said(words);
         }
     }
     let no_report = write("report.json", "{}");
     for step in ["extend", "next"] {
         let ended =
             discrepancy(&[&step, &"--rig", &rig(), &"--report", &no_report, &"--out", &path("x.toml")]);
-        let _ = ended.expect_code(BAD_INPUT).expect_said(&["report.json", "named"]);
+        ended.expect_code(BAD_INPUT).expect_said(&["report.json", "named"]);
     }
 }
 
@@ -441,6 +441,6 @@ fn help_tells_every_step_every_option_and_the_exit_codes() {
         let help = discrepancy(&[&step, &"--help"]).expect_code(GOOD);
         help.expect_printed(parts);
     }
-    let _ = discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_said(&["--rig", "--train"]);
+    discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_said(&["--rig", "--train"]);
     assert!(records().folder.path().exists());
 }

@@ -28,9 +28,9 @@ fn steps_alone_refuse_records_that_do_not_go_together() {
     let [train, other] = &[Axis::Drive, Axis::Load].map(|axis| record(folder.path(), axis));
     for step in ["calibrate", "locate"] {
         let twice = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", train];
-        let _ = discrepancy(&twice).expect_code(BAD_INPUT).expect_said(&["--train", "given twice"]);
+        discrepancy(&twice).expect_code(BAD_INPUT).expect_said(&["--train", "given twice"]);
         let mixed = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", other];
-        let _ = discrepancy(&mixed).expect_code(BAD_INPUT).expect_said(&["load", "the same axes"]);
+        discrepancy(&mixed).expect_code(BAD_INPUT).expect_said(&["load", "the same axes"]);
     }
     // Of the held-out record nothing is reported where it shows another axis.
     let out = folder.path().join("closed");

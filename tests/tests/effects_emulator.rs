@@ -21,7 +21,7 @@ const ROUNDS: usize = 3;
 fn lockstep(effects: &[Switched]) {
     let scene = Scene::new(LIVELY);
     let rig = rig_with(&scene, effects);
-    let _ = run_both(
+    run_both(
         &scene.emulator(Pace::Lockstep).rig(&rig).with("--seconds 1.3"),
         &scene.controller(Pace::Lockstep).with("--repeat"),
     );

@@ -31,8 +31,8 @@ fn run() -> Scene {
     let options = format!("--members 2 --seconds {seconds}");
     let (emulator, controller) = scene.start(Pace::Lockstep, &options, "--repeat");
     scene.peer().be_console(said_in);
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait();
+    emulator.wait().expect_code(0);
+    controller.wait();
     scene
 }
 
@@ -63,8 +63,8 @@ fn the_controllers_end_an_aborted_experiment_by_themselves() {
     let scene = Scene::new(RESTLESS);
     let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2 --seconds 10", "--repeat");
     scene.peer().be_console(|cycle| (cycle == TRIP).then(|| Frame::ConsoleEmergencyStop(stop(false))));
-    let _ = controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
-    let _ = emulator.wait();
+    controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
+    emulator.wait();
     let report = scene.report();
     assert_eq!(report["axes"]["drive"]["chain_state"], "aborted");
     assert_eq!(report["ended_well"], false);

@@ -41,7 +41,7 @@ fn run(scene: &Scene, mut say: impl FnMut(usize) -> Option<Frame>) -> Ended {
     let emulator = scene.emulator(Pace::Lockstep).out(&out).with(options).start();
     let controller = scene.controller(Pace::Lockstep).out(&out).start();
     scene.peer().be_console(|cycle| say(cycle as usize));
-    let _ = emulator.wait();
+    emulator.wait();
     controller.wait()
 }
 
@@ -54,13 +54,13 @@ fn tripped(by: By) -> Scene {
     }
     let ended = run(&scene, |cycle| (by == By::Bus && cycle == TRIP).then(|| stop(false)));
     let cause = if by == By::Controller { "controller-fault" } else { "the emergency stop is tripped" };
-    let _ = ended.expect_code(1).expect_said(&["stopped before the end: drive", cause]);
+    ended.expect_code(1).expect_said(&["stopped before the end: drive", cause]);
     scene
 }
 
 fn figures(scene: &Scene) -> Value {
     // Its code tells of the run, which was stopped; its figures are what is wanted.
-    let _ = Program::Bench.start(&[&"summary", &scene.path("run")]).wait();
+    Program::Bench.start(&[&"summary", &scene.path("run")]).wait();
     json(&scene.path("run/summary.json"))
 }
 
@@ -125,7 +125,7 @@ fn back(after: &str) -> Scene {
         START => Some(start),
         _ => None,
     });
-    let _ = ended.expect_code(0);
+    ended.expect_code(0);
     scene
 }
 
@@ -202,7 +202,7 @@ fn a_controllers_own_fault_is_released_by_the_console_and_the_repetition_begins_
     let scene = Scene::new(&FAST.replace("\"end\"", "\"restart\""));
     own::failing(&scene, FAILS_ONCE, &[]);
     scene.write("program.toml", own::PROGRAM);
-    let _ = run(&scene, |cycle| (cycle == RELEASE).then(|| stop(true))).expect_code(0);
+    run(&scene, |cycle| (cycle == RELEASE).then(|| stop(true))).expect_code(0);
     let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
     let chain = ["ready", "tripped", "waiting-for-release", "recovering", "ready"];
     assert_eq!(drive.states("emergency_stop_chain"), chain);
@@ -230,10 +230,10 @@ fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release
     scene.wait_for_more_rows("emulator", 1500);
     scene.peer().say(&stop(true));
     for controller in [drive, load] {
-        let _ = controller.wait().expect_code(0);
+        controller.wait().expect_code(0);
     }
     emulator.signal(Signal::INT);
-    let _ = emulator.wait();
+    emulator.wait();
     for (axis, ended) in [("drive", "fault"), ("load", "aborted")] {
         let table = scene.axis_table(axis);
         let states = table.states("main_chain");
@@ -247,7 +247,7 @@ fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release
 fn nobody_is_told_to_start_while_the_stop_is_held() {
     let scene = Scene::new(&FAST.replace("\"end\"", "\"restart\""));
     let held = run(&scene, |cycle| (cycle == TRIP).then(|| stop(false)));
-    let _ = held.expect_code(1).expect_said(&["drive: the emergency stop is tripped"]);
+    held.expect_code(1).expect_said(&["drive: the emergency stop is tripped"]);
     let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
     assert_eq!(drive.states("emergency_stop_chain").last(), Some(&"waiting-for-release"));
     assert!(drive.numbers("enabled")[TRIP + 2..].iter().all(|enabled| *enabled == 0.0), "shut for 29 s");

@@ -88,8 +88,8 @@ fn a_bound_that_is_broken_fails_the_experiment() {
     let out = scene.path("run");
     let programs = workspace().join("controller/programs");
     let options = format!("--programs {}", programs.display());
-    let _ = scene.rehearsal().experiment(&strict).out(&out).with(&options).start().wait().expect_code(0);
-    let _ = Program::Bench.start(&[&"summary", &out]).wait().expect_code(1);
+    scene.rehearsal().experiment(&strict).out(&out).with(&options).start().wait().expect_code(0);
+    Program::Bench.start(&[&"summary", &out]).wait().expect_code(1);
 }
 
 #[test]

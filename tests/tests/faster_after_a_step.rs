@@ -26,8 +26,8 @@ fn step(rig: &str) -> Step {
         scene.emulator(Pace::Lockstep).experiment(&experiment).rig(&rig).with("--seconds 5.5").start();
     let controller = scene.controller(Pace::Lockstep).experiment(&experiment).start();
     // Whether the step passes is not asked: what is missing may well spoil it.
-    let _ = controller.wait();
-    let _ = emulator.wait();
+    controller.wait();
+    emulator.wait();
     let truth = scene.truth();
     let valve = scene.measurement().column("drive_valve");
     let edge = (1..valve.len()).find(|at| valve[*at] - valve[at - 1] > EDGE).expect("an edge of the valve");

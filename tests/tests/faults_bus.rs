@@ -34,7 +34,7 @@ fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
     second.into_iter().for_each(|controller| drop(controller.kill()));
     emulator.wait_for("one sender left on the drive command, valve follows");
     scene.wait_for_more_rows("emulator", 600);
-    let _ = emulator.interrupt();
+    emulator.interrupt();
     first.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
     let summary = scene.summary();
     let measurement = scene.measurement();
@@ -56,9 +56,9 @@ fn controllers_that_know_of_each_other_take_a_second_one_for_a_fault_and_stop() 
     let first = scene.controller(Pace::Real).with("--repeat").start();
     scene.wait_for_rows("emulator", UNDER_WAY);
     let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
-    let _ = first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
-    let _ = second.wait().expect_code(1);
-    let _ = emulator.interrupt();
+    first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
+    second.wait().expect_code(1);
+    emulator.interrupt();
     let reported = events::all(&scene.summary());
     assert!(events::times(&reported, "emergency-stop") >= 1, "{reported:?}");
     let valve = scene.measurement().column("drive_valve");
@@ -79,8 +79,8 @@ fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the
     scene.wait_for_rows("emulator", 2000);
     let received = std::thread::spawn(move || listener.frames_to_the_end());
     scene.wait_for_more_rows("emulator", 500);
-    let _ = emulator.interrupt();
-    let _ = controller.wait().expect_code(0);
+    emulator.interrupt();
+    controller.wait().expect_code(0);
     host.signal(Signal::INT);
     let host = host.wait().expect_code(130);
     let received = received.join().expect("the listener listens at last");
@@ -122,10 +122,10 @@ fn a_bus_that_stays_away_ends_both_with_complete_files() {
     let host = scene.bus_host("");
     let (mut emulator, controller) = scene.start(Pace::Real, "--bus-grace 1", "--repeat --bus-grace 1");
     scene.wait_for_rows("emulator", UNDER_WAY);
-    let _ = host.kill();
+    host.kill();
     emulator.wait_for("the bus is gone");
-    let _ = emulator.wait().expect_code(3).expect_said(&["--bus-grace"]);
-    let _ = controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    emulator.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
     let summary = scene.summary();
     let measurement = scene.measurement();
     assert_eq!(count(&summary, "/cycles"), measurement.len() as u64);
@@ -148,7 +148,7 @@ fn a_rig_that_was_killed_is_missed_while_others_still_talk() {
     let (emulator, mut controller) = scene.start(Pace::Real, "", "--repeat --bus-grace 2");
     let stranger = scene.peer();
     scene.wait_for_rows("emulator", UNDER_WAY);
-    let _ = emulator.kill();
+    emulator.kill();
     let over = Arc::new(AtomicBool::new(false));
     let told_over = Arc::clone(&over);
     let chatter = std::thread::spawn(move || {
@@ -159,7 +159,7 @@ fn a_rig_that_was_killed_is_missed_while_others_still_talk() {
         }
     });
     controller.wait_for("no sensors for 0.2 s");
-    let _ = controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
     over.store(true, Ordering::Relaxed);
     chatter.join().expect("the stranger talked to the end");
     drop(host);
@@ -172,7 +172,7 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
     let host = scene.bus_host("");
     let (mut emulator, mut controller) = scene.start(Pace::Real, "--bus-grace 30", "--repeat --bus-grace 30");
     scene.wait_for_rows("emulator", UNDER_WAY);
-    let _ = host.kill();
+    host.kill();
     emulator.wait_for("the bus is gone");
     controller.wait_for("the bus is gone");
     emulator.wait_for("no fresh drive command");
@@ -181,8 +181,8 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
     controller.wait_for("the bus is back");
     emulator.wait_for("fresh drive commands again");
     scene.wait_for_more_rows("emulator", 600);
-    let _ = emulator.interrupt();
-    let _ = controller.wait().expect_code(0);
+    emulator.interrupt();
+    controller.wait().expect_code(0);
     drop(host);
     let summary = scene.summary();
     let measurement = scene.measurement();
@@ -199,10 +199,10 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
 fn the_socket_of_a_host_that_was_killed_is_taken_over() {
     let _machine = turn::take();
     let scene = Scene::new(SHORT);
-    let _ = scene.bus_host("").kill();
+    scene.bus_host("").kill();
     assert!(scene.socket().exists(), "a killed host leaves its socket");
     // In lockstep: a machine that stalls for a second would make the controller stop the rig, and the emulator wait for another.
-    let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
+    run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
     assert!(scene.summary()["bus_host"].is_object(), "the emulator hosted the bus");
     assert!(!scene.socket().exists(), "a host that ends removes its socket");
 }
@@ -215,17 +215,14 @@ fn a_second_host_is_refused_and_a_second_rig_leaves_while_the_first_goes_on() {
     // Long enough on the bus to know that it was here first.
     scene.wait_for_rows("emulator", 500);
     let host = scene.start_bus_host("");
-    let _ = host
-        .wait()
-        .expect_code(3)
-        .expect_said(&["has a host already", "connect to it, or choose another path"]);
+    host.wait().expect_code(3).expect_said(&["has a host already", "connect to it, or choose another path"]);
     let second = scene.emulator(Pace::Real).out(&scene.path("second")).start();
-    let _ = second
+    second
         .wait()
         .expect_code(3)
         .expect_said(&["has a host already; joining it", "another rig is on this bus already"]);
     first.wait_for("another rig is on this bus; stop one of them");
-    let _ = first.interrupt();
+    first.interrupt();
     assert!(json(&scene.path("second/summary.json"))["bus_host"].is_null());
     assert!(count(&scene.summary(), "/frames_ignored/second_rig") > 0);
 }

@@ -14,7 +14,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
     let scene = Scene::new(RESTLESS);
     let (emulator, controller) = scene.under_way(Pace::Lockstep, 600);
     controller.signal(Signal::STOP);
-    let _ = emulator
+    emulator
         .wait()
         .expect_code(LOCKSTEP_TIMEOUT)
         .expect_said(&["lockstep: 'controller' was not done within 5 s of wall time"]);
@@ -29,7 +29,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
 fn a_barrier_that_nobody_joins_is_given_up() {
     let scene = Scene::new(SHORT);
     let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 0.3").start();
-    let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined", "--members"]);
+    emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined", "--members"]);
     assert_eq!(count(&scene.summary(), "/cycles"), 0);
 }
 
@@ -37,16 +37,16 @@ fn a_barrier_that_nobody_joins_is_given_up() {
 fn a_barrier_that_one_of_two_joins_is_given_up_and_the_one_ends_too() {
     let scene = Scene::new(SHORT);
     let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2 --join-timeout 0.5", "");
-    let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined"]);
-    let _ = controller.wait().expect_code(BUS_FAILED);
+    emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined"]);
+    controller.wait().expect_code(BUS_FAILED);
 }
 
 #[test]
 fn a_member_that_is_killed_ends_the_run_and_what_was_recorded_stays() {
     let scene = Scene::new(RESTLESS);
     let (emulator, controller) = scene.under_way(Pace::Lockstep, 600);
-    let _ = controller.kill();
-    let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["all members left the barrier"]);
+    controller.kill();
+    emulator.wait().expect_code(BUS_FAILED).expect_said(&["all members left the barrier"]);
     expect_complete(&scene);
 }
 
@@ -54,8 +54,8 @@ fn a_member_that_is_killed_ends_the_run_and_what_was_recorded_stays() {
 fn an_emulator_that_is_killed_ends_the_member() {
     let scene = Scene::new(RESTLESS);
     let (emulator, controller) = scene.under_way(Pace::Lockstep, 600);
-    let _ = emulator.kill();
-    let _ = controller.wait().expect_code(BUS_FAILED);
+    emulator.kill();
+    controller.wait().expect_code(BUS_FAILED);
     let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
     assert_eq!(count(&scene.report(), "/cycles_answered"), rows as u64);
 }
@@ -65,8 +65,8 @@ fn a_bus_without_a_barrier_is_given_up() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
     let (emulator, controller) = scene.start(Pace::Lockstep, "--join-timeout 0.3", "--bus-grace 0.5");
-    let _ = emulator.wait().expect_code(BUS_FAILED);
-    let _ = controller.wait().expect_code(BUS_FAILED);
+    emulator.wait().expect_code(BUS_FAILED);
+    controller.wait().expect_code(BUS_FAILED);
     drop(host);
 }
 
@@ -80,6 +80,6 @@ fn a_second_emulator_on_the_bus_does_not_take_the_first_ones_place() {
     let second = scene.emulator(Pace::Lockstep).out(&scene.path("second")).with("--join-timeout 1").start();
     let second = second.wait();
     assert_eq!(second.code, Some(BUS_FAILED), "the second is refused; it said:\n{}", second.stderr);
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     assert_eq!(count(&scene.summary(), "/cycles"), 60_000);
 }

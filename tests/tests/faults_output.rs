@@ -13,7 +13,7 @@ const SMALL_FILES: &str = "trap '' XFSZ && ulimit -f 300";
 
 fn expect_told(ended: Ended, folder: &Path) {
     let folder = folder.display().to_string();
-    let _ = ended.expect_code(BAD_INPUT).expect_said(&["cannot write", &folder, "free space", "--out"]);
+    ended.expect_code(BAD_INPUT).expect_said(&["cannot write", &folder, "free space", "--out"]);
 }
 
 /// A batch of lines that the disk took in part was left as it was, so that measurement.csv ended in half a row and the
@@ -26,7 +26,7 @@ fn an_emulator_whose_file_cannot_grow_ends_the_run_and_keeps_whole_lines() {
         let emulator = scene.emulator(pace).after_shell(SMALL_FILES).start();
         let controller = scene.controller(pace).with("--repeat --bus-grace 2").start();
         expect_told(emulator.wait(), &scene.path("emulator"));
-        let _ = controller.wait().expect_code(0);
+        controller.wait().expect_code(0);
         let rows = expect_whole_lines(&scene.path("emulator/measurement.csv"));
         assert!(rows > 100, "what fitted was written: {rows} rows, {pace:?}");
         let _ = expect_whole_lines(&scene.path("emulator/truth.csv"));
@@ -61,7 +61,7 @@ fn a_full_disk_ends_the_run_and_keeps_whole_lines() {
     let emulator = scene.emulator(Pace::Real).out(&folder).start();
     let controller = scene.controller(Pace::Real).with("--repeat").start();
     expect_told(emulator.wait(), &folder);
-    let _ = controller.wait().expect_code(0);
+    controller.wait().expect_code(0);
     assert!(expect_whole_lines(&folder.join("measurement.csv")) > 100);
     let _ = expect_whole_lines(&folder.join("truth.csv"));
     let _ = expect_whole_lines(&folder.join("bus.log"));
@@ -80,9 +80,9 @@ fn an_emulator_that_is_killed_leaves_files_that_read_to_their_last_whole_line() 
     let received = std::thread::spawn(move || listener.frames_to_the_end());
     let controller = scene.controller(Pace::Real).with("--repeat --bus-grace 0.5").start();
     scene.wait_for_rows("emulator", 1500);
-    let _ = emulator.kill();
+    emulator.kill();
     let received = received.join().expect("the listener listens");
-    let _ = controller.wait().expect_code(3);
+    controller.wait().expect_code(3);
     let last = received.iter().rev().find_map(|frame| match protocol::frames::Frame::decode(frame) {
         Ok(protocol::frames::Frame::Tick(tick)) => Some(u64::from(tick.cycle)),
         _ => None,

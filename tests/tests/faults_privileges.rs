@@ -28,13 +28,13 @@ fn a_user_without_privileges_is_told_the_remedy_and_the_run_succeeds() {
     let (emulator, controller) = (emulator.start(), controller.start());
     let remedies =
         ["warning: no FIFO priority", "setcap cap_sys_nice+ep", "warning: no locked memory", "limits.d"];
-    let _ = emulator.wait().expect_code(0).expect_said(&remedies);
+    emulator.wait().expect_code(0).expect_said(&remedies);
     let controller = controller.wait().expect_said(&remedies);
     if controller.code != Some(0) {
         let report = std::fs::read_to_string(scene.path("controller/controller.json")).expect("a report");
         let is_late = LATENESS.iter().any(|words| report.contains(words));
         assert!(is_late || controller.stderr.contains(NOT_DONE), "{}", controller.stderr);
-        let _ = controller.expect_code(if is_late { BOUND_BROKEN } else { BUS_FAILED });
+        controller.expect_code(if is_late { BOUND_BROKEN } else { BUS_FAILED });
     }
     let run = scene.run_description();
     let refused: Vec<&str> =

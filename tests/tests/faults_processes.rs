@@ -21,7 +21,7 @@ fn under_way(scene: &Scene) -> (Running, Running) {
 /// Goes on for a while, ends the run as a person would, and hands back summary and measurement.
 fn end(scene: &Scene, emulator: Running) -> (Value, Table) {
     scene.wait_for_more_rows("emulator", 600);
-    let _ = emulator.interrupt();
+    emulator.interrupt();
     let measurement = scene.measurement();
     let summary = scene.summary();
     assert_eq!(count(&summary, "/cycles"), measurement.len() as u64, "a row for each cycle");
@@ -34,12 +34,12 @@ fn a_controller_that_is_killed_leaves_the_valve_shut_until_the_next_one_comes() 
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let (mut emulator, controller) = under_way(&scene);
-    let _ = controller.kill();
+    controller.kill();
     emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
     let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
     emulator.wait_for("fresh drive commands again");
     let (summary, measurement) = end(&scene, emulator);
-    let _ = second.wait().expect_code(0);
+    second.wait().expect_code(0);
     expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
     assert!(count(&summary, "/drive_commands/expired") >= 1);
     assert_eq!(count(&summary, "/drive_commands/two_sources"), 0, "a restart is no second source");
@@ -55,12 +55,12 @@ fn an_emulator_that_is_killed_and_restarted_is_found_again_and_the_chain_starts_
     let mut controller = scene.controller(Pace::Real).start();
     controller.wait_for(": drive experiment");
     scene.wait_for_rows("first", UNDER_WAY);
-    let _ = emulator.kill();
+    emulator.kill();
     controller.wait_for("the bus is gone");
     let second = scene.emulator(Pace::Real).out(&scene.path("second")).start();
     controller.wait_for("the rig started anew; starting over");
-    let _ = second.wait().expect_code(0).expect_said(&["the controllers are done"]);
-    let _ = controller.wait().expect_code(0);
+    second.wait().expect_code(0).expect_said(&["the controllers are done"]);
+    controller.wait().expect_code(0);
     let report = scene.report();
     assert!(count(&report, "/bus/disconnects") >= 1 && count(&report, "/bus/reconnects") >= 1);
     let news = report["news"].as_array().expect("news");
@@ -96,7 +96,7 @@ fn a_controller_that_stands_still_has_its_valve_shut_and_its_losses_counted_at_b
         emulator.wait_for("fresh drive commands again");
         let (summary, measurement) = end(&scene, emulator);
         let name = format!("process {}", controller.number());
-        let _ = controller.wait().expect_code(0);
+        controller.wait().expect_code(0);
         expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
         assert!(count(&summary, "/drive_commands/expired") >= 1);
         assert_eq!(count(&summary, "/frames_lost_at_rig"), 0, "what was never sent is not lost");
@@ -128,7 +128,7 @@ fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost
     emulator.signal(Signal::CONT);
     emulator.wait_for("woke late");
     let (summary, _) = end(&scene, emulator);
-    let _ = controller.wait().expect_code(0);
+    controller.wait().expect_code(0);
     let skipped = count(&summary, "/skipped");
     // It stood still for 200 ms at least.
     assert!(skipped >= 150, "{skipped} cycles skipped");

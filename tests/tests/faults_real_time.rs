@@ -10,7 +10,7 @@ fn run(pace: Pace) -> Scene {
     let scene = Scene::new(RESTLESS);
     let script = scene.write("faults.toml", SCRIPT);
     let options = format!("--seconds 1.8 --faults {}", script.display());
-    let _ = run_both(&scene.emulator(pace).with(&options), &scene.controller(pace).with("--repeat"));
+    run_both(&scene.emulator(pace).with(&options), &scene.controller(pace).with("--repeat"));
     scene
 }
 
@@ -78,7 +78,7 @@ fn people_break_and_mend_things_while_the_run_goes_on() {
     emulator.wait_for("fault 2 ends");
     emulator.wait_for("fault 3 ends");
     emulator.type_line("quit");
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     let what: Vec<_> = marks(&scene).into_iter().map(|row| (row.number, row.what, row.cause)).collect();
     let expected = [(1, "begins"), (2, "begins"), (3, "begins"), (1, "ends"), (2, "ends"), (3, "ends")];
     assert_eq!(what, expected.map(|(number, what)| (number, what.to_owned(), "console".to_owned())));

@@ -83,16 +83,16 @@ fn a_script_that_is_wrong_is_refused_with_line_key_value_and_range_before_anythi
         let path = scene.write("faults.toml", &script);
         let emulator = scene.emulator(Pace::Real).with(&format!("--faults {}", path.display())).start();
         let ended = emulator.wait().expect_code(2);
-        let _ = ended.expect_said(&[path.to_str().expect("UTF-8")]).expect_said(&hints);
+        ended.expect_said(&[path.to_str().expect("UTF-8")]).expect_said(&hints);
         assert!(!scene.path("emulator").exists(), "no folder before the script is good");
     }
     let scene = Scene::new(SHORT);
     let missing = scene.emulator(Pace::Real).with("--faults /nowhere/faults.toml").start();
-    let _ = missing.wait().expect_code(2).expect_said(&["cannot read /nowhere/faults.toml"]);
+    missing.wait().expect_code(2).expect_said(&["cannot read /nowhere/faults.toml"]);
     let path = scene.write("faults.toml", "\n[[fault]]\nname = \"bus-loss\"\n");
     let emulator =
         scene.emulator(Pace::Real).bus("can://vcan0").with(&format!("--faults {}", path.display()));
-    let _ = emulator
+    emulator
         .start()
         .wait()
         .expect_code(2)

@@ -35,7 +35,7 @@ fn expect_complete(scene: &Scene, pace: Pace, signal: Signal) {
 
 fn expect_interrupted(running: Running) {
     let ended = running.wait().expect_code(INTERRUPTED);
-    let _ = ended.expect_said(&["interrupted; everything recorded so far is saved"]);
+    ended.expect_said(&["interrupted; everything recorded so far is saved"]);
 }
 
 /// In lockstep the emulator did not wait for its farewell to be delivered once it was interrupted: now and then the host
@@ -48,7 +48,7 @@ fn an_emulator_that_is_interrupted_says_so_saves_all_and_sends_the_controller_ho
             let (scene, emulator, controller) = under_way(pace);
             emulator.signal(signal);
             expect_interrupted(emulator);
-            let _ = controller.wait().expect_code(0).expect_said(&["the rig has ended"]);
+            controller.wait().expect_code(0).expect_said(&["the rig has ended"]);
             expect_complete(&scene, pace, signal);
         }
     }
@@ -70,7 +70,7 @@ fn a_controller_that_is_interrupted_saves_all_and_the_emulator_says_what_it_miss
         let (scene, emulator, controller) = under_way(Pace::Lockstep);
         controller.signal(signal);
         expect_interrupted(controller);
-        let _ = emulator.wait().expect_code(3).expect_said(&["all members left the barrier"]);
+        emulator.wait().expect_code(3).expect_said(&["all members left the barrier"]);
         expect_complete(&scene, Pace::Lockstep, signal);
     }
 }

@@ -50,7 +50,7 @@ fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
         (&["--hidden", "x", "--effects", "2"], "--effects"),
     ];
     for (arguments, hint) in wrong {
-        let _ = find_effect(arguments).expect_code(2).expect_said(&[hint]);
+        find_effect(arguments).expect_code(2).expect_said(&[hint]);
     }
 }
 

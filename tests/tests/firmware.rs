@@ -30,7 +30,7 @@ fn run(scene: &Scene, out: &str, seconds: f64) -> PathBuf {
     let emulator = scene.emulator(Pace::Lockstep).with(&options).out(&folder).start();
     let mut command = Command::new(built().join("firmware-embedded"));
     let firmware = Running::start("firmware", command.arg(scene.socket()));
-    let _ = both_good(emulator, firmware);
+    both_good(emulator, firmware);
     folder
 }
 

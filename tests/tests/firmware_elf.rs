@@ -61,7 +61,7 @@ fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
         let options = format!("--members 1 --join-timeout 300 --seconds {seconds}");
         let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
         let mcu = mcu(&scene);
-        let _ = both_good(emulator, mcu);
+        both_good(emulator, mcu);
         scene
     };
     let [one, other] = std::thread::scope(|threads| {
@@ -152,7 +152,7 @@ fn noise_does_not_move_it_and_sensor_loss_and_the_emergency_stop_shut_its_valve_
         STARTED => Some(Frame::RunControl(start)),
         _ => None,
     });
-    let _ = both_good(emulator, mcu);
+    both_good(emulator, mcu);
 
     let frames = by_cycle(&scene);
     let commands: BTreeMap<u64, ValveCommand> = frames
@@ -276,7 +276,7 @@ fn gdb_stops_the_core_while_the_rig_waits_and_the_run_is_the_same_to_the_byte() 
                 "Value returned is",
             ]);
         }
-        let _ = both_good(emulator, mcu);
+        both_good(emulator, mcu);
         scene
     };
     let [plain, debugged] = [run(false), run(true)];
@@ -298,7 +298,7 @@ fn what_is_no_elf_of_the_chip_and_no_bus_is_refused_in_words() {
     ];
     for (arguments, words) in cases {
         let mut command = mcu_command(&scene);
-        let _ = Running::start("mcu", command.args(arguments)).wait().expect_code(2).expect_said(&[words]);
+        Running::start("mcu", command.args(arguments)).wait().expect_code(2).expect_said(&[words]);
     }
 }
 
@@ -336,7 +336,7 @@ fn patched(folder: &Path, function: &str, instruction: u16) -> PathBuf {
     let mut debugger = Command::new("gdb-multiarch");
     debugger.env("PATH", tools_path()).args(["-nx", "-batch", "--write"]).arg(&patched);
     debugger.args(["-ex", &format!("set {{short}}{function} = {instruction}")]);
-    let _ = Running::start("gdb", &mut debugger).wait().expect_code(0);
+    Running::start("gdb", &mut debugger).wait().expect_code(0);
     patched
 }
 
@@ -353,7 +353,7 @@ fn a_fault_and_the_end_of_main_are_told_and_no_silence() {
             scene.emulator(Pace::Lockstep).with("--members 1 --seconds 0.3 --join-timeout 300").start();
         let mut command = Command::new(workspace().join("scripts/mcu"));
         command.arg("--elf").arg(patched(&scene.path(""), function, instruction));
-        let _ = Running::start("mcu", command.args(["--bus", &scene.url()]))
+        Running::start("mcu", command.args(["--bus", &scene.url()]))
             .wait()
             .expect_code(3)
             .expect_said(&[words]);

@@ -93,13 +93,13 @@ fn positions(elf: &Path) -> Option<Positioned> {
     let emulator = scene.emulator(Pace::Real).with("--seconds 200").start();
     let qemu = Running::start("qemu-r5f", &mut qemu(&scene, elf));
     until_in_experiment(&scene, REPETITION_CYCLES + 10);
-    let _ = emulator.interrupt().expect_code(130);
+    emulator.interrupt().expect_code(130);
     let ended = qemu.wait();
     if ended.stderr.contains(QEMU_BROKE) {
         return None;
     }
     // Its bus has gone with the rig.
-    let _ = ended.expect_code(0);
+    ended.expect_code(0);
     let summary = scene.summary();
     assert_eq!(count(&summary, "/frames_malformed"), 0);
     eprintln!("{}", summary["drive_commands"]);
@@ -230,8 +230,8 @@ fn gdb_stops_it_while_the_rig_goes_on_and_a_fault_is_told() {
         "$1 = APPROACH",
         "Value returned is",
     ]);
-    let _ = qemu.wait().expect_code(3).expect_said(&["firmware: prefetch abort at 0xC0000000"]);
-    let _ = emulator.interrupt().expect_code(130);
+    qemu.wait().expect_code(3).expect_said(&["firmware: prefetch abort at 0xC0000000"]);
+    emulator.interrupt().expect_code(130);
 }
 
 #[test]
@@ -250,7 +250,7 @@ fn its_clocks_go_at_the_rates_that_the_port_takes_them_for() {
         let drift_ppm = report[counter]["drift_ppm"].as_f64().expect("a number");
         assert!(drift_ppm.abs() < 1e4, "{counter}: {report}");
     }
-    let _ = Running::start("qemu-clock", command.arg("soon")).wait().expect_code(2);
+    Running::start("qemu-clock", command.arg("soon")).wait().expect_code(2);
 }
 
 #[test]
@@ -268,10 +268,7 @@ fn what_it_cannot_run_is_refused_in_words() {
         (&["--fast"], 2, "unknown argument --fast"),
     ];
     for (arguments, code, words) in cases {
-        let _ = Running::start("qemu-r5f", script().args(arguments))
-            .wait()
-            .expect_code(code)
-            .expect_said(&[words]);
+        Running::start("qemu-r5f", script().args(arguments)).wait().expect_code(code).expect_said(&[words]);
     }
 }
 

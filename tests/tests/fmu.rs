@@ -18,7 +18,7 @@ fn export(rig: &Path, out: &Path, options: &[&str]) -> Ended {
 
 fn exported(scene: &Scene, rig: &Path) -> PathBuf {
     let fmu = scene.path("plant.fmu");
-    let _ = export(rig, &fmu, &[]).expect_code(0);
+    export(rig, &fmu, &[]).expect_code(0);
     fmu
 }
 
@@ -39,7 +39,7 @@ fn expect_close(name: &str, cycle: usize, own: f64, expected: f64) {
 #[test]
 fn the_fmu_under_the_commands_of_a_rehearsal_gives_its_measurement_and_its_truth() {
     let scene = Scene::new(SHORT);
-    let _ = scene.rehearsal().start().wait().expect_code(0);
+    scene.rehearsal().start().wait().expect_code(0);
     let measured = Table::read(&scene.path("controller/measurement.csv"));
     let truth = Table::read(&scene.path("controller/truth.csv"));
     let valves = [measured.column("drive_valve"), measured.column("load_valve")];
@@ -158,17 +158,15 @@ fn the_same_rig_gives_the_same_file_and_what_is_none_is_refused() {
     let scene = Scene::new(SHORT);
     let [one, other] = ["one.fmu", "other.fmu"].map(|name| scene.path(name));
     for out in [&one, &other] {
-        let _ = export(&scene.path("rig.toml"), out, &[]).expect_code(0);
+        export(&scene.path("rig.toml"), out, &[]).expect_code(0);
     }
     assert!(scene.same(&one, &other));
     let bad = scene.rig_with("bad.toml", "pressure_bar = 7.0", "pressure_bar = 70");
     let out = scene.path("bad.fmu");
-    let _ = export(&bad, &out, &[])
-        .expect_code(2)
-        .expect_said(&["bad.toml:", "pressure_bar = 70 is out of range"]);
+    export(&bad, &out, &[]).expect_code(2).expect_said(&["bad.toml:", "pressure_bar = 70 is out of range"]);
     assert!(!out.exists());
     let none = scene.path("none.so");
     let said =
         export(&scene.path("rig.toml"), &out, &["--library", none.to_str().expect("UTF-8")]).expect_code(2);
-    let _ = said.expect_said(&["none.so"]);
+    said.expect_said(&["none.so"]);
 }

@@ -57,8 +57,8 @@ fn an_unknown_command_is_answered_with_the_commands_that_there_are() {
     let prefix = Prefix::made();
     let known =
         "run, latency, find-effect, close, can, test, emulator, controller, bench, discrepancy, campaign";
-    let _ = prefix.run(&["fly"]).expect_code(2).expect_said(&["unknown command 'fly'", known]);
-    let _ = prefix.run(&[]).expect_code(2).expect_said(&["Usage: airbench <COMMAND>", "discrepancy"]);
+    prefix.run(&["fly"]).expect_code(2).expect_said(&["unknown command 'fly'", known]);
+    prefix.run(&[]).expect_code(2).expect_said(&["Usage: airbench <COMMAND>", "discrepancy"]);
     prefix
         .run(&["run", "--help"])
         .expect_code(0)
@@ -71,7 +71,7 @@ fn find_effect_hides_at_most_as_many_effects_as_the_catalogue_has() {
     let one_more = (all + 1).to_string();
     let refused =
         Prefix::made().run(&["find-effect", "--held-out", "identification", "--effects", &one_more]);
-    let _ = refused.expect_code(2).expect_said(&[&format!("allowed are 0 to {all} here")]);
+    refused.expect_code(2).expect_said(&[&format!("allowed are 0 to {all} here")]);
 }
 
 #[test]
@@ -81,12 +81,7 @@ fn a_program_or_file_that_is_missing_is_named_with_every_path_looked_at() {
     let paths = ["bin/bench", "lib/airbench/bench"].map(|path| prefix.path(path).display().to_string());
     for arguments in [&["bench", "figures"][..], &["can", "--", "true"], &["run", "--lockstep"]] {
         let ended = prefix.run(arguments).expect_code(2);
-        let _ = ended.expect_said(&[
-            "the program 'bench' is not there",
-            &paths[0],
-            &paths[1],
-            "AIRBENCH_BIN=DIR",
-        ]);
+        ended.expect_said(&["the program 'bench' is not there", &paths[0], &paths[1], "AIRBENCH_BIN=DIR"]);
     }
     fs::remove_file(prefix.path("share/airbench/rig.toml")).expect("a link of our own");
     let path = prefix.path("share/airbench/rig.toml").display().to_string();
@@ -101,10 +96,10 @@ fn a_command_that_is_a_program_has_its_words_and_its_exit_codes() {
     assert_eq!(prefix.run(&["emulator", "faults"]).expect_code(0).stdout, faults.stdout);
     let refused = Program::Bench.start(&[&"summary", &"/nowhere"]).wait().expect_code(2);
     assert_eq!(prefix.run(&["bench", "summary", "/nowhere"]).expect_code(2).stderr, refused.stderr);
-    let _ = prefix.run(&["can", "--pair", "--", "sh", "-c", "exit 7"]).expect_code(7);
+    prefix.run(&["can", "--pair", "--", "sh", "-c", "exit 7"]).expect_code(7);
     prefix.run(&["close", "--help"]).expect_code(0).expect_printed(&["Usage: discrepancy close"]);
     // The shipped rig file is read before the record.
-    let _ = prefix
+    prefix
         .run(&["close", "--train", "/nowhere.csv"])
         .expect_code(2)
         .expect_said(&["cannot read /nowhere.csv"]);
@@ -120,7 +115,7 @@ fn an_installed_run_needs_its_prefix_alone_and_leaves_its_folder_where_it_was_st
     ]);
     assert!(prefix.path("work/runs/latest/measurement.csv").is_file());
     prefix.run(&["run", "--list"]).expect_code(0).expect_printed(&["\nload-step "]);
-    let _ = prefix.run(&["run", "loadstep"]).expect_code(2).expect_said(&["airbench run --list names them"]);
+    prefix.run(&["run", "loadstep"]).expect_code(2).expect_said(&["airbench run --list names them"]);
 }
 
 /// In two terminals, without a word on a bus in either.
@@ -176,7 +171,7 @@ fn a_signal_to_the_command_alone_ends_all_its_processes_with_everything_saved() 
     let out = out.to_str().expect("a path in ASCII");
     assert!(processes_with(&bus).len() >= 5, "airbench and four of its: {:?}", processes_with(&bus));
     running.signal(Signal::TERM);
-    let _ = running.wait().expect_code(130);
+    running.wait().expect_code(130);
     assert_eq!(processes_with(&bus), [""; 0]);
     assert!(Path::new(out).join("summary.json").is_file());
 }
@@ -188,11 +183,7 @@ fn a_suite_of_tests_is_run_by_the_interpreter_that_has_the_package() {
     install(b"#!/bin/sh\necho \"No module named 'airbench_hil'\" >&2\nexit 1\n", &python);
     let ended =
         Running::start("airbench test", prefix.command(&["test"]).env("AIRBENCH_PYTHON", &python)).wait();
-    let _ = ended.expect_code(2).expect_said(&[
-        "No module named 'airbench_hil'",
-        "pip install",
-        "AIRBENCH_PYTHON",
-    ]);
+    ended.expect_code(2).expect_said(&["No module named 'airbench_hil'", "pip install", "AIRBENCH_PYTHON"]);
 
     let suite = "import os, airbench_hil.programs as programs\n\n\ndef test_programs():\n    \
                  assert programs.program('emulator').samefile(os.environ['EXPECTED'])\n\n\n\

@@ -49,13 +49,13 @@ fn python_can_records_a_run_to_the_frame_and_cantools_decodes_it() {
     );
     door.wait_for_times("is on the bus", 1);
     let controller = scene.controller(Pace::Real).start();
-    let _ = emulator.wait();
-    let _ = controller.wait();
+    emulator.wait();
+    controller.wait();
     let ran = frames(&scene.path("emulator/bus.log"));
     let lines = || std::fs::read_to_string(&log).unwrap_or_default().lines().count();
     wait_until("4000 frames in the logger's file, which it writes in blocks", || lines() > 4000);
     logger.signal(Signal::INT);
-    let _ = logger.wait();
+    logger.wait();
 
     let logged = frames(&log);
     let report = door.close();
@@ -133,7 +133,7 @@ fn python_can_replays_a_log_onto_the_bus() {
     for n in 0..200_u16 {
         assert_eq!(next_on(&peer), CanFrame::new(0x5A5, &n.to_be_bytes()), "frame {n}");
     }
-    let _ = player.wait().expect_code(0);
+    player.wait().expect_code(0);
     assert_eq!(count(&door.close(), "/frames_from_clients"), 200);
 }
 

@@ -18,7 +18,7 @@ fn lockstep(scene: &Scene, cycles: usize, say: impl FnMut(u32) -> Option<Frame>)
     let seconds = cycles as f64 * 1e-3;
     let emulator = scene.emulator(Pace::Lockstep).with(&format!("--seconds {seconds}")).start();
     scene.peer().be_console(say);
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
 }
 
 /// The rig's calls about its own emergency stop, each with the cycle of the sensors that follow it.
@@ -131,8 +131,8 @@ fn a_run_with_people_in_it_is_the_same_to_the_byte() {
     let run = |people: &str| {
         let scene = with_people(people);
         let (emulator, controller) = scene.start(Pace::Lockstep, "--seconds 1.6", "--repeat");
-        let _ = emulator.wait().expect_code(0);
-        let _ = controller.wait();
+        emulator.wait().expect_code(0);
+        controller.wait();
         scene
     };
     let [one, other] = [run(&people), run(&people)];
@@ -218,7 +218,7 @@ fn what_is_typed_is_done_told_and_recorded() {
     scene.wait_for_more_rows("emulator", 300);
     emulator.type_line("quit");
     let received = peer.frames_to_the_end();
-    let _ = emulator.wait().expect_code(0).expect_said(&["ended at the console"]);
+    emulator.wait().expect_code(0).expect_said(&["ended at the console"]);
     let events = reported(&scene);
     for kind in ["emergency-stop", "emergency-stop-released", "link-refused", "unlinked", "weights"] {
         assert_eq!(times(&events, kind), 1, "{kind}: {events:?}");
@@ -262,7 +262,7 @@ fn people_allocate_nothing_in_the_1_ms_path() {
     // What was typed last is done last.
     emulator.wait_for("weights on the carriage: 1 kg");
     emulator.type_line("quit");
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     let summary = scene.summary();
     assert_eq!(times(&all(&summary), "emergency-stop"), 2);
     assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
@@ -276,7 +276,7 @@ fn the_end_of_the_input_closes_the_console_and_not_the_run() {
     emulator.wait_for("10 N");
     emulator.end_input();
     scene.wait_for_more_rows("emulator", 500);
-    let _ = emulator.interrupt();
+    emulator.interrupt();
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
         (&["--out", "/proc/airbench"], "--out"),
     ];
     for (arguments, hint) in wrong {
-        let _ = latency(arguments).expect_code(2).expect_said(&[hint]);
+        latency(arguments).expect_code(2).expect_said(&[hint]);
     }
 }
 

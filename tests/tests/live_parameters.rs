@@ -13,8 +13,8 @@ fn run(change: &str) -> (Scene, AxisTable) {
     let scene = Scene::new(&format!("{}{change}", SHORT.replacen("[run]\n", "[run]\nrepetitions = 2\n", 1)));
     scene.write("program.toml", PROGRAM);
     let emulator = scene.emulator(Pace::Lockstep).start();
-    let _ = scene.controller(Pace::Lockstep).start().wait().expect_code(0);
-    let _ = emulator.wait().expect_code(0);
+    scene.controller(Pace::Lockstep).start().wait().expect_code(0);
+    emulator.wait().expect_code(0);
     let table = scene.axis_table("drive");
     (scene, table)
 }
@@ -101,7 +101,7 @@ fn under_way(options: &str) -> (Scene, Running, Running) {
 
 fn end(scene: &Scene, emulator: Running, controller: Running) -> String {
     scene.wait_for_more_rows("emulator", 600);
-    let _ = emulator.interrupt();
+    emulator.interrupt();
     controller.wait().expect_code(0).stderr
 }
 

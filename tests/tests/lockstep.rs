@@ -35,9 +35,9 @@ fn run(circumstance: Circumstance, options: &str) -> Scene {
             let emulator = emulator.start();
             let listener = scene.peer();
             let controller = controller.start();
-            let _ = emulator.wait().expect_code(0);
+            emulator.wait().expect_code(0);
             drop(listener);
-            let _ = controller.wait().expect_code(0);
+            controller.wait().expect_code(0);
             return scene;
         }
         _ => (emulator.start(), controller.start()),
@@ -48,7 +48,7 @@ fn run(circumstance: Circumstance, options: &str) -> Scene {
         std::thread::sleep(Duration::from_millis(300));
         controller.signal(Signal::CONT);
     }
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     scene
 }
 
@@ -90,7 +90,7 @@ fn an_answer_to_the_last_cycle_is_logged_however_long_it_takes() {
         let command = ValveCommand { alive: (cycle % 16) as u8, echo: cycle as u16, ..Default::default() };
         peer.say(&Frame::DriveValveCommand(command));
     });
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     let log = scene.bus_log();
     let answers = log.iter().filter(|frame| matches!(Frame::decode(frame), Ok(Frame::DriveValveCommand(_))));
     assert_eq!(answers.count(), CYCLES as usize);

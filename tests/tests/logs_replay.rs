@@ -47,7 +47,7 @@ fn commands(count: u64) -> String {
 #[test]
 fn every_frame_of_a_run_is_on_the_bus_again_in_its_order() {
     let scene = Scene::new(SHORT);
-    let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
+    run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
     let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the log");
     // The first 300 ms, and frames of others.
     let mut short: String = log.lines().take(1500).map(|line| format!("{line}\n")).collect();
@@ -85,18 +85,14 @@ fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
     let emulator = scene.emulator(Pace::Real).with("--seconds 60").start();
     scene.wait_for_rows("emulator", 50);
     let refused = replay(&scene, &log, "").wait().expect_code(2);
-    let _ = refused.expect_said(&[
-        "a rig is live",
-        "3 commands and 1 frames of a rig",
-        "--leave-out commands,rig",
-    ]);
+    refused.expect_said(&["a rig is live", "3 commands and 1 frames of a rig", "--leave-out commands,rig"]);
     let refused = replay(&scene, &log, "--leave-out commands").wait().expect_code(2);
-    let _ = refused.expect_said(&["0 commands and 1 frames"]);
-    let _ = replay(&scene, &log, "--leave-out commands,rig").wait().expect_code(0);
+    refused.expect_said(&["0 commands and 1 frames"]);
+    replay(&scene, &log, "--leave-out commands,rig").wait().expect_code(0);
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!((count(&report, "/frames_sent"), count(&report, "/frames_left_out")), (1, 4));
     emulator.signal(Signal::INT);
-    let _ = emulator.wait();
+    emulator.wait();
     let summary = scene.summary();
     assert_eq!(count(&summary, "/stale_commands"), 0);
     let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the rig's own log");
@@ -118,7 +114,7 @@ fn a_rig_that_comes_alive_ends_a_replay_that_would_disturb_it() {
     assert_eq!(report["ended"], "live-rig");
     assert_eq!(count(&report, "/frames_sent"), (before + received(&peer, 0).len()) as u64);
     // Without what disturbs there is nothing to be sent, and with something else it goes on beside the rig.
-    let _ = replay(&scene, &log, "--leave-out 110").wait().expect_code(2).expect_said(&["nothing of"]);
+    replay(&scene, &log, "--leave-out 110").wait().expect_code(2).expect_said(&["nothing of"]);
 }
 
 fn received_some(peer: &Peer, count: usize) -> usize {
@@ -137,7 +133,7 @@ fn an_interrupted_replay_keeps_what_was_done() {
     let peer = scene.peer();
     let replayed = replay(&scene, &log, "--spin-us 100");
     let before = received_some(&peer, 10);
-    let _ = replayed.interrupt();
+    replayed.interrupt();
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!(report["ended"], "interrupted");
     let sent = (before + received(&peer, 0).len()) as u64;
@@ -157,10 +153,10 @@ fn nothing_is_sent_of_a_log_that_is_not_right_to_its_last_line() {
         ("(1700000001.0) can1 110#00\n", "can0, can1: choose one with --interface"),
     ] {
         let log = scene.write("hostile.log", &format!("{}{more}", commands(3)));
-        let _ = replay(&scene, &log, "").wait().expect_code(2).expect_said(&[words]);
+        replay(&scene, &log, "").wait().expect_code(2).expect_said(&[words]);
     }
     assert!(received(&peer, 0).is_empty());
     let log = scene.write("good.log", &commands(3));
     let other = Scene::new(SHORT);
-    let _ = replay(&other, &log, "--wait-s 0").wait().expect_code(3).expect_said(&["needs a host"]);
+    replay(&other, &log, "--wait-s 0").wait().expect_code(3).expect_said(&["needs a host"]);
 }

@@ -115,7 +115,7 @@ fn a_trace_holds_every_cycle_with_its_stages_every_frame_and_every_fault() {
     let folder = scene.path("emulator");
     let faults = scene.write("faults.toml", FAULTS);
     let options = format!("--full-timing --faults {}", faults.display());
-    let _ = run_both(
+    run_both(
         &scene.emulator(Pace::Real).with(&options),
         &scene.controller(Pace::Real).out(&folder).with("--full-timing"),
     );

@@ -112,9 +112,9 @@ fn run_in_lockstep(wire: &str) -> (Scene, Counted) {
     let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
     let mut received = Vec::new();
     scene.peer().take_part("listener", |_, _, frames| received.extend_from_slice(frames));
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     // Good, unless the wire lost the rig's farewell.
-    let _ = controller.wait();
+    controller.wait();
     let summary = scene.summary();
     let controller = scene.report();
     let counted = Counted { received, host: summary["bus_host"].clone(), summary, controller };
@@ -160,7 +160,7 @@ fn in_real_time_both_sums_agree_for_each_identifier() {
     let controller = scene.controller(Pace::Real).with("--repeat").start();
     scene.wait_for_peers(2);
     let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     host.signal(Signal::INT);
     let host = host.wait().expect_code(130);
     let host: Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");

@@ -24,7 +24,7 @@ fn run(act: Option<Act<'_>>) -> Scene {
     if let Some(act) = act {
         scene.peer().take_part("injector", |peer, cycle, _| act(peer, cycle));
     }
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     scene
 }
 

@@ -28,11 +28,11 @@ fn a_model_file_is_set_on_a_page_and_simulated_beside_a_record() {
     let page = fs::read_to_string(page).expect("a page");
     assert!(page.contains("<math") && page.contains("</html>") && !page.contains("http://"), "{page}");
     let over = discrepancy(&[&"explain", &model, &"--html", &model]).expect_code(BAD_INPUT);
-    let _ = over.expect_said(&["it is read here: name another"]);
+    over.expect_said(&["it is read here: name another"]);
     assert_eq!(fs::read_to_string(&model).expect("the model file"), MODEL);
 
     let out = folder.path().join("simulated.csv");
-    let _ = discrepancy(&[&"simulate", &model, &"--record", &record, &"--out", &out]).expect_code(GOOD);
+    discrepancy(&[&"simulate", &model, &"--record", &record, &"--out", &out]).expect_code(GOOD);
     let table = fs::read_to_string(&out).expect("a table");
     assert!(table.starts_with("t_s,u,y,y_model\n"), "{table}");
     for (row, line) in table.lines().skip(1).enumerate() {
@@ -41,5 +41,5 @@ fn a_model_file_is_set_on_a_page_and_simulated_beside_a_record() {
         assert!((said - value(row as i32)).abs() < 1e-5, "{line}");
     }
     let again = discrepancy(&[&"simulate", &model, &"--record", &record, &"--out", &out]);
-    let _ = again.expect_code(BAD_INPUT).expect_said(&["there is a file already"]);
+    again.expect_code(BAD_INPUT).expect_said(&["there is a file already"]);
 }

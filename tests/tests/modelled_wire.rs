@@ -14,7 +14,7 @@ fn run(scene: &Scene, pace: Pace, wire: &str, options: &str) -> (Value, Ended) {
     let emulator = scene.emulator(pace).bus(url).with(options).start();
     let controller = scene.controller(pace).start();
     let ended = emulator.wait().expect_code(0);
-    let _ = controller.wait();
+    controller.wait();
     (scene.summary(), ended)
 }
 
@@ -124,8 +124,8 @@ fn in_lockstep_every_shipped_experiment_keeps_the_plain_bound_and_what_it_assume
         let url = format!("{}?bitrate=1000000", scene.url());
         let emulator = scene.emulator(Pace::Lockstep).bus(url).experiment(&path).with("--seconds 30").start();
         let controller = scene.controller(Pace::Lockstep).experiment(&path).start();
-        let _ = emulator.wait().expect_code(0);
-        let _ = controller.wait();
+        emulator.wait().expect_code(0);
+        controller.wait();
         let summary = scene.summary();
         let widened = expect_below_the_bounds(wire_time(&summary));
         assert!(widened.is_empty(), "{experiment}: not as declared: {widened:#?}");
@@ -183,7 +183,7 @@ fn half_a_mbit_is_refused_with_the_arithmetic() {
         "use bitrate=1000000",
     ];
     let emulator = scene.emulator(Pace::Real).bus(format!("{}?bitrate=500000", scene.url())).start();
-    let _ = emulator.wait().expect_code(2).expect_said(&arithmetic);
+    emulator.wait().expect_code(2).expect_said(&arithmetic);
     assert!(!scene.path("emulator").exists(), "refused before anything is touched");
-    let _ = scene.start_bus_host("bitrate=500000").wait().expect_code(2).expect_said(&arithmetic);
+    scene.start_bus_host("bitrate=500000").wait().expect_code(2).expect_said(&arithmetic);
 }

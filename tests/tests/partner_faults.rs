@@ -118,10 +118,10 @@ fn expect_partner_lost(ended: Ended, axis: &str) -> Ended {
 fn a_controller_that_is_killed_is_noticed_by_the_other_which_shuts_its_valve_and_trips_the_emergency_stop() {
     for (lost, other) in PAIRS {
         let Under { scene, emulator, failing, other: left } = Under::way(Pace::Lockstep, lost, other);
-        let _ = failing.kill();
-        let _ = expect_partner_lost(left.wait(), other);
+        failing.kill();
+        expect_partner_lost(left.wait(), other);
         // Two seconds after the fault nobody is left in the barrier.
-        let _ = emulator.wait().expect_code(3);
+        emulator.wait().expect_code(3);
         expect_lost(&read(&log_of(&scene)), lost, other, 0);
         let report = json(&scene.path("controller").join(format!("controller-{other}.json")));
         assert_eq!(report["axes"][other]["chain_state"], "fault");
@@ -147,9 +147,9 @@ fn a_controller_that_stands_still_is_noticed_by_the_other_and_ends_too_when_it_g
         failing.signal(Signal::STOP);
         emulator.wait_for("emergency stop");
         failing.signal(Signal::CONT);
-        let _ = expect_partner_lost(left.wait(), other);
-        let _ = failing.wait().expect_code(BOUND_BROKEN).expect_said(&["stopped before the end"]);
-        let _ = emulator.interrupt();
+        expect_partner_lost(left.wait(), other);
+        failing.wait().expect_code(BOUND_BROKEN).expect_said(&["stopped before the end"]);
+        emulator.interrupt();
         // In real time the last status may have been a cycle that was missed: one more period.
         expect_lost(&read(&log_of(&scene)), lost, other, 10);
     }
@@ -162,8 +162,8 @@ fn a_controller_whose_partner_never_comes_gives_up_after_10_s_and_says_what_to_d
         let emulator = scene.emulator(Pace::Lockstep).start();
         let controller = scene.axis_controller(Pace::Lockstep, axis).start();
         let ended = controller.wait().expect_code(BOUND_BROKEN);
-        let _ = ended.expect_said(&["partner-missing", "was not heard", "start it, or use --alone"]);
-        let _ = emulator.wait();
+        ended.expect_said(&["partner-missing", "was not heard", "start it, or use --alone"]);
+        emulator.wait();
         let table = scene.axis_table(axis);
         let fault = table.cycles()[table.first("main_chain", "fault", 0)];
         // Ten seconds of the rig's time from the first sensors and status on.
@@ -175,7 +175,7 @@ fn a_controller_whose_partner_never_comes_gives_up_after_10_s_and_says_what_to_d
 #[test]
 fn alone_no_partner_is_waited_for_nor_missed() {
     let scene = Scene::new(SHORT);
-    let _ = run_both(
+    run_both(
         &scene.emulator(Pace::Lockstep),
         &scene.axis_controller(Pace::Lockstep, "drive").with("--alone"),
     );
@@ -184,7 +184,7 @@ fn alone_no_partner_is_waited_for_nor_missed() {
     assert!(count(&report, "/cycles_answered") > 1500);
     // Both axes of one process are never alone.
     let refused = scene.controller(Pace::Lockstep).with("--alone").start().wait();
-    let _ = refused.expect_code(2).expect_said(&["--alone needs --axis drive or --axis load"]);
+    refused.expect_code(2).expect_said(&["--alone needs --axis drive or --axis load"]);
 }
 
 #[test]
@@ -196,9 +196,9 @@ fn controllers_with_different_experiments_do_not_move_the_rig() {
     let load = scene.axis_controller(Pace::Lockstep, "load").experiment(&other).start();
     for controller in [drive, load] {
         let ended = controller.wait().expect_code(BOUND_BROKEN);
-        let _ = ended.expect_said(&["stopped before the end"]);
+        ended.expect_said(&["stopped before the end"]);
     }
-    let _ = emulator.wait();
+    emulator.wait();
     let said = ["drive", "load"].map(|axis| {
         let report = json(&scene.path("controller").join(format!("controller-{axis}.json")));
         report["axes"][axis]["chain_cause"].as_str().expect("a cause").to_owned()
@@ -216,7 +216,7 @@ fn frames_lost_on_the_wire_do_not_stop_a_run() {
     let lossy = format!("{}?loss=0.05&seed=3", scene.url());
     let emulator = scene.emulator(Pace::Lockstep).bus(lossy).with("--members 2").start();
     let controllers = ["drive", "load"].map(|axis| scene.axis_controller(Pace::Lockstep, axis).start());
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     controllers.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
     let summary = scene.summary();
     let lost = |id: &str| count(&summary, &format!("/bus_host/injected_loss/{id}"));
@@ -232,7 +232,7 @@ fn with_console(experiment: &str, cycles: u32, say: impl FnMut(u32) -> Option<Fr
     let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
     let controllers = ["drive", "load"].map(|axis| scene.axis_controller(Pace::Lockstep, axis).start());
     scene.peer().be_console(say);
-    let _ = emulator.wait();
+    emulator.wait();
     (scene, controllers.map(Running::wait))
 }
 
@@ -250,7 +250,7 @@ fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
     let say = |cycle| if cycle == ABORT { run_control(RunControlCommand::Abort, 0) } else { None };
     let (scene, ended) = with_console(&long(), 20_000, say);
     for ended in ended {
-        let _ = ended.expect_code(BOUND_BROKEN).expect_said(&["aborted: the console ended the run"]);
+        ended.expect_code(BOUND_BROKEN).expect_said(&["aborted: the console ended the run"]);
     }
     for axis in ["drive", "load"] {
         let table = table(&scene, axis);

@@ -8,7 +8,7 @@ use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, count, json, run
 fn run(scene: &Scene) -> PathBuf {
     let _machine = turn::take();
     let out = scene.path("run");
-    let _ = run_both(&scene.emulator(Pace::Real).out(&out), &scene.controller(Pace::Real).out(&out));
+    run_both(&scene.emulator(Pace::Real).out(&out), &scene.controller(Pace::Real).out(&out));
     out
 }
 
@@ -66,7 +66,7 @@ fn bounds_and_bad_input_have_their_exit_codes() {
         let file = scene.write(name, &format!("[bounds]\n{text}\n"));
         report(&out, &["--bounds", file.to_str().expect("a path"), "--markdown-only"])
     };
-    let _ = bounds("kept.toml", "\"counts.cycles\" = { min = 1 }").expect_code(0);
+    bounds("kept.toml", "\"counts.cycles\" = { min = 1 }").expect_code(0);
     let broken = bounds("broken.toml", "\"emulator-wakeup.p50_ns\" = { max = 1 }").expect_code(1);
     assert!(broken.stdout.contains("BROKEN"), "{}", broken.stdout);
     let unknown = bounds("unknown.toml", "\"emulator-wakup.p50_ns\" = { max = 1 }").expect_code(2);

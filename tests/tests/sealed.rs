@@ -190,7 +190,7 @@ fn what_only_real_time_leaves_tells_nothing_of_it_either() {
 fn an_empty_seal_changes_no_byte() {
     let sealed = run("# nothing\n", Pace::Lockstep, "");
     let scene = Scene::new(LIVELY);
-    let _ = run_both(
+    run_both(
         &scene.emulator(Pace::Lockstep).with("--seconds 1.3"),
         &scene.controller(Pace::Lockstep).with("--repeat"),
     );
@@ -232,14 +232,9 @@ fn an_experiment_may_name_the_sealed_file_and_no_controller_reads_it() {
     assert!(scene.same(&open.join("emulator/bus.log"), &sealed.join("emulator/bus.log")));
     // A file that is not there stops the rig and not the controllers, which end for want of a rig.
     scene.write("experiment.toml", &named.replacen("mine", "gone", 1));
-    let _ = scene
-        .emulator(Pace::Lockstep)
-        .start()
-        .wait()
-        .expect_code(2)
-        .expect_said(&["cannot read", "gone.toml"]);
+    scene.emulator(Pace::Lockstep).start().wait().expect_code(2).expect_said(&["cannot read", "gone.toml"]);
     let refused = scene.rehearsal().start().wait().expect_code(2);
-    let _ = refused.expect_said(&["rig.sealed", "must not read a sealed file", "emulator run"]);
+    refused.expect_said(&["rig.sealed", "must not read a sealed file", "emulator run"]);
 }
 
 #[test]
@@ -251,7 +246,7 @@ fn a_controller_takes_the_nominal_numbers_of_a_rig_file_with_effects() {
     let start = |launch: system_tests::Launch, name: &str| launch.out(&folder.join(name)).start();
     let emulator = start(scene.emulator(Pace::Lockstep).rig(&rig).with("--seconds 1.3"), "emulator");
     let controller = start(scene.controller(Pace::Lockstep).with("--repeat"), "controller");
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     for file in ["emulator/bus.log", "controller/controller-drive.csv", "controller/controller-load.csv"] {
         assert!(scene.same(&both.join(file), &folder.join(file)), "{file} differs");
     }
@@ -263,7 +258,7 @@ fn emulator_and_rehearsal_write_the_same_truth() {
     let rig = rig_with(&scene, &drawn(3, 12));
     let run = lockstep(&scene, &rig, "run", "");
     let rehearsal = scene.rehearsal().rig(&rig).with("--seconds 1.3 --repeat").start();
-    let _ = rehearsal.wait().expect_code(0);
+    rehearsal.wait().expect_code(0);
     for file in ["measurement.csv", "truth.csv"] {
         let rehearsed = scene.path("controller").join(file);
         assert!(scene.same(&run.join("emulator").join(file), &rehearsed), "{file} differs");
@@ -284,7 +279,7 @@ fn a_wrong_seal_is_refused_before_the_run_with_file_line_and_key() {
     for (text, words) in wrong {
         let file = scene.write("wrong.toml", text);
         let launch = scene.emulator(Pace::Real).with(&format!("--sealed {}", file.display()));
-        let _ = launch.start().wait().expect_code(2).expect_said(&[&format!("{}{words}", file.display())]);
+        launch.start().wait().expect_code(2).expect_said(&[&format!("{}{words}", file.display())]);
         assert!(!scene.path("emulator").exists(), "nothing is left of a run that never was");
     }
 }
@@ -293,7 +288,7 @@ fn a_wrong_seal_is_refused_before_the_run_with_file_line_and_key() {
 fn lockstep(scene: &Scene, rig: &Path, folder: &str, options: &str) -> PathBuf {
     let folder = scene.path(folder);
     let emulator = scene.emulator(Pace::Lockstep).rig(rig).out(&folder.join("emulator"));
-    let _ = run_both(
+    run_both(
         &emulator.with("--seconds 1.3").with(options),
         &scene.controller(Pace::Lockstep).rig(rig).out(&folder.join("controller")).with("--repeat"),
     );

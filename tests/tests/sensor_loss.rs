@@ -102,7 +102,7 @@ fn an_axis_without_sensors_trips_the_emergency_stop_after_five_ticks_of_the_rig(
         scene.wait_for_peers(2);
         let received = play(&rig, silent);
         let ended = controller.wait().expect_code(1);
-        let _ = ended.expect_said(&[&format!("stopped before the end: {silent}: sensor-loss")]);
+        ended.expect_said(&[&format!("stopped before the end: {silent}: sensor-loss")]);
         let (cycle, stop) = received.stop.expect("it trips the emergency stop");
         assert_eq!((stop.reason, stop.release), (EmergencyStopReason::SensorLoss, false), "{silent}");
         eprintln!("{silent}: emergency stop {} cycles after the last sensors", cycle - SILENT_FROM + 1);

@@ -35,7 +35,7 @@ fn led(experiment: &str, asks: &[HandSetPoint]) -> [Vec<f64>; 2] {
             }
         }
     });
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     [("drive", "set_position_m"), ("load", "set_force_N")].map(|(axis, column)| {
         let table = scene.axis_table(axis);
         // Where nothing is asked for, a cell is empty.

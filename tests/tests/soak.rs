@@ -114,7 +114,7 @@ fn a_soak_that_was_killed_or_interrupted_goes_on_with_all_it_had() {
     let running = soak(&scene, 0.6);
     scene.wait_for_rows(&segment_folder(2), 1000);
     let emulators = children(running.number(), "emulator");
-    let _ = running.kill();
+    running.kill();
     let first = results(&scene);
     assert_eq!((count(&first, "/totals/segments"), count(&first, "/totals/failed")), (1, 0));
     // Nothing that it started outlives it.

@@ -75,7 +75,7 @@ fn texts_of(script: &str) -> BTreeMap<String, String> {
     can.env("RIG", workspace().join("plant/rig.toml"));
     can.env("EXPERIMENT", workspace().join("controller/experiments/point-to-point.toml"));
     can.env("AIRBENCH_SHARE", workspace());
-    let _ = Running::start(&script.display().to_string(), &mut can).wait().expect_code(0);
+    Running::start(&script.display().to_string(), &mut can).wait().expect_code(0);
     socketcan::texts(&folder)
 }
 
@@ -123,7 +123,7 @@ fn sockets_are_told_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan(
     let command = [program.as_os_str(), "vcan0".as_ref(), "down".as_ref()];
     let running = Running::start("socketcan-answers", &mut guest(&scene, "", &command));
     wait_until("the sockets", || running.stdout().contains("ready"));
-    let _ = host.interrupt();
+    host.interrupt();
     wait_until("the answers", || running.stdout().contains("all is seen"));
     let _host = scene.bus_host("");
     let ended = running.wait().expect_code(0);
@@ -147,12 +147,12 @@ fn a_listener_is_told_that_the_bus_went_down_as_on_vcan() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     host.signal(Signal::INT);
-    let _ = host.wait();
+    host.wait();
     told.wait_for("Network is down");
     let ended = told.wait();
     let recorded = fs::read_to_string(expected().join("can-utils/down")).unwrap();
     assert!(recorded.starts_with("read: Network is down\ncandump 1\n"), "{recorded}");
-    let _ = ended.expect_code(1).expect_said(&["read: Network is down", "vcan0 is down"]);
+    ended.expect_code(1).expect_said(&["read: Network is down", "vcan0 is down"]);
 }
 
 /// The page's table of system calls against the filter and the tests: every call that is answered stands in it, and every row

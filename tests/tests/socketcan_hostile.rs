@@ -28,14 +28,14 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     for _ in 0..50 {
         let guest = Running::start("candump", &mut guest(&scene, "", &["candump", "vcan0"]));
         wait_until("a frame at the listener", || !guest.stdout().is_empty());
-        let _ = guest.kill();
+        guest.kill();
     }
     scene.wait_for_more_rows("emulator", GOES_ON);
 
     // As fast as it can, on an identifier that is nobody's.
     let flood = shell(&scene, "", "timeout 3 cangen vcan0 -I 7F5 -L 8 -g 0 -i; true");
     scene.wait_for_more_rows("emulator", GOES_ON);
-    let _ = flood.wait().expect_code(0);
+    flood.wait().expect_code(0);
 
     // A thousand sockets in a hundred processes.
     let many = built("many-sockets");
@@ -49,8 +49,8 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
 
     assert!(listener.stdout().lines().count() > 200);
     drop(listener);
-    let _ = controller.interrupt();
-    let _ = emulator.interrupt();
+    controller.interrupt();
+    emulator.interrupt();
     let summary = scene.summary();
     // What the flood cost is told as a loss at a peer's queue, if it cost anything; the rig's own commands were never disputed.
     assert_eq!(count(&summary, "/drive_commands/two_sources"), 0);
@@ -72,7 +72,7 @@ fn a_flood_through_it_arrives_whole_and_in_order() {
     );
     pair.wait_for("ready");
     let sender = [flow.as_os_str(), "send".as_ref(), "vcan0".as_ref(), "20000".as_ref(), "4000".as_ref()];
-    let _ = Running::start("sender", &mut guest(&scene, "", &sender)).wait().expect_code(0);
+    Running::start("sender", &mut guest(&scene, "", &sender)).wait().expect_code(0);
     let received = pair.wait().expect_code(0);
     received.expect_printed(&["out of order 0"]);
     let told = |what: &str| -> u64 {
@@ -109,7 +109,7 @@ fn a_bus_that_stands_still_refuses_with_enobufs_holds_native_senders_and_loses_n
         );
     }
     running.type_line("go");
-    let _ = running.wait().expect_code(0);
+    running.wait().expect_code(0);
     assert_eq!(peer.receive(Duration::from_millis(100)), None);
 }
 
@@ -196,7 +196,7 @@ fn a_sender_that_is_killed_while_it_waits_leaves_no_socket_behind() {
     wait_until("the senders", || running.stdout().contains("done"));
     wait_until("their sockets to be closed", || open(&running) == before);
     running.type_line("go");
-    let _ = running.wait().expect_code(0);
+    running.wait().expect_code(0);
 }
 
 const QUEUER: &str = include_str!("../python/guests/queues_to_nobody.py");

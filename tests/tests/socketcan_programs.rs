@@ -52,9 +52,9 @@ fn the_firmware_for_socketcan_controls_the_rig_on_the_embedded_bus() {
     let program = built.join("firmware-socketcan");
     let running =
         Running::start("firmware", &mut guest(&scene, "", &[program.as_os_str(), "vcan0".as_ref()]));
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     // Its bus has gone with the rig.
-    let _ = running.wait().expect_code(0);
+    running.wait().expect_code(0);
     let summary = scene.summary();
     assert_eq!(count(&summary, "/frames_malformed"), 0);
     // It answers from its first sensors on; a machine that stands still skips cycles, and those need no answer.
@@ -99,16 +99,16 @@ fn two_foreign_programs_meet_on_a_bus_without_a_rig() {
     scene.wait_for_peers(1);
     // Frames before candump has bound its socket pass it by.
     while listener.stdout().lines().count() < 3 {
-        let _ = Running::start(
+        Running::start(
             "cangen",
             &mut guest(&scene, "", &["cangen", "vcan0", "-n", "3", "-I", "5A5", "-g", "1"]),
         )
         .wait()
         .expect_code(0);
     }
-    let _ = listener.wait().expect_code(0);
+    listener.wait().expect_code(0);
     let ended = pair.interrupt();
-    let _ = ended.expect_said(&["the bus carried", "0 did not fit"]);
+    ended.expect_said(&["the bus carried", "0 did not fit"]);
 }
 
 #[test]
@@ -118,11 +118,11 @@ fn a_program_that_does_not_notice_the_end_of_its_bus_is_ended_with_it() {
     let sleeper = Running::start("sleep", &mut guest(&scene, "--end-with-bus", &["sleep", "1000"]));
     let mut waiter = Running::start("sh", &mut guest(&scene, "", &["sh", "-c", "read line; exit 7"]));
     scene.wait_for_peers(2);
-    let _ = host.interrupt();
-    let _ = sleeper.wait().expect_code(128 + 15);
+    host.interrupt();
+    sleeper.wait().expect_code(128 + 15);
     waiter.wait_for("is down");
     waiter.type_line("");
-    let _ = waiter.wait().expect_code(7);
+    waiter.wait().expect_code(7);
 }
 
 #[test]
@@ -223,26 +223,26 @@ fn what_was_written_last_reaches_the_bus_when_the_program_has_ended() {
     let mut pair = can(&["--pair"]);
     pair.wait_for("hosting");
     for _ in 0..10 {
-        let _ = can(&["--", "cangen", "vcan0", "-n", "200", "-g", "0", "-I", "7F6"]).wait().expect_code(0);
+        can(&["--", "cangen", "vcan0", "-n", "200", "-g", "0", "-I", "7F6"]).wait().expect_code(0);
     }
-    let _ = pair.interrupt().expect_said(&["the bus carried 2000 frames"]);
+    pair.interrupt().expect_said(&["the bus carried 2000 frames"]);
 }
 
 #[test]
 fn what_cannot_be_is_said_with_what_to_do() {
     let scene = Scene::new(SHORT);
     let absent = Running::start("no host", &mut guest(&scene, "--wait-s 0", &["true"])).wait().expect_code(3);
-    let _ = absent.expect_said(&["no host at", "emulator run", "--pair"]);
+    absent.expect_said(&["no host at", "emulator run", "--pair"]);
     let bench = executable(Program::Bench, Build::Shipped);
     let inner = scene.url();
     let nested =
         [bench.as_os_str(), "can".as_ref(), "--bus".as_ref(), inner.as_ref(), "--".as_ref(), "true".as_ref()];
     let nested = Running::start("nested", &mut guest(&scene, "--pair", &nested)).wait().expect_code(2);
-    let _ = nested.expect_said(&["does not nest"]);
+    nested.expect_said(&["does not nest"]);
     let missing = Running::start("missing", &mut guest(&scene, "--pair", &["/no/such/program"])).wait();
-    let _ = missing.expect_code(2).expect_said(&["cannot start the command"]);
+    missing.expect_code(2).expect_said(&["cannot start the command"]);
     let kernels = Program::Bench.start(&[&"can", &"--bus", &"can://vcan0", &"--", &"true"]).wait();
-    let _ = kernels.expect_code(2).expect_said(&["embedded buses"]);
+    kernels.expect_code(2).expect_said(&["embedded buses"]);
 }
 
 /// As in a container: Docker's default profile refuses the second to whoever has no CAP_SYS_PTRACE.
@@ -264,7 +264,7 @@ fn a_sandbox_that_forbids_it_is_told_with_what_to_allow() {
             "true",
         ]);
         let refused = Running::start("bench can", &mut command).wait().expect_code(2);
-        let _ = refused.expect_said(&[advice]);
+        refused.expect_said(&[advice]);
     }
 }
 
@@ -298,13 +298,13 @@ fn a_program_of_go_finds_the_interface_reads_and_writes() {
             other => panic!("no answer but {other:?}: {}", running.stderr()),
         }
     }
-    let _ = running.wait().expect_code(0);
+    running.wait().expect_code(0);
 }
 
 #[test]
 fn its_exit_code_is_the_programs_and_a_signal_goes_to_the_program() {
     let scene = Scene::new(SHORT);
-    let _ = shell(&scene, "--pair", "exit 7").wait().expect_code(7);
+    shell(&scene, "--pair", "exit 7").wait().expect_code(7);
     let mut running = shell(
         &scene,
         "--pair",
@@ -312,9 +312,9 @@ fn its_exit_code_is_the_programs_and_a_signal_goes_to_the_program() {
     );
     running.wait_for("ready");
     running.signal(Signal::TERM);
-    let _ = running.wait().expect_code(9).expect_said(&["asked"]);
+    running.wait().expect_code(9).expect_said(&["asked"]);
     let killed = shell(&scene, "--pair", "kill -KILL $$").wait();
-    let _ = killed.expect_code(128 + 9);
+    killed.expect_code(128 + 9);
 }
 
 #[test]
@@ -322,11 +322,11 @@ fn a_program_waits_for_its_bus_and_a_person_can_end_the_waiting() {
     let scene = Scene::new(SHORT);
     let mut waiting = Running::start("bench can", &mut guest(&scene, "--wait-s 300", &["true"]));
     waiting.wait_for("waiting for it");
-    let _ = waiting.interrupt();
+    waiting.interrupt();
     let mut waiting =
         Running::start("bench can", &mut guest(&scene, "--wait-s 300", &["cansend", "vcan0", "123#"]));
     waiting.wait_for("waiting for it");
     let _host = scene.bus_host("");
-    let _ = waiting.wait().expect_code(0);
+    waiting.wait().expect_code(0);
     wait_until("the socket's file", || scene.socket().exists());
 }

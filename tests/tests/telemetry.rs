@@ -50,7 +50,7 @@ fn a_viewer_is_told_what_the_files_hold() {
     assert_eq!(socket.permissions().mode() & 0o777, 0o600, "for this user alone");
     let reading = std::thread::spawn(|| viewer.to_the_end());
     let controller = scene.controller(Pace::Real).with("--repeat").start();
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     let reported = reading.join().expect("the viewer does not panic");
 
     assert_eq!(reported.description["experiment"], value!({ "name": "experiment", "title": "restless" }));
@@ -92,7 +92,7 @@ fn lockstep_leaves_the_same_bytes_whoever_looks_on() {
         let viewers = telemetry.then(|| (viewer(&scene), viewer(&scene)));
         let controller = scene.controller(Pace::Lockstep).start();
         let reported = viewers.map(|(reads, still)| (reads.to_the_end(), still));
-        let _ = both_good(emulator, controller);
+        both_good(emulator, controller);
         (scene, reported.map(|(reported, _)| reported))
     };
     let (alone, watched) = (run(false), run(true));
@@ -127,8 +127,8 @@ fn a_viewer_that_stands_still_or_dies_costs_the_run_nothing() {
             None => break,
         }
     }
-    let _ = emulator.interrupt();
-    let _ = controller.wait();
+    emulator.interrupt();
+    controller.wait();
     assert!(lost.is_some_and(|lost| lost > 1000), "{lost:?} lost");
     assert!(cycles.windows(2).all(|pair| pair[1] == pair[0] + 1), "until it was full nothing was lost");
     assert!(cycles.len() > 2000, "more than a second of 1 kHz fits: {}", cycles.len());
@@ -148,7 +148,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
     assert_eq!(refused["ok"], false);
     assert!(refused["text"].as_str().is_some_and(|text| text.contains("--console")), "{refused}");
     drop(one);
-    let _ = emulator.interrupt();
+    emulator.interrupt();
     // A late wake-up may stand there; nothing that was asked for does.
     let events = all(&scene.summary());
     assert_eq!(times(&events, "emergency-stop"), 0, "{events:?}");
@@ -171,7 +171,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
     });
     assert_eq!(received.expect("the event")["text"], "weights on the carriage: 3 kg");
     assert_eq!(one.ask("quit")["ok"], true);
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     assert!(!scene.path("telemetry").exists(), "the socket went with the run");
 }
 
@@ -183,7 +183,7 @@ fn a_sealed_run_tells_viewers_nothing_that_only_a_simulation_knows() {
     let options = format!("--seconds 1 --sealed {}", sealed.display());
     let emulator = with_telemetry(&scene, Pace::Real).with(&options).start();
     let reported = viewer(&scene).to_the_end();
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     let columns = reported.description["columns"].as_array().expect("columns");
     assert_eq!(columns.len(), 10);
     assert!(columns.iter().all(|column| column["table"] == "measurement"));
@@ -198,7 +198,7 @@ fn a_sealed_run_tells_viewers_nothing_that_only_a_simulation_knows() {
 fn a_socket_that_cannot_be_had_is_refused_before_the_run() {
     let scene = Scene::new(SHORT);
     let path = scene.write("telemetry", "a file of somebody's own");
-    let _ = with_telemetry(&scene, Pace::Real)
+    with_telemetry(&scene, Pace::Real)
         .start()
         .wait()
         .expect_code(2)

@@ -28,7 +28,7 @@ fn run(experiment: &str, cast: Cast) -> Scene {
     let scene = Scene::new(experiment);
     let out = scene.path("run");
     if cast == Cast::Rehearsal {
-        let _ = with_programs(scene.rehearsal().out(&out)).start().wait().expect_code(0);
+        with_programs(scene.rehearsal().out(&out)).start().wait().expect_code(0);
         return scene;
     }
     let axes: &[&str] = match cast {
@@ -47,7 +47,7 @@ fn run(experiment: &str, cast: Cast) -> Scene {
             controller
         })
         .collect();
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     controllers.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
     scene
 }

@@ -44,8 +44,8 @@ impl Watched {
     fn end(self) -> Scene {
         let Self { scene, emulator, controller, page } = self;
         page.close();
-        let _ = emulator.interrupt();
-        let _ = controller.wait();
+        emulator.interrupt();
+        controller.wait();
         scene
     }
 }
@@ -343,7 +343,7 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     watched.scene.write("experiment.toml", &RESTLESS.replace("restless", "restless again"));
     let before = std::mem::replace(&mut watched.emulator, emulator(&watched.scene));
     // It had its folder first; both write the same one, and the first has ended by now.
-    let _ = before.wait().expect_code(130);
+    before.wait().expect_code(130);
     events.wait_for("status", |status| status["telemetry"] == "connected");
     let description = watched.page.get("/api/description").json();
     assert_eq!(description["experiment"]["title"], "restless again", "it is there when connected is told");
@@ -354,8 +354,8 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     let mut page = page;
     page.running().signal(Signal::KILL);
     scene.wait_for_more_rows("emulator", 500);
-    let _ = emulator.interrupt();
-    let _ = controller.wait();
+    emulator.interrupt();
+    controller.wait();
     assert_eq!(count(&scene.summary(), "/records_dropped"), 0);
 }
 
@@ -369,8 +369,8 @@ fn without_telemetry_the_page_shows_what_is_on_the_bus() {
     assert!(rows["columns"]["drive_position_m"][0].is_number(), "{rows}");
     assert!(rows["columns"]["drive_true_position_m"][0].is_null(), "{rows}");
     page.close();
-    let _ = emulator.interrupt();
-    let _ = controller.wait();
+    emulator.interrupt();
+    controller.wait();
 }
 
 #[test]

@@ -38,8 +38,8 @@ impl Rig {
         for program in [&self.controller, &self.emulator] {
             program.signal(Signal::INT);
         }
-        let _ = self.controller.wait();
-        let _ = self.emulator.wait().expect_code(130);
+        self.controller.wait();
+        self.emulator.wait().expect_code(130);
     }
 }
 

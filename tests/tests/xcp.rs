@@ -49,9 +49,9 @@ fn expect_rows_of(table: &AxisTable, rows: &[(usize, Option<f64>, f64)]) {
 }
 
 fn end(emulator: Running, controllers: Vec<Running>) {
-    let _ = emulator.interrupt();
+    emulator.interrupt();
     for controller in controllers {
-        let _ = controller.wait().expect_code(0);
+        controller.wait().expect_code(0);
     }
 }
 

@@ -31,9 +31,9 @@ fn run(scene: &Scene, options: &str, axes: &[&str], script: &Script) -> Vec<[u8;
             spoken += 1;
         }
     });
-    let _ = emulator.wait().expect_code(0);
+    emulator.wait().expect_code(0);
     for controller in controllers {
-        let _ = controller.wait().expect_code(0);
+        controller.wait().expect_code(0);
     }
     answers
 }
@@ -195,7 +195,7 @@ fn a_flood_of_commands_is_dropped_and_counted_and_the_valve_is_served() {
             sent += 21;
         }
     });
-    let _ = both_good(emulator, controller);
+    both_good(emulator, controller);
     let report = scene.report();
     let xcp = &report["axes"]["drive"]["xcp"];
     let (answered, dropped) = (count(xcp, "/answered"), count(xcp, "/commands_dropped"));
@@ -216,7 +216,7 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
     // Another program with the same variables takes the numbers of the set.
     scene.write("program.toml", PROGRAM);
     let options = format!("--parameters {}", set.display());
-    let _ = scene.rehearsal().with(&options).start().wait().expect_code(0);
+    scene.rehearsal().with(&options).start().wait().expect_code(0);
     let gain = |scene: &Scene| {
         let report = scene.report();
         report["axes"]["drive"]["variables"]["algorithm.gain_per_s"].as_f64().expect("a number")
@@ -224,7 +224,7 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
     assert_eq!(gain(&scene), 33.5);
     // What is set on the command line goes before it.
     let both = format!("{options} --set drive.algorithm.gain_per_s=31");
-    let _ = scene.rehearsal().with(&both).start().wait().expect_code(0);
+    scene.rehearsal().with(&both).start().wait().expect_code(0);
     assert_eq!(gain(&scene), 31.0);
     let line = 1 + printed.lines().position(|line| line.starts_with("gain_per_s")).expect("it is there");
     for (from, to, words) in [
@@ -244,14 +244,14 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
         let _ = scene.write("set.toml", &printed.replacen(from, to, 1));
         let place = format!("set.toml:{line}:");
         let ended = scene.rehearsal().with(&options).start().wait().expect_code(2);
-        let _ = ended.expect_said(&words).expect_said(&[&place]);
+        ended.expect_said(&words).expect_said(&[&place]);
     }
 }
 
 #[test]
 fn the_a2l_file_can_be_had_without_a_run_and_is_that_of_the_run() {
     let scene = Scene::new(SHORT);
-    let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep).with("--xcp"));
+    run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep).with("--xcp"));
     for axis in ["drive", "load"] {
         let printed = system_tests::xcp::print_with(&scene, "a2l", &["--axis", axis]);
         let written = bytes(&scene, &format!("controller/controller-{axis}.a2l"));
@@ -266,7 +266,7 @@ fn a_configuration_that_cannot_be_used_is_refused_before_anything_moves() {
     {
         let config = scene.write("bad.toml", text);
         let launch = scene.controller(Pace::Real).with(&format!("--xcp {}", config.display()));
-        let _ = launch.start().wait().expect_code(2).expect_said(&["bad.toml", words]);
+        launch.start().wait().expect_code(2).expect_said(&["bad.toml", words]);
     }
-    let _ = scene.controller(Pace::Real).with("--xcp nowhere.toml").start().wait().expect_code(2);
+    scene.controller(Pace::Real).with("--xcp nowhere.toml").start().wait().expect_code(2);
 }
