@@ -17,19 +17,12 @@ use std::fmt::Write;
 /// Why scores cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
-    /// No scores.
     #[error("nothing to compare: give LABEL@FOLDER, once for each program")]
     Empty,
-    /// One score has the hidden effects left out of the catalogue, the other one has not.
     #[error(
         "'{left}' and '{right}' are of different modes, one without the hidden effects: compare them apart"
     )]
-    Modes {
-        /// Label of one score.
-        left: String,
-        /// Label of the other one.
-        right: String,
-    },
+    Modes { left: String, right: String },
 }
 
 /// The tables of several scores in Markdown: targets and figures, parts of the draws, effect by effect.

@@ -18,36 +18,20 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Why limits or classes were not computed.
 #[derive(Debug, thiserror::Error)]
 pub enum ComputeError {
-    /// The record of a draw cannot be made.
     #[error("draw {number}: {error}")]
-    Make {
-        /// Number of the draw.
-        number: usize,
-        /// Why.
-        error: MakeError,
-    },
-    /// The rig file does not allow an effect or a parameter.
+    Make { number: usize, error: MakeError },
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// A file of the study cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The thread pool cannot be started.
     #[error("no threads: {0}")]
     Threads(#[from] ThreadPoolBuildError),
-    /// Classes are missing.
     #[error("{count} draws have no classes yet: run the command to its end")]
-    Missing {
-        /// Number of draws without classes.
-        count: usize,
-    },
+    Missing { count: usize },
 }
 
 /// Computes the limits of all effects at all places, from train records of `seed` with nothing hidden; `say` gets a line for
 /// each.
-///
-/// # Errors
-/// [`ComputeError`] when a record cannot be made, or an effect is refused.
 pub fn limits(seed: u64, say: &(dyn Fn(&str) + Sync)) -> Result<Limits, ComputeError> {
     let rig = RigParameters::baseline();
     let mut limits = Vec::new();
@@ -106,9 +90,6 @@ fn point(axis: &record_maker::TrueAxis) -> Point {
 
 /// Computes and writes the classes of all draws with hidden effects that have none yet, `jobs` at a time, until `stop` is set.
 /// With a label `done`, only those of draws that have a result under it. `say` gets a line for each.
-///
-/// # Errors
-/// [`ComputeError`] of the first draw that failed.
 pub fn classes(
     study: &Study,
     done: Option<&str>,

@@ -26,16 +26,12 @@ const ENDS: [f64; 6] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 /// Why scores have no curves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
-    /// No scores.
     #[error("nothing to draw: give LABEL@FOLDER, once for each noise factor")]
     Empty,
-    /// The score with this label has the hidden effects left out of the catalogue.
     #[error("'{0}' is of a run without the hidden effects: there are no names to draw")]
     LeftOut(String),
-    /// Two scores of the same noise factor and divisor of the amplitudes.
     #[error("two studies have noise times {0} and amplitudes over {1}: give one of each")]
     Duplicate(f64, f64),
-    /// The drawing library failed.
     #[error("the picture cannot be drawn: {0}")]
     Picture(String),
 }

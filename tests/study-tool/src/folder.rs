@@ -67,22 +67,10 @@ impl Plan {
 /// Why a file of a study cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// The operating system refuses to read or write it.
     #[error("{path}: {error}")]
-    File {
-        /// Path of the file.
-        path: String,
-        /// What the operating system says.
-        error: io::Error,
-    },
-    /// Its content is not valid.
+    File { path: String, error: io::Error },
     #[error("{path}: {what}")]
-    Content {
-        /// Path of the file.
-        path: String,
-        /// What is wrong with it.
-        what: String,
-    },
+    Content { path: String, what: String },
 }
 
 impl FolderError {
@@ -198,9 +186,6 @@ fn hidden_as_json(hidden: &Hidden) -> Value {
 }
 
 /// Reads a text file.
-///
-/// # Errors
-/// [`FolderError::File`] when it cannot be read.
 pub fn read(path: &Path) -> Result<String, FolderError> {
     fs::read_to_string(path).map_err(FolderError::file(path))
 }
@@ -220,9 +205,6 @@ pub(crate) fn read_versioned<T: DeserializeOwned>(
 }
 
 /// Writes a file atomically.
-///
-/// # Errors
-/// [`FolderError::File`] when it cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
     parts::write_whole(path, bytes).map_err(FolderError::file(path))
 }

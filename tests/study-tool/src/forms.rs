@@ -133,9 +133,6 @@ pub struct Selection<'a> {
 }
 
 /// Share of the squared signature of a hidden effect in one of its forms that the best fit of the catalogue's law leaves.
-///
-/// # Errors
-/// [`ComputeError`] when the record cannot be made.
 pub(crate) fn unexplained_share(hidden: &Hidden, form: Form) -> Result<f64, ComputeError> {
     let axis = axis_of(hidden.place).unwrap_or(Axis::Drive);
     let both_axes = hidden.place.part == Part::Linkage;
@@ -158,9 +155,6 @@ pub(crate) fn amplitudes(sheet: &Sheet, place: Place) -> [Hidden; 3] {
 
 /// Fits the catalogue's law to a selection of forms, `jobs` at a time, until `stop` is set: only finished ones are in the
 /// result. `say` gets a line for each.
-///
-/// # Errors
-/// [`ComputeError`] of the first fit that failed.
 pub fn residuals(
     of: &Selection<'_>,
     jobs: usize,

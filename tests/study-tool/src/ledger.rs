@@ -85,7 +85,6 @@ impl TryFrom<String> for Count {
 /// Why draws of a seed are refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SeedError {
-    /// The seed is neither for development nor in the ledger.
     #[error(
         "seed {0} is not in the ledger: seeds below {FIRST_FRESH_SEED} are for development; a fresh one comes from \
          `scripts/study seed` and is entered in tests/study/evidence/ledger.toml before its first draw"

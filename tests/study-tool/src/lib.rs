@@ -37,8 +37,6 @@
 //!
 //! The commands: `scripts/study --help`; the results: `tests/docs/study.md`; the seeds: `tests/docs/seeds.md`.
 
-#![warn(missing_docs)] // an interface of other crates
-
 pub mod answer;
 pub mod classes;
 pub mod compare;

@@ -50,9 +50,6 @@ pub(crate) struct NearestLaw {
 
 /// The nearest law of one hidden effect of a draw; `None` where the same fit does not recover an effect of the catalogue's
 /// form, as between linked rods. A number that it does not recover there is the drawn one.
-///
-/// # Errors
-/// [`ComputeError`] when a record cannot be made.
 pub(crate) fn nearest_law(draw: &Draw, hidden: &Hidden) -> Result<Option<NearestLaw>, ComputeError> {
     let fitted = |form| fitted(&record(draw, hidden, form)?, hidden);
     let own = fitted(Form::Catalogue)?;

@@ -89,9 +89,6 @@ pub(crate) struct Interrupted;
 
 impl Program {
     /// Identifies an executable by the checksum of its bytes; `limit` is the longest wall time of a run.
-    ///
-    /// # Errors
-    /// When the file does not exist or cannot be read.
     pub fn new(path: &Path, arguments: Vec<String>, limit: Duration) -> io::Result<Self> {
         let path = path.canonicalize()?;
         let crc32 = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&fs::read(&path)?);

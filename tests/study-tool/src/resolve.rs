@@ -233,9 +233,6 @@ fn measure(draw: &Draw, name: &str, toml: &str, empty: &Path, folder: &Path) -> 
 }
 
 /// Reads the resolution of a draw.
-///
-/// # Errors
-/// [`FolderError`] when it cannot be read, or is of another version.
 pub(crate) fn read_resolution(path: &Path) -> Result<Resolution, FolderError> {
     read_versioned(path, "resolution", |resolution: &Resolution| resolution.schema_version)
 }

@@ -78,57 +78,22 @@ pub struct Case {
 /// Why there is no score.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
-    /// A file of the study cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// No folders, or no results.
     #[error("no study to score: give its folder")]
     Empty,
-    /// Folders of different studies.
     #[error("{left} and {right} are of different studies: score those of one")]
-    DifferentStudies {
-        /// One folder.
-        left: String,
-        /// The other one.
-        right: String,
-    },
-    /// Two folders have a result of the same draw.
+    DifferentStudies { left: String, right: String },
     #[error(
         "draw {number} has a result in {left} and in {right}: give each folder once, or delete one of them"
     )]
-    Duplicate {
-        /// Number of the draw.
-        number: usize,
-        /// One folder.
-        left: String,
-        /// The other one.
-        right: String,
-    },
-    /// Draws without a result.
+    Duplicate { number: usize, left: String, right: String },
     #[error(
         "{folders}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
     )]
-    MissingRuns {
-        /// Folders that were read, separated by commas.
-        folders: String,
-        /// Label of the results that were asked for.
-        label: String,
-        /// Number of draws without a result.
-        count: usize,
-        /// Number of the first one.
-        first: usize,
-    },
-    /// Results of different programs.
+    MissingRuns { folders: String, label: String, count: usize, first: usize },
     #[error("draw {number} was run with {other:?}, the others with {program:?}: score one program at a time")]
-    Programs {
-        /// Number of the first draw of another program.
-        number: usize,
-        /// Program that this draw was run with.
-        other: Box<Identity>,
-        /// The program of the draws before.
-        program: Box<Identity>,
-    },
-    /// Effects were left out, and [`ScoreInputs::expectations`] is `None`.
+    Programs { number: usize, other: Box<Identity>, program: Box<Identity> },
     #[error("effects were left out of the program's catalogue: tests/study/outside-expected.json is wanted")]
     NoExpectations,
 }
@@ -192,9 +157,6 @@ pub fn score(folders: &[PathBuf], label: &str, known: ScoreInputs<'_>) -> Result
 }
 
 /// Judges one draw that has a result under the label.
-///
-/// # Errors
-/// [`ScoreError`] when a file of the study cannot be used, or expectations are missing.
 pub fn one(study: &Study, draw: &Draw, label: &str, known: ScoreInputs<'_>) -> Result<Case, ScoreError> {
     let result = read_result(&study.run(label, draw.number).join("result.json"))?;
     let classes = classes_of(study, draw, known)?;

@@ -74,43 +74,18 @@ pub struct Step<'a> {
 /// Why a step was not taken.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
-    /// A file of the study cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file of a draw cannot be read or written.
     #[error("draw {number}: {error}")]
-    Files {
-        /// Number of the draw.
-        number: usize,
-        /// What the operating system says.
-        error: io::Error,
-    },
-    /// The record of a draw cannot be made.
+    Files { number: usize, error: io::Error },
     #[error("draw {number}: its record cannot be made: {reason}")]
-    Make {
-        /// Number of the draw.
-        number: usize,
-        /// Why.
-        reason: String,
-    },
-    /// A record is not a valid measurement.
+    Make { number: usize, reason: String },
     #[error("draw {number}: {error}")]
-    Record {
-        /// Number of the draw.
-        number: usize,
-        /// Why.
-        error: ReadError,
-    },
-    /// Too little space on the disk.
+    Record { number: usize, error: ReadError },
     #[error(
         "{free_mib} MiB are left on the disk, {least_free_mib} are wanted: free some and start again, nothing is lost"
     )]
-    Disk {
-        /// Free space, MiB.
-        free_mib: u64,
-        /// Required space, MiB.
-        least_free_mib: u64,
-    },
+    Disk { free_mib: u64, least_free_mib: u64 },
 }
 
 /// Result of a run, as `result.json`.
@@ -322,9 +297,6 @@ impl From<FolderError> for StepEnd {
 }
 
 /// Reads the result of a run.
-///
-/// # Errors
-/// [`FolderError`] when it cannot be read, or is of another version.
 pub(crate) fn read_result(path: &Path) -> Result<RunResult, FolderError> {
     read_versioned(path, "result", |result: &RunResult| result.schema_version)
 }

@@ -165,9 +165,6 @@ impl Twins {
     }
 
     /// Writes `twins.json` into a folder.
-    ///
-    /// # Errors
-    /// [`FolderError`] when the file cannot be written.
     pub fn save(&self, root: &Path) -> Result<(), FolderError> {
         write_whole(&root.join("twins.json"), format!("{:#}\n", json!(self)).as_bytes())
     }

@@ -77,9 +77,6 @@ pub(crate) struct Class {
 
 impl Table {
     /// Collects the table of the results so far.
-    ///
-    /// # Errors
-    /// [`FolderError`] when a result cannot be read.
     pub fn of(study: &Study, own_label: &str) -> Result<Self, FolderError> {
         let (mut singles, mut open, mut program, mut cases) = (0, 0, None, Vec::new());
         for draw in study.draws.iter().filter(|draw| draw.kind == Kind::Single) {

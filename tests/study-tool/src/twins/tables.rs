@@ -72,9 +72,6 @@ pub struct Table {
 
 impl Table {
     /// Collects the table of the results so far.
-    ///
-    /// # Errors
-    /// [`FolderError`] when a result cannot be read.
     pub fn of(twins: &Twins, root: &Path, label: &str) -> Result<Self, FolderError> {
         let study = twins.study(root);
         let resolved = resolve::Table::of(&study, label)?;
