@@ -71,7 +71,6 @@ fn is_one(factor: &f64) -> bool {
     *factor == one()
 }
 
-#[cfg(test)]
 impl Shape {
     pub(crate) const NO_DRAW: Shape = Shape {
         each: 0,
@@ -84,23 +83,14 @@ impl Shape {
         worlds: false,
         far_forms: false,
     };
+    #[cfg(test)]
     pub(crate) const SMALL: Shape =
         Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, ..Shape::NO_DRAW };
 }
 
 impl Default for Shape {
     fn default() -> Self {
-        Shape {
-            each: 6,
-            nulls: 100,
-            parameters: 6,
-            pairs: 60,
-            triples: 20,
-            noise_factor: 1.0,
-            weaker_factor: 1.0,
-            worlds: false,
-            far_forms: false,
-        }
+        Shape { each: 6, nulls: 100, parameters: 6, pairs: 60, triples: 20, ..Shape::NO_DRAW }
     }
 }
 

@@ -3,7 +3,9 @@
 //! Well-formed XML, with the stylesheet of all pages of airbench (light, dark, print). The shade of a cell of the confusion
 //! matrix is its share of the row; the number and the frame of right cells show the same without colour.
 
+use crate::draws::Shape;
 use crate::interval::Rate;
+use crate::program::Identity;
 use crate::score::tables::{ConfusionRow, OTHER_COLUMNS, Split, Spread};
 use crate::score::{Case, Score};
 use pagekit::page::{document, escaped};
@@ -57,7 +59,8 @@ pub fn page(score: &Score) -> String {
 }
 
 fn lead(score: &Score) -> String {
-    let shape = &score.shape;
+    let Shape { each, nulls, parameters, pairs, triples, noise_factor, weaker_factor, .. } = score.shape;
+    let Identity { name, crc32, arguments, .. } = &score.program;
     let classes = match score.without_classes {
         0 => String::new(),
         count => format!(
@@ -70,24 +73,14 @@ fn lead(score: &Score) -> String {
         ""
     };
     format!(
-        "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, \
-         {} of each wrong parameter, {} pairs, {} triples; seed {}, noise times {}, \
-         amplitudes over {}. \
-         Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; \
+        "{} cases on 20 s records: {each} draws of each of the {} effects, {nulls} with nothing hidden, \
+         {parameters} of each wrong parameter, {pairs} pairs, {triples} triples; seed {}, noise times {noise_factor}, \
+         amplitudes over {weaker_factor}. Program {name} with CRC-32 {crc32:08x} {}. Intervals: Wilson, 95 %; \
          'at most' is the exact one-sided bound, 95 %.{left_out}{classes}",
         score.cases.len(),
-        shape.each,
         SHEETS.len(),
-        shape.nulls,
-        shape.parameters,
-        shape.pairs,
-        shape.triples,
         score.seed,
-        shape.noise_factor,
-        shape.weaker_factor,
-        score.program.name,
-        score.program.crc32,
-        score.program.arguments.join(" ")
+        arguments.join(" ")
     )
 }
 

@@ -116,10 +116,7 @@ impl Table {
 
     /// The table in Markdown, with a heading line.
     pub fn markdown(&self) -> String {
-        let identity = self
-            .program
-            .as_ref()
-            .map_or("no program".to_owned(), |own| format!("{} {:08x}", own.name, own.crc32));
+        let identity = self.program.as_ref().map_or("no program".to_owned(), Identity::reported);
         let mut text = String::new();
         let _ = writeln!(
             text,

@@ -127,35 +127,20 @@ impl Tables {
         for error in cases.iter().filter_map(|case| case.judgement.error.clone()) {
             *errors.entry(error).or_default() += 1;
         }
-        let named_right = || singles.iter().filter(|case| right(case));
+        let of_sheet =
+            |name: &'static str| singles.iter().copied().filter(move |case| hidden(case).effect == name);
+        let judged_right = || singles.iter().filter(|case| right(case)).map(|case| &case.judgement);
         Tables {
             headline: headline(cases, &singles),
             splits: splits(&singles),
-            effects: SHEETS
-                .iter()
-                .map(|sheet| {
-                    split(
-                        sheet.name,
-                        singles.iter().copied().filter(|case| hidden(case).effect == sheet.name),
-                    )
-                })
-                .collect(),
-            confusion: SHEETS
-                .iter()
-                .map(|sheet| {
-                    row(sheet.name, singles.iter().copied().filter(|case| hidden(case).effect == sheet.name))
-                })
-                .collect(),
+            effects: SHEETS.iter().map(|sheet| split(sheet.name, of_sheet(sheet.name))).collect(),
+            confusion: SHEETS.iter().map(|sheet| row(sheet.name, of_sheet(sheet.name))).collect(),
             nothing_hidden: nothing_hidden(cases),
             numbers: numbers(&singles),
             wall_s: Spread::of(cases.iter().map(|case| case.wall_s)),
             memory_mib: Spread::of(cases.iter().map(|case| case.memory_kib as f64 / 1024.0)),
-            claimed_closed_ratio: Spread::of(
-                named_right().filter_map(|case| case.judgement.claimed_closed_ratio),
-            ),
-            claimed_joint_ratio: Spread::of(
-                named_right().filter_map(|case| case.judgement.claimed_joint_ratio),
-            ),
+            claimed_closed_ratio: Spread::of(judged_right().filter_map(|own| own.claimed_closed_ratio)),
+            claimed_joint_ratio: Spread::of(judged_right().filter_map(|own| own.claimed_joint_ratio)),
             errors,
         }
     }

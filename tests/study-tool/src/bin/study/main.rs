@@ -94,14 +94,10 @@ fn draws(arguments: &DrawsArguments) -> Done {
 
 fn limits(arguments: &LimitsArguments) -> Done {
     let limits = compute::limits(arguments.seed, &say)?;
-    let text = document::limit_table(&limits);
     if arguments.write {
         write_whole(&committed(LIMITS), format!("{:#}\n", serde_json::json!(limits)).as_bytes())?;
-        document::put(&committed(PAGE), "limits", &text)?;
-    } else {
-        say(&format!("\n{text}"));
     }
-    Ok(())
+    put_or_say(arguments.write, PAGE, "limits", &document::limit_table(&limits))
 }
 
 fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
@@ -124,20 +120,20 @@ fn forms(arguments: &FormsArguments, stop: &AtomicBool) -> Done {
     if stop.load(Ordering::Relaxed) {
         return Ok(());
     }
-    if arguments.write {
-        document::put(&committed(FORMS_PAGE), "forms", &text)?;
-    } else {
-        say(&format!("\n{text}"));
-    }
-    Ok(())
+    put_or_say(arguments.write, FORMS_PAGE, "forms", &text)
 }
 
 fn ledger(arguments: &LedgerArguments) -> Done {
     let text = Ledger::read(&committed(LEDGER))?.markdown();
-    if arguments.write {
-        document::put(&committed(SEEDS_PAGE), "ledger", &text)?;
+    put_or_say(arguments.write, SEEDS_PAGE, "ledger", &text)
+}
+
+/// Puts a table between its marks of a page, or says it.
+fn put_or_say(write: bool, page: &str, name: &str, table: &str) -> Done {
+    if write {
+        document::put(&committed(page), name, table)?;
     } else {
-        say(&format!("\n{text}"));
+        say(&format!("\n{table}"));
     }
     Ok(())
 }
