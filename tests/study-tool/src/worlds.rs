@@ -320,15 +320,17 @@ fn in_words(rate: Rate) -> String {
     format!("{}/{}{share} ({low:.0} to {high:.0} %)", rate.count, rate.of)
 }
 
+type IsCase<'a> = &'a dyn Fn(&Case) -> bool;
+
 /// The rate of the cases of `all` for which `is` holds.
 fn row(
     name: &'static str,
     wanted: [Target; 2],
     worlds: &[Vec<Case>; 2],
-    all: impl Fn(&Case) -> bool,
-    is: impl Fn(&Case) -> bool,
+    all: IsCase<'_>,
+    is: IsCase<'_>,
 ) -> Row {
-    let of_world = |world: &Vec<Case>| Rate::of(world.iter().filter(|case| all(case)), &is);
+    let of_world = |world: &Vec<Case>| Rate::of(world.iter().filter(|case| all(case)), is);
     Row::new(name, worlds.each_ref().map(of_world), wanted)
 }
 
@@ -337,12 +339,21 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
 
     let single = |case: &Case| case.kind == Kind::Single && is_clear(case);
     let ordinary = |case: &Case| single(case) && !case.foreign_form && !case.beyond_drawn;
+    let other = |case: &Case| single(case) && !ordinary(case);
+    let foreign = |case: &Case| single(case) && case.foreign_form && !case.beyond_drawn;
     let strong = |case: &Case| over_limit(case).is_some_and(|ratio| ratio >= STRONG);
     let named = |case: &Case| hidden(case).right;
+    let resembled = |case: &Case| named(case) || case.judgement.resembled;
+    let where_right = |case: &Case| hidden(case).where_right;
+    let right_alone = |case: &Case| case.judgement.alone && where_right(case);
     let null = |case: &Case| case.kind == Kind::Null;
-    let pair = |case: &Case| case.kind == Kind::Pair && case.separable;
-    let all_named = |case: &Case| case.judgement.hidden.iter().all(|own| own.right);
+    let outside = |case: &Case| case.judgement.called == "outside";
+    let off = |case: &Case| !case.parameter_errors.is_empty();
     let much_off = |case: &Case| case.parameter_errors.iter().any(|off| *off > MUCH_OFF);
+    let pair = |case: &Case| case.kind == Kind::Pair && case.separable;
+    let triple = |case: &Case| case.kind == Kind::Triple && case.separable;
+    let all_named = |case: &Case| case.judgement.hidden.iter().all(|own| own.right);
+    let no_third = |case: &Case| case.judgement.too_many == 0;
     let of_form = |foreign: bool| {
         let reported = |case: &Case| -> Vec<bool> {
             let counts = case.kind == Kind::Single && case.foreign_form == foreign;
@@ -351,94 +362,43 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
         };
         worlds.each_ref().map(|world| Rate::of(world.iter().flat_map(reported), |covered| covered))
     };
+    let row = |name, wanted, all: IsCase<'_>, is: IsCase<'_>| row(name, wanted, worlds, all, is);
+    let part = [Component; 2];
     vec![
-        row(
-            "one effect of the catalogue's form: class named",
-            [AtLeast(97), AtLeast(88)],
-            worlds,
-            ordinary,
-            named,
-        ),
-        row("the same, named or resembled", [Component; 2], worlds, ordinary, |case| {
-            named(case) || case.judgement.resembled
-        }),
-        row(
-            "the catalogue's form, 3 to 10 limits",
-            [Component; 2],
-            worlds,
-            |case| ordinary(case) && !strong(case),
-            named,
-        ),
-        row(
-            "the same, 10 limits and more",
-            [Component; 2],
-            worlds,
-            |case| ordinary(case) && strong(case),
-            named,
-        ),
+        row("one effect of the catalogue's form: class named", [AtLeast(97), AtLeast(88)], &ordinary, &named),
+        row("the same, named or resembled", part, &ordinary, &resembled),
+        row("the catalogue's form, 3 to 10 limits", part, &|case| ordinary(case) && !strong(case), &named),
+        row("the same, 10 limits and more", part, &|case| ordinary(case) && strong(case), &named),
         row(
             "another form, or beyond the drawn range: class named",
             [AtLeast(92), AtLeast(80)],
-            worlds,
-            |case| single(case) && !ordinary(case),
-            named,
+            &other,
+            &named,
         ),
-        row(
-            "the same, named or resembled",
-            [Component; 2],
-            worlds,
-            |case| single(case) && !ordinary(case),
-            |case| named(case) || case.judgement.resembled,
-        ),
-        row(
-            "another form, within the drawn range: class named",
-            [Component; 2],
-            worlds,
-            |case| single(case) && case.foreign_form && !case.beyond_drawn,
-            named,
-        ),
+        row("the same, named or resembled", part, &other, &resembled),
+        row("another form, within the drawn range: class named", part, &foreign, &named),
         row(
             "beyond the drawn range, whatever the form: class named",
-            [Component; 2],
-            worlds,
-            |case| single(case) && case.beyond_drawn,
-            named,
+            part,
+            &|case| single(case) && case.beyond_drawn,
+            &named,
         ),
-        row("one effect: name, place, nothing beside", [AtLeast(92), AtLeast(75)], worlds, single, |case| {
-            case.judgement.alone && hidden(case).where_right
-        }),
+        row("one effect: name, place, nothing beside", [AtLeast(92), AtLeast(75)], &single, &right_alone),
         row(
             "class named: place and element right",
             [AtLeast(97), AtLeast(92)],
-            worlds,
-            |case| single(case) && named(case),
-            |case| hidden(case).where_right,
+            &|case| single(case) && named(case),
+            &where_right,
         ),
-        row("nothing hidden: a name, or no report", [NoneOf(200), AtMost(5)], worlds, null, |case| {
+        row("nothing hidden: a name, or no report", [NoneOf(200), AtMost(5)], &null, &|case| {
             !is_no_name(case)
         }),
-        row("nothing hidden: said to be outside the catalogue", [Component; 2], worlds, null, |case| {
-            case.judgement.called == "outside"
-        }),
-        row(
-            "nothing hidden: a parameter off that the file has right",
-            [AtMost(2), AtMost(10)],
-            worlds,
-            null,
-            |case| !case.parameter_errors.is_empty(),
-        ),
-        row("the same by more than 2 % of its value", [Component, NoneOf(200)], worlds, null, much_off),
-        row("two effects: both classes named", [AtLeast(88), AtLeast(70)], worlds, pair, all_named),
-        row("two effects: no third", [AtLeast(95), AtLeast(90)], worlds, pair, |case| {
-            case.judgement.too_many == 0
-        }),
-        row(
-            "three effects: all classes named",
-            [AtLeast(60), Reported],
-            worlds,
-            |case| case.kind == Kind::Triple && case.separable,
-            all_named,
-        ),
+        row("nothing hidden: said to be outside the catalogue", part, &null, &outside),
+        row("nothing hidden: a parameter off that the file has right", [AtMost(2), AtMost(10)], &null, &off),
+        row("the same by more than 2 % of its value", [Component, NoneOf(200)], &null, &much_off),
+        row("two effects: both classes named", [AtLeast(88), AtLeast(70)], &pair, &all_named),
+        row("two effects: no third", [AtLeast(95), AtLeast(90)], &pair, &no_third),
+        row("three effects: all classes named", [AtLeast(60), Reported], &triple, &all_named),
         Row::new(
             "numbers within two standard errors, catalogue's form",
             of_form(false),
@@ -458,35 +418,20 @@ fn left_out_rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
     let is = |case: &Case, is: &dyn Fn(&LeaveOutJudgement) -> bool| case.left_out.as_ref().is_some_and(is);
     let closed = |case: &Case| case.judgement.claimed_joint_ratio.is_some_and(|ratio| ratio >= STILL_CLOSED);
     let remembers = |case: &Case| is(case, &|left| left.with_memory);
+    let forgets = |case: &Case| !remembers(case);
+    let unnamed = |case: &Case| is(case, &|left| left.no_wrong_name);
+    let located = |case: &Case| is(case, &|left| left.balance_right && left.variable_right);
+    let row = |name, wanted, all: IsCase<'_>, is: IsCase<'_>| row(name, wanted, worlds, all, is);
     vec![
-        row(
-            "left out: no wrong name",
-            [AtLeast(94), AtLeast(88)],
-            worlds,
-            |_| true,
-            |case| is(case, &|left| left.no_wrong_name),
-        ),
+        row("left out: no wrong name", [AtLeast(94), AtLeast(88)], &|_| true, &unnamed),
         row(
             "left out: balance, and variable among the first two",
             [AtLeast(85), AtLeast(75)],
-            worlds,
-            |_| true,
-            |case| is(case, &|left| left.balance_right && left.variable_right),
+            &|_| true,
+            &located,
         ),
-        row(
-            "left out: 60 % of the gap closed, without memory",
-            [AtLeast(95), Reported],
-            worlds,
-            |case| !remembers(case),
-            closed,
-        ),
-        row(
-            "left out: 60 % of the gap closed, with memory",
-            [AtLeast(70), Reported],
-            worlds,
-            remembers,
-            closed,
-        ),
+        row("left out: 60 % of the gap closed, without memory", [AtLeast(95), Reported], &forgets, &closed),
+        row("left out: 60 % of the gap closed, with memory", [AtLeast(70), Reported], &remembers, &closed),
     ]
 }
 
