@@ -108,9 +108,19 @@ pub fn guest(scene: &Scene, options: &str, command: &[impl AsRef<OsStr>]) -> Com
     can
 }
 
+/// Starts a command so, whose words may be paths and texts.
+pub fn start(scene: &Scene, options: &str, command: &[&dyn AsRef<OsStr>]) -> Running {
+    Running::start(&command[0].as_ref().display().to_string(), &mut guest(scene, options, command))
+}
+
 /// The same with a line of shell.
 pub fn shell(scene: &Scene, options: &str, line: &str) -> Running {
-    Running::start("bench can", &mut guest(scene, options, &["sh", "-c", line]))
+    start(scene, options, &[&"sh", &"-c", &line])
+}
+
+/// The same with a program in Python.
+pub fn start_python(scene: &Scene, options: &str, program: &str) -> Running {
+    start(scene, options, &[&python(), &"-c", &program])
 }
 
 /// All files of a folder by name.

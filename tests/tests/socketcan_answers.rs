@@ -6,14 +6,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use system_tests::foreign_python::tools_path;
-use system_tests::socketcan::{self, built, expected, guest};
+use system_tests::socketcan::{self, built, expected, guest, start};
 use system_tests::{Build, Ended, Program, Running, SHORT, Scene, executable, turn, wait_until, workspace};
 
 /// What a program prints, on a bus of its own.
 #[track_caller]
 fn output_of(scene: &Scene, program: &Path) -> Ended {
-    let command = [program.as_os_str(), "vcan0".as_ref()];
-    Running::start(&program.display().to_string(), &mut guest(scene, "--pair", &command)).wait()
+    start(scene, "--pair", &[&program, &"vcan0"]).wait()
 }
 
 #[track_caller]
@@ -119,9 +118,7 @@ fn emulator_and_controller_say_and_send_on_it_what_they_do_on_vcan() {
 fn sockets_are_told_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
-    let program = built("socketcan-answers");
-    let command = [program.as_os_str(), "vcan0".as_ref(), "down".as_ref()];
-    let running = Running::start("socketcan-answers", &mut guest(&scene, "", &command));
+    let running = start(&scene, "", &[&built("socketcan-answers"), &"vcan0", &"down"]);
     wait_until("the sockets", || running.stdout().contains("ready"));
     host.interrupt();
     wait_until("the answers", || running.stdout().contains("all is seen"));
@@ -135,10 +132,10 @@ fn sockets_are_told_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan(
 fn a_listener_is_told_that_the_bus_went_down_as_on_vcan() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
-    let listener = Running::start("candump", &mut guest(&scene, "", &["candump", "vcan0"]));
+    let mut told = start(&scene, "", &[&"candump", &"vcan0"]);
     scene.wait_for_peers(1);
     let peer = scene.peer();
-    let (mut told, mut tries) = (listener, 0);
+    let mut tries = 0;
     // Until candump has bound its socket nothing reaches it.
     while !told.stdout().contains("7E0") {
         tries += 1;

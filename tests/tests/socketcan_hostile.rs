@@ -5,7 +5,7 @@ use rustix::process::Signal;
 use std::fs;
 use std::time::{Duration, Instant};
 use system_tests::foreign_python::python;
-use system_tests::socketcan::{built, guest, shell};
+use system_tests::socketcan::{built, guest, shell, start, start_python};
 use system_tests::{PATIENCE, Pace, Packet, Peer, RESTLESS, Running, SHORT, Scene, count, turn, wait_until};
 
 /// Rows of the rig's record that must follow: it goes on.
@@ -18,7 +18,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     let (emulator, controller) = scene.under_way(Pace::Real, 500);
 
     // Stopped, with a socket whose queue fills, and the one who answers its calls as well.
-    let listener = Running::start("candump", &mut guest(&scene, "", &["candump", "vcan0"]));
+    let listener = start(&scene, "", &[&"candump", &"vcan0"]);
     wait_until("frames at the listener", || listener.stdout().lines().count() > 100);
     listener.stop();
     scene.wait_for_more_rows("emulator", GOES_ON);
@@ -26,7 +26,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
 
     // Killed and started again fifty times, in the middle of its calls.
     for _ in 0..50 {
-        let guest = Running::start("candump", &mut guest(&scene, "", &["candump", "vcan0"]));
+        let guest = start(&scene, "", &[&"candump", &"vcan0"]);
         wait_until("a frame at the listener", || !guest.stdout().is_empty());
         guest.kill();
     }
@@ -38,11 +38,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     flood.wait().expect_code(0);
 
     // A thousand sockets in a hundred processes.
-    let many = built("many-sockets");
-    let crowd = Running::start(
-        "many sockets",
-        &mut guest(&scene, "", &[many.as_os_str(), "vcan0".as_ref(), "100".as_ref(), "10".as_ref()]),
-    );
+    let crowd = start(&scene, "", &[&built("many-sockets"), &"vcan0", &"100", &"10"]);
     scene.wait_for_more_rows("emulator", GOES_ON);
     let crowd = crowd.wait().expect_code(0);
     crowd.expect_printed(&["1000 sockets, each has received"]);
@@ -62,17 +58,10 @@ fn a_flood_through_it_arrives_whole_and_in_order() {
     let scene = Scene::new(SHORT);
     let flow = built("frame-flow");
     // Sender and receiver are programs of their own; the bus and its queues are between them.
-    let mut pair = Running::start(
-        "receiver",
-        &mut guest(
-            &scene,
-            "--pair",
-            &[flow.as_os_str(), "receive".as_ref(), "vcan0".as_ref(), "20000".as_ref()],
-        ),
-    );
+    let mut pair = start(&scene, "--pair", &[&flow, &"receive", &"vcan0", &"20000"]);
     pair.wait_for("ready");
-    let sender = [flow.as_os_str(), "send".as_ref(), "vcan0".as_ref(), "20000".as_ref(), "4000".as_ref()];
-    Running::start("sender", &mut guest(&scene, "", &sender)).wait().expect_code(0);
+    let sender = start(&scene, "", &[&flow, &"send", &"vcan0", &"20000", &"4000"]);
+    sender.wait().expect_code(0);
     let received = pair.wait().expect_code(0);
     received.expect_printed(&["out of order 0"]);
     let told = |what: &str| -> u64 {
@@ -90,9 +79,7 @@ fn a_bus_that_stands_still_refuses_with_enobufs_holds_native_senders_and_loses_n
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
     let peer = scene.peer();
-    let python = python();
-    let command = [python.as_os_str(), "-c".as_ref(), SENDER.as_ref()];
-    let mut running = Running::start("sender", &mut guest(&scene, "", &command));
+    let mut running = start_python(&scene, "", SENDER);
     wait_until("the sender", || running.stdout().contains("ready"));
     host.stop();
     running.type_line("go");
@@ -152,9 +139,7 @@ fn a_bus_that_stands_still_holds_native_messages_of_the_transport_protocol_and_l
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
     let peer = scene.peer();
-    let python = python();
-    let command = [python.as_os_str(), "-c".as_ref(), TRANSPORT_SENDER.as_ref()];
-    let mut running = Running::start("sender", &mut guest(&scene, "", &command));
+    let mut running = start_python(&scene, "", TRANSPORT_SENDER);
     wait_until("the sender", || running.stdout().contains("ready"));
     host.stop();
     running.type_line("go");
@@ -204,10 +189,8 @@ const QUEUER: &str = include_str!("../python/guests/queues_to_nobody.py");
 #[test]
 fn it_ends_soon_after_a_program_that_left_hundreds_of_messages_to_nobody() {
     let scene = Scene::new(SHORT);
-    let python = python();
-    let command = [python.as_os_str(), "-c".as_ref(), QUEUER.as_ref()];
     // One after the other they would take a second each, longer than a test waits.
-    let ended = Running::start("sender", &mut guest(&scene, "--pair", &command)).wait().expect_code(0);
+    let ended = start_python(&scene, "--pair", QUEUER).wait().expect_code(0);
     let number = |text: &str, before: &str| -> Option<usize> {
         text.split(before).nth(1)?.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
     };
@@ -224,9 +207,7 @@ const HURRIED: &str = include_str!("../python/guests/closes_in_a_message.py");
 #[test]
 fn a_sender_that_does_not_wait_leaves_the_message_of_a_closed_socket_whole() {
     let scene = Scene::new(SHORT);
-    let python = python();
-    let command = [python.as_os_str(), "-c".as_ref(), HURRIED.as_ref()];
-    let ended = Running::start("senders", &mut guest(&scene, "--pair", &command)).wait().expect_code(0);
+    let ended = start_python(&scene, "--pair", HURRIED).wait().expect_code(0);
     ended.expect_printed(&["second waits its turn", "sendmmsg of none 0", "recvmmsg for one EAGAIN"]);
 }
 

@@ -2,11 +2,12 @@
 
 use protocol::can::CanFrame;
 use rustix::process::Signal;
+use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::process::Command;
 use system_tests::foreign_python::python;
-use system_tests::socketcan::{built, guest, shell};
+use system_tests::socketcan::{built, guest, shell, start};
 use system_tests::{
     Build, PATIENCE, Pace, Packet, Program, Running, SHORT, Scene, count, executable, firmware, install,
     json, turn, wait_until, workspace,
@@ -18,9 +19,7 @@ fn python_can_sends_filters_repeats_and_listens() {
     let scene = Scene::new(SHORT);
     let _host = scene.bus_host("");
     let script = workspace().join("tests/python/socketcan_guest.py");
-    let python = python();
-    let command = [python.as_os_str(), script.as_os_str(), "vcan0".as_ref(), "echo".as_ref()];
-    let running = Running::start("python-can", &mut guest(&scene, "", &command));
+    let running = start(&scene, "", &[&python(), &script, &"vcan0", &"echo"]);
     let peer = scene.peer();
     let mut answered = 0;
     while answered < 100 {
@@ -49,9 +48,7 @@ fn the_firmware_for_socketcan_controls_the_rig_on_the_embedded_bus() {
     let _turn = turn::take();
     let scene = Scene::new("title = \"firmware\"\n[rig]\ncarriage_position_m = 0.15\n");
     let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
-    let program = built.join("firmware-socketcan");
-    let running =
-        Running::start("firmware", &mut guest(&scene, "", &[program.as_os_str(), "vcan0".as_ref()]));
+    let running = start(&scene, "", &[&built.join("firmware-socketcan"), &"vcan0"]);
     emulator.wait().expect_code(0);
     // Its bus has gone with the rig.
     running.wait().expect_code(0);
@@ -69,14 +66,7 @@ fn scripts_run_takes_the_interface_for_a_bus() {
     let programs = executable(Program::Bench, Build::Shipped);
     let run = workspace().join("scripts/run");
     let (out, experiment) = (scene.path("run"), scene.path("experiment.toml"));
-    let command = [
-        run.as_os_str(),
-        "--bus".as_ref(),
-        "can://vcan0".as_ref(),
-        "--out".as_ref(),
-        out.as_os_str(),
-        experiment.as_os_str(),
-    ];
+    let command: [&dyn AsRef<OsStr>; 6] = [&run, &"--bus", &"can://vcan0", &"--out", &out, &experiment];
     let mut can = guest(&scene, "--pair", &command);
     let ended = Running::start("scripts/run", can.env("AIRBENCH_BIN_DIR", programs.parent().unwrap())).wait();
     ended.expect_printed(&["can://vcan0"]);
@@ -94,17 +84,12 @@ fn two_foreign_programs_meet_on_a_bus_without_a_rig() {
     let mut pair =
         Running::start("pair", Program::Bench.command().args(["can", "--pair", "--bus", &scene.url()]));
     pair.wait_for("hosting");
-    let listener =
-        Running::start("candump", &mut guest(&scene, "", &["candump", "-n", "3", "vcan0,5A5:7FF"]));
+    let listener = start(&scene, "", &[&"candump", &"-n", &"3", &"vcan0,5A5:7FF"]);
     scene.wait_for_peers(1);
     // Frames before candump has bound its socket pass it by.
     while listener.stdout().lines().count() < 3 {
-        Running::start(
-            "cangen",
-            &mut guest(&scene, "", &["cangen", "vcan0", "-n", "3", "-I", "5A5", "-g", "1"]),
-        )
-        .wait()
-        .expect_code(0);
+        let cangen: [&dyn AsRef<OsStr>; 8] = [&"cangen", &"vcan0", &"-n", &"3", &"-I", &"5A5", &"-g", &"1"];
+        start(&scene, "", &cangen).wait().expect_code(0);
     }
     listener.wait().expect_code(0);
     let ended = pair.interrupt();
@@ -115,8 +100,8 @@ fn two_foreign_programs_meet_on_a_bus_without_a_rig() {
 fn a_program_that_does_not_notice_the_end_of_its_bus_is_ended_with_it() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
-    let sleeper = Running::start("sleep", &mut guest(&scene, "--end-with-bus", &["sleep", "1000"]));
-    let mut waiter = Running::start("sh", &mut guest(&scene, "", &["sh", "-c", "read line; exit 7"]));
+    let sleeper = start(&scene, "--end-with-bus", &[&"sleep", &"1000"]);
+    let mut waiter = shell(&scene, "", "read line; exit 7");
     scene.wait_for_peers(2);
     host.interrupt();
     sleeper.wait().expect_code(128 + 15);
@@ -255,14 +240,8 @@ fn a_sandbox_that_forbids_it_is_told_with_what_to_allow() {
         [(call_numbers::SECCOMP, "seccomp=unconfined"), (call_numbers::PIDFD_GETFD, "--cap-add SYS_PTRACE")]
     {
         let mut command = Command::new(&forbid);
-        command.arg(call.to_string()).arg(&bench).args([
-            "can",
-            "--pair",
-            "--bus",
-            &scene.url(),
-            "--",
-            "true",
-        ]);
+        command.arg(call.to_string()).arg(&bench);
+        command.args(["can", "--pair", "--bus", &scene.url(), "--", "true"]);
         let refused = Running::start("bench can", &mut command).wait().expect_code(2);
         refused.expect_said(&[advice]);
     }
@@ -287,8 +266,7 @@ fn a_program_of_go_finds_the_interface_reads_and_writes() {
 
     let scene = Scene::new(SHORT);
     let _host = scene.bus_host("");
-    let running =
-        Running::start("go", &mut guest(&scene, "", &[program.as_os_str(), "vcan0".as_ref(), "50".as_ref()]));
+    let running = start(&scene, "", &[&program, &"vcan0", &"50"]);
     let peer = scene.peer();
     wait_until("the program to bind its socket", || running.stdout().contains("bound to vcan0 mtu 16"));
     for number in 0..50 {
@@ -320,11 +298,10 @@ fn its_exit_code_is_the_programs_and_a_signal_goes_to_the_program() {
 #[test]
 fn a_program_waits_for_its_bus_and_a_person_can_end_the_waiting() {
     let scene = Scene::new(SHORT);
-    let mut waiting = Running::start("bench can", &mut guest(&scene, "--wait-s 300", &["true"]));
+    let mut waiting = start(&scene, "--wait-s 300", &[&"true"]);
     waiting.wait_for("waiting for it");
     waiting.interrupt();
-    let mut waiting =
-        Running::start("bench can", &mut guest(&scene, "--wait-s 300", &["cansend", "vcan0", "123#"]));
+    let mut waiting = start(&scene, "--wait-s 300", &[&"cansend", &"vcan0", &"123#"]);
     waiting.wait_for("waiting for it");
     let _host = scene.bus_host("");
     waiting.wait().expect_code(0);
