@@ -4,17 +4,21 @@
 
 use crate::binaries::workspace;
 use crate::foreign_python::{light_path, python, tools_path};
+use crate::records::count;
 use protocol::can::CanFrame;
 use protocol::frames::{ECHO_RANGE, Frame, MainChainState};
+use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Largest dynamic and static error that it may have, m: the bounds of controller/experiments/point-to-point.toml.
-pub const DYNAMIC_M: f64 = 0.004;
+const DYNAMIC_M: f64 = 0.004;
 /// The same at rest.
-pub const STATIC_M: f64 = 0.0004;
+const STATIC_M: f64 = 0.0004;
+/// Largest rounding of a set-point that it reports, m.
+const SET_POINT_M: f64 = 2e-5;
 
 /// The places between which it moves, m, and its times, in cycles.
 const PLACES_M: [f64; 2] = [0.1, 0.4];
@@ -63,6 +67,33 @@ pub struct Positioned {
     pub left_out: usize,
     /// Rests with cycles in the static error.
     pub rests: usize,
+}
+
+impl Positioned {
+    pub fn keeps_the_bounds(&self) -> bool {
+        self.set_point_error_m < SET_POINT_M
+            && self.position_error_dynamic_m < DYNAMIC_M
+            && self.position_error_static_m < STATIC_M
+    }
+
+    /// Holds that the whole of so many repetitions in lockstep is within the bounds, by the errors of a real loop.
+    #[track_caller]
+    pub fn expect_whole(&self, repetitions: usize, least_set_points: usize) {
+        eprintln!("{self:?}");
+        assert_eq!((self.cycles, self.left_out), (8000 * repetitions, 0));
+        assert!(self.set_points > least_set_points && self.keeps_the_bounds(), "{self:?}");
+        assert!(self.position_error_dynamic_m > 5e-4, "a real loop has errors: {self:?}");
+    }
+}
+
+/// Holds that the rig took a command in each cycle of a run in lockstep.
+#[track_caller]
+pub fn expect_every_cycle_answered(summary: &Value) {
+    assert_eq!((count(summary, "/frames_malformed"), count(summary, "/stale_commands")), (0, 0));
+    assert_eq!(count(summary, "/drive_commands/accepted"), count(summary, "/cycles"));
+    for what in ["lost", "late", "duplicate", "breaks", "refused_stale"] {
+        assert_eq!(count(summary, &format!("/drive_commands/{what}")), 0, "{what}");
+    }
 }
 
 /// Reads off the frames of a whole run how it positioned. What a machine that stood still did to the loop is left out, and

@@ -49,17 +49,12 @@ impl Guest {
     /// Runs a job in a machine of its own; the job's exit code must be 0.
     #[track_caller]
     pub fn run(arguments: &[&str]) -> Self {
-        Self::run_so(&[&["--even"], arguments].concat())
+        Self::run_on_two_processors(&[&["--even"], arguments].concat())
     }
 
     /// The same on two processors, for what one cannot show. Its time goes on while the host does something else.
     #[track_caller]
     pub fn run_on_two_processors(arguments: &[&str]) -> Self {
-        Self::run_so(arguments)
-    }
-
-    #[track_caller]
-    fn run_so(arguments: &[&str]) -> Self {
         let _machine = only_one();
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut command = Command::new(workspace().join("scripts/vcan-vm"));

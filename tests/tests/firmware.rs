@@ -6,8 +6,8 @@ use protocol::frames::{Frame, MainChainState};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned};
-use system_tests::{Pace, Running, Scene, both_good, bus_cycles, bus_log, count, json, workspace};
+use system_tests::firmware::{build, expect_every_cycle_answered, positioned};
+use system_tests::{Pace, Running, Scene, both_good, bus_cycles, bus_log, json, workspace};
 
 fn built() -> &'static Path {
     static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();
@@ -40,19 +40,8 @@ fn it_positions_within_the_figures_and_in_lockstep_always_alike() {
     let folder = run(&scene, "one", 30.0);
     let summary = json(&folder.join("summary.json"));
     assert_eq!(summary["ended_because"], "the controllers are done");
-    assert_eq!((count(&summary, "/frames_malformed"), count(&summary, "/stale_commands")), (0, 0));
-    assert_eq!(count(&summary, "/drive_commands/accepted"), count(&summary, "/cycles"));
-    for what in ["lost", "late", "duplicate", "breaks", "refused_stale"] {
-        assert_eq!(count(&summary, &format!("/drive_commands/{what}")), 0, "{what}");
-    }
-    let done = positioned(&bus_log(&folder.join("bus.log")));
-    eprintln!("{done:?}");
-    assert_eq!((done.cycles, done.left_out), (16_000, 0));
-    assert!(done.set_points > 1590 && done.set_point_error_m < 2e-5, "{done:?}");
-    assert!(done.position_error_dynamic_m < DYNAMIC_M, "{done:?}");
-    assert!(done.position_error_static_m < STATIC_M, "{done:?}");
-    // It does position: the errors are those of a real loop, and not of a carriage that was not there.
-    assert!(done.position_error_dynamic_m > 5e-4, "{done:?}");
+    expect_every_cycle_answered(&summary);
+    positioned(&bus_log(&folder.join("bus.log"))).expect_whole(2, 1590);
 
     let again = run(&scene, "again", 30.0);
     for file in ["bus.log", "measurement.csv"] {

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned_in};
+use system_tests::firmware::{build, expect_every_cycle_answered, positioned_in};
 use system_tests::foreign_python::{light_path, run_script_of, tools_path};
 use system_tests::{
     Build, Pace, Program, Running, Scene, both_good, count, count_of_id, executable, json, workspace,
@@ -80,18 +80,8 @@ fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
     }
     let summary = one.summary();
     let cycles = count(&summary, "/cycles");
-    assert_eq!((count(&summary, "/frames_malformed"), count(&summary, "/stale_commands")), (0, 0));
-    assert_eq!(count(&summary, "/drive_commands/accepted"), cycles);
-    for what in ["lost", "late", "duplicate", "breaks", "refused_stale"] {
-        assert_eq!(count(&summary, &format!("/drive_commands/{what}")), 0, "{what}");
-    }
-    let done = positioned_in(&one.bus_log(), 1);
-    eprintln!("{done:?}");
-    assert_eq!((done.cycles, done.left_out), (8_000, 0));
-    assert!(done.set_points > 790 && done.set_point_error_m < 2e-5, "{done:?}");
-    assert!(done.position_error_dynamic_m < DYNAMIC_M, "{done:?}");
-    assert!(done.position_error_static_m < STATIC_M, "{done:?}");
-    assert!(done.position_error_dynamic_m > 5e-4, "a real loop has errors: {done:?}");
+    expect_every_cycle_answered(&summary);
+    positioned_in(&one.bus_log(), 1).expect_whole(1, 790);
 
     // The core's time is the bus's: 10 ms before the first cycle and one for each.
     let report = json(&one.path("mcu.json"));

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Duration;
-use system_tests::firmware::{DYNAMIC_M, Positioned, STATIC_M, build, positioned_where_it_ran};
+use system_tests::firmware::{Positioned, build, positioned_where_it_ran};
 use system_tests::foreign_python::{python, tools_path};
 use system_tests::stalls::Stalls;
 use system_tests::{
@@ -109,12 +109,6 @@ fn positions(elf: &Path) -> Option<Positioned> {
     (done.rests > 0 && done.cycles > done.left_out).then_some(done)
 }
 
-fn keeps_the_bounds(done: &Positioned) -> bool {
-    done.set_point_error_m < 2e-5
-        && done.position_error_dynamic_m < DYNAMIC_M
-        && done.position_error_static_m < STATIC_M
-}
-
 #[test]
 fn it_positions_within_the_bounds_in_real_time() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -127,10 +121,10 @@ fn it_positions_within_the_bounds_in_real_time() {
             let stalled = stalls.longest();
             eprintln!("attempt {attempt} of {ATTEMPTS}: kept from running for {stalled:?}");
             // Nothing but a machine that stood still is a reason to try it again.
-            done.filter(|done| keeps_the_bounds(done) || stalled < STALL || attempt == ATTEMPTS)
+            done.filter(|done| done.keeps_the_bounds() || stalled < STALL || attempt == ATTEMPTS)
         })
         .expect("a machine that does not stand still");
-    assert!(done.set_points > 100 && keeps_the_bounds(&done), "{done:?}");
+    assert!(done.set_points > 100 && done.keeps_the_bounds(), "{done:?}");
     assert!(done.position_error_dynamic_m > 5e-4, "a real loop has errors: {done:?}");
 }
 

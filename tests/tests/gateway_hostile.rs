@@ -15,14 +15,10 @@ use system_tests::{Peer, SHORT, Scene, count, wait_until};
 /// What the gateway may need over what it had before, KiB: 32 clients with full queues would be 14 MiB.
 const MORE_MEMORY_KIB: u64 = 24 << 10;
 
-fn numbered(n: u32) -> CanFrame {
-    CanFrame::new(0x5A5, &n.to_be_bytes())
-}
-
 /// Sends numbered frames, no faster than the client takes them, which must miss none.
 fn misses_nothing(peer: &Peer, client: &mut DoorClient, numbers: std::ops::Range<u32>) {
     for n in numbers {
-        peer.send(&numbered(n).to_bytes());
+        peer.send(&CanFrame::new(0x5A5, &n.to_be_bytes()).to_bytes());
         if n % 256 == 255 {
             (n - 255..=n).for_each(|n| assert_eq!(client.frame(), ("5A5".into(), format!("{n:08X}"))));
         }

@@ -64,6 +64,11 @@ pub(crate) fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory
             flow_b_m3_per_s: 0.0,
         }
     };
+    let point = |axis: record_maker::TrueAxis| Point {
+        extension_m: axis.extension_m,
+        rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
+        pressures_pa: axis.pressure_pa,
+    };
     TrueTrajectory {
         rig: rig.clone(),
         measured: Axis::ALL.map(|own| both || own == axis),
@@ -76,15 +81,7 @@ pub(crate) fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory
         },
         settling: 1,
         inputs: record.rows.iter().map(|row| Inputs { valve: row.valve, ..Inputs::default() }).collect(),
-        points: record.rows.iter().map(|row| row.axes.map(|axis| point(&axis))).collect(),
-    }
-}
-
-fn point(axis: &record_maker::TrueAxis) -> Point {
-    Point {
-        extension_m: axis.extension_m,
-        rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
-        pressures_pa: axis.pressure_pa,
+        points: record.rows.iter().map(|row| row.axes.map(point)).collect(),
     }
 }
 

@@ -29,7 +29,7 @@ pub fn limit_table(limits: &Limits) -> String {
                 limit_cell(limit),
                 limit.unit,
                 digits(limit.strength),
-                excitation_cell(limit)
+                if limit.excited { "" } else { "not excited" }
             );
         }
     }
@@ -47,10 +47,6 @@ fn limit_cell(limit: &Limit) -> String {
         (None, _) if limit.excited => "always seen".to_owned(),
         (None, _) => "none".to_owned(),
     }
-}
-
-fn excitation_cell(limit: &Limit) -> &'static str {
-    if limit.excited { "" } else { "not excited" }
 }
 
 fn digits(value: f64) -> String {
