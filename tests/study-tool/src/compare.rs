@@ -14,7 +14,6 @@ use crate::score::Score;
 use crate::score::tables::{Line, Split, Spread};
 use std::fmt::Write;
 
-/// Why scores cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
     #[error("nothing to compare: give LABEL@FOLDER, once for each program")]

@@ -15,7 +15,6 @@ use record_maker::{MakeError, Recipe, Record, simulate};
 use serde_json::json;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Why limits or classes were not computed.
 #[derive(Debug, thiserror::Error)]
 pub enum ComputeError {
     #[error("draw {number}: {error}")]

@@ -23,7 +23,6 @@ mod picture;
 /// Edges of the bins of amplitude, in limits; there is one more bin below the first and above the last.
 const ENDS: [f64; 6] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 
-/// Why scores have no curves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
     #[error("nothing to draw: give LABEL@FOLDER, once for each noise factor")]

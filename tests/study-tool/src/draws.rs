@@ -45,9 +45,7 @@ pub struct Shape {
     pub nulls: u32,
     /// Draws of each parameter of the baseline that is wrong alone.
     pub parameters: u32,
-    /// Draws of two effects.
     pub pairs: u32,
-    /// Draws of three effects.
     pub triples: u32,
     /// Noise of all records over the specified noise.
     pub noise_factor: f64,
@@ -98,15 +96,12 @@ impl Default for Shape {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// One effect.
     Single,
     /// No effect; parameters of the baseline may be wrong by up to 3 %.
     Null,
     /// No effect; one parameter of the baseline is wrong by 3 to 15 %.
     Parameter,
-    /// Two effects.
     Pair,
-    /// Three effects.
     Triple,
 }
 

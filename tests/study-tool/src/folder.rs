@@ -28,10 +28,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A study: its folder and its draws.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// Folder of the study.
     pub root: PathBuf,
     pub(crate) plan: Plan,
     /// All draws, in the order of their numbers.
@@ -64,7 +62,6 @@ impl Plan {
     }
 }
 
-/// Why a file of a study cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     #[error("{path}: {error}")]
@@ -133,7 +130,6 @@ impl Study {
         self.root.join("runs").join(label).join(name(number))
     }
 
-    /// File of the classes of a draw.
     pub fn class(&self, number: usize) -> PathBuf {
         self.root.join("classes").join(format!("{}.json", name(number)))
     }
@@ -185,7 +181,6 @@ fn hidden_as_json(hidden: &Hidden) -> Value {
     json!({"effect": hidden.name, "where": hidden.place.to_string(), "numbers": numbers})
 }
 
-/// Reads a text file.
 pub fn read(path: &Path) -> Result<String, FolderError> {
     fs::read_to_string(path).map_err(FolderError::file(path))
 }

@@ -121,14 +121,12 @@ pub struct FormResidual {
     pub(crate) shares: [f64; 3],
 }
 
-/// Effects, and forms of them.
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'a> {
     /// Names of the effects; all when empty.
     pub effects: &'a [String],
     /// Name of the place; the first place of each effect when `None`.
     pub place: Option<&'a str>,
-    /// Forms of each effect.
     pub forms: &'a [Form],
 }
 

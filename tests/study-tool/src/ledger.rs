@@ -82,7 +82,6 @@ impl TryFrom<String> for Count {
     }
 }
 
-/// Why draws of a seed are refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SeedError {
     #[error(

@@ -14,7 +14,6 @@ use std::fmt::Write;
 
 mod leave_out;
 
-/// The page of a score, complete HTML.
 pub fn page(score: &Score) -> String {
     let title = format!("Study of {}: {}", score.program.name, score.label);
     let mut sections = vec![

@@ -41,7 +41,6 @@ pub(crate) fn by_marginal(said: &[JudgedExplanation]) -> Option<Vec<JudgedExplan
     said.iter().map(own).collect::<Option<Vec<JudgedExplanation>>>().filter(|said| !said.is_empty())
 }
 
-/// Judges the explanations of a report on a draw.
 pub(crate) fn judge(
     draw: &Draw,
     classes: &[Vec<Member>],

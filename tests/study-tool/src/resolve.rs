@@ -43,13 +43,9 @@ const NOISE_SEED_MASK: u64 = 0x4e_4558_5400;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// Only the truth is named.
     Resolved,
-    /// The truth is among several names.
     StillAmbiguous,
-    /// The truth is not named.
     Wrong,
-    /// No good report, or the experiment was not run.
     Error,
 }
 

@@ -75,7 +75,6 @@ pub struct Case {
     pub(crate) repeat: String,
 }
 
-/// Why there is no score.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
     #[error(transparent)]

@@ -51,9 +51,7 @@ pub fn make_record(
 
 /// How the steps of a study are run.
 pub struct Step<'a> {
-    /// Study whose draws are run.
     pub study: &'a Study,
-    /// Label under which the results are stored.
     pub label: &'a str,
     /// Makes the records of a draw: [`make_record`], but for twins.
     pub make: Make<'a>,
@@ -71,7 +69,6 @@ pub struct Step<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// Why a step was not taken.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
     #[error(transparent)]
