@@ -67,5 +67,7 @@ pub use binaries::{Build, Program, executable, install, script, shipped_experime
 pub use launch::{Launch, Pace, both_good, run_both};
 pub use peer::{Packet, Peer};
 pub use process::{Ended, PATIENCE, Running, wait_until};
-pub use records::{Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, expect_whole_lines, json};
+pub use records::{
+    Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, expect_whole_lines, json, timing_rows,
+};
 pub use scene::{LINKED, PROGRAM, RESTLESS, SHORT, Scene};

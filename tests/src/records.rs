@@ -1,6 +1,7 @@
 //! The files of a run, read as strictly as they are promised: whole lines, every field, nothing half.
 
 use protocol::can::CanFrame;
+use runlog::timing::{self, CycleTiming};
 use serde_json::Value;
 use std::path::Path;
 
@@ -22,6 +23,11 @@ pub fn count(value: &Value, pointer: &str) -> u64 {
 pub fn count_of_id(table: &Value, id: &str) -> u64 {
     let table = table.as_object().unwrap_or_else(|| panic!("no table by identifier: {table}"));
     table.get(id).map_or(0, |count| count.as_u64().expect("a count"))
+}
+
+/// The rows of a timing table.
+pub fn timing_rows(path: &Path) -> Vec<CycleTiming> {
+    timing::read(&text(path)).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 #[derive(Debug)]

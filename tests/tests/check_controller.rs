@@ -54,20 +54,8 @@ fn our_controller_keeps_the_contract() {
     let controller = executable(Program::Controller, Build::Shipped);
     let path = |name: &str| scene.path(name).display().to_string();
     let (rig, experiment, out) = (path("rig.toml"), path("experiment.toml"), path("out"));
-    let line = [
-        controller.to_str().unwrap(),
-        "run",
-        "--bus",
-        "{bus}",
-        "--pace",
-        "lockstep",
-        "--rig",
-        &rig,
-        "--experiment",
-        &experiment,
-        "--out",
-        &out,
-    ];
+    let run = [controller.to_str().unwrap(), "run", "--bus", "{bus}", "--pace", "lockstep"];
+    let line = [&run[..], &["--rig", &rig, "--experiment", &experiment, "--out", &out]].concat();
     let ended = check(&scene, "--pace lockstep --both-axes --seconds 1", &line).wait();
     let results = results(&scene, &ended);
     assert_eq!(that(&results, "failed"), [""; 0], "{}\n{}", ended.stdout, ended.stderr);

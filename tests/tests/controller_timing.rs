@@ -2,18 +2,13 @@
 //! controller that its own rows explain.
 
 use crate::hlog;
-use runlog::timing::{self, CycleTiming, Exchange};
+use runlog::timing::{CycleTiming, Exchange};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
-use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, json, turn};
-
-fn table(path: &Path) -> Vec<CycleTiming> {
-    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    timing::read(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
+use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, json, timing_rows, turn};
 
 fn samples(path: &Path) -> BTreeMap<String, u64> {
     let mut samples = BTreeMap::new();
@@ -41,7 +36,7 @@ fn dropped_at_queue(summary: &Value, process: u32, id: &str) -> u64 {
 fn expect_one_account(scene: &Scene, process: u32, name: &str, waking_axis: &str) -> Vec<CycleTiming> {
     let at = |file: String| scene.path("controller").join(file);
     let report = json(&at(format!("{name}.json")));
-    let rows = table(&at(format!("{name}-timing.csv")));
+    let rows = timing_rows(&at(format!("{name}-timing.csv")));
     assert_eq!(
         rows.len() as u64,
         count(&report, "/cycles_answered"),
@@ -98,7 +93,7 @@ fn rows_of_both_processes_join_to_the_time_on_the_way_each_way() {
     let process = controller.number();
     both_good(emulator, controller);
     let answered = expect_one_account(&scene, process, "controller", "drive");
-    let rig = table(&scene.path("emulator/emulator-timing.csv"));
+    let rig = timing_rows(&scene.path("emulator/emulator-timing.csv"));
     let summary = scene.summary();
     assert_eq!(rig.len() as u64, count(&summary, "/cycles") - count(&summary, "/skipped"));
     let report = scene.report();
@@ -127,7 +122,7 @@ fn events(scene: &Scene) -> Vec<(String, Value)> {
         .map(|dump| {
             let dump = dump.expect("a dump").path();
             let name = dump.file_name().expect("a name").to_string_lossy().into_owned();
-            assert!(!table(&dump.join("timing.csv")).is_empty(), "{name}: the cycles around it");
+            assert!(!timing_rows(&dump.join("timing.csv")).is_empty(), "{name}: the cycles around it");
             let log = std::fs::read_to_string(dump.join("bus.log")).expect("the frames around it");
             for id in [" 120#", " 110#"] {
                 assert!(log.contains(id), "{name}: frames {id} of both ways");

@@ -5,12 +5,13 @@
 
 use crate::hlog;
 use hdrhistogram::Histogram;
-use runlog::timing::{self, CycleTiming};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use system_tests::{Pace, RESTLESS, Running, Scene, both_good, bus_log, count, json, turn, wait_until};
+use system_tests::{
+    Pace, RESTLESS, Running, Scene, both_good, bus_log, count, json, timing_rows, turn, wait_until,
+};
 
 const MS: u64 = 1_000_000;
 
@@ -28,10 +29,6 @@ fn sum(path: &Path, tag: &str) -> Histogram<u64> {
         sum
     });
     sum.unwrap_or_else(|| panic!("no {tag} in {}", path.display()))
-}
-
-fn rows(path: &Path) -> Vec<CycleTiming> {
-    timing::read(&std::fs::read_to_string(path).expect("the table")).unwrap()
 }
 
 fn dumps(scene: &Scene, trigger: &str) -> Vec<PathBuf> {
@@ -57,7 +54,7 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     let summary = scene.summary();
     let (cycles, skipped) = (count(&summary, "/cycles"), count(&summary, "/skipped"));
     assert_eq!((cycles, count(&summary, "/records_dropped")), (4000, 0));
-    let table = rows(&scene.path("emulator/emulator-timing.csv"));
+    let table = timing_rows(&scene.path("emulator/emulator-timing.csv"));
     assert_eq!(table.len() as u64 + skipped, cycles, "rows and skipped cycles");
     // A busy machine may stall the rig for longer at another time; this stall ends with the continuation, whose handler may run
     // on another thread, a moment later.
@@ -103,7 +100,7 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     let event = json(&dump.join("event.json"));
     assert_eq!((&event["trigger"], &event["process"]), (&"overrun".into(), &"emulator".into()));
     assert_eq!((count(&event, "/cycle"), count(&event, "/late_ns")), (stall.cycle, late_ns));
-    let around = rows(&dump.join("timing.csv"));
+    let around = timing_rows(&dump.join("timing.csv"));
     assert!(around.iter().any(|row| row.vitals.continued > 0), "{reported:?} is not in the dump");
     assert!(count(&summary, "/vitals/continued") > 0);
     assert!(around.len() > 1000, "a second before, and something after: {} rows", around.len());
@@ -121,7 +118,7 @@ fn a_dump_can_be_asked_for_and_changes_nothing() {
     wait_until("a dump that was asked for", || !dumps(&scene, "signal").is_empty());
     scene.wait_for_more_rows("emulator", 500);
     let dump = &dumps(&scene, "signal")[0];
-    assert!(rows(&dump.join("timing.csv")).len() > 1000);
+    assert!(timing_rows(&dump.join("timing.csv")).len() > 1000);
     let event: Value = json(&dump.join("event.json"));
     let (from, at) = (count(&event, "/window_from_ns"), count(&event, "/at_monotonic_ns"));
     assert!(at - from >= 1000 * MS, "a second before: {event}");

@@ -421,19 +421,8 @@ fn help_tells_every_step_every_option_and_the_exit_codes() {
     let parts = ["close", "check", "calibrate", "locate", "name", "extend", "verify", "next", "Exit codes"];
     whole.expect_printed(&parts);
     for (step, parts) in [
-        (
-            "close",
-            &[
-                "--rig",
-                "--train",
-                "--test",
-                "--out",
-                "--mapping",
-                "--without",
-                "--threads",
-                "this folder: discrepancy-results",
-            ][..],
-        ),
+        ("close", &["--rig", "--train", "--test", "--out", "--mapping", "--without", "--threads"][..]),
+        ("close", &["this folder: discrepancy-results"]),
         ("check", &["--rig", "--train", "--out", "--mapping"]),
         ("verify", &["--rig", "--extended", "--test"]),
         ("next", &["--rig", "--report", "--out"]),

@@ -34,18 +34,9 @@ fn steps_alone_refuse_records_that_do_not_go_together() {
     }
     // Of the held-out record nothing is reported where it shows another axis.
     let out = folder.path().join("closed");
-    let test = [
-        &"close" as &dyn AsRef<OsStr>,
-        &"--rig",
-        &rig(),
-        &"--train",
-        train,
-        &"--test",
-        other,
-        &"--out",
-        &out,
-    ];
-    let ended = discrepancy(&test).expect_code(BAD_INPUT);
+    let ended =
+        discrepancy(&[&"close", &"--rig", &rig(), &"--train", train, &"--test", other, &"--out", &out]);
+    let ended = ended.expect_code(BAD_INPUT);
     assert!(ended.stdout.contains("no axis that the training records show"), "{}", ended.stdout);
     assert_eq!(json(&out.join("report.json"))["gap"], serde_json::json!({}));
 }

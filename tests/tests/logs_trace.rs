@@ -1,11 +1,11 @@
 //! A run as a trace for Perfetto, held against what the run recorded: every cycle of the timing tables with its stages, every
 //! frame of the log, every mark of a fault, all on one time axis.
 
-use runlog::timing::{self, CycleTiming};
+use runlog::timing::CycleTiming;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, json, run_both, turn};
+use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, json, run_both, timing_rows, turn};
 
 const FAULTS: &str = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\nfrom_s = 0.2\nto_s = 0.25\n";
 
@@ -104,10 +104,6 @@ fn same(one_us: f64, other_us: f64) -> bool {
     (one_us - other_us).abs() < ROUNDING_US
 }
 
-fn rows(folder: &Path, name: &str) -> Vec<CycleTiming> {
-    timing::read(&fs::read_to_string(folder.join(name)).expect(name)).expect("a table")
-}
-
 #[test]
 fn a_trace_holds_every_cycle_with_its_stages_every_frame_and_every_fault() {
     let _machine = turn::take();
@@ -123,8 +119,8 @@ fn a_trace_holds_every_cycle_with_its_stages_every_frame_and_every_fault() {
     let said = export(&folder, &out).stdout;
     let trace = Trace::read(&out);
 
-    let rig = rows(&folder, "emulator-timing.csv");
-    let controller = rows(&folder, "controller-timing.csv");
+    let rig = timing_rows(&folder.join("emulator-timing.csv"));
+    let controller = timing_rows(&folder.join("controller-timing.csv"));
     assert!(rig.len() > 1000 && controller.len() > 1000);
     assert!(said.contains(&format!("{} cycles, 2 marks", rig.len() + controller.len())), "{said}");
     let zero_ns = i128::from(rig[0].due_ns) - i128::from(rig[0].cycle) * 1_000_000;

@@ -47,20 +47,10 @@ fn a_suspect_in_a_file_is_named_over_the_bus_and_runs_in_real_time_in_the_extend
     let train = measured(&scene, &hidden, "train", &strokes([0.4, 0.1], [0.8, 1.2, 0.6]));
     let test = measured(&scene, &hidden, "test", &strokes([0.35, 0.15], [0.7, 1.0, 0.5]));
     let (suspects, out) = (scene.write("suspects.toml", SUSPECTS), scene.path("closed"));
-    let all: [&dyn AsRef<OsStr>; 11] = [
-        &"close",
-        &"--rig",
-        &rig(),
-        &"--train",
-        &train,
-        &"--test",
-        &test,
-        &"--suspects",
-        &suspects,
-        &"--out",
-        &out,
-    ];
-    let told = discrepancy(&all).expect_code(0).stdout;
+    let records: [&dyn AsRef<OsStr>; 4] = [&"--train", &train, &"--test", &test];
+    let close: [&dyn AsRef<OsStr>; 7] =
+        [&"close", &"--rig", &rig(), &"--suspects", &suspects, &"--out", &out];
+    let told = discrepancy(&[&close[..], &records].concat()).expect_code(0).stdout;
     let report = json(&out.join("report.json"));
     let named = &report["named"][0];
     assert_eq!(named["effect"], "eddy-brake", "{told}");
