@@ -65,11 +65,8 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     assert_eq!((reported["pair"].as_u64(), reported["probe"].as_bool()), (Some(1), Some(false)));
     // Where the package cannot be had, that is reported instead.
     if run.join("cyclictest.json").exists() {
-        assert!(
-            reported["reference_command"]
-                .as_str()
-                .is_some_and(|command| command.starts_with("cyclictest -m -p 80"))
-        );
+        let command = reported["reference_command"].as_str();
+        assert!(command.is_some_and(|command| command.starts_with("cyclictest -m -p 80")));
         assert!(ended.stdout.contains("emulator-wakeup p99 / cyclictest p99"), "{}", ended.stdout);
     } else {
         let why = reported["reference_missing_because"].as_str().expect("a reason");

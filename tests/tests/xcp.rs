@@ -90,17 +90,13 @@ fn pyxcp_reads_writes_is_refused_measures_without_a_gap_and_triggers() {
     ];
     assert_eq!(texts(protection, &keys), refusals);
     assert_eq!(protection["unlocked"], true);
-    assert_eq!(
-        numbers(&serde_json::json!([protection["gain_after_refusals"], protection["gain_written"]])),
-        [40.0, 17.125]
-    );
+    assert_eq!(protection["gain_after_refusals"], 40.0);
+    assert_eq!(protection["gain_written"], 17.125);
 
     let set = &seen["parameter_set"];
     let stored = set["stored"].as_str().expect("a text");
-    assert!(
-        stored.contains("[drive.algorithm]") && stored.contains("\ngain_per_s = 17.125  # 1/s, 0 to 200"),
-        "{stored}"
-    );
+    assert!(stored.contains("[drive.algorithm]"), "{stored}");
+    assert!(stored.contains("\ngain_per_s = 17.125  # 1/s, 0 to 200"), "{stored}");
     assert_eq!((&set["gain_loaded"], &set["block_restores"]), (&17.125.into(), &true.into()));
 
     // pyXCP 0.29 begins a block of one double and goes on with another: nothing of it may be taken, and the client must learn it.
