@@ -10,7 +10,7 @@ use crate::inputs::{CampaignInputs, InputsError};
 use crate::outcome::{EndState, Outcome};
 use crate::parts::{Parts, default_runs_per_part, hash};
 use crate::points::{Point, Points, TooManyRuns};
-use crate::processes::{self, ProcessesError, Programs};
+use crate::processes::{self, ProcessesError};
 use crate::rehearsed;
 use figures::top::POSITIONS;
 use settings::SettingsError;
@@ -28,7 +28,7 @@ pub(crate) struct Campaign {
     pub parts: Parts,
     /// The files that it names; none for a command.
     inputs: Option<CampaignInputs>,
-    programs: Programs,
+    programs: PathBuf,
 }
 
 /// Folders that a campaign looks files up in.
@@ -82,8 +82,7 @@ impl Campaign {
             runs,
             runs_per_part: file.runs_per_part.unwrap_or_else(|| default_runs_per_part(runs)),
         };
-        let programs = Programs { folder: places.programs.clone() };
-        let campaign = Self { file, points, parts, inputs, programs };
+        let campaign = Self { file, points, parts, inputs, programs: places.programs.clone() };
         if campaign.inputs.is_some() {
             for run in [0, runs - 1] {
                 campaign.condition(&campaign.points.point(run))?;
@@ -93,7 +92,6 @@ impl Campaign {
     }
 
     /// The experiment of its runs; none for a command.
-    #[must_use]
     pub(crate) fn experiment(&self) -> Option<&ExperimentKind> {
         match &self.file.kind {
             Kind::Experiment(kind) => Some(kind),
@@ -158,7 +156,7 @@ impl Campaign {
         limit: Limit<'_>,
     ) -> Result<Option<Outcome>, CampaignError> {
         let invocation = Invocation { command, folder: &self.file.folder()?, again };
-        command::run(invocation, self.points.factors(), point, limit)
+        command::run(invocation, &self.points.factors, point, limit)
             .map_err(|error| CampaignError::Command(command[0].clone(), point.run, error))
     }
 
@@ -190,7 +188,6 @@ impl Campaign {
         }
     }
 
-    #[must_use]
     pub(crate) fn row(&self, point: &Point, outcome: &Outcome) -> String {
         let passed = outcome.passed.map_or("", |passed| if passed { "1" } else { "0" });
         let mut row = format!("{},{},{}", point.run, point.draw, point.seed);

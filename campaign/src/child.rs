@@ -15,7 +15,7 @@ const TERMINATION_TIMEOUT: Duration = Duration::from_secs(5);
 /// A child process in a process group of its own; dropping it terminates the group.
 #[derive(Debug)]
 pub(crate) struct ChildProcess {
-    child: Child,
+    pub child: Child,
 }
 
 /// Why a wait ended without an exit status.
@@ -33,10 +33,6 @@ impl ChildProcess {
     /// Starts a process in a group of its own, which a Ctrl-C at the terminal does not reach.
     pub(crate) fn start(command: &mut Command) -> io::Result<Self> {
         command.process_group(0).spawn().map(|child| Self { child })
-    }
-
-    pub(crate) fn child(&mut self) -> &mut Child {
-        &mut self.child
     }
 
     /// Waits for the exit status.
@@ -89,7 +85,6 @@ pub(crate) struct Limit<'a> {
 
 impl<'a> Limit<'a> {
     /// A limit of `longest_s` that begins now.
-    #[must_use]
     pub(crate) fn of(longest_s: f64, stop: &'a AtomicBool) -> Self {
         Self { began: Instant::now(), longest_s, stop }
     }

@@ -51,9 +51,6 @@ pub(crate) enum CommandError {
 }
 
 /// Runs the program; `None` when the campaign was asked to stop.
-///
-/// # Errors
-/// [`CommandError`] when the program could not be run or tried nothing.
 pub(crate) fn run(
     Invocation { command, folder, again }: Invocation<'_>,
     factors: &[Factor],
@@ -68,7 +65,7 @@ pub(crate) fn run(
             .stdout(Stdio::piped())
             .stderr(Stdio::piped()),
     )?;
-    let child = process.child();
+    let child = &mut process.child;
     if let Some(mut stdin) = child.stdin.take() {
         // Fails where the program does not read its input.
         let _ = writeln!(stdin, "{}", request(factors, point, again));

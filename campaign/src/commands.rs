@@ -111,14 +111,14 @@ fn plan(arguments: &PlanArguments) -> Result<Exit, CommandError> {
         "{}: {} runs ({} combinations, {} draws) in {} parts of {}",
         campaign.file.title,
         parts.runs,
-        campaign.points.combinations(),
+        campaign.points.combinations,
         campaign.file.draws,
         parts.count(),
         parts.runs_per_part
     ));
     for run in 0..parts.runs.min(arguments.first) {
         let point = campaign.points.point(run);
-        let values = campaign.points.factors().iter().zip(&point.values);
+        let values = campaign.points.factors.iter().zip(&point.values);
         let reported: Vec<_> = values.map(|(factor, value)| format!("{} = {value}", factor.name)).collect();
         say(&format!("run {run}: draw {}, seed {}; {}", point.draw, point.seed, reported.join(", ")));
     }

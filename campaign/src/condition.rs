@@ -51,7 +51,7 @@ pub(crate) fn condition<'s>(
 ) -> Result<Condition<'s>, ConditionError> {
     let refused = |message: String| ConditionError { run: point.run, message };
     let mut sorted = ValuesByTarget::default();
-    for (factor, value) in points.factors().iter().zip(&point.values) {
+    for (factor, value) in points.factors.iter().zip(&point.values) {
         sorted.take(&factor.changes, value, point);
     }
     let nominal = inputs.rig(sorted.file(FileChoice::Rig));
@@ -90,7 +90,6 @@ pub(crate) fn condition<'s>(
 
 impl Condition<'_> {
     /// The program of an axis that the experiment calls `written`.
-    #[must_use]
     pub(crate) fn program(&self, inputs: &CampaignInputs, axis: Axis, written: &str) -> Option<Source> {
         self.programs[axis.index()].or_else(|| inputs.program(written, self.experiment)).cloned()
     }

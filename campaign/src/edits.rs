@@ -31,9 +31,6 @@ pub(crate) enum EditError {
 }
 
 /// The text with these numbers at their paths.
-///
-/// # Errors
-/// [`EditError`] for a text that is no TOML, and for a path that does not fit it.
 pub(crate) fn with<'a>(
     text: &str,
     numbers: impl IntoIterator<Item = (&'a str, f64)>,
@@ -64,7 +61,6 @@ pub(crate) fn moved(text: &str, path: &Path) -> Result<String, EditError> {
 }
 
 /// The file that the one at `path` calls `name`.
-#[must_use]
 pub(crate) fn beside(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name)
 }

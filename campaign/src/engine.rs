@@ -122,10 +122,7 @@ impl Start<'_> {
         };
         format!(
             "{} runs ({} combinations, {} draws){of_shard}; {todo} to do in {parts} parts, {} at once",
-            self.campaign.parts.runs,
-            self.campaign.points.combinations(),
-            self.campaign.file.draws,
-            self.jobs
+            self.campaign.parts.runs, self.campaign.points.combinations, self.campaign.file.draws, self.jobs
         )
     }
 
@@ -220,7 +217,6 @@ impl<'a> Progress<'a> {
 }
 
 /// A duration in s, min, h or days.
-#[must_use]
 pub(crate) fn duration_text(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {

@@ -87,7 +87,6 @@ pub(crate) struct Range {
 
 impl Range {
     /// Quantile of the distribution at `share`, 0 to 1.
-    #[must_use]
     pub(crate) fn at(&self, share: f64) -> f64 {
         let Range { ends: [least, most], log } = *self;
         let value = if log {
@@ -120,7 +119,6 @@ impl fmt::Display for Value {
 
 impl Value {
     /// The number, where it is one.
-    #[must_use]
     pub(crate) fn number(&self) -> Option<f64> {
         match self {
             Value::Number(number) => Some(*number),
@@ -131,7 +129,6 @@ impl Value {
 
 impl Values {
     /// Number of levels of a list; 1 for a range.
-    #[must_use]
     pub(crate) fn listed(&self) -> usize {
         match self {
             Values::List(list) => list.len(),
@@ -156,9 +153,6 @@ const CHOICES: [(&str, Option<FileChoice>); 5] = [
 const AMONG: [(&str, Among); 3] = [("drive", Among::Drive), ("load", Among::Load), ("both", Among::Both)];
 
 /// The factor of a `[[vary]]`.
-///
-/// # Errors
-/// What is wrong and what would be right.
 pub(crate) fn read(section: &mut Section<'_>) -> Result<Factor, SettingsError> {
     section.allow(&[&SUBJECTS[..], &OF_A_FAULT, &["name", "among", "list", "range", "log"]].concat())?;
     let name = section.text("name")?.map(|name| name.text);

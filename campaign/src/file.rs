@@ -150,9 +150,6 @@ impl CampaignFile {
     }
 
     /// The absolute folder that its paths are relative to.
-    ///
-    /// # Errors
-    /// [`SettingsError`] when the current folder cannot be found.
     pub(crate) fn folder(&self) -> Result<PathBuf, SettingsError> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
         std::path::absolute(folder).map_err(|error| SettingsError::unreadable(&self.path, &error))

@@ -150,7 +150,6 @@ impl CampaignInputs {
     ///
     /// # Panics
     /// If the campaign names no such file.
-    #[must_use]
     pub(crate) fn experiment(&self, name: Option<&str>) -> &Text {
         &self.experiments[name.unwrap_or(&self.defaults[0])]
     }
@@ -159,13 +158,11 @@ impl CampaignInputs {
     ///
     /// # Panics
     /// If the campaign names no such file.
-    #[must_use]
     pub(crate) fn rig(&self, name: Option<&str>) -> &RigFile {
         &self.rigs[name.unwrap_or(&self.defaults[1])]
     }
 
     /// A program that an experiment names.
-    #[must_use]
     pub(crate) fn program(&self, name: &str, experiment: &Text) -> Option<&Source> {
         self.programs.get(&self.folders.program(name, &experiment.path))
     }
@@ -174,13 +171,11 @@ impl CampaignInputs {
     ///
     /// # Panics
     /// If the campaign names no such file.
-    #[must_use]
     pub(crate) fn chosen_program(&self, name: &str) -> &Source {
         &self.programs[&self.folders.chosen_program(name)]
     }
 
     /// Name and hash of each file; names do not depend on the folder of the campaign.
-    #[must_use]
     pub(crate) fn hashes(&self) -> BTreeSet<(String, String)> {
         let experiments = self.experiments.iter().map(|(name, file)| (name.as_str(), &file.text));
         let rigs = self.rigs.iter().map(|(name, rig)| (name.as_str(), &rig.file.text));

@@ -188,18 +188,15 @@ impl Results {
     }
 
     /// A column of numbers, a place for each run; NaN where a run has none.
-    #[must_use]
     pub(crate) fn numbers(&self, name: &str) -> Option<&[f64]> {
         self.numbers.get(name).map(Vec::as_slice)
     }
 
     /// Whether every run was completed and kept the bounds of its experiment.
-    #[must_use]
     pub(crate) fn all_passed(&self) -> bool {
         self.unfinished.is_empty() && !self.numbers("passed").unwrap_or_default().contains(&0.0)
     }
 
-    #[must_use]
     pub(crate) fn words(&self, name: &str) -> Option<&CategoricalColumn> {
         self.words.get(name)
     }

@@ -29,7 +29,6 @@ pub(crate) enum EndState {
 
 impl EndState {
     /// Its name in the column `ended`.
-    #[must_use]
     pub(crate) fn name(self) -> &'static str {
         match self {
             EndState::Done => "done",
@@ -41,7 +40,6 @@ impl EndState {
 }
 
 impl Outcome {
-    #[must_use]
     pub(crate) fn failed(because: String) -> Self {
         Outcome { ended: EndState::Failed, because, simulated_s: 0.0, passed: None, figures: BTreeMap::new() }
     }

@@ -13,7 +13,7 @@ use crate::merge::Results;
 use figures::definition;
 use figures::top::POSITIONS;
 use pagekit::grid::Grid;
-use pagekit::number::{in_use, short, without_unit};
+use pagekit::number::{in_use, short};
 use pagekit::page::{document, escaped};
 use std::fmt::Write as _;
 
@@ -21,7 +21,6 @@ use std::fmt::Write as _;
 const DEFAULT_FIGURES: usize = 4;
 
 /// The page; `repeat` makes the command that repeats a run.
-#[must_use]
 pub(crate) fn page(campaign: &Campaign, results: &Results, repeat: &dyn Fn(u64) -> String) -> String {
     let shown = shown(campaign, results);
     let mut body = format!("<h1>{}</h1>\n", escaped(&campaign.file.title));
@@ -64,11 +63,7 @@ fn lead(campaign: &Campaign, results: &Results) -> String {
         "<p class=\"lead\">{} runs{time}: {} combinations of what is listed, {} draws of each. Varied: {over}.</p>\n\
          <p class=\"soft\">Campaign <span class=\"code\">{}</span>, made by <span class=\"code\">{}</span>. All rows: \
          <a href=\"runs.csv\">runs.csv</a>.</p>\n",
-        results.runs,
-        campaign.points.combinations(),
-        campaign.file.draws,
-        parts.campaign,
-        parts.program
+        results.runs, campaign.points.combinations, campaign.file.draws, parts.campaign, parts.program
     )
 }
 
@@ -97,11 +92,6 @@ fn file_section(campaign: &Campaign) -> String {
          </div>\n",
         escaped(&campaign.file.text)
     )
-}
-
-/// Heading for a figure.
-fn name(figure: &str) -> String {
-    without_unit(figure)
 }
 
 /// A value with its display unit.

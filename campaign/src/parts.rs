@@ -63,23 +63,19 @@ const DEFAULT_PARTS: u64 = 1024;
 /// Bounds of the default number of runs of a part.
 const DEFAULT_RUNS: Range<u64> = 8..1001;
 
-#[must_use]
 pub(crate) fn default_runs_per_part(runs: u64) -> u64 {
     (runs / DEFAULT_PARTS).clamp(DEFAULT_RUNS.start, DEFAULT_RUNS.end - 1)
 }
 
 impl Parts {
-    #[must_use]
     pub(crate) fn count(&self) -> u64 {
         self.runs.div_ceil(self.runs_per_part)
     }
 
-    #[must_use]
     pub(crate) fn runs_of(&self, part: u64) -> Range<u64> {
         part * self.runs_per_part..((part + 1) * self.runs_per_part).min(self.runs)
     }
 
-    #[must_use]
     pub(crate) fn path(&self, out: &Path, part: u64) -> PathBuf {
         out.join("parts").join(format!("{part:06}.csv"))
     }
@@ -174,7 +170,6 @@ pub(crate) fn beside(folder: &Path) -> io::Result<NamedTempFile> {
 }
 
 /// SHA-256 in hexadecimal.
-#[must_use]
 pub(crate) fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

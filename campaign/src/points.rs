@@ -17,10 +17,11 @@ use sha2::{Digest, Sha256};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Points {
-    factors: Vec<Factor>,
+    pub factors: Vec<Factor>,
     seed: u64,
     draws: u64,
-    combinations: u64,
+    /// Number of combinations of the lists.
+    pub combinations: u64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -45,9 +46,6 @@ pub(crate) const MOST_RUNS: u64 = 1_000_000_000;
 
 impl Points {
     /// The runs of these factors.
-    ///
-    /// # Errors
-    /// [`TooManyRuns`] beyond [`MOST_RUNS`].
     pub(crate) fn new(factors: &[Factor], draws: u64, seed: u64) -> Result<Self, TooManyRuns> {
         let combinations = factors
             .iter()
@@ -57,27 +55,14 @@ impl Points {
         Ok(Self { factors: factors.to_vec(), seed, draws, combinations })
     }
 
-    #[must_use]
     pub(crate) fn runs(&self) -> u64 {
         self.combinations * self.draws
-    }
-
-    /// Number of combinations of the lists.
-    #[must_use]
-    pub(crate) fn combinations(&self) -> u64 {
-        self.combinations
-    }
-
-    #[must_use]
-    pub(crate) fn factors(&self) -> &[Factor] {
-        &self.factors
     }
 
     /// The run of this number.
     ///
     /// # Panics
     /// If `run` is not below [`Points::runs`].
-    #[must_use]
     pub(crate) fn point(&self, run: u64) -> Point {
         assert!(run < self.runs(), "run {run} of {}", self.runs());
         let (mut combination, draw) = (run / self.draws, run % self.draws);
@@ -144,7 +129,7 @@ mod tests {
 
     #[test]
     fn lists_are_gone_through_with_the_last_fastest() {
-        assert_eq!((points().runs(), points().combinations()), (24, 6));
+        assert_eq!((points().runs(), points().combinations), (24, 6));
         let listed: Vec<_> = (0..6).map(|c| numbers(c * 4)).map(|[a, _, c]| (a, c)).collect();
         assert_eq!(listed, [(1.0, 5.0), (1.0, 6.0), (1.0, 7.0), (2.0, 5.0), (2.0, 6.0), (2.0, 7.0)]);
     }

@@ -20,13 +20,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Location of the programs of a run.
-#[derive(Clone, Debug)]
-pub(crate) struct Programs {
-    /// Folder of `emulator` and `controller`.
-    pub folder: PathBuf,
-}
-
 /// Why a run of processes has no result.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ProcessesError {
@@ -39,7 +32,8 @@ pub(crate) enum ProcessesError {
     System { run: u64, what: String, error: io::Error },
 }
 
-/// Makes a run, of at most `seconds` of the rig's time, with its files in `folder`.
+/// Makes a run by emulator and controller of the folder `programs`, of at most `seconds` of the rig's time, with its files in
+/// `folder`.
 ///
 /// # Errors
 /// [`ProcessesError`]; a failure of emulator or controller is a result.
@@ -47,7 +41,7 @@ pub(crate) fn run(
     condition: &Condition<'_>,
     inputs: &CampaignInputs,
     (run, seconds): (u64, f64),
-    programs: &Programs,
+    programs: &Path,
     folder: &Path,
     limit: Limit<'_>,
 ) -> Result<Outcome, ProcessesError> {
@@ -58,7 +52,7 @@ pub(crate) fn run(
         tempfile::Builder::new().prefix("airbench-").tempdir().map_err(system("a folder for the bus"))?;
     let bus = format!("unix://{}/bus", private.path().display());
     let start = |name: &str, add: &dyn Fn(&mut Command)| {
-        let mut command = Command::new(programs.folder.join(name));
+        let mut command = Command::new(programs.join(name));
         command.args(["run", "--pace", "lockstep", "--bus", &bus, "--out"]).arg(folder);
         command.arg("--experiment").arg(&files.experiment);
         add(&mut command);
@@ -101,9 +95,6 @@ pub(crate) fn run(
 }
 
 /// The outcome from the files of a run's folder and the exit codes.
-///
-/// # Errors
-/// [`SummaryError`] for a folder that cannot be read or written.
 fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, SummaryError> {
     let joined = match join::join(folder) {
         Ok(joined) => joined,

@@ -44,7 +44,6 @@ impl Shard {
     pub(crate) const WHOLE: Shard = Shard { index: 0, count: 1 };
 
     /// Whether the part of this number belongs to this shard.
-    #[must_use]
     pub(crate) fn holds(self, part: u64) -> bool {
         part % u64::from(self.count) == u64::from(self.index)
     }
@@ -52,9 +51,6 @@ impl Shard {
 
 impl ShardArgument {
     /// The shard, with the index of the batch system where none was given; `variable` reads an environment variable.
-    ///
-    /// # Errors
-    /// [`ShardError`] without an index, and for an invalid one.
     pub(crate) fn shard(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, ShardError> {
         let count = self.count;
         if let Some(index) = self.index {

@@ -1,8 +1,9 @@
 //! Distribution of each figure: a table of quantiles, and histograms.
 
-use super::{name, quantile, sorted, value};
+use super::{quantile, sorted, value};
 use crate::merge::Results;
 use pagekit::grid::Grid;
+use pagekit::number::without_unit;
 use pagekit::page::escaped;
 use std::fmt::Write as _;
 
@@ -20,12 +21,14 @@ pub(super) fn section(results: &Results, shown: &[String]) -> String {
     for figure in shown {
         let values = sorted(results.numbers(figure).unwrap_or_default());
         if values.is_empty() {
-            rows.push([name(figure), "0".into()].into_iter().chain(vec!["-".to_owned(); 6]).collect());
+            rows.push(
+                [without_unit(figure), "0".into()].into_iter().chain(vec!["-".to_owned(); 6]).collect(),
+            );
             continue;
         }
         let at = |share| value(figure, quantile(&values, share));
         let quantiles = [0.0, 0.05, 0.5, 0.95, 0.99, 1.0].map(at);
-        rows.push([name(figure), values.len().to_string()].into_iter().chain(quantiles).collect());
+        rows.push([without_unit(figure), values.len().to_string()].into_iter().chain(quantiles).collect());
         pictures += &histogram(figure, &values);
     }
     Grid::new(head, rows).html() + &pictures
@@ -53,7 +56,7 @@ fn histogram(figure: &str, values: &[f64]) -> String {
         );
     }
     let (title, from, to) =
-        (escaped(&name(figure)), escaped(&value(figure, least)), escaped(&value(figure, most)));
+        (escaped(&without_unit(figure)), escaped(&value(figure, least)), escaped(&value(figure, most)));
     format!(
         "<figure><svg class=\"chart\" role=\"img\" aria-label=\"{title}: {} runs from {from} to {to}\" \
          viewBox=\"0 0 {WIDTH} {:.0}\" \

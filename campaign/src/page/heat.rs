@@ -1,10 +1,10 @@
 //! Heat maps: a figure over two factors, or over one.
 
-use super::{name, quantile, sorted, value};
+use super::{quantile, sorted, value};
 use crate::campaign::Campaign;
 use crate::factor::{Factor, Values};
 use crate::merge::Results;
-use pagekit::number::short;
+use pagekit::number::{short, without_unit};
 use pagekit::page::escaped;
 use std::fmt::Write as _;
 
@@ -102,8 +102,8 @@ fn map(figure: &str, column: &[f64], rows: &Axis, columns: Option<&Axis>) -> Str
     let shade =
         |median: f64| if most > least { 5.0 + 50.0 * (median - least) / (most - least) } else { 20.0 };
     let title = match columns {
-        Some(columns) => format!("{} over {} and {}", name(figure), rows.name, columns.name),
-        None => format!("{} over {}", name(figure), rows.name),
+        Some(columns) => format!("{} over {} and {}", without_unit(figure), rows.name, columns.name),
+        None => format!("{} over {}", without_unit(figure), rows.name),
     };
     let title = escaped(&title);
     let mut text = format!(

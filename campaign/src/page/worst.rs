@@ -1,10 +1,11 @@
 //! Worst cases: the runs with the largest figures, and the command that repeats each.
 
-use super::{name, value};
+use super::value;
 use crate::campaign::Campaign;
 use crate::factor::Values;
 use crate::merge::{Results, Unfinished};
 use pagekit::grid::Grid;
+use pagekit::number::without_unit;
 use pagekit::page::escaped;
 
 /// Number of runs shown for each figure.
@@ -31,12 +32,12 @@ pub(super) fn section(
         let mut runs: Vec<_> = (0..column.len()).filter(|run| column[*run].is_finite()).collect();
         // Ties: the first run.
         runs.sort_by(|one, other| column[*other].total_cmp(&column[*one]));
-        let head = [&*name(figure), "run", "with", "repeated by"];
+        let head = [&*without_unit(figure), "run", "with", "repeated by"];
         let rows = runs.iter().take(RUNS_SHOWN).map(|run| {
             let number = *run as u64;
             vec![value(figure, column[*run]), number.to_string(), values(campaign, number), repeat(number)]
         });
-        text += &format!("<h3>{}</h3>\n{}", escaped(&name(figure)), Grid::new(head, rows).html());
+        text += &format!("<h3>{}</h3>\n{}", escaped(&without_unit(figure)), Grid::new(head, rows).html());
     }
     text
 }
