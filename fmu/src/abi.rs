@@ -358,8 +358,8 @@ extern "C" fn fmi2DoStep(
     _no_set_state_prior: c_int,
 ) -> Status {
     on(component, |instance| {
-        let stepped = instance.simulation.step(at_s, step_s)?;
-        Ok(stepped.warning.map_or(Status::Ok, |warning| {
+        let warning = instance.simulation.step(at_s, step_s)?;
+        Ok(warning.map_or(Status::Ok, |warning| {
             instance.log.write(Status::Warning, &warning);
             Status::Warning
         }))

@@ -22,9 +22,6 @@ pub struct Description {
 }
 
 /// The description of a rig whose file is `rig_toml`.
-///
-/// # Errors
-/// [`SetupError`]: the rig does not allow the default set-up.
 pub(crate) fn of(rig: &RigParameters, rig_toml: &str) -> Result<Description, SetupError> {
     let list = variables::of(rig)?;
     let mut digest = IDENTITY.digest();

@@ -24,13 +24,6 @@ const TOLERANCE_S: f64 = 1e-6;
 /// Most periods of one step, some 11 days.
 const MOST_PERIODS: f64 = 1e9;
 
-/// Result of a step.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct StepResult {
-    /// Why the rods could not be linked.
-    pub warning: Option<String>,
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Instantiated,
@@ -93,18 +86,12 @@ impl Simulation {
     }
 
     /// Resets to the state after instantiation, with all values at their start.
-    ///
-    /// # Errors
-    /// [`SetupError`]: never, since the same rig was set up before.
     pub(crate) fn reset(&mut self) -> Result<(), SetupError> {
         *self = Self::new(self.rig.as_ref().clone())?;
         Ok(())
     }
 
     /// Sets the start time, s.
-    ///
-    /// # Errors
-    /// [`Refusal::Mode`], and [`Refusal::Time`] for a start that is not finite.
     pub(crate) fn set_start(&mut self, start_s: f64) -> Result<(), Refusal> {
         self.check_mode(&[Mode::Instantiated], "fmi2SetupExperiment", "fmi2Instantiate or fmi2Reset")?;
         if !start_s.is_finite() {
@@ -115,9 +102,6 @@ impl Simulation {
     }
 
     /// Enters the initialisation.
-    ///
-    /// # Errors
-    /// [`Refusal::Mode`].
     pub(crate) fn enter_initialisation(&mut self) -> Result<(), Refusal> {
         self.check_mode(
             &[Mode::Instantiated],
@@ -129,9 +113,6 @@ impl Simulation {
     }
 
     /// Sets up the plant and leaves the initialisation.
-    ///
-    /// # Errors
-    /// [`Refusal::Mode`], [`Refusal::Parameters`], [`Refusal::Setup`].
     pub(crate) fn exit_initialisation(&mut self) -> Result<(), Refusal> {
         self.check_mode(&[Mode::Initialising], "fmi2ExitInitializationMode", "fmi2EnterInitializationMode")?;
         self.set_up()?;
@@ -140,20 +121,14 @@ impl Simulation {
     }
 
     /// Ends the simulation; values can still be read.
-    ///
-    /// # Errors
-    /// [`Refusal::Mode`].
     pub(crate) fn terminate(&mut self) -> Result<(), Refusal> {
         self.check_mode(&[Mode::Stepping, Mode::Failed], "fmi2Terminate", "fmi2ExitInitializationMode")?;
         self.mode = Mode::Terminated;
         Ok(())
     }
 
-    /// Steps from the communication point `at_s` by `step_s`.
-    ///
-    /// # Errors
-    /// [`Refusal::Mode`], [`Refusal::Time`], [`Refusal::NotFinite`].
-    pub(crate) fn step(&mut self, at_s: f64, step_s: f64) -> Result<StepResult, Refusal> {
+    /// Steps from the communication point `at_s` by `step_s`; returns a warning where the rods could not be linked.
+    pub(crate) fn step(&mut self, at_s: f64, step_s: f64) -> Result<Option<String>, Refusal> {
         if self.mode == Mode::Failed {
             return Err(Refusal::NotFinite { at_s: self.time_s() });
         }
@@ -182,11 +157,10 @@ impl Simulation {
             self.mode = Mode::Failed;
             return Err(Refusal::NotFinite { at_s: self.time_s() });
         }
-        Ok(StepResult { warning })
+        Ok(warning)
     }
 
     /// Time of the plant, s.
-    #[must_use]
     pub(crate) fn time_s(&self) -> f64 {
         self.start_s + self.running.as_ref().map_or(0, |running| running.period) as f64 * PERIOD_S
     }
@@ -228,9 +202,6 @@ impl Simulation {
     }
 
     /// The values of Boolean variables.
-    ///
-    /// # Errors
-    /// As [`Simulation::reals`].
     pub(crate) fn booleans(&mut self, references: &[u32], values: &mut [bool]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
@@ -250,9 +221,6 @@ impl Simulation {
     }
 
     /// The values of Integer variables.
-    ///
-    /// # Errors
-    /// [`Refusal::Reference`].
     pub(crate) fn integers(&self, references: &[u32], values: &mut [i32]) -> Result<(), Refusal> {
         find(&self.variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
         values.fill(self.settings.seed);
@@ -260,9 +228,6 @@ impl Simulation {
     }
 
     /// Sets Real variables, all or none.
-    ///
-    /// # Errors
-    /// [`Refusal::Reference`], [`Refusal::NotSettable`], [`Refusal::OutOfRange`].
     pub(crate) fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Real", |kind| matches!(kind, Kind::Real(_)))?;
@@ -289,9 +254,6 @@ impl Simulation {
     }
 
     /// Sets Boolean variables, all or none.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_reals`].
     pub(crate) fn set_booleans(&mut self, references: &[u32], values: &[bool]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
@@ -307,9 +269,6 @@ impl Simulation {
     }
 
     /// Sets Integer variables, all or none.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_reals`].
     pub(crate) fn set_integers(&mut self, references: &[u32], values: &[i32]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;

@@ -87,7 +87,6 @@ pub(crate) fn of(rig: &RigParameters) -> Result<Vec<Variable>, SetupError> {
 }
 
 /// The default set-up of the plant, adapted to a shorter rig.
-#[must_use]
 pub(crate) fn start_setup(rig: &RigParameters) -> Setup {
     let setup = Setup::default();
     Setup { carriage_position_m: setup.carriage_position_m.min(rig.cylinder().stroke_m), ..setup }
