@@ -50,7 +50,6 @@ pub(crate) enum CanError {
 
 impl CanError {
     /// Exit code of the program.
-    #[must_use]
     pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::Guest(GuestError::NoHost { .. }) => Exit::BusFailed,
@@ -60,7 +59,6 @@ impl CanError {
 }
 
 /// Runs the program; returns its exit code.
-#[must_use]
 pub(crate) fn run(arguments: &CanArguments) -> ExitCode {
     match try_to_run(arguments) {
         Ok(code) => ExitCode::from(u8::try_from(code).unwrap_or(u8::MAX)),

@@ -227,7 +227,7 @@ impl Gateway {
             _ => 10,
         };
         let clients =
-            self.clients.iter().map(|client| (client.stream(), client.has_something_to_write(now_ms)));
+            self.clients.iter().map(|client| (&client.stream, client.has_something_to_write(now_ms)));
         wait(&self.listener, clients, self.bus.socket(), milliseconds)
     }
 

@@ -6,7 +6,6 @@ use crate::gateway::{self, GatewayError};
 use crate::ping_pong::{self, PingPongError};
 use crate::replay::ReplayError;
 use crate::runs::{self, Run, RunsError};
-use crate::soak::SoakError;
 use crate::soak::processes::become_child;
 use crate::{can, compare, export, export_fmu, picture, probe, replay, say, soak, spread};
 use clap::Parser;
@@ -21,44 +20,37 @@ use std::process::ExitCode;
 
 /// Runs the command that the process's arguments name; returns the exit code of the process.
 pub fn main() -> ExitCode {
-    let done: Result<Exit, Box<dyn std::error::Error>> = match Cli::parse().command {
-        Command::Summary { folder } => sum_up(&folder).map_err(Into::into),
-        Command::Compare(arguments) => compare_runs(&arguments).map_err(Into::into),
-        Command::Spread(arguments) => spread_runs(&arguments).map_err(Into::into),
-        Command::Report(arguments) => report_on(&arguments).map_err(Into::into),
-        Command::Cause { file } => name_cause(&file).map_err(Into::into),
+    match Cli::parse().command {
+        Command::Summary { folder } => bad_input(sum_up(&folder)),
+        Command::Compare(arguments) => bad_input(compare_runs(&arguments)),
+        Command::Spread(arguments) => bad_input(spread_runs(&arguments)),
+        Command::Report(arguments) => bad_input(report_on(&arguments)),
+        Command::Cause { file } => bad_input(name_cause(&file)),
         Command::Figures => {
             print(&figures::list());
-            Ok(Exit::Good)
+            Exit::Good.into()
         }
-        Command::CheckExperiment { file } => check(&file).map_err(Into::into),
-        Command::LatencyTable(arguments) => latency::table::table(&arguments)
-            .map(|text| print(&text))
-            .map(|()| Exit::Good)
-            .map_err(Into::into),
-        Command::Replay(arguments) => return reported(replay::run(&arguments), ReplayError::exit),
-        Command::ExportFmu(arguments) => export_fmu::run(&arguments).map_err(Into::into),
-        Command::Export(arguments) => export::run(&arguments).map_err(Into::into),
-        Command::Probe(arguments) => return reported(probe::run(&arguments), |_| Exit::BadInput),
-        Command::PingPong(arguments) => return reported(ping_pong::run(&arguments), PingPongError::exit),
-        Command::Pong(arguments) => return reported(ping_pong::pong(&arguments), PingPongError::exit),
-        Command::CheckController(arguments) => {
-            return reported(conformance::run(&arguments), ConformanceError::exit);
-        }
-        Command::Gateway(arguments) => return reported(gateway::run(&arguments), GatewayError::exit),
-        Command::Can(arguments) => return can::run(&arguments),
-        Command::Watch(arguments) => return reported(live::run(&arguments), LiveError::exit),
-        Command::Soak(arguments) => return reported(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
+        Command::CheckExperiment { file } => bad_input(check(&file)),
+        Command::LatencyTable(arguments) => bad_input(latency::table::table(&arguments).map(|text| {
+            print(&text);
+            Exit::Good
+        })),
+        Command::Replay(arguments) => reported(replay::run(&arguments), ReplayError::exit),
+        Command::ExportFmu(arguments) => bad_input(export_fmu::run(&arguments)),
+        Command::Export(arguments) => bad_input(export::run(&arguments)),
+        Command::Probe(arguments) => bad_input(probe::run(&arguments)),
+        Command::PingPong(arguments) => reported(ping_pong::run(&arguments), PingPongError::exit),
+        Command::Pong(arguments) => reported(ping_pong::pong(&arguments), PingPongError::exit),
+        Command::CheckController(arguments) => reported(conformance::run(&arguments), ConformanceError::exit),
+        Command::Gateway(arguments) => reported(gateway::run(&arguments), GatewayError::exit),
+        Command::Can(arguments) => can::run(&arguments),
+        Command::Watch(arguments) => reported(live::run(&arguments), LiveError::exit),
+        Command::Soak(arguments) => bad_input(soak::run(&arguments)),
         Command::SoakChild(arguments) => {
             eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));
-            return Exit::BadInput.into();
+            Exit::BadInput.into()
         }
-    };
-    let exit = done.unwrap_or_else(|error| {
-        eprintln!("bench: {error}");
-        Exit::BadInput
-    });
-    exit.into()
+    }
 }
 
 /// Exit code of a command, with its error on standard error.
@@ -68,6 +60,11 @@ fn reported<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> Exi
         exit(&error)
     })
     .into()
+}
+
+/// The same of a command whose errors are all bad input.
+fn bad_input(done: Result<Exit, impl Display>) -> ExitCode {
+    reported(done, |_| Exit::BadInput)
 }
 
 fn print(text: &str) {

@@ -98,7 +98,8 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     let clock: StampClock = Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns));
     let mut bus = bus::open(&arguments.bus, clock)?;
     if !connected(bus.as_mut(), Duration::from_secs(arguments.wait_s), &interrupt) {
-        return if interrupt.came() { Ok(Exit::Interrupted) } else { Err(no_bus(arguments)) };
+        let gone = Err(ReplayError::NoBus(arguments.bus.to_string()));
+        return if interrupt.came() { Ok(Exit::Interrupted) } else { gone };
     }
     let received = listen(bus.as_mut(), Duration::from_millis(arguments.listen_ms), &interrupt);
     if received > 0 && schedule.disturbs_a_rig() {
@@ -206,8 +207,4 @@ fn write(
     let length = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(started);
     write_hlog(&histogram, &parts, started.as_secs_f64(), length)
         .map_err(|error| FileError::write(&histogram, error))
-}
-
-fn no_bus(arguments: &ReplayArguments) -> ReplayError {
-    ReplayError::NoBus(arguments.bus.to_string())
 }

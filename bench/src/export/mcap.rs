@@ -12,7 +12,7 @@
 use super::ExportError;
 use super::controllers;
 use super::mdf4::comment;
-use super::run_table::{RunTable, holds_words, unit};
+use super::run_table::{RunTable, holds_words};
 use super::signals::{MessageFrames, Signals};
 use crate::recorded_log::RecordedLog;
 use mcap::records::{MessageHeader, Metadata};
@@ -22,6 +22,7 @@ use protocol::frames::SignalKind;
 use runlog::Axis;
 use runlog::run_folder::{FAULTS_CSV, FileError, MEASUREMENT_CSV, TRUTH_CSV, controller_csv};
 use serde_json::{Map, Value, json};
+use settings::unit_of;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -165,7 +166,7 @@ impl Source<'_> {
             Self::Table { table, .. } => {
                 let of = |name: &String| {
                     let kind = if holds_words(name) { "string" } else { "number" };
-                    (name.clone(), property(kind, "", unit(name)))
+                    (name.clone(), property(kind, "", unit_of(name).unwrap_or_default()))
                 };
                 table.names().iter().map(of).collect()
             }

@@ -5,7 +5,6 @@
 use crate::warn;
 use figures::record::CHAINS;
 use runlog::run_folder::FileError;
-use settings::unit_of;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -112,11 +111,6 @@ pub(super) fn holds_words(column: &str) -> bool {
     CHAINS.contains(&column) || OF_FAULTS.contains(&column)
 }
 
-/// Unit of a column by the end of its name; empty for a dimensionless number and for words.
-pub(super) fn unit(column: &str) -> &'static str {
-    unit_of(column).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -162,7 +156,7 @@ mod tests {
             ("load_pressure_b_Pa", "Pa"),
             ("drive_valve", ""),
         ] {
-            assert_eq!(unit(column), expected, "{column}");
+            assert_eq!(settings::unit_of(column).unwrap_or_default(), expected, "{column}");
         }
     }
 }

@@ -55,7 +55,7 @@ pub(super) struct ClientReport {
 }
 
 pub(super) struct Client {
-    stream: TcpStream,
+    pub(super) stream: TcpStream,
     session: Session,
     outgoing: VecDeque<u8>,
     most_bytes: usize,
@@ -105,10 +105,6 @@ impl Client {
         Ok(client)
     }
 
-    pub(super) fn stream(&self) -> &TcpStream {
-        &self.stream
-    }
-
     pub(super) fn is_raw(&self) -> bool {
         self.session.is_raw()
     }
@@ -151,7 +147,7 @@ impl Client {
         };
         let mut actions = Vec::new();
         self.session.take(&bytes[..read], bus, now_ms, &mut actions);
-        self.report.requests_refused = self.session.refused();
+        self.report.requests_refused = self.session.refused;
         for action in actions {
             match action {
                 Action::Reply(text) => self.reply(&text),

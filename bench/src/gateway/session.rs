@@ -61,7 +61,8 @@ pub(crate) struct Session {
     state: State,
     parser: Parser,
     began_ms: u64,
-    refused: u64,
+    /// Requests refused so far.
+    pub(crate) refused: u64,
     read_only: bool,
 }
 
@@ -102,11 +103,6 @@ impl Session {
     pub(crate) fn is_overdue(&self, now_ms: u64) -> bool {
         matches!(self.state, State::Greeted | State::Opened)
             && now_ms.saturating_sub(self.began_ms) >= RAW_MODE_WITHIN_MS
-    }
-
-    /// Requests refused so far.
-    pub(crate) fn refused(&self) -> u64 {
-        self.refused
     }
 
     fn answer(&mut self, request: Request, bus: &str, now_ms: u64, actions: &mut Vec<Action>) {
@@ -199,7 +195,7 @@ mod tests {
         assert!(session.is_raw() && !session.pause_is_over(34) && session.pause_is_over(35));
         assert_eq!(talk(&mut session, "< echo >", 40), [reply("< echo >")]);
         assert_eq!(talk(&mut session, "< open bus0 >", 40), [reply("< error unknown command >")]);
-        assert_eq!(session.refused(), 3);
+        assert_eq!(session.refused, 3);
     }
 
     #[test]

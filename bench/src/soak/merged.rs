@@ -66,10 +66,8 @@ impl Merged {
     }
 
     fn add(&mut self, tag: &str, more: &Histogram<u64>) -> io::Result<()> {
-        if !self.0.contains_key(tag) {
-            self.0.insert(tag.to_owned(), Recorder::new().histogram().clone());
-        }
-        self.0.get_mut(tag).map_or(Ok(()), |histogram| histogram.add(more)).map_err(io::Error::other)
+        let merged = self.0.entry(tag.to_owned()).or_insert_with(|| Recorder::new().histogram().clone());
+        merged.add(more).map_err(io::Error::other)
     }
 
     /// Restores the distributions of an earlier start.

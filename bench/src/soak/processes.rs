@@ -108,7 +108,6 @@ pub(crate) fn end_in_words(status: Option<ExitStatus>) -> String {
 }
 
 /// Executes the program, after requesting SIGTERM at the end of `parent`. Returns only on failure.
-#[must_use]
 pub(crate) fn become_child(arguments: &ChildArguments) -> io::Error {
     if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
         return error.into();
