@@ -41,7 +41,6 @@ pub(crate) enum Command {
 }
 
 /// The whole command line, for help texts, pages of the manual and completions.
-#[must_use]
 pub fn command() -> clap::Command {
     Cli::command().args_override_self(true)
 }

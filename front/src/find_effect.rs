@@ -47,10 +47,7 @@ pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Res
         return Err(FrontError::Input(format!("--bus {bus}: lockstep needs an embedded bus")));
     }
     let experiment = |option: &str, name: &Path| {
-        front.experiment(name)?.ok_or_else(|| {
-            let (name, list) = (name.display(), front.list_command());
-            FrontError::Input(format!("{option} {name}: no such experiment; {list} names them"))
-        })
+        front.experiment(name, |name| format!("{option} {name}: no such experiment"))
     };
     let fitted = experiment("--experiment", &arguments.experiment)?;
     let held_out = match &arguments.held_out {
@@ -65,13 +62,8 @@ pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Res
         Some(program) => program,
         None => front.places.program("discrepancy")?,
     };
-    let out = front.results(arguments.out.as_deref(), "find-effect")?;
-    if out.join(format!("seed-{}", arguments.seed)).exists() {
-        let out = out.display();
-        return Err(FrontError::Input(format!(
-            "{out} holds an earlier search; choose another folder with --out"
-        )));
-    }
+    let first = format!("seed-{}", arguments.seed);
+    let out = front.results(arguments.out.as_deref(), "find-effect", ("search", first.as_str()))?;
     let read = |file: &PathBuf| fs::read_to_string(file).map_err(|error| FrontError::input(file, &error));
     let hidden = arguments.hidden.as_ref().map(read).transpose()?;
     arguments.suspects.as_ref().map(read).transpose()?;

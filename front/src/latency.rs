@@ -26,13 +26,7 @@ use std::time::Instant;
 /// Measures and reports. Returns the exit code.
 pub(crate) fn latency(arguments: &LatencyArguments, front: &Front) -> Result<u8, FrontError> {
     let plan = Plan::of(arguments, front)?;
-    let out = front.results(arguments.out.as_deref(), "latency")?;
-    if out.join("pair-01").exists() {
-        let out = out.display();
-        return Err(FrontError::Input(format!(
-            "{out} holds an earlier measurement; choose another folder with --out"
-        )));
-    }
+    let out = front.results(arguments.out.as_deref(), "latency", ("measurement", "pair-01"))?;
     let mut children = Children::watch()?;
     let log = out.join("install.log");
     let reference_missing = get("cyclictest", "rt_tests", front, &mut children, &log)?;
@@ -114,10 +108,7 @@ impl Plan {
         if arguments.write && front.places.checkout().is_none() {
             return refused("--write: there is no checkout with bench/docs/latency.md");
         }
-        let Some(experiment) = front.experiment(&arguments.experiment)? else {
-            let (name, list) = (arguments.experiment.display(), front.list_command());
-            return refused(&format!("no experiment '{name}'; {list} names them"));
-        };
+        let experiment = front.experiment(&arguments.experiment, |name| format!("no experiment '{name}'"))?;
         Ok(Self { experiment, cpus: cpus_asked, bounds, spin_bounds })
     }
 }

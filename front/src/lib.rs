@@ -87,19 +87,21 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    /// The command that lists the experiments.
-    pub(crate) fn list_command(&self) -> &'static str {
-        if self.name.starts_with("scripts/") { "scripts/run --list" } else { "airbench run --list" }
-    }
-
-    /// The file of an experiment: a path, or the name of a shipped one.
-    pub(crate) fn experiment(&self, name: &Path) -> Result<Option<PathBuf>, FrontError> {
+    /// The file of an experiment: a path, or the name of a shipped one; `refusal` is of a name that is neither.
+    pub(crate) fn experiment(
+        &self,
+        name: &Path,
+        refusal: impl FnOnce(std::path::Display<'_>) -> String,
+    ) -> Result<PathBuf, FrontError> {
         if name.is_file() {
-            return Ok(Some(name.into()));
+            return Ok(name.into());
         }
         let mut file = name.as_os_str().to_owned();
         file.push(".toml");
-        Ok(Some(self.places.data("experiments")?.join(file)).filter(|file| file.is_file()))
+        let list =
+            if self.name.starts_with("scripts/") { "scripts/run --list" } else { "airbench run --list" };
+        let shipped = Some(self.places.data("experiments")?.join(file)).filter(|file| file.is_file());
+        shipped.ok_or_else(|| FrontError::Input(format!("{}; {list} names them", refusal(name.display()))))
     }
 
     /// The folder of a new run, named by the time of day and `what`; `runs/latest` is up to the caller.
@@ -109,11 +111,23 @@ impl Front {
         Ok(self.places.runs().join(format!("{}-{what}", String::from_utf8_lossy(&time).trim_end())))
     }
 
-    /// Creates the folder of a command's results, the requested or a new one; returns its absolute path without links.
-    pub(crate) fn results(&self, asked: Option<&Path>, what: &str) -> Result<PathBuf, FrontError> {
+    /// Creates the folder of a command's results, the requested or a new one; returns its absolute path without links. A folder
+    /// with an earlier result of this kind, which begins with `first`, is refused.
+    pub(crate) fn results(
+        &self,
+        asked: Option<&Path>,
+        what: &str,
+        (kind, first): (&str, &str),
+    ) -> Result<PathBuf, FrontError> {
         let out = asked.map_or_else(|| self.run_folder(what), |out| Ok(out.into()))?;
         make_folder(&out)?;
-        out.canonicalize().map_err(|error| FrontError::output(&out, &error))
+        let out = out.canonicalize().map_err(|error| FrontError::output(&out, &error))?;
+        if out.join(first).exists() {
+            let out = out.display();
+            let why = format!("{out} holds an earlier {kind}; choose another folder with --out");
+            return Err(FrontError::Input(why));
+        }
+        Ok(out)
     }
 
     pub(crate) fn warn(&self, text: &str) {
@@ -142,7 +156,6 @@ pub(crate) fn make_folder(out: &Path) -> Result<(), FrontError> {
 
 /// Runs the command of the command line. `arguments` are those of the process, with its name first; returns the exit code of
 /// the process.
-#[must_use]
 pub fn main(mut arguments: Vec<OsString>) -> ExitCode {
     let called = arguments.first().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let word = arguments.get(1).map(|word| word.to_string_lossy().into_owned()).unwrap_or_default();

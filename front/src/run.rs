@@ -32,10 +32,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
         return list(front).map(|()| Exit::Good as u8);
     }
     check(arguments)?;
-    let file = front.experiment(&arguments.experiment)?.ok_or_else(|| {
-        let (name, list) = (arguments.experiment.display(), front.list_command());
-        FrontError::Input(format!("no experiment '{name}'; {list} names them"))
-    })?;
+    let file = front.experiment(&arguments.experiment, |name| format!("no experiment '{name}'"))?;
     let program = |name: &str| front.places.program(name);
     let (emulator, controller, bench) = (program("emulator")?, program("controller")?, program("bench")?);
     let (rig, programs) = (front.places.data("rig.toml")?, front.places.data("programs")?);
