@@ -11,6 +11,7 @@
 
 use crate::faults::overlay::on_wire;
 use crate::faults::{Fault, NEEDS_HOST};
+use crate::wire_limits::signal;
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use plant::scene::{Action, Part};
 use protocol::frames::{HAND_FORCE, SignalSpec};
@@ -157,7 +158,7 @@ fn parse(line: &str, limits: Limits) -> Result<Option<Line>, String> {
         }
         ["hand", on @ ("carriage" | "load"), newtons] => {
             let (on, name) = if on == "load" { (Part::LoadEye, "load_eye") } else { (Part::Carriage, on) };
-            let SignalSpec { min, max, .. } = hand_signal(name);
+            let SignalSpec { min, max, .. } = signal(HAND_FORCE, name);
             let force_n = number("hand", newtons, (*min, *max), "N")?;
             Ok(Some(Line::Command(Command::Hand { on, force_n })))
         }
@@ -198,12 +199,6 @@ fn number(what: &str, text: &str, (least, most): (f64, f64), unit: &str) -> Resu
     // A NaN is in no range.
     let value = text.parse().ok().filter(|value: &f64| (least..=most).contains(value));
     value.ok_or_else(|| format!("{what} '{text}': allowed are {least} to {most} {unit}"))
-}
-
-/// The signal of rig.dbc that bounds the force of a hand.
-fn hand_signal(name: &str) -> &'static SignalSpec {
-    let signal = HAND_FORCE.signals.iter().find(|signal| signal.name == name);
-    signal.expect("rig.dbc has a force for each part that a hand can be on")
 }
 
 #[cfg(test)]
@@ -259,7 +254,7 @@ mod tests {
             panic!("{commands:?}")
         };
         assert_eq!((stuck, loss.place()), (like, "bus".into()));
-        assert_eq!((burst.place(), burst.values()[0]), ("load.b".into(), 2.0));
+        assert_eq!((burst.place(), burst.values[0]), ("load.b".into(), 2.0));
     }
 
     #[test]

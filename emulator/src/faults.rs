@@ -32,7 +32,7 @@ pub struct Fault {
     /// Index of its place in the table.
     place: u8,
     /// Its numbers, in the order of the table's keys.
-    values: [f64; MOST_KEYS],
+    pub(crate) values: [f64; MOST_KEYS],
 }
 
 /// Why a fault is invalid.
@@ -135,11 +135,6 @@ impl Fault {
     /// Its numbers by key, each in the unit of the table.
     pub fn numbers(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.spec.keys.iter().map(|key| &*key.name).zip(self.values)
-    }
-
-    /// Its numbers, in the order of the table's keys.
-    pub(crate) fn values(&self) -> [f64; MOST_KEYS] {
-        self.values
     }
 }
 

@@ -30,9 +30,8 @@ pub(crate) fn finish(
 
 /// Prints the run in a few lines.
 fn print_summary(summary: &Summary<Event>, folder: &Path) {
-    let Summary { overruns, frames_sent, frames_received, .. } = summary;
+    let Summary { overruns, frames_sent, frames_received, frames_malformed, stale_commands, .. } = summary;
     let (cycles, skipped) = (summary.cycles.unwrap_or_default(), summary.skipped.unwrap_or_default());
-    let Summary { frames_malformed, stale_commands, .. } = summary;
     let frames_lost = summary.frames_lost.unwrap_or_default();
     protocol::say!("emulator: {cycles} cycles, {skipped} of them skipped in {overruns} overruns");
     protocol::say!(

@@ -28,7 +28,6 @@ impl HostThread {
     }
 
     /// Stops the host and returns its counters; `None` when it failed, which it has reported.
-    #[must_use]
     pub(crate) fn stop(self) -> Option<HostReport> {
         self.stop.store(true, Ordering::Relaxed);
         match self.thread.join() {

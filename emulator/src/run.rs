@@ -311,10 +311,7 @@ fn open_folder(
         .and_then(|()| clear_results(folder))
         .and_then(|()| flight_dump::clear(folder, PROCESS))
         .map_err(|error| RunError::output(folder, &error))?;
-    let interface = match &arguments.bus {
-        BusUrl::Can { interface } => interface.as_str(),
-        BusUrl::Unix { .. } => EMBEDDED_INTERFACE,
-    };
+    let interface = arguments.bus.interface().unwrap_or(EMBEDDED_INTERFACE);
     Writer::create(WriterSetup {
         folder: folder.into(),
         interface: interface.into(),

@@ -84,7 +84,8 @@ fn at_most(
     Err(WireMisfit { table, key, problem: format!("{value} {unit}; rig.dbc carries at most {most} {unit}") })
 }
 
-fn signal(message: &'static MessageSpec, name: &str) -> &'static SignalSpec {
+/// A signal of rig.dbc.
+pub(crate) fn signal(message: &'static MessageSpec, name: &str) -> &'static SignalSpec {
     let found = message.signals.iter().find(|signal| signal.name == name);
     found.unwrap_or_else(|| {
         unreachable!("{}.{name} is in rig.dbc, from which the frames are generated", message.name)

@@ -71,7 +71,7 @@ pub(super) fn run(
     progress: &mut Progress<'_>,
 ) -> Result<Outcome, SoakError> {
     std::fs::create_dir_all(folder).map_err(|error| SoakError::output(folder, &error))?;
-    let interface = interface(&common.arguments.bus);
+    let interface = common.arguments.bus.interface();
     let sent_before = interface.and_then(procfs::sent_by_interface);
     let start = Start { common, spec, folder };
     let mut running = start.controllers()?;
@@ -106,13 +106,6 @@ pub(super) fn run(
     let sent_after = interface.and_then(procfs::sent_by_interface);
     let sent_by_interface = sent_before.zip(sent_after).map(|(before, after)| after.saturating_sub(before));
     Ok(Outcome { end, exits, memory: watch.memory, sent_by_interface })
-}
-
-fn interface(bus: &BusUrl) -> Option<&str> {
-    match bus {
-        BusUrl::Can { interface } => Some(interface),
-        BusUrl::Unix { .. } => None,
-    }
 }
 
 struct Start<'a> {
@@ -156,7 +149,7 @@ impl Start<'_> {
     }
 
     fn controllers(&self) -> Result<Vec<RunningProgram>, SoakError> {
-        let interface = interface(&self.common.arguments.bus);
+        let interface = self.common.arguments.bus.interface();
         let before = interface.and_then(procfs::listeners);
         let mut controllers = Vec::new();
         for process in Process::controllers(self.spec.two_processes) {

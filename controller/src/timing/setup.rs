@@ -6,7 +6,6 @@ use crate::cli::RunArguments;
 use crate::report;
 use crate::run::RunError;
 use crossbeam_channel::bounded;
-use protocol::bus::BusUrl;
 use realtime::{Clock, Freeze, Instant, MonotonicClock};
 use runlog::flight_dump::Log;
 use runlog::timing_recorder::{Due, TimingRecorder, TimingSetup};
@@ -47,10 +46,7 @@ pub(crate) fn begin(
     let (measured_sender, measured) = bounded(MEASURED_QUEUE);
     let (frame_sender, frames) = bounded(FRAME_QUEUE);
     let outlets = Outlets { measured: measured_sender, frames: frame_sender };
-    let interface = match &arguments.bus {
-        BusUrl::Can { interface } => interface.as_str(),
-        BusUrl::Unix { .. } => EMBEDDED_INTERFACE,
-    };
+    let interface = arguments.bus.interface().unwrap_or(EMBEDDED_INTERFACE);
     let recorder = TimingRecorder::create(TimingSetup {
         folder: arguments.files.out.clone(),
         process: report::process(arguments.axis.list()).name().into(),

@@ -27,7 +27,7 @@ pub struct Overlay {
 impl Overlay {
     /// Adds the effect of a fault; faults of frames and nodes act on the wire instead.
     pub fn put(&mut self, fault: &Fault, rig: &RigParameters) {
-        let (place, values) = (fault.place_index(), fault.values());
+        let (place, values) = (fault.place_index(), fault.values);
         let first = values[0];
         // Places of chambers are those of the drive, then those of the load.
         let (axis, chamber) = (place / 2, place % 2);
@@ -73,7 +73,7 @@ impl Overlay {
 pub fn on_wire(fault: &Fault) -> Option<(WireFault, Frames)> {
     let Kind::Bus(kind) = fault.spec.kind else { return None };
     let place = fault.place_index();
-    let [first, second, third] = fault.values();
+    let [first, second, third] = fault.values;
     let (probability, whole) = (first, second as u32);
     let wire = match kind {
         BusKind::Loss => WireFault::Loss { probability },

@@ -266,7 +266,7 @@ fn has_hit(fault: &Fault, plant: &Plant) -> bool {
     let axis = Axis::ALL[fault.place_index()];
     let extension_m = plant.state().axis(axis).extension_m;
     // Away from the other end, where it may have begun.
-    let towards_far_end = fault.values()[0] > 0.0;
+    let towards_far_end = fault.values[0] > 0.0;
     plant.at_an_end(axis) && (extension_m > 0.0) == towards_far_end
 }
 

@@ -35,7 +35,7 @@ pub(crate) struct RigTimingReport {
 }
 
 pub(crate) struct RigTiming {
-    recorder: TimingRecorder,
+    pub(super) recorder: TimingRecorder,
     round_trip: [Further; 2],
     /// Round trips of cycles whose rows are still to come.
     trips: VecDeque<RoundTrip>,
@@ -121,16 +121,6 @@ impl RigTiming {
         let step = self.wall_clock.look();
         self.steps.extend(step.filter(|_| self.steps.len() < MOST_STEPS));
         self.recorder.advance(now)
-    }
-
-    /// New lines of the `.hlog`.
-    pub(crate) fn new_lines(&mut self) -> Vec<u8> {
-        self.recorder.new_lines()
-    }
-
-    /// Writes buffered rows.
-    pub(crate) fn flush(&mut self) -> io::Result<()> {
-        self.recorder.write_out()
     }
 
     /// Writes everything and returns the statistics, also after a failure.

@@ -62,14 +62,10 @@ pub(crate) struct WriterSetup {
 pub(crate) struct WriterReport {
     /// Rows in `measurement.csv` and `truth.csv`.
     pub rows: u64,
-    /// Lines in `bus.log`.
-    pub frames: u64,
     /// The first events of each kind.
     pub events: Vec<Event>,
     pub event_count: u64,
     pub timing: RigTimingReport,
-    /// Why writing failed, if it did.
-    pub failure: Option<String>,
 }
 
 /// The open files of a run.
@@ -189,7 +185,7 @@ impl Writer {
     fn serve(&mut self) {
         let Some(telemetry) = &mut self.setup.telemetry else { return };
         if let Some(timing) = &mut self.timing {
-            telemetry.histograms(&timing.new_lines());
+            telemetry.histograms(&timing.recorder.new_lines());
         }
         telemetry.serve(&self.report.events, self.dropped_events);
     }
@@ -212,7 +208,6 @@ impl Writer {
         let (interface, offset) = (&self.setup.interface, self.setup.epoch_offset_ns);
         for record in self.pending.drain(..ready) {
             candump::write_line(self.bus_log.lines(), interface, offset, &record)?;
-            self.report.frames += 1;
             self.bus_log.write_when_full()?;
         }
         Ok(())
@@ -254,16 +249,14 @@ impl Writer {
         self.measurement.write_out()?;
         self.truth.write_out()?;
         self.faults.as_mut().map_or(Ok(()), LineFile::write_out)?;
-        self.timing.as_mut().map_or(Ok(()), RigTiming::flush)
+        self.timing.as_mut().map_or(Ok(()), |timing| timing.recorder.write_out())
     }
 
     fn fail(&mut self, error: &io::Error, shared: &Shared) {
         let folder = self.setup.folder.display();
-        let message = format!(
-            "cannot write to {folder}: {error}; free space or choose another --out, what was written stays"
+        protocol::say!(
+            "emulator: cannot write to {folder}: {error}; free space or choose another --out, what was written stays"
         );
-        protocol::say!("emulator: {message}");
-        self.report.failure = Some(message);
         // One file failed; the others may still be written.
         for file in
             [&mut self.bus_log, &mut self.measurement, &mut self.truth].into_iter().chain(&mut self.faults)

@@ -86,6 +86,15 @@ impl BusUrl {
         (name.len() <= LONGEST_NAME && name.chars().all(is_writable)).then_some(name)
     }
 
+    /// The interface; none of an embedded bus.
+    #[must_use]
+    pub fn interface(&self) -> Option<&str> {
+        match self {
+            Self::Can { interface } => Some(interface),
+            Self::Unix { .. } => None,
+        }
+    }
+
     /// The embedded bus where this user's programs look for it: `$XDG_RUNTIME_DIR/airbench/bus0`, else a folder of
     /// the user's own under the temporary folder.
     #[must_use]
