@@ -42,7 +42,7 @@ enum Stage {
 pub(super) struct Client {
     /// Unique number of the connection.
     pub(super) number: u64,
-    stream: TcpStream,
+    pub(super) stream: TcpStream,
     stage: Stage,
     incoming: Vec<u8>,
     outgoing: VecDeque<Arc<[u8]>>,
@@ -53,7 +53,7 @@ pub(super) struct Client {
     last_progress_ms: u64,
     /// Events lost to a full queue.
     pub(super) missed: u64,
-    gone: bool,
+    pub(super) gone: bool,
 }
 
 impl Client {
@@ -76,20 +76,12 @@ impl Client {
         })
     }
 
-    pub(super) fn stream(&self) -> &TcpStream {
-        &self.stream
-    }
-
     pub(super) fn has_something_to_write(&self) -> bool {
         !self.outgoing.is_empty()
     }
 
     pub(super) fn is_streaming(&self) -> bool {
         self.stage == Stage::Streaming
-    }
-
-    pub(super) fn is_gone(&self) -> bool {
-        self.gone
     }
 
     /// Reads from the socket; returns the request when it is complete.
@@ -251,7 +243,7 @@ mod tests {
 
     fn is_gone(client: &mut Client, now_ms: u64) -> bool {
         client.write(now_ms);
-        client.is_gone()
+        client.gone
     }
 
     #[test]

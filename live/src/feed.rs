@@ -1,8 +1,9 @@
 //! The client end of the emulator's telemetry: connects whenever there is an emulator, and sends console lines.
 
+use super::client::is_not_ready;
 use runlog::telemetry::{Decoder, Packet};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
-use std::io::{self, Read, Write};
+use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -46,9 +47,7 @@ impl Feed {
         };
         let read = match stream.read(&mut self.bytes) {
             Ok(read) if read > 0 => read,
-            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {
-                return false;
-            }
+            Err(error) if is_not_ready(&error) => return false,
             Ok(_) | Err(_) => return self.disconnect(),
         };
         self.decoder.take(&self.bytes[..read]);

@@ -50,6 +50,7 @@ use protocol::bus::BusError;
 use protocol::exit::Exit;
 use realtime::Interrupt;
 use server::Server;
+use std::collections::VecDeque;
 use std::io;
 use std::net::SocketAddr;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -84,6 +85,14 @@ impl LiveError {
 pub fn wall_clock_ns(age_ns: u64) -> u64 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     (now.as_nanos() as u64).saturating_sub(age_ns)
+}
+
+/// Adds to a queue that holds the newest `most`.
+fn push_newest<T>(queue: &mut VecDeque<T>, most: usize, newest: T) {
+    queue.push_back(newest);
+    if queue.len() > most {
+        queue.pop_front();
+    }
 }
 
 /// Serves the page until SIGINT or SIGTERM; returns the exit code of the program.

@@ -1,6 +1,7 @@
 //! A record of the last minute: `measurement.csv` and `bus.log` in the formats of a run, which `discrepancy check` reads.
 
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
+use crate::push_newest;
 use protocol::periods::CYCLE_NS;
 use runlog::candump::{self, FrameRecord};
 use runlog::run_folder::{BUS_LOG, LineFile, MEASUREMENT_CSV};
@@ -35,8 +36,7 @@ pub(crate) struct RecentRecord {
 pub(crate) struct SavedRecord {
     folder: PathBuf,
     interface: String,
-    linked: bool,
-    added_mass_kg: f64,
+    set_up: SetUp,
     cycles: Vec<Measured>,
     frames: Vec<FrameRecord>,
     /// Why it is shorter than requested, for the message.
@@ -48,19 +48,13 @@ impl RecentRecord {
     pub(crate) fn cycle(&mut self, cycle: u64, values: [Option<f64>; MEASURED_COUNT]) {
         let reported: Vec<f64> = values.into_iter().flatten().collect();
         if let Ok(values) = reported.try_into() {
-            self.cycles.push_back(Measured { cycle, values });
-            if self.cycles.len() > CYCLES_KEPT {
-                self.cycles.pop_front();
-            }
+            push_newest(&mut self.cycles, CYCLES_KEPT, Measured { cycle, values });
         }
     }
 
     /// Adds a frame of the bus, sent or received.
     pub(crate) fn frame(&mut self, record: FrameRecord) {
-        self.frames.push_back(record);
-        if self.frames.len() > FRAMES_KEPT {
-            self.frames.pop_front();
-        }
+        push_newest(&mut self.frames, FRAMES_KEPT, record);
     }
 
     /// Records that linkage or weights changed in this cycle.
@@ -81,12 +75,10 @@ impl RecentRecord {
         let from = newest.saturating_sub(cycles);
         let newest_ns = self.frames.back().map_or(0, |record| record.stamp_ns);
         let from_ns = newest_ns.saturating_sub(cycles * CYCLE_NS);
-        let SetUp { linked, added_mass_kg } = set_up;
         SavedRecord {
             folder: folder.join(format!("saved-{}", newest_ns / 1_000_000)),
             interface: interface.to_owned(),
-            linked,
-            added_mass_kg,
+            set_up,
             cycles: self.cycles.iter().filter(|measured| measured.cycle > from).copied().collect(),
             frames: self.frames.iter().filter(|record| record.stamp_ns > from_ns).copied().collect(),
             cut,
@@ -116,7 +108,8 @@ impl SavedRecord {
             return Ok(reported);
         }
         let mut table = LineFile::create(&self.folder.join(MEASUREMENT_CSV))?;
-        write!(table.lines(), "# linked={} added_mass_kg={}\ntime_s", self.linked, self.added_mass_kg)?;
+        let SetUp { linked, added_mass_kg } = self.set_up;
+        write!(table.lines(), "# linked={linked} added_mass_kg={added_mass_kg}\ntime_s")?;
         for axis in AXES {
             MEASURED.iter().try_for_each(|column| write!(table.lines(), ",{axis}_{column}"))?;
         }

@@ -1,6 +1,7 @@
 //! Latency histograms from the telemetry: wake-ups and round trips, of the whole run and of the last 10 s.
 
 use super::state::StagePercentiles;
+use crate::push_newest;
 use latency::hlog;
 use latency::kinds::{ROUND_TRIPS, WAKE_UP};
 use latency::samples::Samples;
@@ -35,10 +36,7 @@ impl LatencyHistograms {
             let second = passing.start_s as u64;
             let recent = &mut distribution.recent;
             if recent.back().is_none_or(|(newest, _)| *newest != second) {
-                recent.push_back((second, Samples::default()));
-                if recent.len() > RECENT_S {
-                    recent.pop_front();
-                }
+                push_newest(recent, RECENT_S, (second, Samples::default()));
             }
             if let Some((_, samples)) = recent.back_mut() {
                 samples.add_histogram(passing.histogram);

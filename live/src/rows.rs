@@ -6,6 +6,7 @@
 
 use super::columns::{COLUMNS, ControllerSignal, Source};
 use super::state::NewestRow;
+use crate::push_newest;
 use protocol::frames::ChainValues;
 use serde_json::{Map, Value, json};
 use std::collections::VecDeque;
@@ -40,11 +41,7 @@ pub(crate) struct Rows {
 impl Rows {
     /// Adds the values that the controller of an axis sent for `cycle`.
     pub(crate) fn add_chain_values(&mut self, axis: usize, cycle: u64, values: ChainValues) {
-        let chain_values = &mut self.chain_values[axis];
-        chain_values.push_back((cycle, values));
-        if chain_values.len() > VALUES_KEPT {
-            chain_values.pop_front();
-        }
+        push_newest(&mut self.chain_values[axis], VALUES_KEPT, (cycle, values));
     }
 
     /// Adds a row, without values of controllers.

@@ -145,7 +145,7 @@ impl Server {
             self.send_due_events(now_ms);
         }
         self.clients.iter_mut().for_each(|client| client.write(now_ms));
-        let gone = self.clients.extract_if(.., |client| client.is_gone());
+        let gone = self.clients.extract_if(.., |client| client.gone);
         self.missed_by_gone += gone.map(|client| client.missed).sum::<u64>();
         Ok(())
     }
@@ -153,7 +153,7 @@ impl Server {
     /// Indices of the readable clients, and whether a connection waits.
     fn wait(&self) -> io::Result<(Vec<usize>, bool)> {
         let left_ms = self.due.turn.saturating_sub(self.now_ms());
-        let clients = self.clients.iter().map(|client| (client.stream(), client.has_something_to_write()));
+        let clients = self.clients.iter().map(|client| (&client.stream, client.has_something_to_write()));
         wait(&self.listener, clients, None, left_ms as i64)
     }
 
@@ -209,18 +209,15 @@ impl Server {
     /// Passes the emulator's answer on to the client that sent the command.
     fn pass_on_answer(&mut self, text: &str, now_ms: u64) {
         let Some(number) = self.asked.pop_front() else { return };
-        let reported = match serde_json::from_str(text) {
+        let (status, text) = match serde_json::from_str(text) {
             Ok(Answer { ok: true, text }) if text.is_empty() => {
-                message_response(Status::Good, "the emulator obeys")
+                (Status::Good, "the emulator obeys".to_owned())
             }
-            Ok(Answer { ok: true, text }) => message_response(Status::Good, &text),
-            Ok(Answer { ok: false, text }) => message_response(Status::BadRequest, &text),
-            Err(error) => message_response(
-                Status::BadRequest,
-                &format!("the emulator's answer cannot be read: {error}"),
-            ),
+            Ok(Answer { ok: true, text }) => (Status::Good, text),
+            Ok(Answer { ok: false, text }) => (Status::BadRequest, text),
+            Err(error) => (Status::BadRequest, format!("the emulator's answer cannot be read: {error}")),
         };
-        self.answer(number, reported, now_ms);
+        self.answer(number, message_response(status, &text), now_ms);
     }
 
     fn answer(&mut self, number: u64, response: Vec<u8>, now_ms: u64) {
@@ -348,10 +345,8 @@ impl Server {
             return Some(message_response(Status::MethodNotAllowed, "orders come by POST"));
         }
         let Some(token) = &self.token else {
-            return Some(message_response(
-                Status::Forbidden,
-                "this page only looks on: it was started without --control",
-            ));
+            let why = "this page only looks on: it was started without --control";
+            return Some(message_response(Status::Forbidden, why));
         };
         // Browsers send the origin of a request; programs send none and need the token too.
         let host = request.host.as_deref().unwrap_or_default();
@@ -360,10 +355,8 @@ impl Server {
         }
         let shown = request.token.as_deref().unwrap_or_default();
         if !is_same(token.as_bytes(), shown.as_bytes()) {
-            return Some(message_response(
-                Status::Unauthorized,
-                "the token is missing or wrong: open the address that was printed",
-            ));
+            let why = "the token is missing or wrong: open the address that was printed";
+            return Some(message_response(Status::Unauthorized, why));
         }
         match control::read(&request.body) {
             Ok(order) => self.execute(number, order, now_ms),
@@ -373,14 +366,8 @@ impl Server {
 
     fn execute(&mut self, number: u64, order: Order, now_ms: u64) -> Option<Vec<u8>> {
         match order {
-            Order::Stop => {
-                self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
-                Some(self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(false)), now_ms))
-            }
-            Order::Release => {
-                self.stop_due_ms = None;
-                Some(self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(true)), now_ms))
-            }
+            Order::Stop => Some(self.send_stop(false, now_ms)),
+            Order::Release => Some(self.send_stop(true, now_ms)),
             Order::Frame(frame) => Some(self.send(&frame, now_ms)),
             Order::SetPoint { axis, position_m, force_n } => {
                 let asked = self.view.wire.hand_set_point(axis, position_m, force_n);
@@ -390,15 +377,12 @@ impl Server {
                 })
             }
             Order::Line(line) => {
-                let left = self.feed.as_mut().is_some_and(|feed| feed.command(&line));
-                if left {
+                if self.feed.as_mut().is_some_and(|feed| feed.command(&line)) {
                     self.asked.push_back(number);
                     return None;
                 }
-                Some(message_response(
-                    Status::Busy,
-                    "no emulator listens: start it with --telemetry and --console",
-                ))
+                let why = "no emulator listens: start it with --telemetry and --console";
+                Some(message_response(Status::Busy, why))
             }
             Order::Save(seconds) => self.save(number, seconds),
         }
@@ -413,7 +397,7 @@ impl Server {
         match self.bus.send(&encoded) {
             Ok(_) => {
                 // A peer does not receive its frames.
-                self.view.sent(encoded, wall_clock_ns(0));
+                self.view.minute.frame(FrameRecord { stamp_ns: wall_clock_ns(0), frame: encoded });
                 if let Frame::ConsoleEmergencyStop(stop) = frame {
                     self.view.wire.note_stop(CONSOLE, *stop, now_ms);
                 }
@@ -426,9 +410,13 @@ impl Server {
     /// Sends the console's stop again, as `rig.dbc` requires while it is held; this reaches a rig that starts later too.
     fn repeat_stop(&mut self, now_ms: u64) {
         if self.stop_due_ms.is_some_and(|due_ms| now_ms >= due_ms) {
-            self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
-            let _ = self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(false)), now_ms);
+            let _ = self.send_stop(false, now_ms);
         }
+    }
+
+    fn send_stop(&mut self, release: bool, now_ms: u64) -> Vec<u8> {
+        self.stop_due_ms = (!release).then_some(now_ms + EMERGENCY_STOP_CYCLES);
+        self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(release)), now_ms)
     }
 
     fn save(&mut self, number: u64, seconds: f64) -> Option<Vec<u8>> {
@@ -439,7 +427,7 @@ impl Server {
             return Some(message_response(Status::Busy, "a record is being saved already"));
         }
         let interface = self.url.name().unwrap_or_else(|| NAMELESS.into());
-        let record = self.view.minute.last(seconds, &folder, &interface, self.view.set_up());
+        let record = self.view.minute.last(seconds, &folder, &interface, self.view.set_up);
         let done = self.saved.0.clone();
         // In a thread, since the disk may be slow.
         std::thread::spawn(move || done.send((number, record.write())));

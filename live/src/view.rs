@@ -8,7 +8,7 @@ use super::rhythm::LatencyHistograms;
 use super::rows::{Rows, SPACING_CYCLES};
 use super::state::{ActiveFault, Level, Message, State, Timing};
 use super::wire::{Wire, WireEvent};
-use protocol::can::CanFrame;
+use crate::push_newest;
 use runlog::candump::FrameRecord;
 use runlog::event::{EventKind, FaultChange};
 use runlog::telemetry::{Description, EventMessage, FaultEntry, Packet, SetUp};
@@ -46,8 +46,8 @@ pub(crate) struct View {
     records_lost: u64,
     /// Active faults by number.
     faults: BTreeMap<u16, ActiveFault>,
-    /// Set-up of the rig, from the telemetry.
-    set_up: SetUp,
+    /// Set-up of the rig in the newest cycle, from the telemetry.
+    pub set_up: SetUp,
     messages: VecDeque<Message>,
     fresh: Vec<Message>,
 }
@@ -75,28 +75,17 @@ impl View {
             Packet::Cycle(cycle, values) => self.take_cycle(cycle, &values),
             Packet::Event(text) => match serde_json::from_str(&text) {
                 Ok(event) => self.event(event),
-                Err(error) => {
-                    self.report(
-                        Level::Warning,
-                        &format!("an event of the telemetry cannot be read: {error}"),
-                    );
-                }
+                Err(error) => self.warn(&format!("an event of the telemetry cannot be read: {error}")),
             },
             Packet::Histogram(line) => {
                 if let Err(error) = self.rhythm.take(&line) {
-                    self.report(
-                        Level::Warning,
-                        &format!("a histogram of the telemetry cannot be read: {error}"),
-                    );
+                    self.warn(&format!("a histogram of the telemetry cannot be read: {error}"));
                 }
             }
             Packet::Loss(records) => {
                 self.records_lost = records;
                 let text = format!("{records} records of the telemetry did not come here");
-                self.report(
-                    Level::Warning,
-                    &format!("{text}: what is broken and how much was skipped may be out of date"),
-                );
+                self.warn(&format!("{text}: what is broken and how much was skipped may be out of date"));
             }
             Packet::Answer(_) => {}
         }
@@ -104,11 +93,8 @@ impl View {
 
     /// A run begins, or is joined. Data of another run is discarded; the emulator sends what happened earlier in this one.
     fn describe(&mut self, text: &str) {
-        let (description, error) = match serde_json::from_str::<Description>(text) {
-            Ok(description) => (Some(description), None),
-            Err(error) => (None, Some(error)),
-        };
-        let known = description.clone().unwrap_or_default();
+        let read = serde_json::from_str::<Description>(text);
+        let known = read.as_ref().cloned().unwrap_or_default();
         let folder = self.folder.clone().or_else(|| folder_of(&known));
         let mut wire = std::mem::take(&mut self.wire);
         wire.reset();
@@ -121,11 +107,11 @@ impl View {
             skipped: known.dropped_events.skipped,
             telemetry: true,
             wire,
-            description,
+            description: read.as_ref().ok().cloned(),
             ..Self::new(self.folder.as_deref())
         };
-        if let Some(error) = error {
-            self.report(Level::Warning, &format!("the description of the telemetry cannot be read: {error}"));
+        if let Err(error) = read {
+            self.warn(&format!("the description of the telemetry cannot be read: {error}"));
         }
     }
 
@@ -167,7 +153,7 @@ impl View {
             self.rows = Rows::default();
         }
         self.cycle = Some(cycle);
-        let measured = self.wire.measured();
+        let measured = self.wire.measured;
         let of = |source: &Source| match source {
             Source::Measured(index) => measured[*index],
             Source::Supply => self.supply_on_bus_pa(),
@@ -178,7 +164,7 @@ impl View {
     }
 
     fn supply_on_bus_pa(&self) -> Option<f64> {
-        self.wire.status().map(|status| status.supply_pressure_pa)
+        self.wire.status.map(|status| status.supply_pressure_pa)
     }
 
     fn event(&mut self, EventMessage { cycle, kind, text }: EventMessage) {
@@ -213,18 +199,15 @@ impl View {
         }
     }
 
-    /// A message of the page itself, at the newest cycle.
-    pub(crate) fn report(&mut self, level: Level, text: &str) {
-        self.say(self.cycle.unwrap_or_default(), level, text, true);
+    /// A warning of the page itself, at the newest cycle.
+    fn warn(&mut self, text: &str) {
+        self.say(self.cycle.unwrap_or_default(), Level::Warning, text, true);
     }
 
     fn say(&mut self, cycle: u64, level: Level, text: &str, is_kept: bool) {
         let message = Message { t_s: cycle as f64 / 1000.0, level, text: text.to_owned() };
         if is_kept {
-            self.messages.push_back(message.clone());
-            if self.messages.len() > MESSAGES_KEPT {
-                self.messages.pop_front();
-            }
+            push_newest(&mut self.messages, MESSAGES_KEPT, message.clone());
         }
         self.fresh.push(message);
     }
@@ -244,11 +227,6 @@ impl View {
 
     pub(crate) fn run_folder(&self) -> Option<PathBuf> {
         self.folder.clone().or_else(|| self.description.as_ref().and_then(folder_of))
-    }
-
-    /// Set-up of the rig in the newest cycle.
-    pub(crate) fn set_up(&self) -> SetUp {
-        self.set_up
     }
 
     /// Overruns in each of the last seconds, the current one last.
@@ -288,7 +266,7 @@ impl View {
     }
 
     pub(crate) fn state(&self, audience: Audience) -> State {
-        let status = self.wire.status();
+        let status = self.wire.status;
         State {
             cycle: self.cycle,
             t_s: self.cycle.map(|cycle| cycle as f64 / 1000.0),
@@ -317,11 +295,6 @@ impl View {
     /// The state with the last messages, for a new client.
     pub(crate) fn state_with_messages(&self, audience: Audience) -> State {
         State { messages: Some(self.messages.iter().cloned().collect()), ..self.state(audience) }
-    }
-
-    /// Records a frame that this program sent.
-    pub(crate) fn sent(&mut self, frame: CanFrame, stamp_ns: u64) {
-        self.minute.frame(FrameRecord { stamp_ns, frame });
     }
 }
 
@@ -435,10 +408,10 @@ mod tests {
     fn the_set_up_is_that_of_the_newest_change() {
         let mut view = View::new(None);
         described(&mut view, DroppedEvents::default());
-        assert_eq!(view.set_up(), SetUp { linked: false, added_mass_kg: 1.0 });
+        assert_eq!(view.set_up, SetUp { linked: false, added_mass_kg: 1.0 });
         event(&mut view, 10, &json!("linked"));
         event(&mut view, 20, &json!({ "weights": { "added_mass_kg": 2.5 } }));
-        assert_eq!(view.set_up(), SetUp { linked: true, added_mass_kg: 2.5 });
+        assert_eq!(view.set_up, SetUp { linked: true, added_mass_kg: 2.5 });
         event(&mut view, 30, &json!("unlinked"));
         assert_eq!(state(&view)["linked"], false);
     }

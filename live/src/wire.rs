@@ -44,10 +44,11 @@ pub(crate) struct Wire {
     /// Cycles that the rig skipped since the first tick, and its counter in the last tick.
     skipped: u64,
     skipped_reported: Option<u16>,
-    status: Option<RigStatus>,
+    pub(crate) status: Option<RigStatus>,
     chains: [Option<(u64, ChainStatus)>; 2],
     stops: [Option<u64>; 4],
-    measured: [Option<f64>; MEASURED_COUNT],
+    /// Newest values of sensors and valves.
+    pub(crate) measured: [Option<f64>; MEASURED_COUNT],
     lost: u64,
     malformed: u64,
     frames: Counts,
@@ -195,15 +196,6 @@ impl Wire {
         self.stops[stopper] = (!stop.release).then_some(now_ms);
     }
 
-    pub(crate) fn status(&self) -> Option<&RigStatus> {
-        self.status.as_ref()
-    }
-
-    /// Newest values of sensors and valves.
-    pub(crate) fn measured(&self) -> &[Option<f64>; MEASURED_COUNT] {
-        &self.measured
-    }
-
     /// The emergency stop: whether it is tripped, and which nodes hold it.
     pub(crate) fn emergency_stop(&self, now_ms: u64) -> EmergencyStopState {
         let holds = |at: &Option<u64>| at.is_some_and(|at_ms| now_ms.saturating_sub(at_ms) < STOP_HOLDS_MS);
@@ -226,7 +218,12 @@ impl Wire {
 
     /// Closes the current second of the counters, if it is over.
     pub(crate) fn turn(&mut self, now_ms: u64) {
-        self.frames.turn(now_ms);
+        let frames = &mut self.frames;
+        let passed_ms = now_ms.saturating_sub(frames.since_ms);
+        if passed_ms >= 1000 {
+            (frames.since_ms, frames.last_ms) = (now_ms, passed_ms);
+            frames.last = std::mem::take(&mut frames.now);
+        }
     }
 
     /// Bus load by frame, and lost frames.
@@ -299,14 +296,6 @@ impl Counts {
         self.now[place] += 1;
         self.total[place] += 1;
     }
-
-    fn turn(&mut self, now_ms: u64) {
-        let passed_ms = now_ms.saturating_sub(self.since_ms);
-        if passed_ms >= 1000 {
-            (self.since_ms, self.last_ms) = (now_ms, passed_ms);
-            self.last = std::mem::take(&mut self.now);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -362,7 +351,7 @@ mod tests {
         let mut wire = wire(21, &[], 0);
         go_on(&mut wire, [122, 121, 123, 123, 125, 126, 127, 124]);
         assert_eq!(wire.cycle, Some(127));
-        assert_eq!(wire.measured()[1].map(|m| (m * 1e3).round()), Some(127.0), "the newest stand");
+        assert_eq!(wire.measured[1].map(|m| (m * 1e3).round()), Some(127.0), "the newest stand");
         go_on(&mut wire, 128..=130);
         assert_eq!(wire.take(&tick(130, 0), 0), Some(WireEvent::Cycle(130, false)));
         assert_eq!(wire.load().lost, 0);
