@@ -4,6 +4,7 @@
 //! turns with the runs, enough cycles for the percentiles that are reported, no probe that burns the CPUs, no record lost. *Not
 //! controlled* is what another machine or another hour may do differently, and what a reader must know to judge.
 
+use super::add_new;
 use super::controlled::not_controlled;
 use super::files::{EMULATOR, RunFiles};
 use super::model::{Claim, Conditions};
@@ -144,17 +145,9 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions, counts: &[CycleCount]) 
     if dropped > 0 {
         reasons.push(format!("{dropped} records did not reach the files."));
     }
-    let mut add = |found: Vec<String>| {
-        for sentence in found {
-            if !reasons.contains(&sentence) {
-                reasons.push(sentence);
-            }
-        }
-    };
     for (run, count) in runs.iter().zip(counts) {
-        add(unlike_reference(run));
-        add(shared_cpu(run));
-        add(of_the_run(run, *count));
+        let found = [unlike_reference(run), shared_cpu(run), of_the_run(run, *count)].concat();
+        found.into_iter().for_each(|sentence| add_new(&mut reasons, sentence));
     }
     if runs.iter().filter_map(RunFiles::description).any(|description| description.counts_allocations) {
         reasons.push("The build counts allocations, which costs time.".into());
@@ -248,10 +241,7 @@ fn of_the_run(run: &RunFiles, count: CycleCount) -> Vec<String> {
 pub(super) fn virtual_machine(runs: &[RunFiles]) -> Option<String> {
     let mut hosts: Vec<String> = Vec::new();
     for hypervisor in runs.iter().map(RunFiles::hypervisor).filter(Hypervisor::is_present) {
-        let host = hypervisor.to_string();
-        if !hosts.contains(&host) {
-            hosts.push(host);
-        }
+        add_new(&mut hosts, hypervisor.to_string());
     }
     (!hosts.is_empty()).then(|| hosts.join("; "))
 }

@@ -7,6 +7,7 @@
 //! # Source
 //! H. B. Mann, D. R. Whitney, Annals of Mathematical Statistics 18 (1947) 50-60.
 
+use super::add_new;
 use super::kinds;
 use super::model::{Comparison, ComparisonCell, ComparisonRow, RunPart};
 use super::samples::Pick;
@@ -35,11 +36,7 @@ pub(crate) fn compare(runs: &[RunPart]) -> Option<Comparison> {
     };
     let group_of: Vec<String> = runs.iter().enumerate().map(named).collect();
     let mut groups: Vec<String> = Vec::new();
-    for group in &group_of {
-        if !groups.contains(group) {
-            groups.push(group.clone());
-        }
-    }
+    group_of.iter().for_each(|group| add_new(&mut groups, group.clone()));
     if groups.len() < 2 {
         return None;
     }

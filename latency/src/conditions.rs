@@ -1,5 +1,6 @@
 //! Where and how it was measured, as facts: each name with the value that all runs share, or those that they do not.
 
+use super::add_new;
 use super::files::{EMULATOR, RunFiles};
 use super::model::{Conditions, Fact};
 use realtime::Grant;
@@ -46,10 +47,7 @@ impl Facts {
             self.0.push((name.to_owned(), Vec::new()));
             self.0.len() - 1
         });
-        let values = &mut self.0[place].1;
-        if !values.iter().any(|known| known == value) {
-            values.push(value.to_owned());
-        }
+        add_new(&mut self.0[place].1, value.to_owned());
     }
 
     fn reported(self) -> Vec<Fact> {

@@ -2,6 +2,7 @@
 //!
 //! CPUs are those that the loops were pinned to.
 
+use super::add_new;
 use super::claim::{cpus, virtual_machine};
 use super::files::RunFiles;
 use super::model::Conditions;
@@ -17,13 +18,7 @@ pub(crate) fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<
             "The machine is a virtual one ({host}): its host may stop it at any time, unseen from inside."
         ));
     }
-    for run in runs {
-        for sentence in of_run(run) {
-            if !reported.contains(&sentence) {
-                reported.push(sentence);
-            }
-        }
-    }
+    runs.iter().flat_map(of_run).for_each(|sentence| add_new(&mut reported, sentence));
     if conditions.load_generator.is_none() {
         reported.push("What else ran on the machine was not recorded.".into());
     }

@@ -19,7 +19,7 @@ use super::findings::lost_by_gaps;
 use super::model::{AroundRow, Event, ProbeGap};
 use super::probe::{self, Gap};
 use protocol::periods::CYCLE_NS;
-use rules::{Known, LatenessEvidence};
+use rules::LatenessEvidence;
 use runlog::timing::CycleTiming;
 use std::collections::BTreeMap;
 
@@ -227,7 +227,7 @@ fn seen(
         stages_ns: [row.receive_ns, row.step_ns, row.send_ns],
         vitals: row.vitals,
         continued: after.map(|row| row.vitals.continued).sum(),
-        run_delay: if rows.iter().any(|row| row.vitals.run_delay_ns > 0) { Known::Yes } else { Known::No },
+        knows_run_delay: rows.iter().any(|row| row.vitals.run_delay_ns > 0),
         waited_ns: rows[cluster[0].place..=last].iter().map(|row| row.vitals.run_delay_ns).sum(),
         together_ns: cluster.iter().map(Late::severity_ns).sum(),
         probe_watched: probe::watched(run.gaps.as_deref(), cpu, to_ns),

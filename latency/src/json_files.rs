@@ -60,10 +60,7 @@ pub(crate) struct ControllerFile {
 impl SummaryFile {
     /// From the file's content; `None` for null, which counts as missing.
     pub(crate) fn of(json: Value) -> Option<Self> {
-        if json.is_null() {
-            return None;
-        }
-        let (summary, misfit) = typed(&json);
+        let (summary, misfit) = typed(&json)?;
         Some(Self {
             summary,
             misfit,
@@ -78,10 +75,7 @@ impl SummaryFile {
 impl RunFile {
     /// From the file's content; `None` for null, which counts as missing.
     pub(crate) fn of(json: Value) -> Option<Self> {
-        if json.is_null() {
-            return None;
-        }
-        let (description, misfit) = typed(&json);
+        let (description, misfit) = typed(&json)?;
         Some(Self {
             description,
             misfit,
@@ -95,10 +89,7 @@ impl RunFile {
 impl ControllerFile {
     /// From the file's content; `None` for null, which counts as missing.
     pub(crate) fn of(json: Value) -> Option<Self> {
-        if json.is_null() {
-            return None;
-        }
-        let (report, misfit) = typed(&json);
+        let (report, misfit) = typed(&json)?;
         Some(Self {
             report,
             misfit,
@@ -110,12 +101,12 @@ impl ControllerFile {
     }
 }
 
-/// A file as its type; the empty type with the reason where it does not fit.
-fn typed<T: DeserializeOwned + Default>(json: &Value) -> (T, Option<String>) {
-    match T::deserialize(json) {
+/// A file as its type; the empty type with the reason where it does not fit, `None` for null.
+fn typed<T: DeserializeOwned + Default>(json: &Value) -> Option<(T, Option<String>)> {
+    (!json.is_null()).then(|| match T::deserialize(json) {
         Ok(file) => (file, None),
         Err(error) => (T::default(), Some(error.to_string())),
-    }
+    })
 }
 
 /// A part of a file; empty where it is missing or not as its type has it.

@@ -181,6 +181,13 @@ pub(crate) fn from_files(
     ReportWithSources { report, runs, series, sums }
 }
 
+/// Adds a text to a list unless it is there.
+fn add_new(list: &mut Vec<String>, text: String) {
+    if !list.contains(&text) {
+        list.push(text);
+    }
+}
+
 fn default_title(runs: &[RunFiles]) -> String {
     match runs {
         [one] => format!("Latency report of {}", one.folder.display()),

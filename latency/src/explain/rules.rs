@@ -30,13 +30,6 @@ const MANY_FAULTS: u64 = 20;
 const MINOR_FAULT_NS: u64 = 1_000;
 const MAJOR_FAULT_NS: u64 = 100_000;
 
-/// Whether the kernel tells something.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Known {
-    Yes,
-    No,
-}
-
 /// Evidence of an event, at its worst cycle.
 #[derive(Clone, Debug)]
 pub(crate) struct LatenessEvidence {
@@ -51,7 +44,7 @@ pub(crate) struct LatenessEvidence {
     /// SIGCONTs in the event's cycles and right after.
     pub continued: u64,
     /// Whether the kernel tells for how long threads wait for a CPU.
-    pub run_delay: Known,
+    pub knows_run_delay: bool,
     /// Time that it waited for a CPU in all cycles of the event, ns.
     pub waited_ns: u64,
     /// Lateness or slowness of all cycles of the event, ns.
@@ -103,7 +96,7 @@ fn first_that_holds(seen: &LatenessEvidence) -> Cause {
     }
     let cpu_was_free = seen.probe_watched == ProbeCoverage::Watched
         && seen.still_ns.max(seen.another_ns).saturating_mul(4) < bad_ns;
-    if cpu_was_free || seen.run_delay == Known::No {
+    if cpu_was_free || !seen.knows_run_delay {
         return Cause::Unexplained;
     }
     Cause::MachineStoodStill
@@ -227,9 +220,10 @@ fn evidence(seen: &LatenessEvidence) -> Vec<String> {
     if seen.continued > 0 {
         reported.push(format!("SIGCONT was counted {} time(s) in these cycles.", seen.continued));
     }
-    reported.push(match seen.run_delay {
-        Known::Yes => format!("It was ready and waited for the CPU for {}.", in_words(seen.waited_ns)),
-        Known::No => "The kernel does not tell how long threads wait for a CPU.".to_owned(),
+    reported.push(if seen.knows_run_delay {
+        format!("It was ready and waited for the CPU for {}.", in_words(seen.waited_ns))
+    } else {
+        "The kernel does not tell how long threads wait for a CPU.".to_owned()
     });
     reported.push(format!(
         "Page faults in the cycle: {} minor, {} major.",

@@ -113,6 +113,7 @@ fn rows(event: &Event, place: usize) -> String {
         "switched out",
         "CPU",
     ];
+    let us = |value: f64| number(number::decimal(value, 1));
     let mut table = Table::new(label, head);
     let mut left_out = 0;
     for (process, around) in by_process(event) {
@@ -121,7 +122,6 @@ fn rows(event: &Event, place: usize) -> String {
         left_out += around.len() - shown.len();
         for row in shown {
             let is_hit = process == event.process && row.cycle == event.cycle;
-            let us = |value: f64| number(number::decimal(value, 1));
             table.marked_row(
                 if is_hit { "hit" } else { "" },
                 [
@@ -144,7 +144,6 @@ fn rows(event: &Event, place: usize) -> String {
     );
     for gap in &event.probe {
         let meanwhile = if gap.another_ran { "another thread ran" } else { "the CPU itself stood still" };
-        let us = |value: f64| number(number::decimal(value, 1));
         gaps.row([text(format!("CPU {}", gap.cpu)), us(gap.from_us), us(gap.length_us), text(meanwhile)]);
     }
     let note = match left_out {

@@ -24,9 +24,9 @@ pub(super) struct Size {
 }
 
 /// Over the whole page.
-pub(super) const FULL: Size = Size { width: 960.0, height: 340.0, class: "full" };
+const FULL: Size = Size { width: 960.0, height: 340.0, class: "full" };
 /// Two beside each other.
-pub(super) const HALF: Size = Size { width: 560.0, height: 320.0, class: "half" };
+const HALF: Size = Size { width: 560.0, height: 320.0, class: "half" };
 
 /// Room for labels, in pixels.
 pub(super) const LEFT: f64 = 74.0;
@@ -35,13 +35,20 @@ const TOP: f64 = 12.0;
 pub(super) const FOOT: f64 = 46.0;
 
 pub(super) fn histograms(families: &[Family<'_>]) -> String {
-    let charts = families.iter().enumerate().map(|(place, family)| {
-        // What comes first is looked at first.
-        chart(family, if place == 0 { &FULL } else { &HALF })
-    });
-    let charts: String = charts.collect();
+    charts(families, chart, "No histogram: no length of time was measured.")
+}
+
+/// A chart for each family; `without` says why there is none.
+pub(super) fn charts(
+    families: &[Family<'_>],
+    chart: impl Fn(&Family<'_>, &Size) -> String,
+    without: &str,
+) -> String {
+    // What comes first is looked at first.
+    let sizes = std::iter::once(&FULL).chain(std::iter::repeat(&HALF));
+    let charts: String = families.iter().zip(sizes).map(|(family, size)| chart(family, size)).collect();
     if charts.is_empty() {
-        return none("No histogram: no length of time was measured.");
+        return none(without);
     }
     format!("<div class=\"charts\">\n{charts}</div>\n")
 }

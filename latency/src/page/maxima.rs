@@ -4,9 +4,8 @@
 //! pixels the largest of them is drawn.
 
 use super::families::Family;
-use super::histograms::{FOOT, FULL, HALF, LEFT, RIGHT, Size, figure};
+use super::histograms::{FOOT, LEFT, RIGHT, Size, charts, figure};
 use crate::model::{Distribution, Maximum, Report};
-use pagekit::markup::none;
 use pagekit::number;
 use pagekit::svg::{Drawing, Look, Place, Scale, line, stroke, text, whole_decades};
 
@@ -51,15 +50,8 @@ impl Runs {
 /// A chart for each family that was watched over time.
 pub(super) fn maxima(report: &Report, families: &[Family<'_>]) -> String {
     let runs = Runs::of(report);
-    let charts = families
-        .iter()
-        .enumerate()
-        .map(|(place, family)| chart(family, &runs, if place == 0 { &FULL } else { &HALF }));
-    let charts: String = charts.collect();
-    if charts.is_empty() {
-        return none("No time series: no maxima of single seconds were measured.");
-    }
-    format!("<div class=\"charts\">\n{charts}</div>\n")
+    let without = "No time series: no maxima of single seconds were measured.";
+    charts(families, |family, size| chart(family, &runs, size), without)
 }
 
 fn chart(family: &Family<'_>, runs: &Runs, size: &Size) -> String {

@@ -1,7 +1,7 @@
 //! The runs one by one: how regularly frames came, what was counted, each run's percentiles.
 
 use super::figures::percentiles;
-use crate::model::{ArrivalRow, RunPart};
+use crate::model::{ArrivalRow, PercentilesNs, RunPart};
 use crate::samples::PERCENTILES;
 use crate::tallies;
 use pagekit::grid::Grid;
@@ -9,71 +9,48 @@ use pagekit::markup::{Cell, Table, folded, list, number, words as text};
 use pagekit::number;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What came of one frame at one receiver over all runs.
-#[derive(Default)]
-struct Arrivals {
-    period_ms: u64,
-    count: u64,
-    gaps: u64,
-    /// None of a frame that is sent on change too.
-    bursts: Option<u64>,
-    /// The largest of any run; percentiles of runs cannot be added up.
-    p99: Option<u64>,
-    p999: Option<u64>,
-    max: Option<u64>,
-}
-
-impl Arrivals {
-    fn add(&mut self, row: &ArrivalRow) {
-        let of = &row.interval_ns;
-        self.period_ms = row.period_ms;
-        self.count += row.count;
-        self.gaps += row.gaps;
-        self.bursts = row.bursts.map(|bursts| bursts + self.bursts.unwrap_or(0)).or(self.bursts);
-        self.p99 = self.p99.max(of.p99);
-        self.p999 = self.p999.max(of.p999);
-        self.max = self.max.max(of.max);
-    }
+/// Adds a row to the sum over all runs; of the percentiles the largest, since those of runs cannot be added up.
+fn add(sum: &mut ArrivalRow, row: &ArrivalRow) {
+    sum.period_ms = row.period_ms;
+    sum.count += row.count;
+    sum.gaps += row.gaps;
+    sum.bursts = row.bursts.map(|bursts| bursts + sum.bursts.unwrap_or(0)).or(sum.bursts);
+    let (largest, of) = (&mut sum.interval_ns, &row.interval_ns);
+    largest.p99 = largest.p99.max(of.p99);
+    largest.p999 = largest.p999.max(of.p999);
+    largest.max = largest.max.max(of.max);
 }
 
 /// Gaps and bursts of each cyclic frame, over all runs and for each.
 pub(super) fn arrivals(runs: &[RunPart]) -> String {
-    let mut sums: BTreeMap<(&str, &str), Arrivals> = BTreeMap::new();
+    let mut sums: BTreeMap<(&str, &str), ArrivalRow> = BTreeMap::new();
     let head = ["receiver", "frame", "period, ms", "came", "gaps", "bursts"];
     let intervals = ["interval p99, µs", "p99.9, µs", "longest, µs"];
     let mut each = Table::new("Arrivals of each run", ["run"].into_iter().chain(head).chain(intervals));
     for (run, part) in runs.iter().enumerate() {
         for row in &part.arrivals {
-            sums.entry((&row.receiver, &row.frame)).or_default().add(row);
-            let mut one = Arrivals::default();
-            one.add(row);
-            let names = [text(format!("{run}")), text(&row.receiver)];
-            each.row(names.into_iter().chain(arrival_cells(&row.frame, &one)));
+            let key = (row.receiver.as_str(), row.frame.as_str());
+            sums.entry(key).and_modify(|sum| add(sum, row)).or_insert_with(|| row.clone());
+            each.row([text(format!("{run}"))].into_iter().chain(arrival_cells(row)));
         }
     }
     let mut table = Table::new("Arrivals over all runs", head.into_iter().chain(intervals));
-    for ((receiver, frame), sum) in &sums {
-        table.row([text(*receiver)].into_iter().chain(arrival_cells(frame, sum)));
-    }
+    sums.values().for_each(|sum| table.row(arrival_cells(sum)));
     let lead = "Over all runs; of the percentiles the largest of any run. A gap is an interval longer than one and a half \
                 periods, a burst one shorter than half a period; cycles that the rig missed are gaps too.";
     let all = table.html_or("None was measured.");
-    if sums.is_empty() || runs.len() < 2 {
-        return format!("{}{all}", pagekit::markup::paragraph(lead));
-    }
-    format!(
-        "{}{all}{}",
-        pagekit::markup::paragraph(lead),
-        folded("Each run", &each.html_or("None was measured."))
-    )
+    let is_sum = !sums.is_empty() && runs.len() > 1;
+    let each = if is_sum { folded("Each run", &each.html_or("None was measured.")) } else { String::new() };
+    format!("{}{all}{each}", pagekit::markup::paragraph(lead))
 }
 
-/// A frame and what came of it.
-fn arrival_cells(frame: &str, of: &Arrivals) -> Vec<Cell> {
+/// Receiver and frame, and what came of it.
+fn arrival_cells(of: &ArrivalRow) -> Vec<Cell> {
     let counts = [of.period_ms, of.count, of.gaps].map(|value| number(number::count(value)));
     let bursts = of.bursts.map_or_else(|| text("sent on change too"), |bursts| number(number::count(bursts)));
-    let lengths = [of.p99, of.p999, of.max].map(|ns| number(number::maybe_us(ns)));
-    [text(frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
+    let PercentilesNs { p99, p999, max, .. } = of.interval_ns;
+    let lengths = [p99, p999, max].map(|ns| number(number::maybe_us(ns)));
+    [text(&of.receiver), text(&of.frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
 }
 
 pub(super) fn counts(runs: &[RunPart]) -> String {
