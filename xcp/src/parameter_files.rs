@@ -81,11 +81,6 @@ pub struct ParameterFileWorker {
     folder: PathBuf,
 }
 
-/// Name of the file in the run's folder that stores a set.
-fn file_name(axis: Axis) -> String {
-    format!("controller-{}-parameters.toml", axis.name())
-}
-
 impl ParameterFileWorker {
     /// A worker for these axes. `folder` is the run's folder; loaded values go to `changes`.
     pub fn new(
@@ -140,8 +135,9 @@ impl ParameterFileWorker {
         self.axes.iter().find(|axis_parameters| axis_parameters.axis == axis)
     }
 
+    /// The file that stores a set.
     fn path(&self, axis: Axis) -> PathBuf {
-        self.folder.join(file_name(axis))
+        self.folder.join(format!("controller-{}-parameters.toml", axis.name()))
     }
 
     fn store(&self, axis: Axis, values: Vec<f64>) {
