@@ -126,14 +126,14 @@ pub enum NoPort {}
 impl CalibrationPort for NoPort {}
 
 pub struct ControllerNode<P = NoPort> {
-    view: RigView,
+    pub view: RigView,
     members: Vec<Member<P>>,
     outlets: Outlets,
-    ignored: IgnoredFrames,
-    records_dropped: u64,
-    ending: bool,
+    pub ignored: IgnoredFrames,
+    pub records_dropped: u64,
+    pub ending: bool,
     /// Cycles that an axis answered, each once.
-    answered: u64,
+    pub answered: u64,
     newest_answered: Option<u64>,
 }
 
@@ -329,10 +329,6 @@ impl<P: CalibrationPort> ControllerNode<P> {
         let _ = self.outlets.news.try_send(news);
     }
 
-    pub fn ending(&self) -> bool {
-        self.ending
-    }
-
     pub fn controllers(&self) -> impl Iterator<Item = &AxisController> {
         self.members.iter().map(|member| &member.controller)
     }
@@ -349,19 +345,6 @@ impl<P: CalibrationPort> ControllerNode<P> {
         self.controllers().all(|controller| controller.state() == MainChainState::Done)
     }
 
-    pub fn view(&self) -> &RigView {
-        &self.view
-    }
-
-    pub fn ignored(&self) -> IgnoredFrames {
-        self.ignored
-    }
-
-    /// Cycles that an axis answered, each once.
-    pub fn answered(&self) -> u64 {
-        self.answered
-    }
-
     /// Cycles answered by `axis`; 0 where it is none of ours.
     pub fn answered_by(&self, axis: Axis) -> u64 {
         self.member(axis).map_or(0, |member| member.answered)
@@ -370,10 +353,6 @@ impl<P: CalibrationPort> ControllerNode<P> {
     /// Cycles answered since an axis was stopped for good, by an abort or a fault; 0 while none is.
     pub fn stopped_for(&self) -> u64 {
         self.members.iter().map(|member| member.stopped_for).max().unwrap_or(0)
-    }
-
-    pub fn records_dropped(&self) -> u64 {
-        self.records_dropped
     }
 }
 

@@ -117,11 +117,11 @@ impl Motion {
     }
 
     pub fn start_m(&self) -> f64 {
-        self.row.start()
+        self.row.start
     }
 
     pub fn end_m(&self) -> f64 {
-        self.row.end()
+        self.row.end
     }
 }
 

@@ -88,7 +88,7 @@ pub struct Mode {
 
 impl Inputs {
     pub fn read(files: &FileArguments) -> Result<Self, InputError> {
-        let rig_toml = read(&files.rig)?;
+        let rig_toml = run_folder::read_text(&files.rig).map_err(InputError::of)?;
         let rig =
             RigParameters::from_toml(&rig_toml, &files.rig.display().to_string()).map_err(InputError::of)?;
         let (stroke_m, most_m) = (rig.cylinder().stroke_m, DRIVE_CHAIN_VALUES.signals[0].max);
@@ -98,7 +98,7 @@ impl Inputs {
                 "{file}: cylinder.stroke_mm: {stroke_m} m; rig.dbc carries positions of at most {most_m} m"
             )));
         }
-        let experiment_toml = read(&files.experiment)?;
+        let experiment_toml = run_folder::read_text(&files.experiment).map_err(InputError::of)?;
         let given = [&files.drive_program, &files.load_program];
         let source_of = |axis: Axis, section: &AxisExperiment| {
             let path = match (given[axis.index()], &files.programs) {
@@ -367,11 +367,6 @@ fn parse_override(text: &str) -> Result<Setting, InputError> {
             "--set {text}: expected AXIS.TASK.NAME=NUMBER, such as drive.algorithm.gain_per_s=30"
         ))
     })
-}
-
-fn read(path: &Path) -> Result<String, InputError> {
-    std::fs::read_to_string(path)
-        .map_err(|error| InputError(format!("cannot read {}: {error}", path.display())))
 }
 
 #[cfg(test)]

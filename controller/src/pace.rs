@@ -71,7 +71,7 @@ pub(crate) fn run_real(
     stopwatch.begin();
     let end = loop {
         bus.wait_readable(LONGEST_WAIT);
-        if watch.is_none() && node.answered() >= WARM_UP {
+        if watch.is_none() && node.answered >= WARM_UP {
             watch = Some(realtime::allocations::watch());
         }
         stopwatch.woke();
@@ -85,7 +85,7 @@ pub(crate) fn run_real(
         if interrupt.came() {
             break End::Interrupted;
         }
-        if node.ending() {
+        if node.ending {
             break End::RigEnded;
         }
         ever_up |= bus.is_up();
@@ -152,7 +152,7 @@ impl RigActivity {
 
     /// Counts of the rig's frames, sensors and ticks; those of other nodes do not count.
     fn counts(node: &Node) -> (PerAxis, Option<u64>) {
-        (node.view().received, node.view().cycle())
+        (node.view.received, node.view.cycle())
     }
 
     /// Duration of its silence; reports when the silence begins.
@@ -188,7 +188,7 @@ pub(crate) fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOut
                     if interrupt.came() {
                         break End::Interrupted;
                     }
-                    if node.ending() {
+                    if node.ending {
                         break End::RigEnded;
                     }
                     node.answer(bus);
@@ -208,7 +208,7 @@ pub(crate) fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOut
                 let since = *waiting_since.get_or_insert_with(WallInstant::now);
                 if bus.counters().disconnects > 0 || since.elapsed() > grace {
                     // The last tick may be lost on the wire; a rig that leaves when all is done has ended.
-                    let ended = node.ending() || node.done();
+                    let ended = node.ending || node.done();
                     break if ended { End::RigEnded } else { End::BusGone };
                 }
                 bus.wait_readable(Duration::from_millis(100));

@@ -18,7 +18,7 @@ fn of_axis<P: CalibrationPort>(
     node: &ControllerNode<P>,
     inputs: &Inputs,
 ) -> AxisReport {
-    let view = node.view();
+    let view = &node.view;
     let program = controller.program();
     let source = inputs.programs[controller.axis().index()].as_ref();
     let values = program.values().iter();

@@ -250,10 +250,10 @@ impl ControlLoop<'_> {
             grants,
             bus: *bus.counters(),
             axes,
-            answered: node.answered(),
-            skipped: node.view().skipped,
-            ignored: node.ignored(),
-            records_dropped: node.records_dropped(),
+            answered: node.answered,
+            skipped: node.view.skipped,
+            ignored: node.ignored,
+            records_dropped: node.records_dropped,
         })
     }
 }

@@ -90,7 +90,7 @@ impl ForceProfile {
     }
 
     pub fn initial_force_n(&self) -> f64 {
-        self.row.start()
+        self.row.start
     }
 
     fn limited(&self, moment: Moment) -> ForceSetPoint {
@@ -156,21 +156,15 @@ impl ForceSource {
             }
         };
         let point = self.profile.limited(moment);
-        let after_a_load = matches!(self.memory.segment, Some(index) if self.profile.row.is_load(index));
-        self.memory.last_n = after_a_load.then_some(point.force_n);
+        let last = self.memory.segment.and_then(|index| self.profile.row.segments.get(index));
+        self.memory.last_n = matches!(last, Some(Segment::Load { .. })).then_some(point.force_n);
         point
     }
 
     /// The set-point that is held from the end on. After a load that depends on the axis it is the force that it had last, so
     /// that nothing jumps.
     pub fn end(&self) -> ForceSetPoint {
-        ForceSetPoint::at_rest(self.memory.last_n.unwrap_or(self.profile.row.end()))
-    }
-}
-
-impl Row<Segment> {
-    fn is_load(&self, index: usize) -> bool {
-        matches!(self.segment(index), Some(Segment::Load { .. }))
+        ForceSetPoint::at_rest(self.memory.last_n.unwrap_or(self.profile.row.end))
     }
 }
 

@@ -21,12 +21,12 @@ impl Lasting for Arc<dyn Law> {
 /// Segments in a row from a start value; the unit is the row's, m or N.
 #[derive(Clone, Debug)]
 pub(super) struct Row<S> {
-    start: f64,
-    segments: Vec<S>,
+    pub(super) start: f64,
+    pub(super) segments: Vec<S>,
     /// When each segment ends, s after the row's start.
     until_s: Vec<f64>,
     /// The value from the last one's end on.
-    end: f64,
+    pub(super) end: f64,
 }
 
 impl<S: Lasting> Row<S> {
@@ -58,18 +58,6 @@ impl<S: Lasting> Row<S> {
 
     pub(super) fn duration_s(&self) -> f64 {
         self.until_s.last().copied().unwrap_or(0.0)
-    }
-
-    pub(super) fn segment(&self, index: usize) -> Option<&S> {
-        self.segments.get(index)
-    }
-
-    pub(super) fn start(&self) -> f64 {
-        self.start
-    }
-
-    pub(super) fn end(&self) -> f64 {
-        self.end
     }
 }
 

@@ -14,6 +14,7 @@
 
 use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
 use algorithms::algorithm::Quantity;
+use runlog::run_folder::read_text;
 use settings::SettingsError;
 use std::path::Path;
 use std::sync::Arc;
@@ -64,8 +65,7 @@ struct Point {
 }
 
 fn points_of(path: &Path) -> Result<(Quantity, Vec<Point>), String> {
-    let text =
-        std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let text = read_text(path).map_err(|error| error.to_string())?;
     let name = path.display();
     let mut lines =
         (1..).zip(text.lines()).filter(|(_, line)| !line.starts_with('#') && !line.trim().is_empty());
