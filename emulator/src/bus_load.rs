@@ -20,7 +20,7 @@ use std::path::Path;
 pub(crate) fn print(arguments: &BusLoadArguments) -> Result<Exit, RunError> {
     let analysis = RigAnalysis::worst_case(BIT_RATE_PER_S);
     let text = match &arguments.markdown {
-        None => format!("{}\n\n{analysis}", BusLoad::of_rig()),
+        None => format!("{BusLoad}\n\n{analysis}"),
         Some(summary) => markdown(&analysis, &wire_time(summary)?),
     };
     // A closed pipe, as of `| head`, is no error.

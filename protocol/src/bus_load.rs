@@ -81,10 +81,6 @@ const fn bits_down_to_fastest() -> u32 {
     bits
 }
 
-const fn share_ppm(bits: u32, period_ms: u32) -> u64 {
-    share_ppm_at(bits, period_ms, BIT_RATE_PER_S)
-}
-
 /// Share of a bus of `bits_per_s` that a frame of so many bits takes each period, in parts per million.
 #[must_use]
 pub const fn share_ppm_at(bits: u32, period_ms: u32, bits_per_s: u32) -> u64 {
@@ -110,58 +106,34 @@ const fn backlog_ms() -> u32 {
     1 + FULLEST_MILLISECOND_BITS.saturating_sub(BITS_PER_MS).div_ceil(BITS_PER_MS - each_ms)
 }
 
-/// The cyclic messages of `rig.dbc`, those that [`LOAD_PPM`] counts.
-pub fn cyclic_messages() -> impl Iterator<Item = &'static MessageSpec> {
-    MESSAGES.iter().copied().filter(|message| message.cycle_time_ms > 0)
-}
-
-/// The bus load as a table for people: one line for each cyclic frame, sum, reserve, fullest millisecond.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BusLoad {
-    /// Cyclic load with reserve, in parts per million of the bus.
-    pub load_ppm: u64,
-    /// Worst-case bits when everything falls into the same millisecond.
-    pub fullest_millisecond_bits: u32,
-    /// Milliseconds, the fullest one included, until everything of it was sent.
-    pub backlog_ms: u32,
-}
-
-impl BusLoad {
-    /// The load of all that `rig.dbc` sends in cycles.
-    #[must_use]
-    pub const fn of_rig() -> Self {
-        Self {
-            load_ppm: LOAD_PPM,
-            fullest_millisecond_bits: FULLEST_MILLISECOND_BITS,
-            backlog_ms: BACKLOG_MS,
-        }
-    }
-}
+/// The load of all that `rig.dbc` sends in cycles, as a table for people: one line for each cyclic frame, sum, reserve, fullest
+/// millisecond.
+#[derive(Clone, Copy, Debug)]
+pub struct BusLoad;
 
 impl fmt::Display for BusLoad {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { load_ppm, fullest_millisecond_bits, backlog_ms } = *self;
         let percent = |ppm: u64| ppm as f64 / 1e4;
         writeln!(
             f,
             "{:<22} {:>5} {:>5} {:>5} {:>9} {:>8}",
             "frame", "id", "bytes", "bits", "period_ms", "share_%"
         )?;
-        for message in cyclic_messages() {
+        for message in MESSAGES.iter().filter(|message| message.cycle_time_ms > 0) {
             let MessageSpec { name, id, length, cycle_time_ms, .. } = message;
             let bits = worst_case_bits(*length);
-            let share = percent(share_ppm(bits, *cycle_time_ms));
+            let share = percent(share_ppm_at(bits, *cycle_time_ms, BIT_RATE_PER_S));
             writeln!(f, "{name:<22} {id:#05X} {length:>5} {bits:>5} {cycle_time_ms:>9} {share:>8.2}")?;
         }
-        let reserve = share_ppm(RESERVE_BITS, 1);
-        let (name, sum) = ("reserve: one DAQ frame", percent(load_ppm - reserve));
+        let reserve = share_ppm_at(RESERVE_BITS, 1, BIT_RATE_PER_S);
+        let (name, sum) = ("reserve: one DAQ frame", percent(LOAD_PPM - reserve));
         writeln!(f, "{:<22} {:>36.2}", "sum of cyclic frames", sum)?;
         writeln!(f, "{name:<22} {:>5} {:>5} {RESERVE_BITS:>5} {:>9} {:>8.2}", "", 8, 1, percent(reserve))?;
-        writeln!(f, "{:<22} {:>36.2}   limit {:.0}", "load", percent(load_ppm), percent(LOAD_LIMIT_PPM))?;
+        writeln!(f, "{:<22} {:>36.2}   limit {:.0}", "load", percent(LOAD_PPM), percent(LOAD_LIMIT_PPM))?;
         write!(
             f,
-            "fullest millisecond: {fullest_millisecond_bits} bits, {:.1} % of what it carries; sent after {backlog_ms} ms",
-            100.0 * f64::from(fullest_millisecond_bits) / f64::from(BITS_PER_MS)
+            "fullest millisecond: {FULLEST_MILLISECOND_BITS} bits, {:.1} % of what it carries; sent after {BACKLOG_MS} ms",
+            100.0 * f64::from(FULLEST_MILLISECOND_BITS) / f64::from(BITS_PER_MS)
         )
     }
 }
@@ -193,7 +165,7 @@ mod tests {
 
     #[test]
     fn table_shows_each_cyclic_frame_and_the_sums() {
-        let table = BusLoad::of_rig().to_string();
+        let table = BusLoad.to_string();
         for message in MESSAGES {
             assert_eq!(table.contains(message.name), message.cycle_time_ms > 0, "{}", message.name);
         }
