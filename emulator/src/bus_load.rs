@@ -47,7 +47,7 @@ fn markdown(analysis: &RigAnalysis, run: &WireTimeReport) -> String {
         true
     });
     let bounds = analysis.responses().into_iter().zip(as_it_came.responses());
-    for (place, (frame, (bound, as_it_came))) in analysis.frames().iter().zip(bounds).enumerate() {
+    for (place, (frame, (bound, as_it_came))) in analysis.frames.iter().zip(bounds).enumerate() {
         let message = frame.message;
         let seen = seen_of(run, message.id);
         let critical = critical::play(analysis, place, 1);

@@ -79,12 +79,6 @@ impl MessageSpec {
     pub fn by_id(id: u16) -> Option<&'static Self> {
         MESSAGES.iter().find(|spec| spec.id == id).copied()
     }
-
-    /// The entry of [`MESSAGES`] with this name.
-    #[must_use]
-    pub fn by_name(name: &str) -> Option<&'static Self> {
-        MESSAGES.iter().find(|spec| spec.name == name).copied()
-    }
 }
 
 /// What `rig.dbc` says about one signal of a message.

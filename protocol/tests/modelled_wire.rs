@@ -48,7 +48,7 @@ fn any_phasing(analysis: &RigAnalysis, timing: WireTiming, seed: u64) -> WireTim
     const TIME_NS: u64 = 60 * MS;
     let mut model = WireModel::new(timing, seed);
     let mut random = Pcg64Mcg::seed_from_u64(seed);
-    for frame in analysis.frames() {
+    for frame in &analysis.frames {
         let from_ns = random.next_u64() % (10 * MS);
         release_as_early_as_allowed(&mut model, frame, [from_ns, TIME_NS], &mut random);
     }
@@ -56,7 +56,7 @@ fn any_phasing(analysis: &RigAnalysis, timing: WireTiming, seed: u64) -> WireTim
 }
 
 fn expect_below(analysis: &RigAnalysis, seen: &WireTimeReport) -> Result<(), TestCaseError> {
-    for (frame, bound) in analysis.frames().iter().zip(analysis.responses()) {
+    for (frame, bound) in analysis.frames.iter().zip(analysis.responses()) {
         let measured_ns = seen.identifiers[&name(frame.message)].response_ns.max;
         let bound_ns = bound.unwrap().response_ns;
         prop_assert!(measured_ns <= bound_ns, "{}: {measured_ns} of {bound_ns} ns", frame.message.name);

@@ -44,7 +44,7 @@ fn expect_below_the_bounds(wire: &Value) -> Vec<String> {
     };
     let bounds = bounds_ns(&plain).into_iter().zip(bounds_ns(&as_it_came));
     let (mut kept, mut cyclic, mut widened) = (true, 0, Vec::new());
-    for (frame, (plain_ns, as_it_came_ns)) in plain.frames().iter().zip(bounds) {
+    for (frame, (plain_ns, as_it_came_ns)) in plain.frames.iter().zip(bounds) {
         let Some(seen) = seen_of(frame) else { continue };
         let name = frame.message.name;
         let [distance_ns, jitter_ns] = came(seen);
@@ -99,7 +99,7 @@ fn expect_arrivals_as_declared(experiment: &str, log: &Path) {
         cycle += u64::from(id == DRIVE_SENSORS.id);
         sent.push(cycle);
     }
-    for frame in RigAnalysis::worst_case(BIT_RATE_PER_S).frames() {
+    for frame in RigAnalysis::worst_case(BIT_RATE_PER_S).frames {
         let Some(sent) = cycles_of.get(&frame.message.id) else { continue };
         for count in 1..=30.min(sent.len() - 1) {
             let least_ns = frame.arrivals.earliest_ns(count as u64);

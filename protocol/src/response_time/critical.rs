@@ -36,8 +36,8 @@ pub fn play(analysis: &RigAnalysis, place: usize, seed: u64) -> Option<CriticalI
         let bytes = random.next_u64().to_le_bytes();
         CanFrame::new(frame.message.id, &bytes[..usize::from(frame.message.length)])
     };
-    let mut model = WireModel::new(WireTiming::at(analysis.bits_per_s()), seed);
-    let (level, below) = analysis.frames().split_at(place + 1);
+    let mut model = WireModel::new(WireTiming::at(analysis.bits_per_s), seed);
+    let (level, below) = analysis.frames.split_at(place + 1);
     if let Some(longest) = below.iter().max_by_key(|frame| frame.bits) {
         let node = model.join();
         model.enter(node, any_content(longest), 0);
@@ -54,7 +54,7 @@ pub fn play(analysis: &RigAnalysis, place: usize, seed: u64) -> Option<CriticalI
         frame.bits = seen.map_or(0, |seen| seen.bits[1]);
         seen.is_some()
     });
-    let frame = &analysis.frames()[place];
+    let frame = &analysis.frames[place];
     Some(CriticalInstant {
         measured_ns: seen_of(frame, &report)?.response_ns.max,
         bound_ns: sent.response_of(frame.message.id)?.response_ns,
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn the_model_comes_within_a_tenth_of_the_bound_with_the_stuffing_sent() {
         let analysis = RigAnalysis::worst_case(1_000_000);
-        for (place, frame) in analysis.frames().iter().enumerate() {
+        for (place, frame) in analysis.frames.iter().enumerate() {
             for seed in 0..50 {
                 let CriticalInstant { measured_ns, bound_ns } = play(&analysis, place, seed).unwrap();
                 let share = measured_ns as f64 / bound_ns as f64;

@@ -116,6 +116,11 @@ impl RigFrame {
         let period_ns = u64::from(self.message.cycle_time_ms) * MS;
         (period_ns > 0).then(|| period_ns - late_ns(self.message))
     }
+
+    fn is_late(&self, response: Option<Response>) -> bool {
+        let is_beyond = |deadline_ns| response.is_none_or(|found| found.response_ns > deadline_ns);
+        self.deadline_ns().is_some_and(is_beyond)
+    }
 }
 
 /// How much later than its period a frame may be queued.
@@ -127,10 +132,11 @@ fn late_ns(message: &MessageSpec) -> u64 {
 /// The analysis of `rig.dbc` at a bit rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigAnalysis {
-    bits_per_s: u32,
+    /// Bit rate of the wire.
+    pub bits_per_s: u32,
     errors: Option<ErrorBound>,
-    /// In the order of arbitration.
-    frames: Vec<RigFrame>,
+    /// In the order of arbitration, the highest priority first.
+    pub frames: Vec<RigFrame>,
 }
 
 impl RigAnalysis {
@@ -156,18 +162,6 @@ impl RigAnalysis {
         self
     }
 
-    /// Bit rate of the wire.
-    #[must_use]
-    pub fn bits_per_s(&self) -> u32 {
-        self.bits_per_s
-    }
-
-    /// The frames, the highest priority first.
-    #[must_use]
-    pub fn frames(&self) -> &[RigFrame] {
-        &self.frames
-    }
-
     /// The worst case of each frame, in their order.
     #[must_use]
     pub fn responses(&self) -> Vec<Option<Response>> {
@@ -187,19 +181,10 @@ impl RigAnalysis {
         self.responses()[place]
     }
 
-    /// The cyclic frames that are not through by their deadline.
-    fn late(&self) -> Vec<(&RigFrame, Option<u64>)> {
-        let responses = self.responses();
-        let of_frame = self.frames.iter().zip(responses);
-        of_frame
-            .filter_map(|(frame, response)| {
-                let (deadline_ns, response_ns) =
-                    (frame.deadline_ns()?, response.map(|found| found.response_ns));
-                response_ns
-                    .is_none_or(|response_ns| response_ns > deadline_ns)
-                    .then_some((frame, response_ns))
-            })
-            .collect()
+    /// Number of the cyclic frames that are not through by their deadline.
+    fn late(&self) -> usize {
+        let of_frame = self.frames.iter().zip(self.responses());
+        of_frame.filter(|(frame, response)| frame.is_late(*response)).count()
     }
 }
 
@@ -240,20 +225,16 @@ impl fmt::Display for RigAnalysis {
 
 /// Why a bit rate is too low for `rig.dbc`, with the arithmetic.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TooSlow {
-    analysis: RigAnalysis,
-}
+pub struct TooSlow(RigAnalysis);
 
 impl fmt::Display for TooSlow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let bits_per_s = self.analysis.bits_per_s;
+        let bits_per_s = self.0.bits_per_s;
         let percent = |ppm: u64| ppm as f64 / 1e4;
         writeln!(f, "at {bits_per_s} bit/s the cyclic frames of rig.dbc do not fit:")?;
-        let responses = self.analysis.responses();
-        for (frame, found) in self.analysis.frames.iter().zip(responses) {
+        for (frame, found) in self.0.frames.iter().zip(self.0.responses()) {
             let (Some(deadline_ns), message) = (frame.deadline_ns(), frame.message) else { continue };
             let response_ns = found.map(|found| found.response_ns);
-            let late = response_ns.is_none_or(|response_ns| response_ns > deadline_ns);
             let share = percent(share_ppm_at(frame.bits, message.cycle_time_ms, bits_per_s));
             writeln!(
                 f,
@@ -264,7 +245,7 @@ impl fmt::Display for TooSlow {
                 message.cycle_time_ms,
                 in_us(response_ns),
                 in_us(Some(deadline_ns)),
-                if late { "  too late" } else { "" },
+                if frame.is_late(found) { "  too late" } else { "" },
             )?;
         }
         let reserve = percent(share_ppm_at(RESERVE_BITS, 1, bits_per_s));
@@ -274,11 +255,7 @@ impl fmt::Display for TooSlow {
             "reserve: one DAQ frame"
         )?;
         let (load, limit) = (percent(load_ppm_at(bits_per_s)), percent(LOAD_LIMIT_PPM));
-        write!(
-            f,
-            "  load {load:.2} %, limit {limit:.0} %; {} frames miss their deadline",
-            self.analysis.late().len()
-        )
+        write!(f, "  load {load:.2} %, limit {limit:.0} %; {} frames miss their deadline", self.0.late())
     }
 }
 
@@ -288,10 +265,10 @@ impl fmt::Display for TooSlow {
 /// [`TooSlow`], which tells the arithmetic.
 pub fn check(bits_per_s: u32) -> Result<(), TooSlow> {
     let analysis = RigAnalysis::worst_case(bits_per_s);
-    if load_ppm_at(bits_per_s) <= LOAD_LIMIT_PPM && analysis.late().is_empty() {
+    if load_ppm_at(bits_per_s) <= LOAD_LIMIT_PPM && analysis.late() == 0 {
         Ok(())
     } else {
-        Err(TooSlow { analysis })
+        Err(TooSlow(analysis))
     }
 }
 
@@ -304,7 +281,7 @@ mod tests {
 
     #[test]
     fn every_frame_comes_with_a_period_or_a_reason() {
-        for frame in RigAnalysis::worst_case(1_000_000).frames() {
+        for frame in RigAnalysis::worst_case(1_000_000).frames {
             let MessageSpec { name, cycle_time_ms, send_type, .. } = frame.message;
             assert!(frame.arrivals.period_ns > 0, "{name}: add it to ARRIVALS");
             assert!(*cycle_time_ms > 0 || !frame.reason.is_empty(), "{name}");
@@ -327,7 +304,7 @@ mod tests {
     #[test]
     fn what_came_too_close_or_too_early_did_not_keep_to_it() {
         let analysis = RigAnalysis::worst_case(1_000_000);
-        let of = |id: u16| *analysis.frames().iter().find(|frame| frame.message.id == id).unwrap();
+        let of = |id: u16| *analysis.frames.iter().find(|frame| frame.message.id == id).unwrap();
         let (sensors, answer, chain) =
             (of(DRIVE_SENSORS.id), of(DRIVE_VALVE_COMMAND.id), of(DRIVE_CHAIN_STATUS.id));
         assert!(sensors.kept_to(None, None) && sensors.kept_to(Some(950_000), Some(50_000)));
