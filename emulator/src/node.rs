@@ -67,13 +67,13 @@ pub(crate) struct NodeFigures {
 pub(crate) struct EmulatorNode {
     node: RigNode<BreakableRig>,
     console: Option<Receiver<Command>>,
-    quit_asked: bool,
+    pub(crate) quit_asked: bool,
     recorder: Recorder,
     bench_frames: bool,
     lockstep: bool,
     bus_was_up: bool,
     bus_disconnects: u64,
-    frames: FrameCounters,
+    pub(crate) frames: FrameCounters,
     exchange: [ExchangeWatch; 2],
     chains_done: [Option<bool>; 2],
 }
@@ -318,14 +318,6 @@ impl EmulatorNode {
             self.record_event(cycle, EventKind::NotFinite);
         }
         finite
-    }
-
-    pub(crate) fn frame_counters(&self) -> FrameCounters {
-        self.frames
-    }
-
-    pub(crate) fn quit_asked(&self) -> bool {
-        self.quit_asked
     }
 
     /// Whether any valve command was accepted.

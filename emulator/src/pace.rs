@@ -135,7 +135,7 @@ impl RunContext<'_> {
             Some(End::Interrupted)
         } else if shared.output_failed.load(Ordering::Relaxed) {
             Some(End::OutputFailed)
-        } else if node.quit_asked() {
+        } else if node.quit_asked {
             Some(End::Quit)
         } else if limits.cycles.is_some_and(|limit| cycles >= limit) {
             Some(End::TimeUp)

@@ -16,9 +16,9 @@ pub(crate) struct BreakableRig {
 
 impl BreakableRig {
     pub(crate) fn new(mut plant: Plant, mut sensors: Sensors, people: People, faults: FaultSchedule) -> Self {
-        if faults.possible() {
+        if faults.possible {
             plant.expect_faults();
-            sensors.seed_faults(faults.seed());
+            sensors.seed_faults(faults.seed);
         }
         Self { peopled: PeopledPlant::new(plant, sensors, people), faults }
     }
@@ -80,7 +80,7 @@ impl SimulatedRig for BreakableRig {
 
     fn step(&mut self, cycle: u64, valve: [f64; 2]) -> CycleRecord {
         let mut record = self.peopled.step(cycle, valve);
-        if self.faults.possible() {
+        if self.faults.possible {
             record.terms.push(self.faults.active() as f64);
         }
         record

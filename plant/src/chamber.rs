@@ -36,7 +36,8 @@ pub(crate) struct Chambers<P = Pair> {
     area_b: P,
     atmospheric_force: P,
     exhaust_pa: P,
-    normal_pa: f64,
+    /// p_N, Pa.
+    pub(crate) normal_pa: f64,
 }
 
 /// How the lagged flow goes through one span with the edge flow held.
@@ -86,11 +87,6 @@ impl Chambers {
     /// Piston areas of chambers a and b, m^2.
     pub(crate) fn areas_m2(&self) -> [f64; 2] {
         [self.area_a.drive(), self.area_b.drive()]
-    }
-
-    /// p_N, Pa.
-    pub(crate) fn normal_pa(&self) -> f64 {
-        self.normal_pa
     }
 
     #[inline(always)]

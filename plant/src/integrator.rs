@@ -51,7 +51,8 @@ pub(crate) struct Integrator<P = Pair> {
     pub(crate) linkage: Linkage,
     pub(crate) supply: Supply,
     atmospheric_pa: f64,
-    file_dead_volume_m3: f64,
+    /// Dead volume of the rig file, which an effect may have replaced in the chambers, m^3.
+    pub(crate) file_dead_volume_m3: f64,
     substeps: u32,
     coarse: Span<P>,
     fine: Span<P>,
@@ -221,11 +222,6 @@ impl Integrator {
     /// The two lengths of step: a substep, and a part of one.
     pub(crate) fn spans(&self) -> [&Span; 2] {
         [&self.coarse, &self.fine]
-    }
-
-    /// Dead volume of the rig file, which an effect may have replaced in the chambers, m^3.
-    pub(crate) fn file_dead_volume_m3(&self) -> f64 {
-        self.file_dead_volume_m3
     }
 
     /// Pressure around the rods, Pa.

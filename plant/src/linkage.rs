@@ -23,7 +23,7 @@ use crate::parameters::RigParameters;
 /// Gap and contact.
 #[derive(Debug, Clone)]
 pub(crate) struct Linkage {
-    half_gap_m: f64,
+    pub(crate) half_gap_m: f64,
     stiffness_n_per_m: f64,
     damping_n_s_per_m: f64,
 }
@@ -59,10 +59,6 @@ impl Linkage {
             stiffness_n_per_m: form.one(self.stiffness_n_per_m),
             damping_n_s_per_m: form.one(self.damping_n_s_per_m),
         }
-    }
-
-    pub(crate) fn half_gap_m(&self) -> f64 {
-        self.half_gap_m
     }
 
     /// Whether the eye lies in the gap, so that it can be linked.

@@ -280,7 +280,7 @@ impl Plant {
             self.state.linked = true;
             Ok(())
         } else {
-            Err(LinkRefused { distance_m, half_gap_m: self.integrator.linkage.half_gap_m() })
+            Err(LinkRefused { distance_m, half_gap_m: self.integrator.linkage.half_gap_m })
         }
     }
 

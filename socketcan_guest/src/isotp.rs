@@ -194,7 +194,7 @@ impl IsoTp {
         let mask = low | EXTENDED_FLAG | REMOTE_FLAG | crate::abi::ERROR_FLAG;
         let data = &frame[CAN_FRAME_DATA_AT..];
         let at = self.settings.address_bytes();
-        if identifier(frame) & mask != received || at == 1 && data[0] != self.settings.received_address() {
+        if identifier(frame) & mask != received || at == 1 && data[0] != self.settings.received_address {
             return;
         }
         // Bytes beyond the length are accepted with their content, as by the kernel.

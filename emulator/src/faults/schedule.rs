@@ -45,12 +45,13 @@ pub(crate) struct FaultSchedule {
     /// Whether a fault waits or is active.
     busy: bool,
     next_number: u16,
-    seed: u64,
+    /// Seed of all random faults.
+    pub(crate) seed: u64,
     orders: Option<WireOrders>,
     overlay: Overlay,
     pending_marks: VecDeque<(u16, bool)>,
     /// Whether faults are possible in this run.
-    possible: bool,
+    pub(crate) possible: bool,
 }
 
 /// The objects that faults act on in a cycle.
@@ -87,16 +88,6 @@ impl FaultSchedule {
             pending_marks: VecDeque::with_capacity(if possible { MARKS } else { 0 }),
             possible,
         }
-    }
-
-    /// Whether there can be any in this run.
-    pub(crate) fn possible(&self) -> bool {
-        self.possible
-    }
-
-    /// Seed of all random faults.
-    pub(crate) fn seed(&self) -> u64 {
-        self.seed
     }
 
     /// Number of active faults.

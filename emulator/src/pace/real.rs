@@ -56,7 +56,7 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
         bus_lost_at = if bus.is_up() { None } else { bus_lost_at.or(Some(index)) };
         let end = if bus_lost_at.is_some_and(|lost| index - lost > grace_cycles) {
             Some(End::BusGone)
-        } else if index < NEWCOMER_CYCLES && node.frame_counters().second_rig > 0 {
+        } else if index < NEWCOMER_CYCLES && node.frames.second_rig > 0 {
             Some(End::SecondRig)
         } else {
             context.after_cycle(cycles)

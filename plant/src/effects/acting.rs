@@ -399,7 +399,7 @@ impl Laws for Effects {
         }
         let (of, from) = (at.of, at.from);
         let span_s = at.span.span_s;
-        let normal_pa = of.chambers.normal_pa();
+        let normal_pa = of.chambers.normal_pa;
         let volumes = |extension| [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
         let mut stored = to.air().map(|air| air.stored.to_array());

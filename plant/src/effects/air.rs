@@ -75,7 +75,7 @@ impl Effects {
             let inside = ChamberHeat {
                 flow_m3_per_s: heat.flow_m3_per_s,
                 temperature_k: self.temperature_k * heat.stored_j
-                    / (of.chambers.normal_pa() * heat.normal_volume_m3),
+                    / (of.chambers.normal_pa * heat.normal_volume_m3),
                 wetted_m2: wetted_m2(of.chambers.areas_m2()[chamber], heat.volume_m3),
             };
             let carried = effect.thermal_rate_w(ChamberHeat { wetted_m2: 0.0, ..inside });

@@ -338,7 +338,7 @@ pub(crate) struct DeclaredTerms {
     terms: Vec<Acting>,
     laws: Vec<Kept>,
     /// Whether a force, a flow or what is kept is over the force sensor.
-    follows_sensor: bool,
+    pub(crate) follows_sensor: bool,
     kg_per_m3: f64,
     exhaust_pa: f64,
     supply_pa: f64,
@@ -385,11 +385,6 @@ impl DeclaredTerms {
     /// Whether any keeps a value.
     pub(crate) fn remembers(&self) -> bool {
         !self.laws.is_empty()
-    }
-
-    /// Whether a force, a flow or what is kept is over the force sensor.
-    pub(crate) fn follows_sensor(&self) -> bool {
-        self.follows_sensor
     }
 
     /// What they keep where the plant begins, at these [`VARIABLES`].

@@ -164,7 +164,7 @@ impl Memory {
             AxisMoving {
                 spool: lane(lanes.spool),
                 play: lane(lanes.spool),
-                normal_volume_m3: stored_j.map(|stored| lane(stored) / of.chambers.normal_pa()),
+                normal_volume_m3: stored_j.map(|stored| lane(stored) / of.chambers.normal_pa),
                 port_flow_m3_per_s: lanes.air().map(|air| lane(air.flow)),
                 shown: truths,
                 seen: truths,

@@ -14,7 +14,7 @@ impl Effects {
     /// Where the plant begins: what the force sensors show there, and what terms keep of it.
     pub(super) fn begin_forces(&mut self, of: &Integrator, lanes: &Lanes, linked: bool) {
         self.see_forces(of, lanes, Pair::both(0.0), linked);
-        for axis in (0..2).filter(|axis| self.on[*axis].declared.follows_sensor()) {
+        for axis in (0..2).filter(|axis| self.on[*axis].declared.follows_sensor) {
             let values = self.declared_in_step(axis, &seen_at(of, lanes, axis)).values();
             self.memory.declared[axis] = self.on[axis].declared.begin(&values);
         }
@@ -27,7 +27,7 @@ impl Effects {
 
     /// Keeps what the force sensors should show, where a declared term is over it in a step.
     pub(super) fn see_forces(&mut self, of: &Integrator, lanes: &Lanes, hand: Pair, linked: bool) {
-        if self.on.iter().any(|on| on.declared.follows_sensor()) {
+        if self.on.iter().any(|on| on.declared.follows_sensor) {
             let forces = TrueForces::at(of, Some(self), lanes, hand, linked);
             self.memory.sensor_force_n = [0, 1].map(|axis| forces.sensor_n(of, axis));
         }

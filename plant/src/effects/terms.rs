@@ -163,7 +163,7 @@ impl Effects {
                 rate.heat_exchange -=
                     self.work_share(axis) * air.of_axis_pa(axis)[chamber] * area_m2 * place.velocity;
                 teller.balance(&rate, at, element);
-                let file = of.file_dead_volume_m3();
+                let file = of.file_dead_volume_m3;
                 let dead_volume = self.on[axis].dead_volume.map_or(0.0, |effect| effect.term(file));
                 teller.balance(&DeadSpace { dead_volume }, at, element);
             }

@@ -227,7 +227,7 @@ impl Host {
     /// What was counted so far.
     pub(super) fn report(&self) -> HostReport {
         let wire_time = self.timed.as_ref().map(|timed| timed.report(&self.report.peers));
-        let met = self.wire.met().iter();
+        let met = self.wire.met.iter();
         let faults = met.map(|(name, frames)| (Cow::Borrowed(*name), frames.clone())).collect();
         HostReport { wire_time, faults, ..self.report.clone() }
     }

@@ -112,7 +112,7 @@ pub(super) struct Wire {
     orders: Receiver<WireOrder>,
     give: Sender<WireOrder>,
     /// Frames that met a fault, by its name and their identifier.
-    met: BTreeMap<&'static str, FramesById>,
+    pub(super) met: BTreeMap<&'static str, FramesById>,
 }
 
 impl Wire {
@@ -136,11 +136,6 @@ impl Wire {
     /// The way in which orders reach this wire.
     pub(super) fn orders(&self) -> WireOrders {
         WireOrders(self.give.clone())
-    }
-
-    /// Frames that met a fault, by its name.
-    pub(super) fn met(&self) -> &BTreeMap<&'static str, FramesById> {
-        &self.met
     }
 
     /// Whether nothing is done to frames.

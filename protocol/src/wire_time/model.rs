@@ -284,7 +284,7 @@ impl WireModel {
 
     fn suspend(&mut self, from: NodeId) {
         let node = &mut self.nodes[from];
-        if node.is_passive() {
+        if node.passive {
             node.suspended_until_ns = self.now_ns + self.timing.duration_ns(SUSPEND_BITS);
         }
     }

@@ -84,7 +84,7 @@ pub(super) struct Node {
     waiting: Vec<Queued>,
     pub(super) tec: u32,
     pub(super) rec: u32,
-    passive: bool,
+    pub(super) passive: bool,
     pub(super) off: Option<Off>,
     /// Gone from the bus; what it had queued is still sent.
     pub(super) gone: bool,
@@ -138,10 +138,6 @@ impl Node {
     /// Whether it takes part in what happens on the wire.
     pub(super) fn on_the_bus(&self) -> bool {
         self.off.is_none() && !self.gone
-    }
-
-    pub(super) fn is_passive(&self) -> bool {
-        self.passive
     }
 
     pub(super) fn has_sent(&mut self) -> Option<Change> {
@@ -235,7 +231,7 @@ mod tests {
         assert_eq!(sender.has_sent(), Some(Change::Active));
         let mut receiver = Node::default();
         let passive = (0..200).filter_map(|_| receiver.has_seen_failure()).count();
-        assert_eq!((passive, receiver.is_passive(), receiver.rec), (1, true, 200));
+        assert_eq!((passive, receiver.passive, receiver.rec), (1, true, 200));
         assert_eq!(receiver.has_received(), Some(Change::Active));
         assert_eq!(receiver.rec, REC_AFTER_PASSIVE);
     }

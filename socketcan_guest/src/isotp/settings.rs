@@ -42,7 +42,7 @@ pub(super) struct Settings {
     address: u8,
     sent_padding: u8,
     received_padding: u8,
-    received_address: u8,
+    pub(super) received_address: u8,
     frame_time_ns: u32,
     /// Block size, STmin and number of waits of our flow control frames.
     flow_control: [u8; 3],
@@ -150,10 +150,6 @@ impl Settings {
     /// Bytes of the extended address at the start of the data.
     pub(super) fn address_bytes(&self) -> usize {
         usize::from(self.has(flag::EXTEND_ADDR))
-    }
-
-    pub(super) fn received_address(&self) -> u8 {
-        self.received_address
     }
 
     /// Frames of a block in our flow control; 0: no blocks.

@@ -54,7 +54,7 @@ fn faults_begin_and_end_by_time_and_the_plant_is_whole_again() {
          [[fault]]\nname = \"valve-offset\"\nat = \"load\"\noffset = 0.1\nfrom_s = 0.02\nfor_s = 0.02\n",
         false,
     );
-    assert!(bench.schedule.possible());
+    assert!(bench.schedule.possible);
     let reported = bench.run(0, 50);
     assert_eq!(reported, [(10, 1, "begins"), (20, 2, "begins"), (30, 1, "ends"), (40, 2, "ends")]);
     assert_eq!(bench.schedule.overlay, Overlay::default());

@@ -67,7 +67,7 @@ fn a_fault_concerns_its_own_frames_and_ends_when_told() {
     assert_eq!(counters(&out(&mut wire, 3)), [0, 1, 2]);
     let mut wire = with(WireFault::Loss { probability: 1.0 }, Frames::Id(0x120));
     assert_eq!(out(&mut wire, 2), [Fate::Lost(sensors(0)), Fate::Lost(sensors(1))]);
-    assert_eq!(wire.met()["bus-loss"].by_name()["120"], 2);
+    assert_eq!(wire.met["bus-loss"].by_name()["120"], 2);
     assert!(wire.orders().give(WireOrder::End { number: 9 }));
     wire.take_orders(0, &mut Vec::new());
     assert!(wire.is_plain());
@@ -107,7 +107,7 @@ fn a_frame_that_is_held_comes_with_its_copies() {
             assert!(wire.orders().give(begin));
             wire.take_orders(0, &mut Vec::new());
             assert_eq!(counters(&out(&mut wire, 4)), expected, "{first:?}, then {second:?}");
-            assert_eq!(wire.met()["bus-duplication"].by_name()["120"], 4);
+            assert_eq!(wire.met["bus-duplication"].by_name()["120"], 4);
         }
     }
 }
