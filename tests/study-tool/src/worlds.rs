@@ -43,6 +43,8 @@ pub struct Worlds {
     /// Draws that took longer than the targets of the median and of the longest, in each world.
     pub(crate) longer: [[Rate; 2]; 2],
     pub(crate) errors: usize,
+    /// Draws whose classes are not known, of both scores: there the class is the effect alone.
+    pub(crate) without_classes: usize,
     /// Other programs on the same draws.
     pub(crate) others: Vec<PairedCounts>,
 }
@@ -114,6 +116,7 @@ impl Worlds {
             score.cases.iter().filter(|case| case.background == background).cloned().collect()
         };
         let worlds = [false, true].map(|background| in_world(score, background));
+        let without_classes = score.without_classes + left.map_or(0, |left| left.without_classes);
         let left =
             [false, true].map(|background| left.map_or_else(Vec::new, |left| in_world(left, background)));
         let mut rows = rows(&worlds);
@@ -152,6 +155,7 @@ impl Worlds {
             wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
             longer,
             others: others.iter().map(|other| PairedCounts::of(score, other)).collect(),
+            without_classes,
             errors: cases().filter(|case| case.judgement.error.is_some()).count(),
         }
     }
@@ -171,6 +175,14 @@ impl Worlds {
             let _ = writeln!(text, "| {name} | {} |", cells.join(" | "));
         }
         text += &self.wall_time_rows();
+        if self.without_classes > 0 {
+            let _ = writeln!(
+                text,
+                "\n**{} draws have no classes**: there twins count as wrong names. Run `scripts/study cosines --out DIR --done \
+                 LABEL` first.",
+                self.without_classes
+            );
+        }
         text += &self.null_chi2_in_words();
         text += &self.others_in_words();
         text += &self.calibration_in_words();

@@ -23,6 +23,10 @@ fn a_program_that_tells_the_truth_is_right_in_both_worlds() {
     assert_eq!(table.null_chi2_in_words(), "");
     let text = table.markdown();
     assert!(text.contains("of 100 draws") && text.lines().count() > 20, "{text}");
+    for (count, said) in [(0, false), (3, true)] {
+        score.without_classes = count;
+        assert_eq!(Worlds::of(&score, None, &[], 100).markdown().contains("3 draws have no classes"), said);
+    }
     assert!(text.contains("| none of 200 | not resolved (estimate reaches) |"), "{text}");
     assert!(text.contains("| reported |  |") && text.contains("| 94 % | no draw |"), "{text}");
 }
