@@ -46,6 +46,24 @@ impl Caller {
         Ok(bytes)
     }
 
+    /// Capacity for an address or a value, from its length: a `socklen_t` that the call also returns.
+    ///
+    /// # Errors
+    /// `EINVAL` for a negative one; otherwise as [`Caller::read`].
+    pub(crate) fn read_room(self, length_at: u64) -> Result<usize, Errno> {
+        let room = i32::from_ne_bytes(self.read_array(length_at)?);
+        usize::try_from(room).map_err(|_| Errno::INVAL)
+    }
+
+    /// Writes as much of an address as there is room for, and its whole length; `places` are those of both.
+    ///
+    /// # Errors
+    /// As [`Caller::read`].
+    pub(crate) fn write_address(self, places: (u64, u64), room: usize, address: &[u8]) -> Result<(), Errno> {
+        self.write(places.0, &address[..address.len().min(room)])?;
+        self.write(places.1, &(address.len() as i32).to_ne_bytes())
+    }
+
     /// Copies into its memory.
     ///
     /// # Errors

@@ -21,12 +21,12 @@ const UNSUPPORTED_PROTOCOLS: [(i32, &str); 4] =
 
 impl Supervisor {
     /// `socket(AF_CAN, type, protocol)`.
-    pub(crate) fn make_socket(&mut self, notification: &Notification) -> Answer {
+    pub(crate) fn make_socket(&mut self, notification: &Notification) -> Result<Answer, Errno> {
         let (kind_and_flags, protocol) = (notification.int(1), notification.int(2));
         let flags = libc::SOCK_CLOEXEC | libc::SOCK_NONBLOCK;
         let kind = kind_and_flags & 0xF;
         if kind_and_flags & !(flags | 0xF) != 0 || !(0..CAN_PROTOCOLS).contains(&protocol) {
-            return Errno::INVAL.into();
+            return Err(Errno::INVAL);
         }
         let (wanted, made) = match protocol {
             CAN_RAW => (libc::SOCK_RAW, Kind::Raw(RawOptions::default())),
@@ -38,16 +38,15 @@ impl Supervisor {
                         "socket: {name} is not served; the call fails with EPROTONOSUPPORT"
                     ));
                 }
-                return Errno::PROTONOSUPPORT.into();
+                return Err(Errno::PROTONOSUPPORT);
             }
         };
         if kind != wanted {
-            return Errno::PROTOTYPE.into();
+            return Err(Errno::PROTOTYPE);
         }
-        match self.inject_socket(notification, made, kind_and_flags) {
-            Ok(()) => Answer::Deferred,
-            Err(error) => Errno::from_io_error(&error).unwrap_or(Errno::NOMEM).into(),
-        }
+        let injected = self.inject_socket(notification, made, kind_and_flags);
+        injected.map_err(|error| Errno::from_io_error(&error).unwrap_or(Errno::NOMEM))?;
+        Ok(Answer::Deferred)
     }
 
     fn inject_socket(&mut self, notification: &Notification, kind: Kind, flags: i32) -> io::Result<()> {
@@ -64,54 +63,48 @@ impl Supervisor {
     }
 
     /// `bind`: to an interface, or with index 0 to any.
-    pub(crate) fn bind(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+    pub(crate) fn bind(&mut self, notification: &Notification) -> Result<Answer, Errno> {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Ok(Answer::Continue) };
         if self.sockets.get(&inode).is_some_and(|socket| socket.transport().is_some()) {
             return self.bind_transport(notification, inode);
         }
-        let interface = match self.read_interface(notification) {
-            Ok(interface) => interface,
-            Err(error) => return error.into(),
-        };
-        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+        let interface = self.read_interface(notification)?;
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Ok(Answer::Continue) };
         if socket.raw().is_none() {
-            return Errno::OPNOTSUPP.into();
+            return Err(Errno::OPNOTSUPP);
         }
         if socket.interface == Some(interface) {
-            return Answer::Value(0);
+            return Ok(Answer::Value(0));
         }
         let is_down = match self.interfaces.iter().find(|known| known.index == interface) {
             Some(known) => !known.is_up,
             None if interface == 0 => false,
-            None => return Errno::NODEV.into(),
+            None => return Err(Errno::NODEV),
         };
         socket.interface = Some(interface);
         if is_down {
             self.deliver_error(inode, interface, Errno::NETDOWN);
         }
-        Answer::Value(0)
+        Ok(Answer::Value(0))
     }
 
     /// `connect`, which binds a broadcast manager; raw sockets do not support it.
-    pub(crate) fn connect(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+    pub(crate) fn connect(&mut self, notification: &Notification) -> Result<Answer, Errno> {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Ok(Answer::Continue) };
         let interface = self.read_interface(notification);
-        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Ok(Answer::Continue) };
         if !matches!(socket.kind, Kind::Bcm(_)) {
-            return Errno::OPNOTSUPP.into();
+            return Err(Errno::OPNOTSUPP);
         }
-        let interface = match interface {
-            Ok(interface) => interface,
-            Err(error) => return error.into(),
-        };
+        let interface = interface?;
         if socket.interface.is_some() {
-            return Errno::ISCONN.into();
+            return Err(Errno::ISCONN);
         }
         if interface != 0 && !self.interfaces.iter().any(|known| known.index == interface) {
-            return Errno::NODEV.into();
+            return Err(Errno::NODEV);
         }
         socket.interface = Some(interface);
-        Answer::Value(0)
+        Ok(Answer::Value(0))
     }
 
     /// The interface in the address of `bind(fd, address, length)`.
@@ -126,31 +119,28 @@ impl Supervisor {
     }
 
     /// `getsockname(fd, address, length)`.
-    pub(crate) fn get_name(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
-        let Some(socket) = self.sockets.get(&inode) else { return Answer::Continue };
+    pub(crate) fn get_name(&mut self, notification: &Notification) -> Result<Answer, Errno> {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Ok(Answer::Continue) };
+        let Some(socket) = self.sockets.get(&inode) else { return Ok(Answer::Continue) };
         let interface = socket.interface.unwrap_or(0);
         let address = match &socket.kind {
             Kind::Raw(_) => abi::address(interface).to_vec(),
             Kind::Transport(transport) => transport.address(interface).to_vec(),
-            Kind::Bcm(_) => return Errno::OPNOTSUPP.into(),
+            Kind::Bcm(_) => return Err(Errno::OPNOTSUPP),
         };
         let [_, at, length_at, ..] = notification.arguments;
         let caller = Caller::new(notification.thread);
-        let written = caller.read_array(length_at).map(i32::from_ne_bytes).and_then(|room| {
-            let room = usize::try_from(room).map_err(|_| Errno::INVAL)?;
-            self.listener.check_alive(notification.id)?;
-            caller.write(at, &address[..address.len().min(room)])?;
-            caller.write(length_at, &(address.len() as i32).to_ne_bytes())
-        });
-        written.map_or_else(Answer::Error, |()| Answer::Value(0))
+        let room = caller.read_room(length_at)?;
+        self.listener.check_alive(notification.id)?;
+        caller.write_address((at, length_at), room, &address)?;
+        Ok(Answer::Value(0))
     }
 
     /// Calls of connected sockets.
-    pub(crate) fn unsupported(&mut self, notification: &Notification) -> Answer {
+    pub(crate) fn unsupported(&mut self, notification: &Notification) -> Result<Answer, Errno> {
         match self.guest_socket(notification) {
-            Some(_) => Errno::OPNOTSUPP.into(),
-            None => Answer::Continue,
+            Some(_) => Err(Errno::OPNOTSUPP),
+            None => Ok(Answer::Continue),
         }
     }
 }

@@ -255,11 +255,7 @@ fn write_message(caller: Caller, at: u64, datagram: &[u8], address: &[u8]) -> Re
     let header = Header::read(caller, at)?;
     let length = datagram.len().min(header.room());
     header.scatter(caller, &datagram[..length])?;
-    if header.name != 0 {
-        let room = usize::try_from(header.name_bytes).map_err(|_| Errno::INVAL)?;
-        caller.write(header.name, &address[..address.len().min(room)])?;
-        caller.write(at + 8, &(address.len() as u32).to_ne_bytes())?;
-    }
+    header.write_name(caller, at, address)?;
     let out_flags = if length < datagram.len() { libc::MSG_TRUNC } else { 0 };
     caller.write(at + 40, &0_u64.to_ne_bytes())?;
     caller.write(at + 48, &out_flags.to_ne_bytes())?;
@@ -276,10 +272,7 @@ fn write_from(
     let [_, buffer, length, _, name, name_length] = notification.arguments;
     let bytes = &datagram[..datagram.len().min(length as usize)];
     caller.write(buffer, bytes)?;
-    let room = i32::from_ne_bytes(caller.read_array(name_length)?);
-    let room = usize::try_from(room).map_err(|_| Errno::INVAL)?;
-    caller.write(name, &address[..address.len().min(room)])?;
-    caller.write(name_length, &(address.len() as i32).to_ne_bytes())?;
+    caller.write_address((name, name_length), caller.read_room(name_length)?, address)?;
     Ok(bytes.len())
 }
 

@@ -12,42 +12,39 @@ use std::os::fd::AsFd;
 
 impl Supervisor {
     /// `setsockopt(fd, level, option, value, length)`.
-    pub(crate) fn set_option(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, _end)) = self.guest_socket(notification) else { return Answer::Continue };
+    pub(crate) fn set_option(&mut self, notification: &Notification) -> Result<Answer, Errno> {
+        let Some((inode, _end)) = self.guest_socket(notification) else { return Ok(Answer::Continue) };
         let (level, option) = (notification.int(1), notification.int(2));
-        let value = match self.read_value(notification) {
-            Ok(value) => value,
-            Err(error) => return error.into(),
-        };
-        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+        let value = self.read_value(notification)?;
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Ok(Answer::Continue) };
         if level == libc::SOL_SOCKET {
             let number = value.get(..4).map(|four| u32::from_ne_bytes(four.try_into().expect("four bytes")));
             match (option, number) {
                 (libc::SO_RCVBUF | libc::SO_RCVBUFFORCE, Some(bytes)) => {
                     socket.resize_queue(bytes as usize);
                     // The guest's end stores it, for `getsockopt`.
-                    return Answer::Continue;
+                    return Ok(Answer::Continue);
                 }
                 (libc::SO_RXQ_OVFL, Some(wanted)) => {
                     socket.tells_dropped = wanted != 0;
-                    return Answer::Value(0);
+                    return Ok(Answer::Value(0));
                 }
                 // Raw CAN sockets are bound by `bind`; the kernel accepts the option without effect.
                 (libc::SO_BINDTODEVICE, _) => {
                     let end = value.iter().position(|byte| *byte == 0).unwrap_or(value.len());
                     let is_ours = self.interfaces.iter().any(|known| known.name.as_bytes() == &value[..end]);
-                    return if is_ours { Answer::Value(0) } else { Answer::Continue };
+                    return Ok(if is_ours { Answer::Value(0) } else { Answer::Continue });
                 }
-                _ => return Answer::Continue,
+                _ => return Ok(Answer::Continue),
             }
         }
-        let set = match &mut socket.kind {
+        match &mut socket.kind {
             Kind::Raw(raw) if level == SOL_CAN_RAW => raw.set(option, &value),
             Kind::Transport(transport) if level == SOL_CAN_ISOTP => transport.protocol.set(option, &value),
             Kind::Raw(_) | Kind::Transport(_) => Err(Errno::INVAL),
             Kind::Bcm(_) => Err(Errno::OPNOTSUPP),
-        };
-        set.map_or_else(Answer::Error, |()| Answer::Value(0))
+        }?;
+        Ok(Answer::Value(0))
     }
 
     /// The value of `setsockopt`. A value longer than allowed is refused unread, as by the kernel, since it may not be mapped.
@@ -60,13 +57,13 @@ impl Supervisor {
     }
 
     /// `getsockopt(fd, level, option, value, length)`.
-    pub(crate) fn get_option(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, end)) = self.guest_socket(notification) else { return Answer::Continue };
-        let Some(socket) = self.sockets.get_mut(&inode) else { return Answer::Continue };
+    pub(crate) fn get_option(&mut self, notification: &Notification) -> Result<Answer, Errno> {
+        let Some((inode, end)) = self.guest_socket(notification) else { return Ok(Answer::Continue) };
+        let Some(socket) = self.sockets.get_mut(&inode) else { return Ok(Answer::Continue) };
         let (level, option) = (notification.int(1), notification.int(2));
         let is_raw = socket.raw().is_some();
         let number = |number: i32| Ok((number.to_ne_bytes().to_vec(), true));
-        let value = match (level, option) {
+        let (value, may_be_cut) = match (level, option) {
             (libc::SOL_SOCKET, libc::SO_TYPE) => {
                 number(if is_raw { libc::SOCK_RAW } else { libc::SOCK_DGRAM })
             }
@@ -77,7 +74,7 @@ impl Supervisor {
             (libc::SOL_SOCKET, libc::SO_ERROR) => {
                 number(socket.take_error(end.as_fd()).map_or(0, Errno::raw_os_error))
             }
-            (libc::SOL_SOCKET, _) => return Answer::Continue,
+            (libc::SOL_SOCKET, _) => return Ok(Answer::Continue),
             _ => match &socket.kind {
                 Kind::Bcm(_) => Err(Errno::OPNOTSUPP),
                 Kind::Raw(raw) if level == SOL_CAN_RAW => raw.get(option),
@@ -86,10 +83,9 @@ impl Supervisor {
                 }
                 Kind::Raw(_) | Kind::Transport(_) => Err(Errno::INVAL),
             },
-        };
-        let written =
-            value.and_then(|(value, may_be_cut)| self.write_value(notification, &value, may_be_cut));
-        written.map_or_else(Answer::Error, |()| Answer::Value(0))
+        }?;
+        self.write_value(notification, &value, may_be_cut)?;
+        Ok(Answer::Value(0))
     }
 
     /// Writes a value and its length.
@@ -99,8 +95,7 @@ impl Supervisor {
     fn write_value(&self, notification: &Notification, value: &[u8], may_be_cut: bool) -> Result<(), Errno> {
         let caller = Caller::new(notification.thread);
         let [_, _, _, value_at, length_at, _] = notification.arguments;
-        let room = i32::from_ne_bytes(caller.read_array(length_at)?);
-        let room = usize::try_from(room).map_err(|_| Errno::INVAL)?;
+        let room = caller.read_room(length_at)?;
         self.listener.check_alive(notification.id)?;
         if room < value.len() && !may_be_cut {
             caller.write(length_at, &(value.len() as i32).to_ne_bytes())?;

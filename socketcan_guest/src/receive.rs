@@ -114,6 +114,18 @@ impl Header {
         Ok(())
     }
 
+    /// Writes the address of the sender, if it is asked for; the header is at `at`.
+    ///
+    /// # Errors
+    /// `EFAULT`, or `EINVAL` for a negative length.
+    pub(crate) fn write_name(&self, caller: Caller, at: u64, address: &[u8]) -> Result<(), Errno> {
+        if self.name == 0 {
+            return Ok(());
+        }
+        let room = usize::try_from(self.name_bytes).map_err(|_| Errno::INVAL)?;
+        caller.write_address((self.name, at + 8), room, address)
+    }
+
     /// Capacity of the parts, bytes.
     pub(crate) fn room(&self) -> usize {
         self.parts.iter().fold(0, |sum, (_, length)| sum.saturating_add(*length))
@@ -213,8 +225,12 @@ fn flags_at(notification: &Notification) -> usize {
 
 fn may_wait(notification: &Notification, end: BorrowedFd<'_>) -> bool {
     let flags = notification.int(flags_at(notification));
-    flags & (libc::MSG_DONTWAIT | libc::MSG_ERRQUEUE) == 0
-        && fcntl_getfl(end).is_ok_and(|flags| !flags.contains(OFlags::NONBLOCK))
+    flags & (libc::MSG_DONTWAIT | libc::MSG_ERRQUEUE) == 0 && blocks(end)
+}
+
+/// Whether calls on a descriptor block.
+pub(crate) fn blocks(end: BorrowedFd<'_>) -> bool {
+    fcntl_getfl(end).is_ok_and(|flags| !flags.contains(OFlags::NONBLOCK))
 }
 
 /// `recvfrom(fd, buffer, length, flags, address, address length)`.
@@ -227,16 +243,11 @@ fn receive_from(
     taken: &mut Vec<Message>,
 ) -> Result<usize, Errno> {
     let [_, buffer, length, _, name, name_length] = notification.arguments;
-    let room = i32::from_ne_bytes(caller.read_array(name_length)?);
-    if room < 0 {
-        return Err(Errno::INVAL);
-    }
+    let room = caller.read_room(name_length)?;
     let message = take(socket, end, flags)?;
     let bytes = &message.bytes[..message.bytes.len().min(length as usize)];
     caller.write(buffer, bytes)?;
-    let address = sender(socket, &message);
-    caller.write(name, &address[..address.len().min(room as usize)])?;
-    caller.write(name_length, &(address.len() as i32).to_ne_bytes())?;
+    caller.write_address((name, name_length), room, &sender(socket, &message))?;
     let length = reported_length(socket, flags, bytes.len(), &message);
     taken.push(message);
     Ok(length)
@@ -275,12 +286,7 @@ fn receive_one(
     if length < message.bytes.len() {
         out_flags |= libc::MSG_TRUNC;
     }
-    if header.name != 0 {
-        let address = sender(socket, &message);
-        let room = usize::try_from(header.name_bytes).map_err(|_| Errno::INVAL)?;
-        caller.write(header.name, &address[..address.len().min(room)])?;
-        caller.write(header_at + 8, &(address.len() as u32).to_ne_bytes())?;
-    }
+    header.write_name(caller, header_at, &sender(socket, &message))?;
     let mut control = message.control.clone();
     if socket.tells_dropped && message.note.dropped != 0 {
         control.extend(overflow_message(message.note.dropped));

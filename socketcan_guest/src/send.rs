@@ -8,11 +8,10 @@ use crate::bcm::Action;
 use crate::bus_peer::{FrameBytes, SendResult};
 use crate::caller::Caller;
 use crate::notification::{Answer, Notification};
-use crate::receive::{Header, LONGEST_MESSAGE, LONGEST_OTHER};
+use crate::receive::{Header, LONGEST_MESSAGE, LONGEST_OTHER, blocks};
 use crate::socket::{Kind, Note};
 use crate::supervisor::{Supervisor, wall_clock_ns};
 use crate::transport::SendingCall;
-use rustix::fs::{OFlags, fcntl_getfl};
 use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv};
 use std::io;
@@ -35,16 +34,16 @@ pub(crate) enum FrameOrigin {
 
 impl Supervisor {
     /// `write` of a length other than a frame's. The kernel checks the interface before the length.
-    pub(crate) fn write(&mut self, notification: &Notification) -> Answer {
-        let Some((inode, end)) = self.guest_socket(notification) else { return Answer::Continue };
+    pub(crate) fn write(&mut self, notification: &Notification) -> Result<Answer, Errno> {
+        let Some((inode, end)) = self.guest_socket(notification) else { return Ok(Answer::Continue) };
         self.send_bytes_at(notification, inode, end.as_fd(), None)
     }
 
     /// `sendto(fd, buffer, length, flags, address, address length)`.
-    pub(crate) fn send_to(&mut self, notification: &Notification) -> Answer {
+    pub(crate) fn send_to(&mut self, notification: &Notification) -> Result<Answer, Errno> {
         let Some((inode, end)) = self.guest_socket(notification) else {
             self.note_link_request(notification);
-            return Answer::Continue;
+            return Ok(Answer::Continue);
         };
         let [.., name, name_length] = notification.arguments;
         let name = (name != 0).then_some((name, name_length as i32));
@@ -57,25 +56,20 @@ impl Supervisor {
         inode: u64,
         end: BorrowedFd<'_>,
         name: Option<(u64, i32)>,
-    ) -> Answer {
+    ) -> Result<Answer, Errno> {
         let [_, buffer, length, ..] = notification.arguments;
         let caller = Caller::new(notification.thread);
         let mut bytes = vec![0; (length as usize).min(LONGEST_MESSAGE)];
-        let read = caller
-            .read(buffer, &mut bytes)
-            .and_then(|()| read_name(caller, name))
-            .and_then(|name| self.listener.check_alive(notification.id).map(|()| name));
+        caller.read(buffer, &mut bytes)?;
+        let name = read_name(caller, name)?;
+        self.listener.check_alive(notification.id)?;
         let value = bytes.len() as i64;
-        match read {
-            Err(error) => error.into(),
+        if self.is_transport(inode) {
             // The destination is set by `bind`, whatever address is given.
-            Ok(_) if self.is_transport(inode) => {
-                self.send_transport(inode, end, bytes, sending_call(notification, end, value))
-            }
-            Ok(name) => self
-                .send(inode, name.as_deref(), &bytes)
-                .map_or_else(Answer::Error, |()| Answer::Value(value)),
+            return self.send_transport(inode, end, bytes, sending_call(notification, end, value));
         }
+        self.send(inode, name.as_deref(), &bytes)?;
+        Ok(Answer::Value(value))
     }
 
     fn is_transport(&self, inode: u64) -> bool {
@@ -83,10 +77,10 @@ impl Supervisor {
     }
 
     /// `sendmsg` and `sendmmsg`.
-    pub(crate) fn send_message(&mut self, notification: &Notification) -> Answer {
+    pub(crate) fn send_message(&mut self, notification: &Notification) -> Result<Answer, Errno> {
         let Some((inode, end)) = self.guest_socket(notification) else {
             self.note_link_request(notification);
-            return Answer::Continue;
+            return Ok(Answer::Continue);
         };
         let caller = Caller::new(notification.thread);
         let at = notification.arguments[1];
@@ -94,8 +88,8 @@ impl Supervisor {
             return self.send_transport_message(notification, inode, end.as_fd());
         }
         if notification.call == libc::SYS_sendmsg {
-            let sent = self.send_one(notification, inode, caller, at);
-            return sent.map_or_else(Answer::Error, |length| Answer::Value(length as i64));
+            let length = self.send_one(notification, inode, caller, at)?;
+            return Ok(Answer::Value(length as i64));
         }
         let mut count = 0;
         for number in 0..notification.arguments[2].min(1024) {
@@ -105,11 +99,11 @@ impl Supervisor {
                 .and_then(|length| caller.write(at + 56, &(length as u32).to_ne_bytes()));
             match sent {
                 Ok(()) => count += 1,
-                Err(error) if count == 0 => return Answer::Error(error),
+                Err(error) if count == 0 => return Err(error),
                 Err(_) => break,
             }
         }
-        Answer::Value(count)
+        Ok(Answer::Value(count))
     }
 
     fn send_one(
@@ -133,27 +127,20 @@ impl Supervisor {
         notification: &Notification,
         inode: u64,
         end: BorrowedFd<'_>,
-    ) -> Answer {
+    ) -> Result<Answer, Errno> {
         let caller = Caller::new(notification.thread);
         let at = notification.arguments[1];
         let is_one = notification.call == libc::SYS_sendmsg;
         if !is_one && notification.int(2) == 0 {
-            return Answer::Value(0);
+            return Ok(Answer::Value(0));
         }
-        let read = Header::read(caller, at).and_then(|header| header.gather(caller)).and_then(|bytes| {
-            self.listener.check_alive(notification.id)?;
-            if !is_one {
-                caller.write(at + 56, &(bytes.len() as u32).to_ne_bytes())?;
-            }
-            Ok(bytes)
-        });
-        match read {
-            Err(error) => error.into(),
-            Ok(bytes) => {
-                let value = if is_one { bytes.len() as i64 } else { 1 };
-                self.send_transport(inode, end, bytes, sending_call(notification, end, value))
-            }
+        let bytes = Header::read(caller, at)?.gather(caller)?;
+        self.listener.check_alive(notification.id)?;
+        if !is_one {
+            caller.write(at + 56, &(bytes.len() as u32).to_ne_bytes())?;
         }
+        let value = if is_one { bytes.len() as i64 } else { 1 };
+        self.send_transport(inode, end, bytes, sending_call(notification, end, value))
     }
 
     /// Sends for a guest; `name` is the given address.
@@ -267,11 +254,7 @@ impl Supervisor {
                     let _ = self.send_frame(inode, interface, &frame);
                 }
                 Action::Notify(interface, message) => {
-                    let stamp_ns = wall_clock_ns();
-                    if let Some(socket) = self.sockets.get_mut(&inode) {
-                        socket.deliver(&message, Note::new(interface, stamp_ns));
-                    }
-                    self.serve_waiting(inode);
+                    self.deliver(inode, &message, Note::new(interface, wall_clock_ns()));
                 }
             }
         }
@@ -372,8 +355,7 @@ fn sending_call(notification: &Notification, end: BorrowedFd<'_>, value: i64) ->
         libc::SYS_sendmsg => notification.int(2),
         _ => 0,
     };
-    let may_wait = flags & libc::MSG_DONTWAIT == 0
-        && fcntl_getfl(end).is_ok_and(|flags| !flags.contains(OFlags::NONBLOCK));
+    let may_wait = flags & libc::MSG_DONTWAIT == 0 && blocks(end);
     SendingCall { id: notification.id, value, may_wait }
 }
 

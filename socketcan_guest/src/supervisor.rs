@@ -164,12 +164,12 @@ impl Supervisor {
     fn answer_some(&mut self) {
         for _ in 0..EVENTS_A_SOURCE {
             let Some(notification) = self.listener.next() else { return };
-            let answer = self.answer_to(&notification);
+            let answer = self.answer_to(&notification).unwrap_or_else(Answer::Error);
             self.listener.answer(notification.id, answer);
         }
     }
 
-    fn answer_to(&mut self, notification: &Notification) -> Answer {
+    fn answer_to(&mut self, notification: &Notification) -> Result<Answer, Errno> {
         match notification.call {
             libc::SYS_socket => self.make_socket(notification),
             libc::SYS_bind => self.bind(notification),
@@ -183,11 +183,11 @@ impl Supervisor {
             libc::SYS_ioctl => self.ioctl(notification),
             libc::SYS_setsockopt => self.set_option(notification),
             libc::SYS_getsockopt => self.get_option(notification),
-            libc::SYS_recvmsg | libc::SYS_recvmmsg | libc::SYS_recvfrom => self.receive(notification),
+            libc::SYS_recvmsg | libc::SYS_recvmmsg | libc::SYS_recvfrom => Ok(self.receive(notification)),
             libc::SYS_sendmsg | libc::SYS_sendmmsg => self.send_message(notification),
             libc::SYS_sendto => self.send_to(notification),
             libc::SYS_write => self.write(notification),
-            _ => Answer::Continue,
+            _ => Ok(Answer::Continue),
         }
     }
 
@@ -316,9 +316,13 @@ impl Supervisor {
 
     /// Lets the next receiving call fail with this error; a native read returns length 0.
     pub(crate) fn deliver_error(&mut self, inode: u64, interface: u32, error: Errno) {
-        let note = Note { error: Some(error), ..Note::new(interface, wall_clock_ns()) };
+        self.deliver(inode, &[], Note { error: Some(error), ..Note::new(interface, wall_clock_ns()) });
+    }
+
+    /// Delivers a message to a guest's socket, and serves the calls that wait for one.
+    pub(crate) fn deliver(&mut self, inode: u64, message: &[u8], note: Note) {
         if let Some(socket) = self.sockets.get_mut(&inode) {
-            socket.deliver(&[], note);
+            socket.deliver(message, note);
         }
         self.serve_waiting(inode);
     }

@@ -94,35 +94,34 @@ impl Supervisor {
     }
 
     /// `bind` of a transport socket: to an interface and two identifiers.
-    pub(crate) fn bind_transport(&mut self, notification: &Notification, inode: u64) -> Answer {
+    pub(crate) fn bind_transport(
+        &mut self,
+        notification: &Notification,
+        inode: u64,
+    ) -> Result<Answer, Errno> {
         if notification.int(2) < ADDRESS_BYTES as i32 {
-            return Errno::INVAL.into();
+            return Err(Errno::INVAL);
         }
-        let caller = Caller::new(notification.thread);
-        let address: [u8; ADDRESS_BYTES] = match caller.read_array(notification.arguments[1]) {
-            Ok(address) => address,
-            Err(error) => return error.into(),
-        };
-        let Some(interface) = abi::interface_of(&address) else { return Errno::INVAL.into() };
+        let address: [u8; ADDRESS_BYTES] =
+            Caller::new(notification.thread).read_array(notification.arguments[1])?;
+        let interface = abi::interface_of(&address).ok_or(Errno::INVAL)?;
         let wanted = Identifiers { received: u32_at(&address, 8), sent: u32_at(&address, 12) };
         let known = self.interfaces.iter().find(|known| known.index == interface);
         let (is_interface, is_down) = (known.is_some(), known.is_some_and(|known| !known.is_up));
-        let Some(transport) = self.transport(inode) else { return Answer::Continue };
+        let Some(transport) = self.transport(inode) else { return Ok(Answer::Continue) };
         let protocol = &mut transport.protocol;
-        let bound = protocol.check(wanted).and_then(|()| match interface {
-            0 => Err(Errno::NODEV),
-            _ => protocol.bind(wanted, is_interface),
-        });
-        if let Err(error) = bound {
-            return error.into();
+        protocol.check(wanted)?;
+        if interface == 0 {
+            return Err(Errno::NODEV);
         }
+        protocol.bind(wanted, is_interface)?;
         if let Some(socket) = self.sockets.get_mut(&inode) {
             socket.interface = Some(interface);
         }
         if is_down {
             self.deliver_error(inode, interface, Errno::NETDOWN);
         }
-        Answer::Value(0)
+        Ok(Answer::Value(0))
     }
 
     /// Sends a message for a call, which may have to wait.
@@ -132,25 +131,25 @@ impl Supervisor {
         end: BorrowedFd<'_>,
         message: Vec<u8>,
         call: SendingCall,
-    ) -> Answer {
+    ) -> Result<Answer, Errno> {
         // A call that a signal ended is repeated by its caller; its message was withdrawn and must not be sent too.
         self.forget_dead_senders();
-        let Some(transport) = self.transport(inode) else { return Errno::BADF.into() };
+        let transport = self.transport(inode).ok_or(Errno::BADF)?;
         if transport.protocol.identifiers().is_none() {
-            return Errno::ADDRNOTAVAIL.into();
+            return Err(Errno::ADDRNOTAVAIL);
         }
         if transport.has_more_to_send() || self.is_behind_another(inode) {
             if !call.may_wait {
-                return Errno::AGAIN.into();
+                return Err(Errno::AGAIN);
             }
             self.wait_to_send(inode, Some(call), message);
-            return Answer::Deferred;
+            return Ok(Answer::Deferred);
         }
         // An unread error is reported to the next sender.
         let has_length = (1..=LONGEST_PDU).contains(&message.len());
         let error =
             self.sockets.get_mut(&inode).filter(|_| has_length).and_then(|socket| socket.take_error(end));
-        error.map_or_else(|| self.start_for(inode, &message, call), Answer::Error)
+        error.map_or_else(|| self.start_for(inode, &message, call), Err)
     }
 
     /// Sends a native message, after those that wait.
@@ -188,17 +187,15 @@ impl Supervisor {
             .any(|(_, socket, transport)| transport.protocol.is_sending() && socket.has_hung_up())
     }
 
-    fn start_for(&mut self, inode: u64, message: &[u8], call: SendingCall) -> Answer {
-        if let Err(error) = self.start_transport(inode, message) {
-            return error.into();
-        }
-        match self.transport(inode) {
+    fn start_for(&mut self, inode: u64, message: &[u8], call: SendingCall) -> Result<Answer, Errno> {
+        self.start_transport(inode, message)?;
+        Ok(match self.transport(inode) {
             Some(transport) if transport.protocol.is_sending() && transport.protocol.waits_for_the_end() => {
                 transport.awaiting_end = Some(call);
                 Answer::Deferred
             }
             _ => Answer::Value(call.value),
-        }
+        })
     }
 
     /// Sends the first or only frame of a message. Native writes stay in the queue until the last frame.
@@ -251,11 +248,7 @@ impl Supervisor {
                     let _ = self.send_frame(inode, interface, &frame);
                 }
                 Event::Received(message) => {
-                    let note = Note::new(interface, wall_clock_ns());
-                    if let Some(socket) = self.sockets.get_mut(&inode) {
-                        socket.deliver(&message, note);
-                    }
-                    self.serve_waiting(inode);
+                    self.deliver(inode, &message, Note::new(interface, wall_clock_ns()));
                 }
                 Event::ReceivingFailed(error) => self.deliver_error(inode, interface, error),
                 Event::SendingFailed(error) => {
@@ -324,7 +317,7 @@ impl Supervisor {
                 }
                 // A signal may have ended it.
                 Some(call) if self.listener.is_alive(call.id) => {
-                    let answer = self.start_for(inode, &message, call);
+                    let answer = self.start_for(inode, &message, call).unwrap_or_else(Answer::Error);
                     self.listener.answer(call.id, answer);
                 }
                 Some(_) => {}
