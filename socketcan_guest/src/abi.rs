@@ -6,7 +6,6 @@
 
 use protocol::can::CAN_FRAME_BYTES;
 
-/// `AF_CAN`.
 pub(crate) const AF_CAN: i32 = 29;
 /// Offset of the data in a frame.
 pub(crate) const CAN_FRAME_DATA_AT: usize = 8;
@@ -17,9 +16,7 @@ pub(crate) const MOST_DATA: u8 = 8;
 pub(crate) const SOL_CAN_FIRST: i32 = 100;
 /// `SOL_CAN_J1939`, the highest.
 pub(crate) const SOL_CAN_LAST: i32 = 107;
-/// `SOL_CAN_RAW`.
 pub(crate) const SOL_CAN_RAW: i32 = 101;
-/// `SOL_CAN_ISOTP`.
 pub(crate) const SOL_CAN_ISOTP: i32 = 106;
 
 /// Protocols of `AF_CAN`.
@@ -42,7 +39,6 @@ pub(crate) const ERROR_MASK: u32 = 0x1FFF_FFFF;
 /// Bytes of `struct sockaddr_can` that the kernel requires and returns: family, two of padding, index of the interface.
 pub(crate) const ADDRESS_BYTES: usize = 8;
 
-/// The address of an interface.
 pub(crate) fn address(interface: u32) -> [u8; ADDRESS_BYTES] {
     let mut bytes = [0; ADDRESS_BYTES];
     bytes[..2].copy_from_slice(&(AF_CAN as u16).to_ne_bytes());
@@ -60,6 +56,15 @@ pub(crate) fn interface_of(address: &[u8]) -> Option<u32> {
 /// A frame's identifier, flags included.
 pub(crate) fn identifier(frame: &[u8; CAN_FRAME_BYTES]) -> u32 {
     u32_at(frame, 0)
+}
+
+/// A classic frame.
+pub(crate) fn frame(id: u32, data: &[u8]) -> [u8; CAN_FRAME_BYTES] {
+    let mut frame = [0; CAN_FRAME_BYTES];
+    frame[..4].copy_from_slice(&id.to_ne_bytes());
+    frame[4] = data.len() as u8;
+    frame[CAN_FRAME_DATA_AT..CAN_FRAME_DATA_AT + data.len()].copy_from_slice(data);
+    frame
 }
 
 /// The native 32-bit number at an offset.

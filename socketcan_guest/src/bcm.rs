@@ -26,7 +26,6 @@ use transmit::Transmission;
 /// `MAX_NFRAMES`.
 const MOST_FRAMES: u32 = 256;
 
-/// An action of the manager.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     /// A frame goes to the interface of this index, and to the guests on it.

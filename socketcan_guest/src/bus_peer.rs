@@ -23,7 +23,6 @@ const LONGEST_PACKET: usize = 64;
 /// A frame as it crosses the bus.
 pub(crate) type FrameBytes = [u8; CAN_FRAME_BYTES];
 
-/// Result of sending a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SendResult {
     /// The host accepted it.

@@ -39,7 +39,6 @@ pub(crate) const TRANSMIT_QUEUE: u32 = 1000;
 /// Lowest index of an interface, if it is free: above the usual indices of a machine.
 const FIRST_INDEX: u32 = 100;
 
-/// An interface of the guests.
 pub(crate) struct Interface {
     pub(crate) name: String,
     pub(crate) index: u32,

@@ -22,7 +22,7 @@ mod receiver;
 mod sender;
 mod settings;
 
-use crate::abi::{CAN_FRAME_DATA_AT, EXTENDED_FLAG, REMOTE_FLAG, STANDARD_MASK, identifier};
+use crate::abi::{self, CAN_FRAME_DATA_AT, EXTENDED_FLAG, REMOTE_FLAG, STANDARD_MASK, frame, identifier};
 use crate::bus_peer::FrameBytes;
 use receiver::Receiver;
 use rustix::io::Errno;
@@ -191,7 +191,7 @@ impl IsoTp {
             return;
         };
         let low = if received & EXTENDED_FLAG != 0 { EXTENDED_MASK } else { STANDARD_MASK };
-        let mask = low | EXTENDED_FLAG | REMOTE_FLAG | crate::abi::ERROR_FLAG;
+        let mask = low | EXTENDED_FLAG | REMOTE_FLAG | abi::ERROR_FLAG;
         let data = &frame[CAN_FRAME_DATA_AT..];
         let at = self.settings.address_bytes();
         if identifier(frame) & mask != received || at == 1 && data[0] != self.settings.received_address {
@@ -215,7 +215,7 @@ impl IsoTp {
             kind::CONSECUTIVE => replies.extend(self.receiver.take_consecutive(incoming, events)),
             _ => {}
         }
-        events.extend(replies.iter().map(|data| Event::Reply(self::frame(sent, data))));
+        events.extend(replies.iter().map(|data| Event::Reply(abi::frame(sent, data))));
     }
 
     /// Time of the next action without a frame.
@@ -228,15 +228,6 @@ impl IsoTp {
         self.sender.advance(now, events);
         self.receiver.advance(now, events);
     }
-}
-
-/// A frame with these data.
-fn frame(id: u32, data: &[u8]) -> FrameBytes {
-    let mut frame = FrameBytes::default();
-    frame[..4].copy_from_slice(&id.to_ne_bytes());
-    frame[4] = data.len() as u8;
-    frame[CAN_FRAME_DATA_AT..CAN_FRAME_DATA_AT + data.len()].copy_from_slice(data);
-    frame
 }
 
 #[cfg(test)]

@@ -68,9 +68,8 @@ enum StartReport {
 /// Runs the guest with `interfaces`, each an embedded bus, as its CAN interfaces. `started` is called in the answering thread
 /// once the program runs: the program does not inherit what it changes of the thread. Returns the program's exit code, 128 and
 /// the signal's number if a signal ended it; `None` when the user interrupted the wait for a host.
-/// number if a signal ended it; `None` when a person ended the waiting.
 ///
-/// [`GuestError`] when the program cannot be run with this filter.
+/// # Errors
 /// [`GuestError`].
 pub fn run(
     interfaces: &[NamedInterface],

@@ -15,7 +15,6 @@ use rustix::io::Errno;
 use std::io;
 use std::os::fd::AsFd;
 
-/// Names of unsupported protocols.
 const UNSUPPORTED_PROTOCOLS: [(i32, &str); 4] =
     [(3, "CAN_TP16"), (4, "CAN_TP20"), (5, "CAN_MCNET"), (7, "CAN_J1939")];
 

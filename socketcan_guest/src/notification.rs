@@ -19,13 +19,11 @@ pub(crate) struct Notification {
     pub(crate) id: u64,
     /// The calling thread.
     pub(crate) thread: i32,
-    /// Number of the call.
     pub(crate) call: i64,
     pub(crate) arguments: [u64; 6],
 }
 
 impl Notification {
-    /// An argument that is an `int`.
     pub(crate) fn int(&self, index: usize) -> i32 {
         self.arguments[index] as i32
     }

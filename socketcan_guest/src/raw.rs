@@ -26,7 +26,6 @@ const FILTER_BYTES: usize = 8;
 /// `CAN_RAW_FILTER_MAX`.
 const MOST_FILTERS: usize = 512;
 
-/// A filter of the guest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Filter {
     id: u32,
@@ -51,52 +50,46 @@ impl Filter {
     }
 }
 
-/// Options of a socket.
 #[derive(Clone, Debug)]
 pub(crate) struct RawOptions {
     filters: Vec<Filter>,
-    error_mask: u32,
-    /// Numbers as set; any but 0 switches on.
-    loopback: i32,
-    receive_own: i32,
-    fd_frames: i32,
-    join_filters: i32,
-    xl_frames: i32,
+    /// The other options as set, by their numbers; any value but 0 switches on.
+    numbers: [u32; XL_FRAMES as usize + 1],
 }
 
 impl Default for RawOptions {
     fn default() -> Self {
-        let filters = vec![Filter { id: 0, mask: 0 }];
-        Self {
-            filters,
-            error_mask: 0,
-            loopback: 1,
-            receive_own: 0,
-            fd_frames: 0,
-            join_filters: 0,
-            xl_frames: 0,
-        }
+        let mut numbers = [0; XL_FRAMES as usize + 1];
+        numbers[LOOPBACK as usize] = 1;
+        Self { filters: vec![Filter { id: 0, mask: 0 }], numbers }
     }
 }
 
 impl RawOptions {
     /// Whether the other guests on the interface receive the frames of this socket.
     pub(crate) fn loops_back(&self) -> bool {
-        self.loopback != 0
+        self.is_on(LOOPBACK)
     }
 
-    /// Whether it receives its own frames.
     pub(crate) fn receives_own(&self) -> bool {
-        self.receive_own != 0
+        self.is_on(RECEIVE_OWN)
+    }
+
+    fn is_on(&self, option: i32) -> bool {
+        self.numbers[option as usize] != 0
     }
 
     /// Whether a frame of this identifier, flags included, passes.
     pub(crate) fn passes(&self, id: u32) -> bool {
         let passed = self.filters.iter().filter(|filter| filter.is_passed_by(id)).count();
-        let by_error_filter = id & ERROR_FLAG != 0 && id & self.error_mask != 0;
+        let by_error_filter = id & ERROR_FLAG != 0 && id & self.numbers[ERROR_FILTER as usize] != 0;
         let count = passed + usize::from(by_error_filter);
         // The kernel counts the matches of an entry of its lists, whichever option created it.
-        if self.join_filters != 0 && self.filters.len() > 1 { count >= self.filters.len() } else { count > 0 }
+        if self.is_on(JOIN_FILTERS) && self.filters.len() > 1 {
+            count >= self.filters.len()
+        } else {
+            count > 0
+        }
     }
 
     /// `setsockopt`.
@@ -117,18 +110,13 @@ impl RawOptions {
             return Err(Errno::NOPROTOOPT);
         }
         let number = u32::from_ne_bytes(value.try_into().map_err(|_| Errno::INVAL)?);
-        match option {
-            ERROR_FILTER => self.error_mask = number & ERROR_MASK,
-            LOOPBACK => self.loopback = number as i32,
-            RECEIVE_OWN => self.receive_own = number as i32,
-            FD_FRAMES if self.xl_frames != 0 && number == 0 => return Err(Errno::INVAL),
-            FD_FRAMES => self.fd_frames = number as i32,
-            JOIN_FILTERS => self.join_filters = number as i32,
-            _ => {
-                self.xl_frames = number as i32;
-                self.fd_frames = if number == 0 { self.fd_frames } else { self.xl_frames };
-            }
+        if option == FD_FRAMES && self.is_on(XL_FRAMES) && number == 0 {
+            return Err(Errno::INVAL);
         }
+        if option == XL_FRAMES && number != 0 {
+            self.numbers[FD_FRAMES as usize] = number;
+        }
+        self.numbers[option as usize] = if option == ERROR_FILTER { number & ERROR_MASK } else { number };
         Ok(())
     }
 
@@ -137,20 +125,14 @@ impl RawOptions {
     /// # Errors
     /// `ENOPROTOOPT`.
     pub(crate) fn get(&self, option: i32) -> Result<(Vec<u8>, bool), Errno> {
-        let number = match option {
+        match option {
             FILTER => {
                 let bytes = |filter: &Filter| [filter.id.to_ne_bytes(), filter.mask.to_ne_bytes()].concat();
-                return Ok((self.filters.iter().flat_map(bytes).collect(), false));
+                Ok((self.filters.iter().flat_map(bytes).collect(), false))
             }
-            ERROR_FILTER => self.error_mask,
-            LOOPBACK => self.loopback as u32,
-            RECEIVE_OWN => self.receive_own as u32,
-            FD_FRAMES => self.fd_frames as u32,
-            JOIN_FILTERS => self.join_filters as u32,
-            XL_FRAMES => self.xl_frames as u32,
-            _ => return Err(Errno::NOPROTOOPT),
-        };
-        Ok((number.to_ne_bytes().to_vec(), true))
+            ERROR_FILTER..=XL_FRAMES => Ok((self.numbers[option as usize].to_ne_bytes().to_vec(), true)),
+            _ => Err(Errno::NOPROTOOPT),
+        }
     }
 
     /// Longest value of `setsockopt`.

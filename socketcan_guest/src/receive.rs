@@ -46,7 +46,6 @@ pub(crate) struct Message {
     note: Note,
 }
 
-/// A call that waits for a message.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WaitingCall {
     pub(crate) notification: Notification,

@@ -23,7 +23,6 @@ const BATCH: usize = 16;
 /// Most batches taken before a call is answered: more than a queue holds.
 const BATCHES: usize = 64;
 
-/// Origin of a frame on an interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameOrigin {
     /// Received from the bus.

@@ -75,7 +75,6 @@ pub(crate) struct GuestSocket {
     pub(crate) tells_dropped: bool,
     /// Time of the last message read, ns, as far as it is known.
     last_stamp_ns: Option<u64>,
-    /// Calls that wait for a message.
     pub(crate) waiting: VecDeque<WaitingCall>,
     /// Messages received for a call that a signal then ended.
     pub(crate) returned: VecDeque<Message>,

@@ -39,7 +39,6 @@ const LISTENER: u64 = u64::MAX;
 const CHILD: u64 = u64::MAX - 1;
 /// The bus of the first interface; the others have lower numbers.
 const FIRST_BUS: u64 = u64::MAX - 16;
-/// Most interfaces.
 pub(crate) const MOST_INTERFACES: usize = 64;
 
 /// State of the loop.

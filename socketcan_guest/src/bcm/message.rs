@@ -50,7 +50,6 @@ pub(super) mod flag {
 /// `BCM_TIMER_SEC_MAX`: 400 days.
 const LONGEST_S: i64 = 400 * 24 * 60 * 60;
 
-/// The head of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Head {
     pub(super) opcode: u32,

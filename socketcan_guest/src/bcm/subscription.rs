@@ -72,7 +72,6 @@ impl Subscription {
         [self.silent_at, self.held_back_until].into_iter().flatten().min()
     }
 
-    /// RX_STATUS.
     pub(super) fn status(&self) -> Vec<u8> {
         self.head.with(opcode::RX_STATUS, &self.frames)
     }

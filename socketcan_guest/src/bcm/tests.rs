@@ -2,18 +2,11 @@
 
 use super::message::{HEAD_BYTES, Head, flag, opcode};
 use super::*;
+use crate::abi::frame;
 use std::time::Duration;
 
 const INTERFACE: u32 = 7;
 const MS: Duration = Duration::from_millis(1);
-
-fn frame(id: u32, data: &[u8]) -> FrameBytes {
-    let mut bytes = [0; 16];
-    bytes[..4].copy_from_slice(&id.to_ne_bytes());
-    bytes[4] = data.len() as u8;
-    bytes[8..8 + data.len()].copy_from_slice(data);
-    bytes
-}
 
 struct Command(Head, Vec<FrameBytes>);
 

@@ -34,7 +34,6 @@ impl Transmission {
         self.due
     }
 
-    /// TX_STATUS.
     pub(super) fn status(&self) -> Vec<u8> {
         self.head.with(opcode::TX_STATUS, &self.frames)
     }

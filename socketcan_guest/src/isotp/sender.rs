@@ -22,7 +22,6 @@ enum State {
     Sends { due: Instant, until: Instant },
 }
 
-/// Progress of a message.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
     state: State,
