@@ -12,7 +12,7 @@ use crate::children::Children;
 use crate::cli::FindEffectArguments;
 use crate::pair::{Pair, PairError};
 use crate::private::RunBus;
-use crate::{Front, FrontError, last_lines, make_folder, say};
+use crate::{Front, FrontError, last_lines, logs, make_folder, say};
 use protocol::exit::Exit;
 use runlog::Axis;
 use runlog::run_folder::TRUTH_CSV;
@@ -64,7 +64,7 @@ pub(crate) fn find_effect(arguments: &FindEffectArguments, front: &Front) -> Res
     };
     let first = format!("seed-{}", arguments.seed);
     let out = front.results(arguments.out.as_deref(), "find-effect", ("search", first.as_str()))?;
-    let read = |file: &PathBuf| fs::read_to_string(file).map_err(|error| FrontError::input(file, &error));
+    let read = |file: &PathBuf| fs::read_to_string(file).map_err(FrontError::input(file));
     let hidden = arguments.hidden.as_ref().map(read).transpose()?;
     arguments.suspects.as_ref().map(read).transpose()?;
     let bus = RunBus::of_its_own(arguments.bus.as_deref(), arguments.lockstep)?;
@@ -113,13 +113,11 @@ impl Search<'_> {
         let folder = self.out.join(format!("seed-{seed}"));
         let hidden = folder.join("hidden");
         make_folder(&folder)?;
-        DirBuilder::new().mode(0o700).create(&hidden).map_err(|error| FrontError::output(&hidden, &error))?;
+        DirBuilder::new().mode(0o700).create(&hidden).map_err(FrontError::output(&hidden))?;
         say(&format!("== seed {seed}: files in {}", folder.display()));
         let sealed = hidden.join("sealed.toml");
         match &self.hidden {
-            Some(text) => {
-                fs::write(&sealed, text).map_err(|error| FrontError::output(&sealed, &error))?;
-            }
+            Some(text) => fs::write(&sealed, text).map_err(FrontError::output(&sealed))?,
             // Nothing was measured: the folder is removed for another try, unless it has other files.
             None => self.draw(seed, &sealed).inspect_err(|_| {
                 drop(fs::remove_dir_all(&hidden));
@@ -154,11 +152,10 @@ impl Search<'_> {
         self.call(compare.arg("--out").arg(folder.join("gap.html")), "no picture of the gap")?;
 
         let report = judge::read(&workflow.join("report.json"))?;
-        let sealed = fs::read_to_string(&sealed).map_err(|error| FrontError::input(&sealed, &error))?;
+        let sealed = fs::read_to_string(&sealed).map_err(FrontError::input(&sealed))?;
         let judgement = judge::judge(&sealed, &report)?;
         let path = folder.join("told.txt");
-        fs::write(&path, judgement.lines.join("\n") + "\n")
-            .map_err(|error| FrontError::output(&path, &error))?;
+        fs::write(&path, judgement.lines.join("\n") + "\n").map_err(FrontError::output(&path))?;
         judgement.lines.iter().for_each(|line| say(&format!("  {line}")));
         say(&format!("  report: {}", workflow.join("report.html").display()));
         Ok(judgement.right)
@@ -182,17 +179,11 @@ impl Search<'_> {
     /// A run of the rig with the hidden effects of the folder's sealed file.
     fn sealed(&mut self, folder: &Path, name: &str, file: &Path, noise: u64) -> Result<(), FrontError> {
         let (run, hidden) = (folder.join(name), folder.join("hidden"));
-        let rig = self.rig.clone();
-        self.drive(
-            &run,
-            file,
-            &rig,
-            noise,
-            &[OsStr::new("--sealed"), hidden.join("sealed.toml").as_os_str()],
-        )?;
+        let (rig, sealed) = (self.rig.clone(), hidden.join("sealed.toml"));
+        self.drive(&run, file, &rig, noise, &[OsStr::new("--sealed"), sealed.as_os_str()])?;
         // Its names are the terms of the hidden effects.
         let truth = hidden.join(format!("truth-{}.csv", name.replace('/', "-")));
-        fs::rename(run.join(TRUTH_CSV), &truth).map_err(|error| FrontError::output(&truth, &error))
+        fs::rename(run.join(TRUTH_CSV), &truth).map_err(FrontError::output(&truth))
     }
 
     /// Without the effect all rigs are equal: run once, and copied for the others.
@@ -215,7 +206,7 @@ impl Search<'_> {
         noise: u64,
         more: &[&OsStr],
     ) -> Result<(), FrontError> {
-        let experiment = fs::read_to_string(file).map_err(|error| FrontError::input(file, &error))?;
+        let experiment = fs::read_to_string(file).map_err(FrontError::input(file))?;
         let pace = if self.arguments.lockstep { &["--pace", "lockstep"][..] } else { &[] };
         let mut pair = Pair::new([&self.emulator, &self.controller], [rig, &self.rig], file, run, &self.bus);
         pair.emulator.args(["--seed", &noise.to_string()]).args(pace).args(more);
@@ -229,10 +220,9 @@ impl Search<'_> {
             PairError::Other(error) => error,
         })?;
         self.check_interrupt()?;
-        let failed = |error| FrontError::output(&console, &error);
-        let log = File::options().append(true).open(&console).map_err(failed)?;
+        let (out, error) = logs(File::options().append(true).open(&console), &console)?;
         let mut summary = Command::new(&self.bench);
-        summary.arg("summary").arg(run).stdout(log.try_clone().map_err(failed)?).stderr(log);
+        summary.arg("summary").arg(run).stdout(out).stderr(error);
         // Bounds of an experiment are for the baseline and do not matter here.
         match self.children.call(&mut summary)? {
             0 | 1 => self.check_interrupt(),
@@ -244,7 +234,7 @@ impl Search<'_> {
     fn close(&mut self, folder: &Path, workflow: &Path) -> Result<(), FrontError> {
         make_folder(workflow)?;
         let console = workflow.join("console.log");
-        let log = File::create(&console).map_err(|error| FrontError::output(&console, &error))?;
+        let (out, error) = logs(File::create(&console), &console)?;
         let measured = |name: &str| folder.join(name).join("measured/measurement.csv");
         let mut close = Command::new(&self.discrepancy);
         close.arg("close").arg("--rig").arg(&self.rig).arg("--train").arg(measured("fitted"));
@@ -252,8 +242,7 @@ impl Search<'_> {
         if let Some(suspects) = &self.arguments.suspects {
             close.arg("--suspects").arg(suspects);
         }
-        close.stdout(log.try_clone().map_err(|error| FrontError::output(&console, &error))?).stderr(log);
-        let code = self.children.call(&mut close)?;
+        let code = self.children.call(close.stdout(out).stderr(error))?;
         self.check_interrupt()?;
         if code != 0 {
             eprintln!("{}", last_lines(&console, 5));
@@ -275,12 +264,12 @@ impl Search<'_> {
 
 fn copy_folder(from: &Path, to: &Path) -> Result<(), FrontError> {
     make_folder(to)?;
-    for entry in fs::read_dir(from).map_err(|error| FrontError::input(from, &error))?.flatten() {
+    for entry in fs::read_dir(from).map_err(FrontError::input(from))?.flatten() {
         let (path, copy) = (entry.path(), to.join(entry.file_name()));
         if path.is_dir() {
             copy_folder(&path, &copy)?;
         } else {
-            fs::copy(&path, &copy).map_err(|error| FrontError::output(&copy, &error))?;
+            fs::copy(&path, &copy).map_err(FrontError::output(&copy))?;
         }
     }
     Ok(())

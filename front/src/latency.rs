@@ -10,14 +10,14 @@ mod slices;
 use crate::children::Children;
 use crate::cli::LatencyArguments;
 use crate::private::PrivateFolder;
-use crate::{Front, FrontError, last_lines, say};
+use crate::{Front, FrontError, last_lines, logs, say};
 use protocol::exit::Exit;
 use runlog::conditions::Conditions;
 use runlog::run_folder::{
     CONDITIONS_JSON, CYCLICTEST_JSON, PING_PONG_JSON, SCHEMA_VERSION, SUMMARY_JSON, write_json,
 };
 use rustix::thread::{CpuSet, sched_getaffinity};
-use slices::{Slice, SliceRunner, logs};
+use slices::{Slice, SliceRunner};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -182,7 +182,7 @@ impl Measurement<'_> {
         let (began, mut done) = (Instant::now(), 0);
         for pair in 1..=pairs {
             let folder = self.pair_folder(pair);
-            fs::create_dir(&folder).map_err(|error| FrontError::output(&folder, &error))?;
+            fs::create_dir(&folder).map_err(FrontError::output(&folder))?;
             // Alternating order, so that slow drifts (heat, other load) do not always affect the same slice.
             let mut order = slices.clone();
             if pair % 2 == 0 {
@@ -226,7 +226,7 @@ impl Measurement<'_> {
             let histogram = name.starts_with("ping-pong-") && name.ends_with(".hlog");
             if histogram || [CYCLICTEST_JSON, PING_PONG_JSON].contains(&name.as_str()) {
                 let kept = run.join(&name);
-                fs::rename(&path, &kept).map_err(|error| FrontError::output(&kept, &error))?;
+                fs::rename(&path, &kept).map_err(FrontError::output(&kept))?;
             }
         }
         let reference = run.join(CYCLICTEST_JSON);
@@ -248,7 +248,7 @@ impl Measurement<'_> {
                 uncommitted_files: self.front.places.checkout().and_then(uncommitted_files),
             };
             let file = folder.join(CONDITIONS_JSON);
-            write_json(&file, &conditions).map_err(|error| FrontError::output(&file, &error))
+            write_json(&file, &conditions).map_err(FrontError::output(&file))
         };
         write(&run, "plain".into())?;
         if !spin.is_dir() {
@@ -257,7 +257,7 @@ impl Measurement<'_> {
         // The one reference of the pair belongs to both of its runs.
         if reference.is_file() {
             let copy = spin.join(CYCLICTEST_JSON);
-            fs::copy(&reference, &copy).map_err(|error| FrontError::output(&copy, &error))?;
+            fs::copy(&reference, &copy).map_err(FrontError::output(&copy))?;
         }
         write(&spin, format!("spin {} us", self.arguments.spin_us))
     }
@@ -291,7 +291,7 @@ impl Measurement<'_> {
         table.arg("latency-table").arg(&made);
         if !spinning.is_empty() {
             let (out, log) = (self.out.join("spin"), self.out.join("spin.log"));
-            let file = File::create(&log).map_err(|error| FrontError::output(&log, &error))?;
+            let file = File::create(&log).map_err(FrontError::output(&log))?;
             let mut spinning = report(&spinning, &out, &plan.spin_bounds);
             match self.runner.children.call(spinning.stdout(file))? {
                 0 => {}
@@ -315,7 +315,7 @@ impl Measurement<'_> {
             return Ok(code);
         }
         let file = self.out.join("table.md");
-        let written = File::create(&file).map_err(|error| FrontError::output(&file, &error))?;
+        let written = File::create(&file).map_err(FrontError::output(&file))?;
         if self.runner.children.call(table.args(["--made-by", &self.front.typed]).stdout(written))? != 0 {
             return Err(FrontError::Input("no table of ratios could be made".into()));
         }

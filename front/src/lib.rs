@@ -38,6 +38,7 @@ use places::Places;
 use protocol::exit::Exit;
 use std::error::Error;
 use std::ffi::{OsStr, OsString};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -60,12 +61,12 @@ pub(crate) enum FrontError {
 }
 
 impl FrontError {
-    fn input(file: &Path, reason: &io::Error) -> Self {
-        Self::Input(format!("cannot read {}: {reason}", file.display()))
+    fn input(file: &Path) -> impl Fn(io::Error) -> Self + Copy {
+        move |reason| Self::Input(format!("cannot read {}: {reason}", file.display()))
     }
 
-    fn output(file: &Path, reason: &io::Error) -> Self {
-        Self::Input(format!("cannot write {}: {reason}", file.display()))
+    fn output(file: &Path) -> impl Fn(io::Error) -> Self + Copy {
+        move |reason| Self::Input(format!("cannot write {}: {reason}", file.display()))
     }
 
     fn exit(&self) -> Exit {
@@ -121,7 +122,7 @@ impl Front {
     ) -> Result<PathBuf, FrontError> {
         let out = asked.map_or_else(|| self.run_folder(what), |out| Ok(out.into()))?;
         make_folder(&out)?;
-        let out = out.canonicalize().map_err(|error| FrontError::output(&out, &error))?;
+        let out = out.canonicalize().map_err(FrontError::output(&out))?;
         if out.join(first).exists() {
             let out = out.display();
             let why = format!("{out} holds an earlier {kind}; choose another folder with --out");
@@ -144,6 +145,12 @@ pub(crate) fn last_lines(file: &Path, count: usize) -> String {
     let text = std::fs::read_to_string(file).unwrap_or_default();
     let lines: Vec<_> = text.lines().collect();
     lines[lines.len().saturating_sub(count)..].join("\n")
+}
+
+/// A file for both outputs of a process.
+pub(crate) fn logs(opened: io::Result<File>, file: &Path) -> Result<(File, File), FrontError> {
+    let both = opened.and_then(|out| Ok((out.try_clone()?, out)));
+    both.map_err(FrontError::output(file))
 }
 
 /// Creates a folder of results if it is missing.

@@ -1,7 +1,7 @@
 //! Emulator and controller as two processes on one bus, with their output in one file.
 
 use crate::children::{Children, Event, code};
-use crate::{FrontError, make_folder};
+use crate::{FrontError, logs, make_folder};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -50,7 +50,7 @@ impl Pair {
         let log = self.run.with_extension("log");
         let console = self.run.join("console.log");
         let code = self.run_into(&log, children).map_err(PairError::Other)?;
-        fs::rename(&log, &console).map_err(|error| PairError::Other(FrontError::output(&console, &error)))?;
+        fs::rename(&log, &console).map_err(FrontError::output(&console)).map_err(PairError::Other)?;
         if code == 0 || children.interrupted() {
             Ok(console)
         } else {
@@ -60,14 +60,12 @@ impl Pair {
 
     fn run_into(&mut self, log: &Path, children: &mut Children) -> Result<u8, FrontError> {
         make_folder(&self.run)?;
-        let unwritable = |error| FrontError::output(log, &error);
         let _ = fs::remove_file(log);
-        // Both append, so that neither overwrites the output of the other.
-        let file = File::options().create(true).append(true).open(log).map_err(unwritable)?;
         let mut members = Vec::new();
         for command in [&mut self.emulator, &mut self.controller] {
-            let out = file.try_clone().and_then(|out| Ok((out, file.try_clone()?))).map_err(unwritable)?;
-            members.push(children.start(command.stdout(out.0).stderr(out.1))?);
+            // Both append, so that neither overwrites the output of the other.
+            let (out, error) = logs(File::options().create(true).append(true).open(log), log)?;
+            members.push(children.start(command.stdout(out).stderr(error))?);
         }
         let (mut first_code, mut deadline) = (0, None);
         while children.count(&members) > 0 {

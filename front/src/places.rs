@@ -55,7 +55,6 @@ impl Places {
         Self { programs, data }
     }
 
-    /// A program of the set.
     pub(crate) fn program(&self, name: &str) -> Result<PathBuf, FrontError> {
         let paths: Vec<_> = self.programs.iter().map(|folder| folder.join(name)).collect();
         paths.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {

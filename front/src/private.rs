@@ -23,10 +23,8 @@ impl PrivateFolder {
                 Ok(()) => return Ok(Self(folder)),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => {
-                    return Err(FrontError::Input(format!(
-                        "cannot make the folder {}: {error}",
-                        folder.display()
-                    )));
+                    let folder = folder.display();
+                    return Err(FrontError::Input(format!("cannot make the folder {folder}: {error}")));
                 }
             }
         }

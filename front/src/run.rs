@@ -60,15 +60,8 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     let mut control = Command::new(&controller);
     control.arg(if arguments.rehearse { "rehearse" } else { "run" });
     for_controller(&mut control, arguments);
-    control
-        .arg("--rig")
-        .arg(&rig)
-        .arg("--experiment")
-        .arg(&file)
-        .arg("--programs")
-        .arg(programs)
-        .arg("--out")
-        .arg(&out);
+    control.arg("--rig").arg(&rig).arg("--experiment").arg(&file);
+    control.arg("--programs").arg(programs).arg("--out").arg(&out);
 
     let mut run = Run { children, members: Vec::new(), stopped: false };
     if arguments.rehearse {
@@ -79,13 +72,8 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     } else {
         say(&format!("running {name} on {bus}, files in {}", out.display()));
         let mut emulate = Command::new(&emulator);
-        emulate
-            .args(["run", "--bus", &bus, "--rig"])
-            .arg(&rig)
-            .arg("--experiment")
-            .arg(&file)
-            .arg("--out")
-            .arg(&out);
+        emulate.args(["run", "--bus", &bus, "--rig"]).arg(&rig);
+        emulate.arg("--experiment").arg(&file).arg("--out").arg(&out);
         for_emulator(&mut emulate, arguments);
         if arguments.gateway {
             let mut gateway = Command::new(&bench);

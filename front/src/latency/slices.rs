@@ -2,7 +2,7 @@
 
 use crate::children::{Children, Event};
 use crate::pair::{Pair, PairError};
-use crate::{Front, FrontError, last_lines};
+use crate::{Front, FrontError, last_lines, logs};
 use runlog::run_folder::{CYCLICTEST_JSON, PING_PONG_JSON, PROBE_CSV};
 use rustix::process::Pid;
 use std::fs::{self, File};
@@ -13,7 +13,6 @@ use std::time::{Duration, Instant};
 /// A load generator that ends within this time has failed.
 const LOAD_STARTS: Duration = Duration::from_millis(500);
 
-/// Subject of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Slice {
     /// The reference of wake-ups.
@@ -133,10 +132,10 @@ impl SliceRunner {
             |line: &str| line.bytes().all(|byte| byte.is_ascii_digit() || byte == b' ') && line.contains(' ');
         let said = fs::read_to_string(&log).unwrap_or_default();
         let said: Vec<_> = said.lines().filter(|line| !is_bin(line)).collect();
-        fs::write(&log, said.join("\n") + "\n").map_err(|error| FrontError::output(&log, &error))?;
+        fs::write(&log, said.join("\n") + "\n").map_err(FrontError::output(&log))?;
         if code == 0 && part.metadata().is_ok_and(|part| part.len() > 0) {
             let whole = folder.join(CYCLICTEST_JSON);
-            return fs::rename(&part, &whole).map_err(|error| FrontError::output(&whole, &error));
+            return fs::rename(&part, &whole).map_err(FrontError::output(&whole));
         }
         let first = said.into_iter().find(|line| !line.is_empty()).unwrap_or("it said nothing");
         let why = format!("cyclictest ended with code {code}: {first}");
@@ -151,20 +150,14 @@ impl SliceRunner {
         let (seconds, priority) = (self.seconds.to_string(), self.priority.to_string());
         let programs = [self.emulator.as_path(), &self.controller];
         let mut pair = Pair::new(programs, [&self.rig, &self.rig], &self.experiment, run, &self.bus);
-        pair.emulator.args([
-            "--seconds",
-            &seconds,
-            "--cpu",
-            &cpu,
-            "--fifo-priority",
-            &priority,
-            "--full-timing",
-        ]);
+        pair.emulator.args(["--seconds", &seconds]);
+        pair.controller.arg("--repeat").arg("--programs").arg(&self.programs);
+        for (program, cpu) in [(&mut pair.emulator, cpu), (&mut pair.controller, controller_cpu)] {
+            program.args(["--cpu", &cpu, "--fifo-priority", &priority, "--full-timing"]);
+        }
         if spin_us > 0 {
             pair.emulator.args(["--spin-us", &spin_us.to_string()]);
         }
-        pair.controller.arg("--repeat").arg("--programs").arg(&self.programs);
-        pair.controller.args(["--cpu", &controller_cpu, "--fifo-priority", &priority, "--full-timing"]);
         let ended = pair.run(&mut self.children);
         if let Some(watching) = watching {
             self.end(watching);
@@ -201,8 +194,8 @@ impl SliceRunner {
             let (json, log) = (file("host.json"), file("host.log"));
             let mut command = Command::new(&self.emulator);
             command.args(["bus", "--bus", bus]);
-            command.stdout(File::create(&json).map_err(|error| FrontError::output(&json, &error))?);
-            command.stderr(File::create(&log).map_err(|error| FrontError::output(&log, &error))?);
+            command.stdout(File::create(&json).map_err(FrontError::output(&json))?);
+            command.stderr(File::create(&log).map_err(FrontError::output(&log))?);
             host = Some(self.children.start(&mut command)?);
         }
         let [cpu, peer_cpu] = self.cpus.map(|cpu| cpu.to_string());
@@ -227,10 +220,4 @@ impl SliceRunner {
         let said = last_lines(&file("log"), 1);
         Err(FrontError::Process(format!("the ping-pong '{name}' failed: {said}")))
     }
-}
-
-/// A file for both outputs of a process.
-pub(super) fn logs(opened: std::io::Result<File>, file: &Path) -> Result<(File, File), FrontError> {
-    let both = opened.and_then(|out| Ok((out.try_clone()?, out)));
-    both.map_err(|error| FrontError::output(file, &error))
 }
