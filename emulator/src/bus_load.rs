@@ -3,29 +3,24 @@
 use crate::cli::BusLoadArguments;
 use crate::run::RunError;
 use protocol::bus_load::BusLoad;
-use protocol::exit::Exit;
 use protocol::frames::BIT_RATE_PER_S;
 use protocol::response_time::rig::{RigAnalysis, arrivals_text, in_us};
 use protocol::response_time::{Response, critical};
 use protocol::wire_time::{IdentifierReport, WireTimeReport};
 use runlog::summary::Summary;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 
-/// Prints the bus load of the rig's messages and the response times, or the page's table.
+/// The bus load of the rig's messages and the response times, or the page's table.
 ///
 /// # Errors
 /// [`RunError::Input`] when the run's summary cannot be read, or has no wire times.
-pub(crate) fn print(arguments: &BusLoadArguments) -> Result<Exit, RunError> {
+pub(crate) fn text(arguments: &BusLoadArguments) -> Result<String, RunError> {
     let analysis = RigAnalysis::worst_case(BIT_RATE_PER_S);
-    let text = match &arguments.markdown {
+    Ok(match &arguments.markdown {
         None => format!("{BusLoad}\n\n{analysis}"),
         Some(summary) => markdown(&analysis, &wire_time(summary)?),
-    };
-    // A closed pipe, as of `| head`, is no error.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    Ok(Exit::Good)
+    })
 }
 
 fn wire_time(summary: &Path) -> Result<WireTimeReport, RunError> {

@@ -3,27 +3,21 @@
 //! All names and ranges come from the data sheets of the effects.
 
 use crate::cli::EffectsArguments;
-use crate::run::RunError;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Group, PlaceKind, Sheet};
-use protocol::exit::Exit;
 use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use std::io::Write as _;
 
 /// Line width of sentences.
 const WIDTH: usize = 100;
 
-pub(crate) fn print(arguments: &EffectsArguments) -> Result<Exit, RunError> {
-    let text = if arguments.json {
+pub(crate) fn text(arguments: &EffectsArguments) -> String {
+    if arguments.json {
         serde_json::to_string_pretty(&as_json()).unwrap_or_default()
     } else {
         SHEETS.iter().map(as_text).collect::<Vec<_>>().join("\n")
-    };
-    // A closed pipe, as of `| head`, is no error.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    Ok(Exit::Good)
+    }
 }
 
 fn as_text(sheet: &Sheet) -> String {

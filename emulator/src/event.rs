@@ -16,7 +16,6 @@ impl Serialize for Mark {
     }
 }
 
-/// The event for the outcome of an action.
 pub(crate) fn of_outcome(outcome: Outcome) -> EventKind {
     match outcome {
         Outcome::Stopped => EventKind::EmergencyStop,
@@ -36,7 +35,6 @@ pub(crate) fn of_hand(HandForces { carriage_n, load_eye_n }: HandForces) -> Even
     EventKind::ConsoleHand { carriage_n, load_eye_n }
 }
 
-/// The axis of the events.
 pub(crate) fn axis_of(axis: plant::Axis) -> Axis {
     match axis {
         plant::Axis::Drive => Axis::Drive,

@@ -127,7 +127,6 @@ impl Fault {
         self.spec.places.names().swap_remove(usize::from(self.place))
     }
 
-    /// Index of its place.
     pub(crate) fn place_index(&self) -> usize {
         usize::from(self.place)
     }

@@ -51,7 +51,6 @@ pub(crate) struct NodeParts {
     pub lockstep: bool,
 }
 
-/// Counters of the node.
 pub(crate) struct NodeFigures {
     /// Frames by their result.
     pub frames: FrameCounters,

@@ -86,7 +86,6 @@ pub(crate) struct Shared {
     pub controller_received: AtomicBool,
 }
 
-/// Limits of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     /// Number of cycles; `None` runs until the controllers are done.

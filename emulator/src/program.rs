@@ -17,16 +17,22 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Bus(arguments) => host_bus(&arguments),
-        Command::Seal(arguments) => seal::seal(&arguments),
-        Command::Effects(arguments) => catalogue::print(&arguments),
-        Command::Faults(arguments) => faults::listing::print(&arguments),
-        Command::BusLoad(arguments) => bus_load::print(&arguments),
+        Command::Seal(arguments) => seal::seal(&arguments).map(print),
+        Command::Effects(arguments) => Ok(print(catalogue::text(&arguments))),
+        Command::Faults(arguments) => faults::listing::text(&arguments).map(print),
+        Command::BusLoad(arguments) => bus_load::text(&arguments).map(print),
     };
     let exit = result.unwrap_or_else(|error| {
         protocol::say!("emulator: {error}");
         error.exit()
     });
     exit.into()
+}
+
+/// Prints a result; a closed pipe, as of `| head`, is no error.
+fn print(text: String) -> Exit {
+    let _ = writeln!(std::io::stdout(), "{text}");
+    Exit::Good
 }
 
 fn host_bus(arguments: &BusArguments) -> Result<Exit, RunError> {

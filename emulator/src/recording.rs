@@ -80,7 +80,6 @@ pub(crate) fn queues(waits: bool) -> (Recorder, Records) {
 }
 
 impl Records {
-    /// Whether all senders are gone.
     fn senders_gone(&self) -> bool {
         self.sender_alive.strong_count() == 0
     }

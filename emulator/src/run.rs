@@ -43,7 +43,6 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Interface name in the log of the embedded bus, and of every lockstep run, so that logs can be compared.
 const EMBEDDED_INTERFACE: &str = "bus0";
-/// Period of the progress lines.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(5);
 
 /// Why a run cannot start.

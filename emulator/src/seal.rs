@@ -6,7 +6,6 @@
 use crate::cli::{SealArguments, SealedAxis};
 use crate::run::RunError;
 use plant::effects::draw::{Among, as_toml, draw};
-use protocol::exit::Exit;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -15,11 +14,11 @@ use std::path::{Path, PathBuf};
 /// Mode of the sealed file: readable and writable by its owner alone.
 const MODE: u32 = 0o600;
 
-/// Draws effects and writes the file.
+/// Draws effects and writes the file; returns its path.
 ///
 /// # Errors
 /// [`RunError::Input`] when there are not so many effects, or the file exists; [`RunError::Output`] when it cannot be written.
-pub(crate) fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
+pub(crate) fn seal(arguments: &SealArguments) -> Result<String, RunError> {
     let SealArguments { seed, effects, axis, out } = arguments;
     let drawn = draw(*seed, usize::from(*effects), among(*axis))
         .map_err(|error| RunError::Input(format!("--effects {effects}: {error}")))?;
@@ -34,9 +33,7 @@ pub(crate) fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
         }
         Err(error) => return Err(RunError::output(out, &error)),
     }
-    // A closed pipe is no error.
-    let _ = writeln!(io::stdout(), "{}", out.display());
-    Ok(Exit::Good)
+    Ok(out.display().to_string())
 }
 
 fn among(axis: SealedAxis) -> Among {
@@ -83,6 +80,7 @@ mod tests {
     use super::*;
     use plant::RigParameters;
     use plant::effects::SHEETS;
+    use protocol::exit::Exit;
     use std::os::unix::fs::PermissionsExt;
 
     fn arguments(out: PathBuf, seed: u64) -> SealArguments {

@@ -5,16 +5,14 @@ use super::table::{FaultSpec, Places, all};
 use crate::cli::FaultsArguments;
 use crate::inputs::Script;
 use crate::run::RunError;
-use protocol::exit::Exit;
 use runlog::run_folder::SCHEMA_VERSION;
 use runlog::telemetry::{FaultEntry, FaultKey};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use std::io::Write as _;
 
-/// Prints the table, or checks a script.
-pub(crate) fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
-    let text = if let Some(path) = &arguments.check {
+/// The table, or the result of the check of a script.
+pub(crate) fn text(arguments: &FaultsArguments) -> Result<String, RunError> {
+    Ok(if let Some(path) = &arguments.check {
         let Script { script, .. } = Script::read(path)?;
         format!("{}: {} fault(s), each as the table allows", path.display(), script.faults.len())
     } else if arguments.json {
@@ -24,10 +22,7 @@ pub(crate) fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
     } else {
         let rows: Vec<_> = all().map(as_text).collect();
         format!("{}\nconditions are on: {}", rows.join(""), signals().collect::<Vec<_>>().join(", "))
-    };
-    // A closed pipe, as of `| head`, is no error.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    Ok(Exit::Good)
+    })
 }
 
 /// Places as text; frames are too many to be listed.

@@ -38,7 +38,6 @@ struct Entry {
     state: State,
 }
 
-/// All faults of a run.
 pub(crate) struct FaultSchedule {
     entries: Vec<Entry>,
     room: usize,

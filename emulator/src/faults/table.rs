@@ -79,7 +79,6 @@ pub(crate) enum Channel {
     Pressure,
 }
 
-/// Fault of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SensorKind {
     Stuck,
@@ -95,7 +94,6 @@ pub(crate) enum SensorKind {
     Quantisation,
 }
 
-/// Fault of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BusKind {
     Loss,

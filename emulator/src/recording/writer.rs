@@ -57,7 +57,6 @@ pub(crate) struct WriterSetup {
     pub telemetry: Option<Telemetry>,
 }
 
-/// Results of the writer.
 #[derive(Debug, Default)]
 pub(crate) struct WriterReport {
     /// Rows in `measurement.csv` and `truth.csv`.
