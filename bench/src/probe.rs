@@ -45,7 +45,6 @@ use thread_priority::{
 
 /// Capacity of the queue of gaps: what all CPUs can produce in several periods of the writer.
 const QUEUE: usize = 65_536;
-/// Period of the writer.
 const WRITE_PERIOD: Duration = Duration::from_millis(50);
 /// Most rows of the table, so that a forgotten probe does not fill the disk.
 const MOST_ROWS: u64 = 2_000_000;
@@ -76,7 +75,6 @@ struct ProbeState {
     dropped: AtomicU64,
 }
 
-/// Runs the probe.
 pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let cpus = cpus(arguments.cpus.as_deref())?;
     let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;
@@ -168,7 +166,6 @@ fn begin(cpu: usize) -> Result<(), ProbeError> {
     })
 }
 
-/// A spinning thread.
 struct SpinningThread {
     vitals: VitalsReader,
     watch: GapWatch,

@@ -60,21 +60,18 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
     run
 }
 
-/// Changes `summary.json` of a run.
 pub(crate) fn edit_summary(run: &mut RunFiles, change: impl FnOnce(&mut Value)) {
     let mut json = run.summary.take().map(|file| file.json).unwrap_or_default();
     change(&mut json);
     run.summary = SummaryFile::of(json);
 }
 
-/// Changes `run.json` of a run.
 pub(crate) fn edit_run(run: &mut RunFiles, change: impl FnOnce(&mut Value)) {
     let mut json = run.run.take().map(|file| file.json).unwrap_or_default();
     change(&mut json);
     run.run = RunFile::of(json);
 }
 
-/// Changes `controller.json` of a run.
 pub(crate) fn edit_controller(run: &mut RunFiles, change: impl FnOnce(&mut Value)) {
     let mut json = run.controllers.remove("controller").map(|file| file.json).unwrap_or_default();
     change(&mut json);

@@ -15,7 +15,6 @@ pub(crate) const MEASURED_COUNT: usize = 2 * MEASURED.len();
 /// Names of the axes, the prefixes of their columns.
 pub(crate) const AXES: [&str; 2] = Axis::NAMES;
 
-/// Source of a value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Source {
     /// Column of `measurement.csv`, by its index.

@@ -227,7 +227,6 @@ impl Server {
         }
     }
 
-    /// Sends the events that are due to subscribers.
     fn send_due_events(&mut self, now_ms: u64) {
         for message in self.view.take_messages() {
             self.broadcast("message", &json!(message), now_ms);
@@ -448,7 +447,6 @@ fn is_due(due_ms: &mut u64, now_ms: u64, every_ms: u64) -> bool {
     is_time
 }
 
-/// A random token.
 fn draw_token() -> io::Result<String> {
     let mut bytes = [0; TOKEN_BYTES];
     std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;

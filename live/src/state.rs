@@ -49,7 +49,6 @@ pub(crate) struct EmergencyStopState {
     pub senders: Vec<&'static str>,
 }
 
-/// An injected fault that is active.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct ActiveFault {
     pub name: String,

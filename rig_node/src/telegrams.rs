@@ -39,7 +39,6 @@ pub(crate) fn emergency_stop(call: RigCall) -> Frame {
     Frame::RigEmergencyStop(EmergencyStop::of_operator(call == RigCall::Release))
 }
 
-/// Sensors of an axis that saturated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SaturatedSensors {
     position: bool,

@@ -360,7 +360,7 @@ impl<'a> Section<'a> {
         let path = self.path_of(name.get_ref());
         let meant = nearest(name.get_ref(), allowed)
             .map_or(String::new(), |meant| format!(": did you mean {meant}?"));
-        Err(self.source.error_at(
+        Err(self.source.wrong_from(
             name.span().start,
             &format!("unknown key {path}; allowed is {}{meant}", allowed.join(", ")),
         ))
@@ -370,7 +370,7 @@ impl<'a> Section<'a> {
     #[must_use]
     pub fn wrong(&self, message: &str) -> SettingsError {
         let dot = if self.path.is_empty() { "" } else { "." };
-        self.source.error_at(self.at, &format!("{}{dot}{message}", self.path))
+        self.source.wrong_from(self.at, &format!("{}{dot}{message}", self.path))
     }
 
     /// An error of the value under `key`, which begins with that key.
@@ -405,7 +405,7 @@ impl<'a> Section<'a> {
     }
 
     fn reported(&self, value: &Spanned<DeValue<'_>>, message: &str) -> SettingsError {
-        self.source.error_at(value.span().start, &self.path_of(message))
+        self.source.wrong_from(value.span().start, &self.path_of(message))
     }
 
     fn path_of(&self, key: &str) -> String {
@@ -433,7 +433,7 @@ impl<'a> Section<'a> {
                     format!("{path} = {written} must be a table: write {example}")
                 }
             };
-            return Err(self.source.error_at(value.span().start, &message));
+            return Err(self.source.wrong_from(value.span().start, &message));
         };
         Ok(Self::new(self.source, path, table, value.span().start))
     }

@@ -71,12 +71,6 @@ impl<'a> Source<'a> {
         self.text
     }
 
-    /// An error at a byte of the file.
-    #[must_use]
-    pub fn wrong_from(&self, at: usize, message: &str) -> SettingsError {
-        self.error_at(at, message)
-    }
-
     /// The whole file.
     #[must_use]
     pub fn root(&self) -> Section<'_> {
@@ -92,7 +86,9 @@ impl<'a> Source<'a> {
         line_of(self.text, at)
     }
 
-    pub(crate) fn error_at(&self, at: usize, message: &str) -> SettingsError {
+    /// An error at a byte of the file.
+    #[must_use]
+    pub fn wrong_from(&self, at: usize, message: &str) -> SettingsError {
         let (file, line) = (self.file.display(), self.line(at));
         SettingsError(if self.columns {
             format!("{file}:{line}:{}: {message}", column_of(self.text, at))

@@ -10,7 +10,6 @@ use plotters::style::BLACK;
 /// Range of the picture around a step, s.
 const AROUND: Span = Span { from_s: -0.2, to_s: 0.6 };
 
-/// A quantity that is compared.
 struct Quantity {
     title: &'static str,
     of: fn(&Record) -> Series,

@@ -25,7 +25,6 @@ impl CheckedAxis {
         }
     }
 
-    /// The frame of its sensors.
     pub(crate) fn sensors(self) -> &'static MessageSpec {
         match self {
             Self::Drive => DRIVE_SENSORS,

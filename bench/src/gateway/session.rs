@@ -26,7 +26,6 @@ pub(crate) const RAW_MODE_WITHIN_MS: u64 = 10_000;
 /// Refused requests after which a session ends.
 pub(crate) const MOST_REFUSED: u64 = 100;
 
-/// An action of the server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     /// Send this text to the client.
@@ -47,7 +46,6 @@ pub(crate) enum DisconnectReason {
     TooManyRefused,
 }
 
-/// State of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Greeted,

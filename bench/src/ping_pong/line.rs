@@ -20,7 +20,6 @@ pub(super) trait Line {
     /// Waits for frames for a while and passes each on, with its arrival in ns of CLOCK_MONOTONIC where that is known.
     fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Disconnected>;
 
-    /// Whether it is connected.
     fn is_up(&self) -> bool;
 }
 

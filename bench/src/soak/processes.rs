@@ -45,7 +45,6 @@ impl RunningProgram {
         self.child.id()
     }
 
-    /// Whether it is running.
     pub(crate) fn is_running(&mut self) -> bool {
         if self.ended.is_none() {
             self.ended = self.child.try_wait().ok().flatten();

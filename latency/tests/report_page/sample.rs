@@ -1,6 +1,7 @@
 //! A report as a session of ten pairs might leave it, made up: every list has entries, some numbers are missing or none.
 
 use latency::model::*;
+use latency::samples::Samples;
 use runlog::timing_recorder::CommandAges;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -27,51 +28,23 @@ impl Spread {
     }
 }
 
-/// Twenty bins a decade.
-fn bin_of(ns: u64) -> (u64, u64) {
-    let edge = |place: f64| 10f64.powf(place / 20.0).round() as u64;
-    let mut place = ((ns.max(1) as f64).log10() * 20.0).floor();
-    while edge(place + 1.0) <= ns {
-        place += 1.0;
-    }
-    (edge(place), edge(place + 1.0))
-}
-
-fn percentiles(sorted: &[u64]) -> PercentilesNs {
-    let at =
-        |share: f64| sorted.get(((sorted.len() as f64 * share).ceil() as usize).saturating_sub(1)).copied();
-    PercentilesNs {
-        p50: at(0.5),
-        p90: at(0.9),
-        p99: at(0.99),
-        p999: at(0.999),
-        p9999: at(0.9999),
-        max: sorted.last().copied(),
-        count: sorted.len() as u64,
-    }
-}
-
 fn distribution(name: &str, source: Source, about: &str, middle_ns: f64) -> Distribution {
     let mut spread = Spread(name.bytes().map(u64::from).sum());
-    let (mut all, mut maxima) = (Vec::new(), Vec::new());
+    let (mut all, mut maxima) = (Samples::default(), Vec::new());
     for run in 0..RUNS {
         for second in 0..SECONDS {
             let samples: Vec<_> = (0..200).map(|_| spread.latency_ns(middle_ns)).collect();
             let max_ns = samples.iter().copied().max().unwrap_or_default();
             maxima.push(Maximum { run, second, max_ns });
-            all.extend(samples);
+            samples.iter().for_each(|ns| all.record(*ns, 1));
         }
     }
-    all.sort_unstable();
-    let mut bins: BTreeMap<(u64, u64), u64> = BTreeMap::new();
-    all.iter().for_each(|ns| *bins.entry(bin_of(*ns)).or_default() += 1);
-    let bins = bins.into_iter().map(|((from_ns, to_ns), count)| Bin { from_ns, to_ns, count });
     Distribution {
         name: name.into(),
         source,
         about: about.into(),
-        percentiles_ns: percentiles(&all),
-        bins: bins.collect(),
+        percentiles_ns: all.percentiles_ns(),
+        bins: all.bins(),
         maxima: if source == Source::Reference { Vec::new() } else { maxima },
     }
 }
