@@ -182,17 +182,12 @@ fn write(
     started: Duration,
 ) -> Result<(), FileError> {
     let (table, histogram) = (out.join("replay.json"), out.join("replay.hlog"));
-    let end = match played.end {
-        End::Whole => "whole",
-        End::Interrupted => "interrupted",
-        End::LiveRig => "live-rig",
-    };
     let reported = json!({
         "schema": "airbench-replay",
         "schema_version": SCHEMA_VERSION,
         "log": log.file,
         "bus": arguments.bus.to_string(),
-        "ended": end,
+        "ended": played.end,
         "frames_in_log": log.frames.len(),
         "frames_scheduled": schedule.frames.len(),
         "frames_sent": played.sent,

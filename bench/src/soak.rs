@@ -180,7 +180,7 @@ impl SoakRun<'_> {
             let (end, codes) = self.segment(keeping, rig_s)?;
             match end {
                 End::DiskFull(free_bytes) => {
-                    let (free, out) = (free_bytes / 1_000_000, keeping.out().display());
+                    let (free, out) = (free_bytes / 1_000_000, keeping.out.display());
                     let why = format!(
                         "the disk of {out} is nearly full, {free} MB are free: make room, or see --min-free-mb"
                     );
@@ -202,7 +202,7 @@ impl SoakRun<'_> {
     /// Runs, judges and records one segment; returns how it ended and the exit codes of its programs.
     fn segment(&self, keeping: &mut SoakFolder, rig_s: f64) -> Result<(End, Vec<Option<i32>>), SoakError> {
         let spec = self.plan.segment(keeping.next_number());
-        let folder = keeping.out().join("segments").join(spec.folder());
+        let folder = keeping.out.join("segments").join(spec.folder());
         let (started_unix_s, began) = (unix_s(), Instant::now());
         let (planned_s, elapsed_s) = (keeping.soak.planned_s, keeping.soak.elapsed_s);
         let failed = keeping.soak.totals.failed;
@@ -249,7 +249,7 @@ impl SoakRun<'_> {
             eprintln!("soak: segment {} failed: {}: {}", segment.folder, check.name, check.detail);
         }
         keeping.soak.segments.push(segment);
-        let out = keeping.out().to_owned();
+        let out = keeping.out.clone();
         let SoakArguments { keep, keep_failed, .. } = self.common.arguments;
         rotate::rotate(&out, &mut keeping.soak.segments, *keep, *keep_failed)
             .map_err(|error| SoakError::output(&out, &error))?;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 const EXPERIMENT: &str = r#"
 title = "load-step"
@@ -17,11 +17,9 @@ force_settling_s = { least = 0.05, most = 0.13 }
 frames_lost = 0
 "#;
 
-fn bench(arguments: &[&Path]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_bench")).args(arguments).output().unwrap()
-}
-
-fn text_and_code(output: &Output) -> (String, i32) {
+/// Text and exit code of the program.
+fn bench(arguments: &[&Path]) -> (String, i32) {
+    let output = Command::new(env!("CARGO_BIN_EXE_bench")).args(arguments).output().unwrap();
     let text =
         [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat();
     (text, output.status.code().unwrap())
@@ -60,7 +58,7 @@ fn run(parent: &Path, name: &str, experiment: &str, time_constant_s: f64) -> Pat
 fn a_run_is_summed_up_judged_and_drawn() {
     let parent = tempfile::tempdir().unwrap();
     let good = run(parent.path(), "good", EXPERIMENT, 0.03);
-    let (text, code) = text_and_code(&bench(&[Path::new("summary"), &good]));
+    let (text, code) = bench(&[Path::new("summary"), &good]);
     assert!(code == 0 && text.contains("from 0.05 to 0.13, is 0.09") && text.contains("step.svg"), "{text}");
     let summary: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(good.join("summary.json")).unwrap()).unwrap();
@@ -68,7 +66,7 @@ fn a_run_is_summed_up_judged_and_drawn() {
     assert!((summary["position_error_static_m"].as_f64().unwrap() - 1e-4).abs() < 1e-12);
     assert!(fs::read_to_string(good.join("step.svg")).unwrap().contains("A step of 200 N."));
     let slow = run(parent.path(), "slow", EXPERIMENT, 0.06);
-    let (text, code) = text_and_code(&bench(&[Path::new("summary"), &slow]));
+    let (text, code) = bench(&[Path::new("summary"), &slow]);
     assert!(code == 1 && text.contains("BROKEN"), "{text}");
 }
 
@@ -80,15 +78,15 @@ fn runs_of_one_experiment_are_compared_and_others_refused() {
     let other =
         run(parent.path(), "other", &EXPERIMENT.replace("[load]", "[load]\ninitial_force_n = 50.0"), 0.03);
     let page = parent.path().join("pages/both.html");
-    let (text, code) = text_and_code(&bench(&[Path::new("compare"), &one, &two, Path::new("--out"), &page]));
+    let (text, code) = bench(&[Path::new("compare"), &one, &two, Path::new("--out"), &page]);
     assert!(code == 0 && text.contains("force settling") && text.contains("-50"), "{text}");
     let html = fs::read_to_string(&page).unwrap();
     assert!(html.contains("force-pid-map") && html.matches("<svg").count() == 2);
-    let (text, code) = text_and_code(&bench(&[Path::new("compare"), &one, &other]));
+    let (text, code) = bench(&[Path::new("compare"), &one, &other]);
     assert!(code == 2 && text.contains("--anyway"), "{text}");
-    let (_, code) = text_and_code(&bench(&[Path::new("compare"), &one, &other, Path::new("--anyway")]));
+    let (_, code) = bench(&[Path::new("compare"), &one, &other, Path::new("--anyway")]);
     assert_eq!(code, 0);
-    let (_, code) = text_and_code(&bench(&[Path::new("compare"), &one]));
+    let (_, code) = bench(&[Path::new("compare"), &one]);
     assert_eq!(code, 2, "one run is nothing to compare");
 }
 
@@ -98,8 +96,7 @@ fn repetitions_have_a_spread() {
     let runs =
         [("a", 0.03), ("b", 0.03), ("c", 0.03)].map(|(name, s)| run(parent.path(), name, EXPERIMENT, s));
     let out = parent.path().join("out");
-    let (text, code) =
-        text_and_code(&bench(&[Path::new("spread"), &runs[0], &runs[1], &runs[2], Path::new("--out"), &out]));
+    let (text, code) = bench(&[Path::new("spread"), &runs[0], &runs[1], &runs[2], Path::new("--out"), &out]);
     assert!(code == 0 && text.contains("standard deviation"), "{text}");
     let reported: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(out.join("spread.json")).unwrap()).unwrap();
@@ -113,9 +110,9 @@ fn a_misspelt_bound_is_found_before_a_run() {
     let file = parent.path().join("e.toml");
     for (name, code, hint) in [("force_settling_s", 0, ""), ("force_setling_s", 2, "no such figure")] {
         fs::write(&file, EXPERIMENT.replace("force_settling_s", name)).unwrap();
-        let (text, ended) = text_and_code(&bench(&[Path::new("check-experiment"), &file]));
+        let (text, ended) = bench(&[Path::new("check-experiment"), &file]);
         assert!(ended == code && text.contains(hint), "{text}");
     }
-    let (text, code) = text_and_code(&bench(&[Path::new("figures")]));
+    let (text, code) = bench(&[Path::new("figures")]);
     assert!(code == 0 && text.contains("force_settling_s"));
 }

@@ -334,7 +334,7 @@ impl EmulatorNode {
             frames: self.frames,
             commands: self.node.commands().each_ref().map(|intake| *intake.counters()),
             skipped: self.node.skipped(),
-            records_dropped: self.recorder.dropped(),
+            records_dropped: self.recorder.dropped,
         }
     }
 }

@@ -38,7 +38,7 @@ pub(crate) struct Recorder {
     round_trips: Sender<RoundTrip>,
     /// Lockstep waits for the writer instead of losing a record: simulated time has no deadline.
     waits: bool,
-    dropped: u64,
+    pub(crate) dropped: u64,
     writer_alive: Weak<()>,
     _alive: Arc<()>,
 }
@@ -126,10 +126,6 @@ impl Recorder {
     /// Whether the queue of cycles is full while the writer runs.
     pub(crate) fn is_full(&self) -> bool {
         self.cycles.is_full() && self.writer_alive.strong_count() > 0
-    }
-
-    pub(crate) fn dropped(&self) -> u64 {
-        self.dropped
     }
 }
 

@@ -49,7 +49,7 @@ impl BreakableRig {
 
     /// The next mark for the bench's frame: number of the fault, and whether it begins.
     pub(crate) fn next_fault_mark(&mut self) -> Option<(u16, bool)> {
-        self.faults.next_mark()
+        self.faults.pending_marks.pop_front()
     }
 }
 
@@ -62,7 +62,7 @@ impl SimulatedRig for BreakableRig {
         let (plant, sensors, inputs) = self.peopled.parts();
         let broken = FaultTargets { plant, sensors, inputs };
         self.faults.begin_cycle(cycle, broken, |mark| tell(EventKind::Fault(mark)));
-        *self.peopled.hand(Hand::Faults) = self.faults.hands();
+        *self.peopled.hand(Hand::Faults) = self.faults.overlay.hands;
         self.peopled.sample_sensors()
     }
 

@@ -168,10 +168,7 @@ impl RunFiles {
         let Passing { tag, start_s, duration_s, histogram } = passing;
         // Logs from before the load axis had a round trip of its own name the drive's without its axis.
         let tag = if tag == "round-trip" { ROUND_TRIPS[0] } else { tag };
-        if !self.logged.contains_key(tag) {
-            self.logged.insert(tag.to_owned(), Series::default());
-        }
-        let Some(series) = self.logged.get_mut(tag) else { return };
+        let series = self.logged.entry(tag.to_owned()).or_default();
         series.samples.add_histogram(histogram);
         if !histogram.is_empty() && duration_s <= LONGEST_SECOND_S {
             let largest = series.maxima_ns.entry(start_s as u64).or_default();

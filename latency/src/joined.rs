@@ -59,23 +59,15 @@ pub(crate) fn one_way(run: &RunFiles) -> OneWay {
         for row in rig {
             let reported = exchange(row);
             if let Some(other) = answered.get(&row.cycle).filter(|_| reported.sensors_ns > 0) {
-                found.record(
-                    &format!("{axis}-rig-to-controller"),
-                    row.cycle,
-                    reported.sensors_ns,
-                    other.sensors_ns,
-                );
+                let tag = format!("{axis}-rig-to-controller");
+                found.record(tag, row.cycle, reported.sensors_ns, other.sensors_ns);
             }
             let answer = answered
                 .get(&reported.answers)
                 .filter(|other| reported.command_ns > 0 && other.command_ns > 0);
             if let Some(other) = answer {
-                found.record(
-                    &format!("{axis}-controller-to-rig"),
-                    row.cycle,
-                    other.command_ns,
-                    reported.command_ns,
-                );
+                let tag = format!("{axis}-controller-to-rig");
+                found.record(tag, row.cycle, other.command_ns, reported.command_ns);
             }
         }
     }
@@ -83,15 +75,9 @@ pub(crate) fn one_way(run: &RunFiles) -> OneWay {
 }
 
 impl OneWay {
-    fn record(&mut self, tag: &str, cycle: u64, sent_ns: u64, arrived_ns: u64) {
+    fn record(&mut self, tag: String, cycle: u64, sent_ns: u64, arrived_ns: u64) {
         self.below_zero += u64::from(arrived_ns < sent_ns);
-        let ns = arrived_ns.saturating_sub(sent_ns);
-        if !self.series.contains_key(tag) {
-            self.series.insert(tag.to_owned(), Series::default());
-        }
-        if let Some(series) = self.series.get_mut(tag) {
-            series.record(cycle, ns);
-        }
+        self.series.entry(tag).or_default().record(cycle, arrived_ns.saturating_sub(sent_ns));
     }
 }
 

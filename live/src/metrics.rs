@@ -85,7 +85,7 @@ fn head(text: &mut String, name: impl Display, kind: &str, help: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use latency::hlog::{self, Interval};
+    use crate::rhythm;
     use runlog::telemetry::Packet;
 
     #[test]
@@ -96,12 +96,8 @@ mod tests {
             text.lines().filter(|line| line.contains("wake_up_seconds{quantile=")).count()
         };
         assert_eq!(quantiles(&view), 0, "nothing was measured, and nothing took 0 s");
-        let samples = std::iter::repeat_n(20_000, 100).collect();
-        let interval = Interval { tag: "emulator-wakeup".into(), start_s: 0.0, duration_s: 1.0, samples };
-        let mut log = Vec::new();
-        hlog::write(&mut log, 0.0, [&interval]).unwrap();
-        for line in String::from_utf8(log).unwrap().lines() {
-            view.packet(Packet::Histogram(line.to_owned()));
+        for line in rhythm::tests::lines("emulator-wakeup", 0.0, 20_000) {
+            view.packet(Packet::Histogram(line));
         }
         assert_eq!(quantiles(&view), 3, "all but p99.9, which wants a thousand");
     }

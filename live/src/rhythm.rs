@@ -88,11 +88,12 @@ impl LatencyHistograms {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use latency::hlog::Interval;
 
-    fn lines(tag: &str, start_s: f64, ns: u64) -> Vec<String> {
+    /// Lines of a log of a second with a hundred samples of this length.
+    pub(crate) fn lines(tag: &str, start_s: f64, ns: u64) -> Vec<String> {
         let samples = std::iter::repeat_n(ns, 100).collect();
         let interval = Interval { tag: tag.into(), start_s, duration_s: 1.0, samples };
         let mut log = Vec::new();

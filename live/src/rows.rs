@@ -66,11 +66,8 @@ impl Rows {
                     *value = between(&self.chain_values[axis], row.cycle, signal).map(|value| value as f32);
                 }
             }
-            self.kept.push_back(row);
+            push_newest(&mut self.kept, KEPT, row);
             self.fresh = (self.fresh + 1).min(self.kept.len());
-            if self.kept.len() > KEPT {
-                self.kept.pop_front();
-            }
         }
     }
 

@@ -83,17 +83,13 @@ struct Incoming<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct IsoTp {
     settings: Settings,
-    identifiers: Option<Identifiers>,
+    /// Identifiers of its frames, once it is bound.
+    pub(crate) identifiers: Option<Identifiers>,
     sender: Sender,
     receiver: Receiver,
 }
 
 impl IsoTp {
-    /// Identifiers of its frames, once it is bound.
-    pub(crate) fn identifiers(&self) -> Option<Identifiers> {
-        self.identifiers
-    }
-
     /// Checks the identifiers of `bind`, before the interface is checked.
     ///
     /// # Errors

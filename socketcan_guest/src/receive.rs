@@ -187,7 +187,7 @@ impl Supervisor {
             if flags & !TRANSPORT_FLAGS != 0 {
                 return Errno::INVAL.into();
             }
-            if transport.protocol.identifiers().is_none() {
+            if transport.protocol.identifiers.is_none() {
                 return Errno::ADDRNOTAVAIL.into();
             }
         }

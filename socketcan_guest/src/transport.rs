@@ -80,7 +80,7 @@ impl Transport {
     pub(crate) fn address(&self, interface: u32) -> [u8; ADDRESS_BYTES] {
         let mut address = [0; ADDRESS_BYTES];
         address[..abi::ADDRESS_BYTES].copy_from_slice(&abi::address(interface));
-        if let Some(Identifiers { sent, received }) = self.protocol.identifiers() {
+        if let Some(Identifiers { sent, received }) = self.protocol.identifiers {
             address[8..12].copy_from_slice(&received.to_ne_bytes());
             address[12..].copy_from_slice(&sent.to_ne_bytes());
         }
@@ -135,7 +135,7 @@ impl Supervisor {
         // A call that a signal ended is repeated by its caller; its message was withdrawn and must not be sent too.
         self.forget_dead_senders();
         let transport = self.transport(inode).ok_or(Errno::BADF)?;
-        if transport.protocol.identifiers().is_none() {
+        if transport.protocol.identifiers.is_none() {
             return Err(Errno::ADDRNOTAVAIL);
         }
         if transport.has_more_to_send() || self.is_behind_another(inode) {
@@ -172,7 +172,7 @@ impl Supervisor {
     /// Sockets of the same channel.
     fn others_of_channel(&self, inode: u64) -> impl Iterator<Item = (u64, &GuestSocket, &Transport)> {
         let channel =
-            |socket: &GuestSocket| Some((socket.interface?, socket.transport()?.protocol.identifiers()?));
+            |socket: &GuestSocket| Some((socket.interface?, socket.transport()?.protocol.identifiers?));
         let own = self.sockets.get(&inode).and_then(channel);
         let others = self
             .sockets

@@ -15,27 +15,25 @@ use pagekit::number::in_use;
 /// Length of the means, s.
 const MEAN_S: f64 = 0.02;
 
+/// Ends of the columns, with their units, the sizes in SI of the units in which they are drawn, and these.
+const UNITS: [(&str, &str, f64, &str); 4] =
+    [("_m", "m", 1e-3, "mm"), ("_Pa", "Pa", 1e2, "mbar"), ("_N", "N", 1.0, "N"), ("", "1", 1e-2, "%")];
+
 struct ComparedSignal {
     /// Column of `measurement.csv`.
     column: &'static str,
-    title: String,
+    name: String,
     unit: &'static str,
     unit_in_si: f64,
+    drawn: &'static str,
 }
 
 fn shown() -> impl Iterator<Item = ComparedSignal> {
-    MEASURED.iter().map(|column| {
-        let (name, unit, unit_in_si, drawn) = if let Some(name) = column.strip_suffix("_m") {
-            (name, "m", 1e-3, "mm")
-        } else if let Some(name) = column.strip_suffix("_Pa") {
-            (name, "Pa", 1e2, "mbar")
-        } else if let Some(name) = column.strip_suffix("_N") {
-            (name, "N", 1.0, "N")
-        } else {
-            (*column, "1", 1e-2, "%")
-        };
-        let title = format!("{}, {drawn}", name.replace('_', " "));
-        ComparedSignal { column, title, unit, unit_in_si }
+    MEASURED.iter().flat_map(|column| {
+        UNITS.into_iter().find_map(|(end, unit, unit_in_si, drawn)| {
+            let name = column.strip_suffix(end)?.replace('_', " ");
+            Some(ComparedSignal { column, name, unit, unit_in_si, drawn })
+        })
     })
 }
 
@@ -61,12 +59,7 @@ pub(crate) fn table(runs: &[Run]) -> Grid {
     }
     let rows = shown().map(|quantity| {
         let rms: Vec<_> = others.iter().map(|run| difference(first, run, quantity.column).rms()).collect();
-        let mut row = vec![
-            quantity.column.rsplit_once('_').map_or(quantity.column, |(name, _)| name).replace('_', " "),
-        ];
-        if quantity.unit == "1" {
-            row[0] = quantity.column.replace('_', " ");
-        }
+        let mut row = vec![quantity.name];
         for (place, value) in rms.iter().enumerate() {
             row.push(value.map_or_else(|| "-".to_owned(), |value| in_use(value, quantity.unit)));
             if place > 0 {
@@ -89,7 +82,7 @@ pub(crate) fn pictures(runs: &[Run]) -> Vec<Picture> {
             width: if place == 0 { 2 } else { 1 },
             samples: difference(first, run, quantity.column).map(|value| value / quantity.unit_in_si),
         });
-        Panel { title: quantity.title.clone(), curves: curves.collect() }
+        Panel { title: format!("{}, {}", quantity.name, quantity.drawn), curves: curves.collect() }
     });
     let title = format!("{}: differences from {}", first.title(), first.name);
     vec![overlay::whole(title, runs, panels.collect())]

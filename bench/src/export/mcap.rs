@@ -168,7 +168,7 @@ impl Source<'_> {
                     let kind = if holds_words(name) { "string" } else { "number" };
                     (name.clone(), property(kind, "", unit_of(name).unwrap_or_default()))
                 };
-                table.names().iter().map(of).collect()
+                table.names.iter().map(of).collect()
             }
             Self::Signals { message, .. } => {
                 let signals = message.spec.signals.iter().map(|signal| {
@@ -201,8 +201,7 @@ impl Source<'_> {
         out.push(b'{');
         match self {
             Self::Table { table, .. } => {
-                for (name, cell) in
-                    table.names().iter().zip(table.cells()).filter(|(_, cell)| !cell.is_empty())
+                for (name, cell) in table.names.iter().zip(table.cells()).filter(|(_, cell)| !cell.is_empty())
                 {
                     let value =
                         if holds_words(name) { Value::from(cell) } else { Value::from(table.number(cell)?) };

@@ -18,7 +18,7 @@ pub(super) struct RunTable {
     /// Line of `row`, from 1.
     line: u64,
     row: String,
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
 }
 
 impl RunTable {
@@ -41,11 +41,6 @@ impl RunTable {
             return Err(table.refused("the first column is not time_s"));
         }
         Ok(Some(table))
-    }
-
-    /// Names of the columns, the time first.
-    pub(super) fn names(&self) -> &[String] {
-        &self.names
     }
 
     /// Advances to the next row; returns its time since cycle 0, ns, or `None` at the end.
@@ -126,7 +121,7 @@ mod tests {
     fn rows_come_with_their_time_and_a_cut_one_does_not() {
         let mut table =
             opened("# linked=false\ntime_s,at_m\n0.001,2\n# more\n0.002,\n0.003,4").unwrap().unwrap();
-        assert_eq!(table.names(), ["time_s", "at_m"]);
+        assert_eq!(table.names, ["time_s", "at_m"]);
         assert_eq!(table.next_ns().unwrap(), Some(1_000_000));
         assert_eq!(table.cells().collect::<Vec<_>>(), ["0.001", "2"]);
         assert_eq!(table.next_ns().unwrap(), Some(2_000_000));

@@ -233,7 +233,7 @@ impl Trace {
     }
 
     fn fault(&mut self, table: &RunTable, at_us: f64) -> io::Result<()> {
-        let row: BTreeMap<&str, &str> = table.names().iter().map(String::as_str).zip(table.cells()).collect();
+        let row: BTreeMap<&str, &str> = table.names.iter().map(String::as_str).zip(table.cells()).collect();
         let of = |name| row.get(name).copied().unwrap_or_default();
         self.add(&Event {
             name: &format!("{} {}: {}", of("fault"), of("at"), of("what")),

@@ -7,6 +7,7 @@ use super::kind::Kind;
 use super::schedule::Schedule;
 use protocol::bus::{Bus, Received};
 use realtime::{Clock, Instant, Interrupt, Recorder};
+use serde::Serialize;
 use std::time::Duration;
 
 /// Longest wait between two polls of the bus and of Ctrl-C.
@@ -14,7 +15,8 @@ const WAIT_STEP: Duration = Duration::from_millis(5);
 /// Time from the decision to begin until the first frame is due.
 const LEAD: Duration = Duration::from_millis(20);
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum End {
     /// After the last frame.
     Whole,

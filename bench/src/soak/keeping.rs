@@ -17,7 +17,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 pub(super) struct SoakFolder {
     pub soak: Soak,
     pub merged: Merged,
-    out: PathBuf,
+    pub out: PathBuf,
     /// Lock on the folder, held for the life of the process.
     _lock: File,
 }
@@ -85,10 +85,6 @@ impl SoakFolder {
         }
         self.soak.segments.sort_by_key(|segment| segment.spec.number);
         Ok(())
-    }
-
-    pub(super) fn out(&self) -> &Path {
-        &self.out
     }
 
     pub(super) fn next_number(&self) -> u32 {

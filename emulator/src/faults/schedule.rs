@@ -12,7 +12,6 @@ use super::mark::{Cause, Mark};
 use super::overlay::{Overlay, on_wire};
 use super::script::{Condition, FaultScript, Until};
 use super::table::Kind;
-use plant::scene::HandForces;
 use plant::{Axis, Inputs, Plant, Sensors};
 use protocol::bus::{WireOrder, WireOrders};
 use runlog::event::FaultChange;
@@ -47,8 +46,9 @@ pub(crate) struct FaultSchedule {
     /// Seed of all random faults.
     pub(crate) seed: u64,
     orders: Option<WireOrders>,
-    overlay: Overlay,
-    pending_marks: VecDeque<(u16, bool)>,
+    pub(crate) overlay: Overlay,
+    /// Marks for the bench's frame: number of the fault, and whether it begins.
+    pub(crate) pending_marks: VecDeque<(u16, bool)>,
     /// Whether faults are possible in this run.
     pub(crate) possible: bool,
 }
@@ -95,16 +95,6 @@ impl FaultSchedule {
             return 0;
         }
         self.entries.iter().filter(|entry| matches!(entry.state, State::Active { .. })).count()
-    }
-
-    /// External forces of faults, in +x.
-    pub(crate) fn hands(&self) -> HandForces {
-        self.overlay.hands
-    }
-
-    /// The next mark for the bench's frame: number of the fault, and whether it begins.
-    pub(crate) fn next_mark(&mut self) -> Option<(u16, bool)> {
-        self.pending_marks.pop_front()
     }
 
     /// Starts and ends the faults that are due in `cycle`, before the sensors are sampled.

@@ -313,9 +313,9 @@ mod tests {
         }
         let rig = std::thread::spawn(move || {
             while taken < MOST && !news.is_empty() {
-                let lost = recorder.dropped();
+                let lost = recorder.dropped;
                 recorder.cycle(record.clone());
-                taken += 1 - (recorder.dropped() - lost);
+                taken += 1 - (recorder.dropped - lost);
             }
             taken
         });

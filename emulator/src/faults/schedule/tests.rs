@@ -1,6 +1,7 @@
 //! When faults begin and end.
 
 use super::*;
+use plant::scene::HandForces;
 use plant::{RigParameters, Setup};
 
 struct Bench {
@@ -30,7 +31,7 @@ impl Bench {
             let Self { schedule, plant, sensors, inputs } = self;
             let broken = FaultTargets { plant, sensors, inputs };
             schedule.begin_cycle(cycle, broken, |mark| reported.push((cycle, mark.number, mark.what.name())));
-            schedule.hands().put_into(&mut self.inputs);
+            schedule.overlay.hands.put_into(&mut self.inputs);
             self.plant.step(&self.inputs);
         }
         reported
@@ -59,7 +60,7 @@ fn faults_begin_and_end_by_time_and_the_plant_is_whole_again() {
     assert_eq!(reported, [(10, 1, "begins"), (20, 2, "begins"), (30, 1, "ends"), (40, 2, "ends")]);
     assert_eq!(bench.schedule.overlay, Overlay::default());
     assert!(!bench.schedule.busy && bench.schedule.active() == 0);
-    let sent: Vec<_> = std::iter::from_fn(|| bench.schedule.next_mark()).collect();
+    let sent: Vec<_> = std::iter::from_fn(|| bench.schedule.pending_marks.pop_front()).collect();
     assert_eq!(sent, [(1, true), (2, true), (1, false), (2, false)]);
 }
 
@@ -93,7 +94,7 @@ fn an_end_stop_is_hit_and_rods_part_once() {
     };
     assert!(!bench.plant.linked());
     assert!(hit < 1000, "{hit}");
-    assert_eq!(bench.schedule.hands(), HandForces::default(), "let go");
+    assert_eq!(bench.schedule.overlay.hands, HandForces::default(), "let go");
 }
 
 #[test]
