@@ -78,17 +78,12 @@ pub(crate) fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
         std::fs::rename(&part, out).map_err(|error| FileError::write(out, error))?;
         Ok(reported)
     });
-    match renamed {
-        Ok((reported, exit)) => {
-            say(&format!("{}: {reported}", out.display()));
-            Ok(exit)
-        }
-        Err(error) => {
-            // An incomplete file is of no use; a failure to remove it changes nothing.
-            let _ = std::fs::remove_file(&part);
-            Err(error)
-        }
-    }
+    let (reported, exit) = renamed.inspect_err(|_| {
+        // An incomplete file is of no use; a failure to remove it changes nothing.
+        let _ = std::fs::remove_file(&part);
+    })?;
+    say(&format!("{}: {reported}", out.display()));
+    Ok(exit)
 }
 
 type ExportResult = (String, Exit);

@@ -138,8 +138,7 @@ mod tests {
 
     #[test]
     fn a_cycle_that_the_rig_missed_is_late_against_its_own_time() {
-        let mut run = made_up::run(100);
-        made_up::stall(&mut run, "emulator", 50, 5_300_000);
+        let run = made_up::stalled(100, "emulator", 50, 5_300_000);
         let reported = of_rows("emulator", &run.rows["emulator"]);
         let wakeup = &reported["emulator-wakeup"].samples;
         assert_eq!(wakeup.count(), 100);

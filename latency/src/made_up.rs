@@ -152,6 +152,13 @@ pub(crate) fn stall<'a>(
     row
 }
 
+/// A run in which a process woke this late in a cycle.
+pub(crate) fn stalled(cycles: u64, process: &str, cycle: u64, late_ns: u64) -> RunFiles {
+    let mut run = run(cycles);
+    stall(&mut run, process, cycle, late_ns);
+    run
+}
+
 /// Makes the work of a cycle longer, and gives its row.
 pub(crate) fn slow<'a>(run: &'a mut RunFiles, process: &str, cycle: u64, by_ns: u64) -> &'a mut CycleTiming {
     let rows = run.rows.get_mut(process).expect("a process with rows");

@@ -57,8 +57,7 @@ mod tests {
     #[test]
     fn what_machines_do_by_themselves_is_nothing_that_was_done() {
         assert_eq!(name(&report_of(vec![made_up::run(2000)])).0, "nothing");
-        let mut run = made_up::run(2000);
-        made_up::stall(&mut run, "emulator", 100, 3_300_000);
+        let mut run = made_up::stalled(2000, "emulator", 100, 3_300_000);
         let (cause, sentence) = name(&report_of(vec![run.clone()]));
         assert_eq!(cause, "nothing");
         assert!(sentence.contains("the machine stood still"), "{sentence}");

@@ -1,7 +1,7 @@
 //! The data of the run in progress, from its telemetry and from the bus.
 
 use super::chains;
-use super::columns::{COLUMNS, Layout, Source};
+use super::columns::{COLUMNS, Column, Layout, MEASURED_COUNT, Source};
 use super::light::{Judgement, Light};
 use super::minute::RecentRecord;
 use super::rhythm::LatencyHistograms;
@@ -122,17 +122,20 @@ impl View {
         if !cycle.is_multiple_of(SPACING_CYCLES) {
             return;
         }
-        let supply_pa = self.layout.supply_pa(values).or(self.supply_on_bus_pa());
-        let row: Vec<_> = COLUMNS
-            .iter()
-            .enumerate()
-            .map(|(place, column)| match &column.source {
-                Source::Measured(index) => measured[*index],
-                Source::Truth(_, factor) => self.layout.truth(place, *factor, values),
-                Source::Supply => supply_pa,
-                Source::Controller(..) => None,
-            })
-            .collect();
+        self.add_row(cycle, &measured, values);
+    }
+
+    /// Adds a row of the charts; `values` are those of the telemetry, none without it.
+    fn add_row(&mut self, cycle: u64, measured: &[Option<f64>; MEASURED_COUNT], values: &[f64]) {
+        let on_bus_pa = self.wire.status.map(|status| status.supply_pressure_pa);
+        let supply_pa = self.layout.supply_pa(values).or(on_bus_pa);
+        let of = |(place, column): (usize, &Column)| match &column.source {
+            Source::Measured(index) => measured[*index],
+            Source::Truth(_, factor) => self.layout.truth(place, *factor, values),
+            Source::Supply => supply_pa,
+            Source::Controller(..) => None,
+        };
+        let row: Vec<_> = COLUMNS.iter().enumerate().map(of).collect();
         self.rows.add(cycle, &row);
     }
 
@@ -154,17 +157,7 @@ impl View {
         }
         self.cycle = Some(cycle);
         let measured = self.wire.measured;
-        let of = |source: &Source| match source {
-            Source::Measured(index) => measured[*index],
-            Source::Supply => self.supply_on_bus_pa(),
-            Source::Truth(..) | Source::Controller(..) => None,
-        };
-        let row: Vec<_> = COLUMNS.iter().map(|column| of(&column.source)).collect();
-        self.rows.add(cycle, &row);
-    }
-
-    fn supply_on_bus_pa(&self) -> Option<f64> {
-        self.wire.status.map(|status| status.supply_pressure_pa)
+        self.add_row(cycle, &measured, &[]);
     }
 
     fn event(&mut self, EventMessage { cycle, kind, text }: EventMessage) {
@@ -247,7 +240,7 @@ impl View {
     /// The properties of the run that do not change.
     pub(crate) fn description(&self, control: bool) -> Value {
         let described = self.description.as_ref();
-        let column = |column: &super::columns::Column| json!({ "name": column.name, "unit": column.unit });
+        let column = |column: &Column| json!({ "name": column.name, "unit": column.unit });
         json!({
             "schema_version": runlog::run_folder::SCHEMA_VERSION,
             "experiment": described.and_then(|run| run.experiment.as_ref()),

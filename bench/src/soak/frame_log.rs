@@ -4,6 +4,7 @@
 //! memory does not depend on its length.
 
 use super::account::Counts;
+use super::evidence::counts;
 use protocol::bus::OTHERS;
 use protocol::can::CanFrame;
 use protocol::frames::{DRIVE_VALVE_COMMAND, Frame, LOAD_VALVE_COMMAND, MESSAGES};
@@ -40,11 +41,8 @@ pub(super) fn read(path: &Path) -> io::Result<FrameLog> {
             counters.entry(name.to_owned()).or_insert((alive, alive)).1 = alive;
         }
     }
-    let mut by_name = Counts::default();
-    for (id, count) in frames {
-        by_name.add(&known_name(&String::from_utf8_lossy(&id)), count);
-    }
-    Ok(FrameLog { frames: by_name, counters })
+    let frames = counts(frames.iter().map(|(id, count)| (String::from_utf8_lossy(id).into_owned(), *count)));
+    Ok(FrameLog { frames, counters })
 }
 
 /// Name of an identifier as peers count it; those outside `rig.dbc` share one.

@@ -83,8 +83,7 @@ mod tests {
     #[test]
     fn the_dump_its_frames_and_the_rigs_own_events_stand_beside_an_event() {
         let folder = tempfile::tempdir().unwrap();
-        let mut run = made_up::run(500);
-        made_up::stall(&mut run, "emulator", 100, 3_700_000);
+        let mut run = made_up::stalled(500, "emulator", 100, 3_700_000);
         run.folder = folder.path().into();
         made_up::edit_summary(&mut run, |summary| {
             summary["event_count"] = json!(4);
@@ -111,8 +110,7 @@ mod tests {
 
     #[test]
     fn without_a_dump_nothing_is_named() {
-        let mut run = made_up::run(500);
-        made_up::stall(&mut run, "emulator", 100, 3_700_000);
+        let run = made_up::stalled(500, "emulator", 100, 3_700_000);
         let mut event = explain::events(0, &run).remove(0);
         add(&mut event, &run);
         assert_eq!((event.dump, event.frames.len(), event.rig_events.len()), (None, 0, 0));

@@ -22,8 +22,7 @@ fn an_undisturbed_run_has_no_event() {
 
 #[test]
 fn a_stopped_rig_is_one_event_and_its_controller_is_not_late() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 5_400_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 5_400_000);
     // The handler may run a cycle later.
     run.rows.get_mut("emulator").unwrap()[102].vitals.continued = 1;
     let event = one(&run);
@@ -95,8 +94,7 @@ fn a_cpu_that_stood_still_under_the_probe_is_no_contention() {
 
 #[test]
 fn both_processes_late_at_once_is_the_machine() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 900_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 900_000);
     made_up::stall(&mut run, "controller", 100, 900_000).vitals.run_delay_ns = 850_000;
     let events = events(0, &run);
     assert_eq!(events.len(), 2);
@@ -106,8 +104,7 @@ fn both_processes_late_at_once_is_the_machine() {
 
 #[test]
 fn a_late_timer_without_any_trace_is_most_likely_the_machine() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 3_700_000);
+    let run = made_up::stalled(500, "emulator", 100, 3_700_000);
     let event = one(&run);
     assert_eq!(event.cause, Cause::MachineStoodStill);
     assert!(event.sentence.contains("most likely"), "{}", event.sentence);
@@ -116,8 +113,7 @@ fn a_late_timer_without_any_trace_is_most_likely_the_machine() {
 
 #[test]
 fn a_probe_that_saw_the_cpu_free_contradicts() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 3_700_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 3_700_000);
     run.gaps = Some(vec![gap(0, 10, 200_000, false)]);
     assert_eq!(one(&run).cause, Cause::Unexplained);
 }
@@ -147,8 +143,7 @@ fn slow_work_is_told_apart_from_a_machine_that_stood_still() {
 
 #[test]
 fn without_run_delay_nothing_is_left_over_for_the_machine() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 3_700_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 3_700_000);
     run.rows.get_mut("emulator").unwrap().iter_mut().for_each(|row| row.vitals.run_delay_ns = 0);
     assert_eq!(one(&run).cause, Cause::Unexplained);
 }
@@ -176,8 +171,7 @@ fn waiting_that_is_no_cause_is_told_as_it_was() {
 
 #[test]
 fn witnesses_that_contradict_each_other_make_it_likely_only() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 900_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 900_000);
     made_up::stall(&mut run, "controller", 100, 900_000).vitals.run_delay_ns = 850_000;
     let events = events(0, &run);
     let of = |process: &str| events.iter().find(|event| event.process == process).unwrap();
@@ -198,8 +192,7 @@ fn waiting_is_added_up_over_the_cycles_of_an_event() {
 
 #[test]
 fn what_two_processes_suffered_at_once_takes_one_place() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 900_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 900_000);
     made_up::stall(&mut run, "controller", 100, 800_000);
     made_up::stall(&mut run, "controller", 300, 700_000);
     let mut events = events(0, &run);
@@ -213,8 +206,7 @@ fn what_two_processes_suffered_at_once_takes_one_place() {
 
 #[test]
 fn a_watched_cpu_without_gaps_is_never_called_unwatched() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 3_700_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 3_700_000);
     run.gaps = Some(vec![gap(1, 10, 200_000, false)]);
     let reported = |run: &RunFiles| one(run).evidence.join(" ");
     assert!(reported(&run).contains("does not tell whether that CPU was watched"), "{}", reported(&run));

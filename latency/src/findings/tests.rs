@@ -98,8 +98,7 @@ fn waiting_of_a_machine_that_nobody_saw_running_is_no_hog() {
 
 #[test]
 fn lateness_without_rows_is_no_undisturbed_run() {
-    let mut run = made_up::run(500);
-    made_up::stall(&mut run, "emulator", 100, 5_400_000);
+    let mut run = made_up::stalled(500, "emulator", 100, 5_400_000);
     made_up::edit_summary(&mut run, |summary| {
         summary["wakeup_ns"] = json!({ "max": 5_400_000, "count": 500 });
         summary["skipped"] = json!(5);
@@ -123,8 +122,7 @@ fn lateness_without_rows_is_no_undisturbed_run() {
 
 #[test]
 fn what_somebody_did_stands_before_what_machines_do() {
-    let mut run = made_up::run(3000);
-    made_up::stall(&mut run, "emulator", 100, 9_300_000);
+    let mut run = made_up::stalled(3000, "emulator", 100, 9_300_000);
     made_up::stall(&mut run, "emulator", 500, 5_300_000).vitals.continued = 1;
     assert_eq!(found(run), [Cause::EmulatorStopped, Cause::MachineStoodStill]);
 }
