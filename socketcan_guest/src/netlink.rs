@@ -146,7 +146,7 @@ impl Supervisor {
             Ok(received) => received,
             // The kernel answers at once, so there is no answer, and the guest may wait for it.
             Err(Errno::AGAIN) => return None,
-            Err(error) => return Some(error.into()),
+            Err(error) => return Some(Answer::Error(error)),
         };
         let (datagram, is_over) = with_guest_interfaces(&datagram, &request, &self.interfaces);
         if is_over && flags & libc::MSG_PEEK == 0 {
@@ -160,7 +160,7 @@ impl Supervisor {
         Some(match written {
             Ok(_) if flags & libc::MSG_TRUNC != 0 => Answer::Value(datagram.len() as i64),
             Ok(length) => Answer::Value(length as i64),
-            Err(error) => error.into(),
+            Err(error) => Answer::Error(error),
         })
     }
 }

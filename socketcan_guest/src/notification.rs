@@ -42,12 +42,6 @@ pub(crate) enum Answer {
     Deferred,
 }
 
-impl From<Errno> for Answer {
-    fn from(error: Errno) -> Self {
-        Self::Error(error)
-    }
-}
-
 /// Descriptor for notifications.
 pub(crate) struct Listener(OwnedFd);
 

@@ -185,17 +185,17 @@ impl Supervisor {
         }
         if let Some(transport) = socket.transport() {
             if flags & !TRANSPORT_FLAGS != 0 {
-                return Errno::INVAL.into();
+                return Answer::Error(Errno::INVAL);
             }
             if transport.protocol.identifiers.is_none() {
-                return Errno::ADDRNOTAVAIL.into();
+                return Answer::Error(Errno::ADDRNOTAVAIL);
             }
         }
         if flags & libc::MSG_ERRQUEUE != 0 {
-            return Errno::AGAIN.into();
+            return Answer::Error(Errno::AGAIN);
         }
         if !self.listener.is_alive(notification.id) {
-            return Errno::INTR.into();
+            return Answer::Error(Errno::INTR);
         }
         let caller = Caller::new(notification.thread);
         let mut taken = Vec::new();

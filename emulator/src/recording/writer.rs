@@ -36,6 +36,7 @@ const SKIPS_REPORTED: usize = 10;
 const FRAME_DELAY_NS: u64 = 250_000_000;
 
 /// Properties of the run for the writer.
+#[derive(Default)]
 pub(crate) struct WriterSetup {
     /// The run's folder, which exists.
     pub folder: PathBuf,
@@ -276,17 +277,8 @@ mod tests {
     use std::path::Path;
 
     fn writer_into(folder: &Path) -> Writer {
-        let setup = WriterSetup {
-            folder: folder.to_owned(),
-            interface: "can0".to_owned(),
-            epoch_offset_ns: 0,
-            linked: false,
-            added_mass_kg: 0.0,
-            terms: Vec::new(),
-            faults: false,
-            timing: None,
-            telemetry: None,
-        };
+        let setup =
+            WriterSetup { folder: folder.to_owned(), interface: "can0".to_owned(), ..WriterSetup::default() };
         Writer::create(setup).unwrap()
     }
 
