@@ -11,8 +11,6 @@ use plant::effects::sheet::{EffectKey, Sheet, Switched};
 use std::path::{Path, PathBuf};
 
 const PERIOD_NS: f64 = 1e6;
-/// Columns of truth.csv that are no terms.
-const STATES: [&str; Truth::COLUMNS.len()] = Truth::COLUMNS;
 
 /// Both axes linked and on their way together, then each for itself: to and fro, for `--repeat`. Nothing is judged.
 pub const LIVELY: &str = include_str!("../scenes/lively.toml");
@@ -86,14 +84,11 @@ pub struct Live {
     pub missed: u64,
     /// Cycles whose own work, without the time that another thread had the CPU, was longer than the period.
     pub overworked: u64,
-    /// Stage that computes: the step of the plant, its truth and its terms.
-    pub step_ns_p50: u64,
-    pub step_ns_p99: u64,
-    /// Stage that samples the sensors and sends.
-    pub send_ns_p50: u64,
-    pub send_ns_p99: u64,
-    pub execution_ns_p50: u64,
-    pub execution_ns_p99: u64,
+    /// Median and 99th percentile of the stage that computes: the step of the plant, its truth and its terms.
+    pub step_ns: [u64; 2],
+    /// The same of the stage that samples the sensors and sends.
+    pub send_ns: [u64; 2],
+    pub execution_ns: [u64; 2],
 }
 
 /// Runs emulator and controllers in real time with these effects; the run lies in the folder `run` of the scene.
@@ -106,21 +101,18 @@ pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> Live {
         &scene.controller(Pace::Real).out(&folder).with("--repeat"),
     );
     let summary = json(&folder.join("summary.json"));
-    let figure = |name: &str| count(&summary, name);
+    let percentiles = |stage: &str| ["p50", "p99"].map(|of| count(&summary, &format!("/{stage}/{of}")));
     let rows = Table::read(&folder.join("emulator-timing.csv"));
     let [woke, done, others] = ["woke_ns", "done_ns", "run_delay_ns"].map(|column| rows.column(column));
     // The first second touches memory for the first time.
     let work_ns = (1000..rows.len()).map(|row| done[row] - woke[row] - others[row]);
     Live {
-        cycles: figure("/cycles"),
-        missed: figure("/skipped"),
+        cycles: count(&summary, "/cycles"),
+        missed: count(&summary, "/skipped"),
         overworked: work_ns.filter(|ns| *ns > PERIOD_NS).count() as u64,
-        step_ns_p50: figure("/step_ns/p50"),
-        step_ns_p99: figure("/step_ns/p99"),
-        send_ns_p50: figure("/send_ns/p50"),
-        send_ns_p99: figure("/send_ns/p99"),
-        execution_ns_p50: figure("/execution_ns/p50"),
-        execution_ns_p99: figure("/execution_ns/p99"),
+        step_ns: percentiles("step_ns"),
+        send_ns: percentiles("send_ns"),
+        execution_ns: percentiles("execution_ns"),
     }
 }
 
@@ -129,8 +121,8 @@ pub fn expect_physical(truth: &Path) {
     let table = Table::read(truth);
     assert!(table.len() > 100, "{}: {} rows", truth.display(), table.len());
     for name in table.names() {
-        // Terms may have either sign; states that are pressures may not.
-        let pressure = STATES.contains(&name.as_str()) && name.contains("_pressure_");
+        // Terms may have either sign; states that are pressures may not, and those are the truth's own columns.
+        let pressure = Truth::COLUMNS.contains(&name.as_str()) && name.contains("_pressure_");
         for (row, value) in table.column(name).iter().enumerate() {
             let good = value.is_finite() && (!pressure || *value > 0.0);
             assert!(good, "{}: {name} = {value} in row {row}", truth.display());

@@ -30,22 +30,22 @@ fn main() {
     );
     for (slices, (name, _)) in slices.iter().zip(&kinds) {
         let sum = |of: fn(&Live) -> u64| slices.iter().map(of).sum::<u64>();
-        let middle = |of: fn(&Live) -> u64| {
-            let mut values: Vec<u64> = slices.iter().map(of).collect();
-            values.sort_unstable();
-            values[values.len() / 2] as f64 / 1e3
+        let middle = |of: fn(&Live) -> [u64; 2]| {
+            let [p50_us, p99_us] = [0, 1].map(|percentile| {
+                let mut values: Vec<u64> = slices.iter().map(|live| of(live)[percentile]).collect();
+                values.sort_unstable();
+                values[values.len() / 2] as f64 / 1e3
+            });
+            format!("{p50_us:.1} / {p99_us:.1}")
         };
         println!(
-            "| {name} | {} | {} | {} | {:.1} / {:.1} | {:.1} / {:.1} | {:.1} / {:.1} |",
+            "| {name} | {} | {} | {} | {} | {} | {} |",
             sum(|live| live.cycles),
             sum(|live| live.missed),
             sum(|live| live.overworked),
-            middle(|live| live.step_ns_p50),
-            middle(|live| live.step_ns_p99),
-            middle(|live| live.send_ns_p50),
-            middle(|live| live.send_ns_p99),
-            middle(|live| live.execution_ns_p50),
-            middle(|live| live.execution_ns_p99),
+            middle(|live| live.step_ns),
+            middle(|live| live.send_ns),
+            middle(|live| live.execution_ns),
         );
     }
 }
