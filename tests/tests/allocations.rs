@@ -9,7 +9,7 @@ use protocol::can::CanFrame;
 use rustix::process::Signal;
 use system_tests::onlooker::Viewer;
 use system_tests::xcp::{self, Talk};
-use system_tests::{Build, LINKED, Pace, Peer, RESTLESS, Scene, count, run_both, turn};
+use system_tests::{Build, LINKED, Pace, Peer, RESTLESS, Scene, both_good, count, run_both, turn};
 
 /// Faults that begin and end after the warm-up, mild enough for the run to go on as it does.
 const FAULTS: &str = include_str!("../scenes/faults/allocations.toml");
@@ -149,10 +149,8 @@ fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
 fn programs_that_do_not_count_say_so() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    run_both(
-        &scene.emulator(Pace::Real).with("--seconds 1.2"),
-        &scene.controller(Pace::Real).with("--repeat"),
-    );
+    let (emulator, controller) = scene.start(Pace::Real, "--seconds 1.2", "--repeat");
+    both_good(emulator, controller);
     assert_eq!(scene.run_description()["counts_allocations"], false);
     assert!(scene.summary()["allocations_in_cycle"].is_null());
     assert!(scene.report()["allocations_in_cycle"].is_null());

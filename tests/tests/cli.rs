@@ -1,9 +1,8 @@
 //! Command lines and files that cannot be used: a message that a person can act on, the documented exit code, no hang.
 
 use std::path::Path;
-use std::process::Command;
 use system_tests::exit::{BAD_INPUT, BUS_FAILED};
-use system_tests::{Build, Ended, Launch, PROGRAM, Pace, Program, Running, SHORT, Scene, executable};
+use system_tests::{Ended, Launch, PROGRAM, Pace, Program, Running, SHORT, Scene};
 
 /// A key of the rig file made wrong: text, its replacement, and what the message must hold besides file and line.
 const WRONG_RIGS: [(&str, &str, &[&str]); 7] = [
@@ -206,9 +205,8 @@ fn a_wrong_command_line_tells_what_is_allowed() {
     ];
     let cases = emulator.map(|case| (Program::Emulator, case)).into_iter();
     for (program, (line, hint)) in cases.chain(controller.map(|case| (Program::Controller, case))) {
-        let mut command = Command::new(executable(program, Build::Shipped));
-        let ended =
-            Running::start(&format!("{} {line}", program.name()), command.args(line.split(' '))).wait();
+        let name = format!("{} {line}", program.name());
+        let ended = Running::start(&name, program.command().args(line.split(' '))).wait();
         ended.expect_code(BAD_INPUT).expect_said(&[hint]);
     }
 }
@@ -216,8 +214,7 @@ fn a_wrong_command_line_tells_what_is_allowed() {
 #[test]
 fn help_tells_the_exit_codes_in_one_table() {
     for program in [Program::Emulator, Program::Controller] {
-        let mut command = Command::new(executable(program, Build::Shipped));
-        let ended = Running::start(program.name(), command.arg("--help")).wait().expect_code(0);
+        let ended = program.start(&[&"--help"]).wait().expect_code(0);
         let parts = ["0 good", "1 a bound", "2 usage", "3 the bus", "4 lockstep", "130 interrupted"];
         ended.expect_printed(&parts);
     }

@@ -16,9 +16,9 @@ use system_tests::{
 const MS: u64 = 1_000_000;
 
 fn under_way(scene: &Scene, options: &str) -> (Running, Running) {
-    let (emulator, controller) = scene.start(Pace::Real, options, "--repeat");
+    let both = scene.start(Pace::Real, options, "--repeat");
     scene.wait_for_rows("emulator", 1500);
-    (emulator, controller)
+    both
 }
 
 /// All lines of a tag added up, which is the whole run.
@@ -152,8 +152,7 @@ fn a_rig_that_is_killed_leaves_its_histograms_but_for_the_last_second() {
     let scene = Scene::new(RESTLESS);
     let (emulator, controller) = under_way(&scene, "--seconds 60");
     scene.wait_for_rows("emulator", 4000);
-    emulator.signal(Signal::KILL);
-    emulator.wait();
+    emulator.kill();
     drop(controller);
     let path = scene.path("emulator/emulator.hlog");
     assert!(std::fs::read(&path).expect("the log").ends_with(b"\n"));

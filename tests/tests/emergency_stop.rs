@@ -24,21 +24,15 @@ fn said_in(cycle: u32) -> Option<Frame> {
     }
 }
 
-/// Runs with a member that stops and releases, for the whole of it.
-fn run() -> Scene {
+#[test]
+fn a_stop_is_released_by_its_sender_alone_and_the_record_shows_the_valve_that_acts() {
     let scene = Scene::new(RESTLESS);
-    let seconds = CYCLES as f64 * 1e-3;
-    let options = format!("--members 2 --seconds {seconds}");
+    let options = format!("--members 2 --seconds {}", CYCLES as f64 * 1e-3);
     let (emulator, controller) = scene.start(Pace::Lockstep, &options, "--repeat");
+    // A member stops and releases, for the whole of it.
     scene.peer().be_console(said_in);
     emulator.wait().expect_code(0);
     controller.wait();
-    scene
-}
-
-#[test]
-fn a_stop_is_released_by_its_sender_alone_and_the_record_shows_the_valve_that_acts() {
-    let scene = run();
     let truth = scene.truth();
     let measurement = scene.measurement();
     let (supply, valve) = (truth.column("supply_pressure_Pa"), measurement.column("drive_valve"));

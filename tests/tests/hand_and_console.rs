@@ -38,10 +38,6 @@ fn rig_calls(log: &Path) -> Vec<(usize, bool)> {
     calls
 }
 
-fn reported(scene: &Scene) -> Vec<Event> {
-    all(&scene.summary())
-}
-
 fn cycles_of(events: &[Event], kind: &str) -> Vec<usize> {
     events.iter().filter(|event| event.kind == kind).map(|event| event.cycle).collect()
 }
@@ -55,7 +51,7 @@ fn a_scripted_stop_is_called_out_every_100_ms_and_empties_the_supply() {
     lockstep(&scene, 1800, |_| None);
     let stops = [400, 500, 600, 700, 800, 900].map(|cycle| (cycle, false));
     assert_eq!(rig_calls(&scene.path("emulator/bus.log")), [&stops[..], &[(950, true)]].concat());
-    let events = reported(&scene);
+    let events = all(&scene.summary());
     assert_eq!(cycles_of(&events, "emergency-stop"), [400]);
     assert_eq!(cycles_of(&events, "emergency-stop-released"), [950]);
     let supply = scene.truth().column("supply_pressure_Pa");
@@ -113,7 +109,7 @@ fn the_rig_releases_its_own_stop_alone() {
         1299 => stop(true),
         _ => None,
     });
-    let events = reported(&scene);
+    let events = all(&scene.summary());
     assert_eq!(cycles_of(&events, "emergency-stop"), [400], "held by one or the other all the time");
     assert_eq!(cycles_of(&events, "emergency-stop-still-held"), [950]);
     assert_eq!(cycles_of(&events, "emergency-stop-released"), [1300]);
@@ -140,7 +136,7 @@ fn a_run_with_people_in_it_is_the_same_to_the_byte() {
         let path = |scene: &Scene| scene.path("emulator").join(file);
         assert!(one.same(&path(&one), &path(&other)), "{file} differs");
     }
-    let events = reported(&one);
+    let events = all(&one.summary());
     assert_eq!(cycles_of(&events, "link-given-up"), [1200]);
     assert_eq!(times(&events, "weights"), 1);
 }
@@ -219,7 +215,7 @@ fn what_is_typed_is_done_told_and_recorded() {
     emulator.type_line("quit");
     let received = peer.frames_to_the_end();
     emulator.wait().expect_code(0).expect_said(&["ended at the console"]);
-    let events = reported(&scene);
+    let events = all(&scene.summary());
     for kind in ["emergency-stop", "emergency-stop-released", "link-refused", "unlinked", "weights"] {
         assert_eq!(times(&events, kind), 1, "{kind}: {events:?}");
     }
@@ -287,5 +283,5 @@ fn without_the_option_nothing_is_read_from_standard_input() {
     wait_until("the run goes on", || scene.path("emulator/run.json").exists());
     let ended = emulator.wait().expect_code(0);
     assert!(!ended.stderr.contains("console"), "{}", ended.stderr);
-    assert_eq!(times(&reported(&scene), "emergency-stop"), 0);
+    assert_eq!(times(&all(&scene.summary()), "emergency-stop"), 0);
 }

@@ -5,14 +5,13 @@ use runlog::timing::CycleTiming;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, json, run_both, timing_rows, turn};
+use system_tests::{Ended, Pace, Program, SHORT, Scene, json, run_both, timing_rows, turn};
 
 const FAULTS: &str = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\nfrom_s = 0.2\nto_s = 0.25\n";
 
 fn export(folder: &Path, out: &Path) -> Ended {
-    let mut bench = Program::Bench.command();
-    bench.arg("export").arg(folder).args(["--to", "trace", "--out"]).arg(out);
-    Running::start("bench export", &mut bench).wait().expect_code(0)
+    let bench = Program::Bench.start(&[&"export", &folder, &"--to", &"trace", &"--out", &out]);
+    bench.wait().expect_code(0)
 }
 
 struct Trace {

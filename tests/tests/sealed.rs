@@ -13,7 +13,7 @@ use plant::effects::sheet::Switched;
 use plant::effects::{SHEETS, sheet};
 use protocol::frames::{DRIVE_SENSORS, MESSAGES};
 use system_tests::hidden::{Extreme, LIVELY, drawn, everything, rig_with};
-use system_tests::{Pace, Program, Running, Scene, Table, both_good, bus_log, json, run_both, turn};
+use system_tests::{Pace, Program, Scene, Table, both_good, bus_log, json, run_both, turn};
 
 const SEALED_RUNS: u64 = 20;
 /// Shorter texts of numbers stand anywhere by chance.
@@ -41,8 +41,7 @@ fn run(sealed: &str, pace: Pace, options: &str) -> Left {
         &scene.emulator(pace).out(&folder).with("--seconds 1.3").with(&sealed).with(options),
         &scene.controller(pace).out(&folder).with("--repeat"),
     );
-    let mut summary = Program::Bench.command();
-    let summary = Running::start("bench summary", summary.arg("summary").arg(&folder)).wait().expect_code(0);
+    let summary = Program::Bench.start(&[&"summary", &folder]).wait().expect_code(0);
     let said =
         ended.iter().chain([&summary]).map(|ended| format!("{}{}", ended.stdout, ended.stderr)).collect();
     Left { scene, said }
@@ -190,10 +189,8 @@ fn what_only_real_time_leaves_tells_nothing_of_it_either() {
 fn an_empty_seal_changes_no_byte() {
     let sealed = run("# nothing\n", Pace::Lockstep, "");
     let scene = Scene::new(LIVELY);
-    run_both(
-        &scene.emulator(Pace::Lockstep).with("--seconds 1.3"),
-        &scene.controller(Pace::Lockstep).with("--repeat"),
-    );
+    let (emulator, controller) = scene.start(Pace::Lockstep, "--seconds 1.3", "--repeat");
+    both_good(emulator, controller);
     for file in ["bus.log", "measurement.csv", "truth.csv"] {
         assert!(scene.same(&scene.path("emulator").join(file), &sealed.path(file)), "{file} differs");
     }

@@ -45,12 +45,7 @@ impl Counter {
 
     /// The controller hears the same frames; a stale command is none of its business.
     pub(crate) fn in_controller(self) -> Option<&'static str> {
-        match self {
-            Self::Malformed => Some("/frames_ignored/malformed"),
-            Self::Unknown => Some("/frames_ignored/unknown"),
-            Self::ErrorFrame => Some("/bus/error_frames"),
-            Self::Host | Self::StaleDrive | Self::StaleLoad => None,
-        }
+        matches!(self, Self::Malformed | Self::Unknown | Self::ErrorFrame).then(|| self.in_summary())
     }
 }
 
