@@ -1,5 +1,6 @@
 //! `controller-drive.csv` and `controller-load.csv`: states of chains by name, and numbers that may be absent.
 
+use crate::records;
 use std::path::Path;
 
 #[derive(Debug)]
@@ -11,8 +12,7 @@ pub struct AxisTable {
 impl AxisTable {
     /// Reads a table up to its last whole line; the process that wrote it may have been killed.
     pub fn read(path: &Path) -> Self {
-        let text =
-            std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let text = records::text(path);
         let whole = &text[..=text.rfind('\n').expect("at least the head")];
         let fields = |line: &str| -> Vec<String> { line.split(',').map(str::to_owned).collect() };
         let mut lines = whole.lines();

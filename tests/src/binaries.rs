@@ -78,6 +78,11 @@ pub fn executable(program: Program, build: Build) -> PathBuf {
     path
 }
 
+/// The folder of the shipped programs, as `AIRBENCH_BIN_DIR` gives it to a script.
+pub fn shipped_programs() -> PathBuf {
+    executable(Program::Bench, Build::Shipped).parent().expect("a program lies in a folder").to_owned()
+}
+
 /// The checkout that is tested.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the workspace").to_owned()
@@ -99,9 +104,8 @@ pub fn shipped_experiments() -> Vec<(String, PathBuf)> {
 
 /// Runs one of `scripts` on the shipped build, for so long at most.
 pub fn script(name: &str, arguments: &[&str], limit: Duration) -> Ended {
-    let bench = executable(Program::Bench, Build::Shipped);
     let mut command = Command::new(workspace().join("scripts").join(name));
-    command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
+    command.args(arguments).env("AIRBENCH_BIN_DIR", shipped_programs());
     Running::start(&format!("scripts/{name}"), &mut command).wait_within(limit)
 }
 

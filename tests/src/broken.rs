@@ -2,7 +2,7 @@
 //! is given and writes down what it hears.
 
 use crate::launch::Pace;
-use crate::records::Table;
+use crate::records::{Table, text};
 use crate::scene::Scene;
 use protocol::can::CanFrame;
 use protocol::frames::{Frame, RigStatus, ValveCommand};
@@ -54,7 +54,7 @@ pub struct Row {
 }
 
 pub fn rows(path: &Path) -> Vec<Row> {
-    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let text = text(path);
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("time_s,number,what,fault,at,numbers,cause"), "head of {}", path.display());
     let row = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {

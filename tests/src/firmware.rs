@@ -25,7 +25,7 @@ const PLACES_M: [f64; 2] = [0.1, 0.4];
 const MOVE_CYCLES: u64 = 3000;
 const REST_CYCLES: u64 = 1000;
 /// How often it moves out and back; the first time with the chamber pressures of the start.
-const REPETITIONS: u64 = 2;
+pub const REPETITIONS: u64 = 2;
 /// The last part of a rest, over which the static error is averaged (bus.md, A run's folder).
 const STATIC_CYCLES: u64 = 200;
 /// Cycles without an answer, in real time, by which a machine that stands still holds the loop up; and how many cycles after it
@@ -96,14 +96,9 @@ pub fn expect_every_cycle_answered(summary: &Value) {
     }
 }
 
-/// Reads off the frames of a whole run how it positioned. What a machine that stood still did to the loop is left out, and
-/// reported.
-pub fn positioned(frames: &[CanFrame]) -> Positioned {
-    positioned_in(frames, REPETITIONS)
-}
-
-/// The same of a run that ended after so many repetitions.
-pub fn positioned_in(frames: &[CanFrame], repetitions: u64) -> Positioned {
+/// Reads off the frames of a run that ended after so many repetitions how it positioned. What a machine that stood still did to
+/// the loop is left out, and reported.
+pub fn positioned(frames: &[CanFrame], repetitions: u64) -> Positioned {
     let done = positioned_where_it_ran(frames, repetitions);
     assert_eq!(done.rests as u64, 2 * repetitions, "all rests are there");
     done

@@ -7,15 +7,13 @@
 use crate::binaries::workspace;
 use crate::foreign_python::{light_path, python};
 use crate::process::Running;
-use crate::records::{count, json};
+use crate::records::{count, find, json};
 use protocol::can::CanFrame;
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::Mutex;
 use std::time::Duration;
 use tempfile::TempDir;
 
@@ -28,14 +26,8 @@ const LAST_LINES: usize = 12;
 /// The programs may be started a moment before the rig's cycle 0, by this much at most, s.
 const BEFORE_CYCLE_ZERO_S: f64 = 1.0;
 
-/// One machine at a time: two would stall one another. (Test binaries run one after the other anyway.)
-fn only_one() -> MutexGuard<'static, ()> {
-    static MACHINE: Mutex<()> = Mutex::new(());
-    // A test that failed leaves no machine behind.
-    MACHINE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
-static STARTED: AtomicU32 = AtomicU32::new(0);
+/// How many machines were started, one at a time: two would stall one another. (Test binaries run one after the other anyway.)
+static STARTED: Mutex<u32> = Mutex::new(0);
 
 /// A machine that has run its job and is gone.
 #[derive(Debug)]
@@ -55,7 +47,8 @@ impl Guest {
     /// The same on two processors, for what one cannot show. Its time goes on while the host does something else.
     #[track_caller]
     pub fn run_on_two_processors(arguments: &[&str]) -> Self {
-        let _machine = only_one();
+        // A test that failed leaves no machine behind.
+        let mut started = STARTED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut command = Command::new(workspace().join("scripts/vcan-vm"));
         // The guest's programs are built by vcan-vm as it wants them, whatever this test was built with.
@@ -64,8 +57,8 @@ impl Guest {
         let ended = Running::start("scripts/vcan-vm", &mut command).wait_within(LIMIT);
         let lines: Vec<&str> = ended.stderr.lines().collect();
         let last = lines[lines.len().saturating_sub(LAST_LINES)..].join("\n");
-        let nth = STARTED.fetch_add(1, Ordering::Relaxed);
-        let log = workspace().join(format!("target/vm-said-{}-{nth}.txt", std::process::id()));
+        let log = workspace().join(format!("target/vm-said-{}-{started}.txt", std::process::id()));
+        *started += 1;
         fs::write(&log, &ended.stderr).expect("a log in target");
         eprintln!("the last lines of {}:\n{last}", log.display());
         Self { folder, said: ended.expect_code(0).stderr }
@@ -149,9 +142,9 @@ pub struct InterfaceCounters {
 impl InterfaceCounters {
     /// What `interface` counted between `links-before.json` and `links-after.json` of `folder`.
     pub fn during(folder: &Path, interface: &str) -> Self {
-        let [before, after] =
-            ["links-before.json", "links-after.json"].map(|file| link(&json(&folder.join(file)), interface));
-        let counted = |pointer: &str| count(&after, pointer) - count(&before, pointer);
+        let links = ["links-before.json", "links-after.json"].map(|file| json(&folder.join(file)));
+        let [before, after] = links.each_ref().map(|links| find(links, "ifname", interface));
+        let counted = |pointer: &str| count(after, pointer) - count(before, pointer);
         Self {
             sent: counted("/stats64/tx/packets"),
             received: counted("/stats64/rx/packets"),
@@ -159,15 +152,6 @@ impl InterfaceCounters {
             overruns: counted("/stats64/rx/over_errors"),
         }
     }
-}
-
-/// An interface in the list that `ip -json link` prints.
-pub fn link(links: &Value, interface: &str) -> Value {
-    let all = links.as_array().expect("a list of interfaces");
-    all.iter()
-        .find(|link| link["ifname"] == interface)
-        .unwrap_or_else(|| panic!("no {interface} in {links:#}"))
-        .clone()
 }
 
 /// What `compare_candump.py` says of candump's log and a run's folder.

@@ -1,6 +1,6 @@
 //! The command line of a program in a scene.
 
-use crate::binaries::{Build, Program, executable};
+use crate::binaries::{Build, Program, executable, workspace};
 use crate::process::{Ended, Running};
 use crate::scene::Scene;
 use std::ffi::OsString;
@@ -90,6 +90,11 @@ impl Launch {
     pub fn with(mut self, options: &str) -> Self {
         self.more.extend(options.split_whitespace().map(OsString::from));
         self
+    }
+
+    /// The shipped programs, for what names them.
+    pub fn with_shipped_programs(self) -> Self {
+        self.with(&format!("--programs {}", workspace().join("controller/programs").display()))
     }
 
     /// A line of shell that is run first, in the same process: `ulimit` and the like.

@@ -63,11 +63,14 @@ pub mod viewers;
 pub mod xcp;
 
 pub use axis_table::AxisTable;
-pub use binaries::{Build, Program, executable, install, script, shipped_experiments, workspace};
+pub use binaries::{
+    Build, Program, executable, install, script, shipped_experiments, shipped_programs, workspace,
+};
 pub use launch::{Launch, Pace, both_good, run_both};
 pub use peer::{Packet, Peer};
 pub use process::{Ended, PATIENCE, Running, wait_until};
 pub use records::{
-    Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, expect_whole_lines, json, timing_rows,
+    Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, dropped_at_queue, expect_whole_lines,
+    find, json, text, timing_rows,
 };
 pub use scene::{LINKED, PROGRAM, RESTLESS, SHORT, Scene};

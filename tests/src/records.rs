@@ -25,6 +25,20 @@ pub fn count_of_id(table: &Value, id: &str) -> u64 {
     table.get(id).map_or(0, |count| count.as_u64().expect("a count"))
 }
 
+/// The entry of a list in a JSON file whose `key` is `value`.
+#[track_caller]
+pub fn find<'a>(list: &'a Value, key: &str, value: &str) -> &'a Value {
+    let entries = list.as_array().unwrap_or_else(|| panic!("no list: {list:#}"));
+    let found = entries.iter().find(|entry| entry[key] == value);
+    found.unwrap_or_else(|| panic!("no {key} {value} in {list:#}"))
+}
+
+/// Sensors with this identifier that found no room at a process, which a machine under load kept from its work.
+pub fn dropped_at_queue(summary: &Value, process: u32, id: &str) -> u64 {
+    let peer = find(&summary["bus_host"]["peers"], "name", &format!("process {process}"));
+    count_of_id(&peer["dropped_at_queue"], id)
+}
+
 /// The rows of a timing table.
 pub fn timing_rows(path: &Path) -> Vec<CycleTiming> {
     timing::read(&text(path)).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -148,6 +162,6 @@ fn log_line(line: &str) -> Option<CanFrame> {
     (bytes.len() <= 8).then(|| CanFrame::from_raw(number, &bytes))
 }
 
-fn text(path: &Path) -> String {
+pub fn text(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }

@@ -48,6 +48,14 @@ impl Scene {
         scene
     }
 
+    /// The short experiment, its bus in a process of its own, and a peer on it.
+    pub fn with_bus() -> (Self, Running, Peer) {
+        let scene = Self::new(SHORT);
+        let host = scene.bus_host("");
+        let peer = scene.peer();
+        (scene, host, peer)
+    }
+
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }

@@ -9,10 +9,10 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::{LazyLock, Mutex};
+use tempfile::TempDir;
 
 /// Folder of what was recorded on vcan.
-#[must_use]
 pub fn expected() -> PathBuf {
     workspace().join("tests/expected/socketcan")
 }
@@ -34,13 +34,11 @@ pub const DIFFERENCES_WHEN_DOWN: [(&str, &str); 4] = [
 ];
 
 /// The recorded answers, but for the differences.
-#[must_use]
 pub fn expected_answers() -> String {
     recorded_but_for("answers.txt", &DIFFERENCES)
 }
 
 /// A recorded output with lines that differ in the place of those on vcan.
-#[must_use]
 pub fn recorded_but_for(file: &str, differences: &[(&str, &str)]) -> String {
     let recorded = fs::read_to_string(expected().join(file)).expect("a recorded output");
     let mut differences = differences.iter().peekable();
@@ -55,14 +53,12 @@ pub fn recorded_but_for(file: &str, differences: &[(&str, &str)]) -> String {
 }
 
 /// The sources of the programs.
-#[must_use]
 pub fn sources() -> PathBuf {
     workspace().join("tests/c/socketcan")
 }
 
 /// Builds a program of `tests/c/socketcan` into `folder`, statically linked, and gives its path. The compiler is that of a C
 /// library: `gcc`, or `musl-gcc`.
-#[must_use]
 pub fn build(folder: &Path, program: &str, compiler: &str) -> PathBuf {
     let path = folder.join(program);
     let mut make = Command::new("make");
@@ -74,10 +70,8 @@ pub fn build(folder: &Path, program: &str, compiler: &str) -> PathBuf {
 }
 
 /// The folder that `tests/c/socketcan/payload.sh` fills, for the guest of `scripts/vcan-vm` and for this machine; filled once.
-#[must_use]
 pub fn payload() -> &'static Path {
-    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    let filled = || {
+    static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
         let folder = workspace().join("target/socketcan-payload");
         let mut payload = Command::new(sources().join("payload.sh"));
         payload.arg(&folder).env("PYTHON", python()).env("PATH", tools_path());
@@ -85,18 +79,16 @@ pub fn payload() -> &'static Path {
         let made = payload.output().expect("bash is installed");
         assert!(made.status.success(), "the payload is not made:\n{}", String::from_utf8_lossy(&made.stderr));
         folder
-    };
-    FOLDER.get_or_init(filled)
+    });
+    &FOLDER
 }
 
 /// A program that several tests start, built once.
-#[must_use]
 pub fn built(program: &'static str) -> PathBuf {
-    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
-    static BUILDING: std::sync::Mutex<()> = std::sync::Mutex::new(());
-    let folder = FOLDER.get_or_init(|| tempfile::tempdir().expect("a temporary folder"));
-    // A build that failed left nothing that another could take for good.
-    let _one_at_a_time = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    static FOLDER: LazyLock<Mutex<TempDir>> =
+        LazyLock::new(|| Mutex::new(tempfile::tempdir().expect("a temporary folder")));
+    // One at a time. A build that failed left nothing that another could take for good.
+    let folder = FOLDER.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     build(folder.path(), program, "gcc")
 }
 
@@ -124,7 +116,6 @@ pub fn start_python(scene: &Scene, options: &str, program: &str) -> Running {
 }
 
 /// All files of a folder by name.
-#[must_use]
 pub fn texts(folder: &Path) -> BTreeMap<String, String> {
     let files = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     let text = |entry: fs::DirEntry| {
@@ -135,7 +126,6 @@ pub fn texts(folder: &Path) -> BTreeMap<String, String> {
 }
 
 /// The first line in which two outputs differ, by its number, so that a failing test shows it and not all of both.
-#[must_use]
 pub fn first_difference(one: &str, other: &str) -> Option<(usize, String, String)> {
     let (mut one, mut other) = (one.lines(), other.lines());
     (1..)

@@ -121,7 +121,5 @@ pub fn print_with(scene: &Scene, command: &str, options: &[&str]) -> String {
     let mut program = Program::Controller.command();
     program.arg(command).arg("--rig").arg(scene.path("rig.toml"));
     program.arg("--experiment").arg(scene.path("experiment.toml")).args(options);
-    let Ended { code, stdout, stderr, .. } = Running::start("controller", &mut program).wait();
-    assert_eq!(code, Some(0), "{stderr}");
-    stdout
+    Running::start("controller", &mut program).wait().expect_code(0).stdout
 }

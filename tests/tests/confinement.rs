@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use system_tests::{Pace, Program, Running, SHORT, Scene, run_both, turn, xcp};
+use system_tests::{Pace, Program, Running, SHORT, Scene, run_both, text, turn, xcp};
 
 /// System calls that make, change or remove something in a file system.
 const CALLS: &str = "open,openat,openat2,creat,mkdir,mkdirat,rename,renameat,renameat2,link,linkat,symlink,symlinkat,unlink,\
@@ -21,7 +21,7 @@ fn traced(log: &Path) -> String {
 
 /// Paths that a traced program wrote to, made or removed.
 fn written(log: &Path) -> BTreeSet<PathBuf> {
-    let text = fs::read_to_string(log).unwrap_or_else(|error| panic!("{}: {error}", log.display()));
+    let text = text(log);
     assert!(text.contains("openat"), "{} tells of no file at all", log.display());
     let changes = |line: &&str| {
         let opens = line.contains("open(") || line.contains("openat(") || line.contains("openat2(");

@@ -8,7 +8,9 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
-use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, json, timing_rows, turn};
+use system_tests::{
+    Pace, RESTLESS, Scene, both_good, count, dropped_at_queue, find, json, timing_rows, turn,
+};
 
 fn samples(path: &Path) -> BTreeMap<String, u64> {
     let mut samples = BTreeMap::new();
@@ -22,14 +24,6 @@ fn samples(path: &Path) -> BTreeMap<String, u64> {
 fn begun_by_the_other(row: &CycleTiming, waking_axis: &str) -> bool {
     let (waking, other) = if waking_axis == "drive" { (row.drive, row.load) } else { (row.load, row.drive) };
     waking.sensors_ns == 0 || (row.due_ns == other.sensors_ns && row.due_ns != waking.sensors_ns)
-}
-
-/// Sensors with this identifier that found no room at this process, which a machine under load kept from its work.
-fn dropped_at_queue(summary: &Value, process: u32, id: &str) -> u64 {
-    let name = format!("process {process}");
-    let peers = summary["bus_host"]["peers"].as_array().expect("peers");
-    let peer = peers.iter().find(|peer| peer["name"] == name.as_str()).expect("the controller was a peer");
-    count_of_id(&peer["dropped_at_queue"], id)
 }
 
 /// Holds table, histograms and report of a controller against each other.
@@ -88,8 +82,8 @@ fn one_way(
 fn rows_of_both_processes_join_to_the_time_on_the_way_each_way() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Real).with("--seconds 4 --full-timing").start();
-    let controller = scene.controller(Pace::Real).with("--repeat --full-timing").start();
+    let (emulator, controller) =
+        scene.start(Pace::Real, "--seconds 4 --full-timing", "--repeat --full-timing");
     let process = controller.number();
     both_good(emulator, controller);
     let answered = expect_one_account(&scene, process, "controller", "drive");
@@ -97,8 +91,7 @@ fn rows_of_both_processes_join_to_the_time_on_the_way_each_way() {
     let summary = scene.summary();
     assert_eq!(rig.len() as u64, count(&summary, "/cycles") - count(&summary, "/skipped"));
     let report = scene.report();
-    let arrivals = report["arrivals"].as_array().expect("a list");
-    let sensors = arrivals.iter().find(|arrivals| arrivals["frame"] == "DriveSensors").expect("they came");
+    let sensors = find(&report["arrivals"], "frame", "DriveSensors");
     assert_eq!(count(sensors, "/count"), count(&report, "/axes/drive/sensors_received"));
     let least = answered.len() * 95 / 100;
     for (axis, ways) in [

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::exit::{BAD_INPUT, GOOD, INTERRUPTED};
-use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, json};
+use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, find, json};
 use tempfile::TempDir;
 
 /// A constant force: some 14 degrees at 5 kg.
@@ -248,13 +248,12 @@ fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
     });
     let check = on("check", &record, folder.path(), &[]).expect_code(GOOD);
     let checks = json(&folder.path().join("checks.json"));
-    let findings = checks[0]["findings"].as_array().expect("findings");
+    let findings = &checks[0]["findings"];
     for kind in ["lost-samples", "gap"] {
-        let own = findings.iter().find(|own| own["kind"] == kind);
-        let own = own.unwrap_or_else(|| panic!("no {kind} in: {}", check.stdout));
+        let own = find(findings, "kind", kind);
         assert!(own["line"].is_u64() && own["fatal"] == false, "{own}");
     }
-    let saturated = findings.iter().any(|own| {
+    let saturated = findings.as_array().expect("findings").iter().any(|own| {
         (own["kind"] == "clipped" || own["kind"] == "stuck") && own["column"] == "drive_pressure_a_Pa"
     });
     assert!(saturated, "{}", check.stdout);
@@ -289,8 +288,7 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
         let report = json(&folder.path().join("report.json"));
         assert_eq!(report["verdict"], "bad-data");
         assert!(effects(&report, "named").is_empty());
-        let findings = report["checks"][0]["findings"].as_array().expect("findings");
-        let own = findings.iter().find(|own| own["kind"] == kind).unwrap_or_else(|| panic!("{findings:#?}"));
+        let own = find(&report["checks"][0]["findings"], "kind", kind);
         assert_eq!(own["fatal"], true);
         let line = own["line"].as_u64().unwrap_or_else(|| panic!("no line in {own}"));
         ended.expect_printed(&[reported, &format!("{}:{line}: ", record.display())]);

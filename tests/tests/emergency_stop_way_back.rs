@@ -6,8 +6,8 @@
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand};
 use rustix::process::Signal;
 use serde_json::Value;
-use system_tests::bus_cycles::read;
-use system_tests::{AxisTable, Ended, LINKED, Pace, Program, Scene, Table, json, own, turn};
+use system_tests::bus_cycles::by_cycle;
+use system_tests::{AxisTable, Ended, LINKED, Pace, Program, Scene, Table, bus_log, json, own, turn};
 
 /// 0.3 m in 0.5 s: 1.2 m/s at its fastest, which the valve gives for a moment only.
 const FAST: &str = include_str!("../scenes/fast.toml");
@@ -210,7 +210,7 @@ fn a_controllers_own_fault_is_released_by_the_console_and_the_repetition_begins_
     assert_eq!(states.iter().filter(|state| **state == "fault").count(), 1, "{states:?}");
     assert_eq!(states.iter().filter(|state| **state == "experiment").count(), 2, "{states:?}");
     assert_eq!(states.last(), Some(&"done"));
-    let withdrawn = read(&scene.path("run/bus.log"))
+    let withdrawn = by_cycle(&bus_log(&scene.path("run/bus.log")))
         .into_iter()
         .filter(|logged| matches!(logged.frame, Frame::DriveEmergencyStop(stop) if stop.release));
     assert_eq!(withdrawn.count(), 1, "it withdraws its own stop with one frame");
@@ -251,7 +251,7 @@ fn nobody_is_told_to_start_while_the_stop_is_held() {
     let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
     assert_eq!(drive.states("emergency_stop_chain").last(), Some(&"waiting-for-release"));
     assert!(drive.numbers("enabled")[TRIP + 2..].iter().all(|enabled| *enabled == 0.0), "shut for 29 s");
-    let released = read(&scene.path("run/bus.log"))
+    let released = by_cycle(&bus_log(&scene.path("run/bus.log")))
         .into_iter()
         .any(|logged| matches!(logged.frame, Frame::DriveEmergencyStop(_) | Frame::LoadEmergencyStop(_)));
     assert!(!released, "the controllers hold no stop of their own, and withdraw none");

@@ -1,7 +1,7 @@
 //! Every shipped experiment runs to its end, passes its own bounds, and is listed with its sentence.
 
 use std::path::{Path, PathBuf};
-use system_tests::{PATIENCE, Program, SHORT, Scene, json, script, shipped_experiments, workspace};
+use system_tests::{PATIENCE, Program, SHORT, Scene, json, script, shipped_experiments};
 
 fn about(path: &Path) -> String {
     let text = std::fs::read_to_string(path).expect("it is listed");
@@ -49,7 +49,6 @@ fn point_to_point() -> (PathBuf, String) {
 #[test]
 fn point_to_point_keeps_its_bounds_in_every_repetition_and_with_weights() {
     let (_, text) = point_to_point();
-    let programs = workspace().join("controller/programs");
     for (added_mass_kg, seed) in [(0.0, 1), (2.5, 2), (5.0, 3)] {
         let weights = format!("added_mass_kg = {added_mass_kg:?}");
         let four =
@@ -57,9 +56,8 @@ fn point_to_point_keeps_its_bounds_in_every_repetition_and_with_weights() {
         assert!(four.contains(&weights) && four.contains("repetitions = 4"), "{four}");
         let scene = Scene::new(SHORT);
         let (experiment, out) = (scene.write("four.toml", &four), scene.path("run"));
-        let options = format!("--programs {} --seed {seed}", programs.display());
-        let _ =
-            scene.rehearsal().experiment(&experiment).out(&out).with(&options).start().wait().expect_code(0);
+        let rehearsal = scene.rehearsal().experiment(&experiment).out(&out).with_shipped_programs();
+        rehearsal.with(&format!("--seed {seed}")).start().wait().expect_code(0);
         let summary = Program::Bench.start(&[&"summary", &out]).wait().expect_code(0);
         let reported = json(&out.join("summary.json"));
         assert!(
@@ -86,9 +84,8 @@ fn a_bound_that_is_broken_fails_the_experiment() {
     let scene = Scene::new(SHORT);
     let strict = scene.write("strict.toml", &text.replace(bound, "position_error_dynamic_m = 1e-9"));
     let out = scene.path("run");
-    let programs = workspace().join("controller/programs");
-    let options = format!("--programs {}", programs.display());
-    scene.rehearsal().experiment(&strict).out(&out).with(&options).start().wait().expect_code(0);
+    let rehearsal = scene.rehearsal().experiment(&strict).out(&out).with_shipped_programs();
+    rehearsal.start().wait().expect_code(0);
     Program::Bench.start(&[&"summary", &out]).wait().expect_code(1);
 }
 

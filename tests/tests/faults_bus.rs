@@ -2,7 +2,6 @@
 //! a listener that does not listen.
 
 use protocol::can::CanFrame;
-use rustix::process::Signal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -52,9 +51,7 @@ fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
 fn controllers_that_know_of_each_other_take_a_second_one_for_a_fault_and_stop() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Real).start();
-    let first = scene.controller(Pace::Real).with("--repeat").start();
-    scene.wait_for_rows("emulator", UNDER_WAY);
+    let (emulator, first) = scene.under_way(Pace::Real, UNDER_WAY);
     let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
     first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
     second.wait().expect_code(1);
@@ -81,8 +78,7 @@ fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the
     scene.wait_for_more_rows("emulator", 500);
     emulator.interrupt();
     controller.wait().expect_code(0);
-    host.signal(Signal::INT);
-    let host = host.wait().expect_code(130);
+    let host = host.interrupt();
     let received = received.join().expect("the listener listens at last");
     drop(never);
 

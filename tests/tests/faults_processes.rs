@@ -4,7 +4,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use std::time::Duration;
 use system_tests::events::{self, expect_valve_shut_between};
-use system_tests::{Pace, RESTLESS, Running, SHORT, Scene, Table, count, count_of_id, json, turn};
+use system_tests::{Pace, RESTLESS, Running, SHORT, Scene, Table, count, dropped_at_queue, json, turn};
 
 /// Rows after which the valve moves.
 const UNDER_WAY: usize = 900;
@@ -95,23 +95,17 @@ fn a_controller_that_stands_still_has_its_valve_shut_and_its_losses_counted_at_b
         controller.signal(Signal::CONT);
         emulator.wait_for("fresh drive commands again");
         let (summary, measurement) = end(&scene, emulator);
-        let name = format!("process {}", controller.number());
+        let process = controller.number();
         controller.wait().expect_code(0);
         expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
         assert!(count(&summary, "/drive_commands/expired") >= 1);
         assert_eq!(count(&summary, "/frames_lost_at_rig"), 0, "what was never sent is not lost");
         assert!(count(&summary, "/stale_commands") >= 2, "both axes went stale");
         let report = scene.report();
-        let peers = summary["bus_host"]["peers"].as_array().expect("peers");
-        let peer =
-            peers.iter().find(|peer| peer["name"] == name.as_str()).expect("the controller was a peer");
         for (axis, id) in [("drive", "120"), ("load", "121")] {
-            let dropped = count_of_id(&peer["dropped_at_queue"], id);
-            assert_eq!(
-                count(&report, &format!("/axes/{axis}/sensors_lost")),
-                dropped,
-                "{axis}, stopped for {stopped:?}"
-            );
+            let dropped = dropped_at_queue(&summary, process, id);
+            let lost = count(&report, &format!("/axes/{axis}/sensors_lost"));
+            assert_eq!(lost, dropped, "{axis}, stopped for {stopped:?}");
         }
     }
 }

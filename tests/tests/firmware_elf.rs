@@ -10,12 +10,13 @@ use runlog::candump::read_line;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
-use system_tests::firmware::{build, expect_every_cycle_answered, positioned_in};
+use std::sync::LazyLock;
+use system_tests::firmware::{build, expect_every_cycle_answered, positioned};
 use system_tests::foreign_python::{light_path, run_script_of, tools_path};
 use system_tests::{
     Build, Pace, Program, Running, Scene, both_good, count, count_of_id, executable, json, workspace,
 };
+use tempfile::TempDir;
 
 /// The approach, 1 s, settling, 2 s, and the first of two repetitions, 8 s: the shortest run with all bounds in it.
 const ONE_REPETITION_S: f64 = 11.01;
@@ -24,18 +25,14 @@ const MOVING_S: f64 = 4.0;
 /// Clocks of a millisecond at 8 MHz.
 const CLOCKS: u64 = 8000;
 
-fn built() -> &'static Path {
-    static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();
-    let made = || {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        build(folder.path(), &["elf"]);
-        folder
-    };
-    BUILT.get_or_init(made).path()
-}
+static BUILT: LazyLock<TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    build(folder.path(), &["elf"]);
+    folder
+});
 
 fn elf() -> PathBuf {
-    built().join("firmware-stm32f103.elf")
+    BUILT.path().join("firmware-stm32f103.elf")
 }
 
 /// `scripts/mcu` with the ELF; its report lies in the scene as `mcu.json`.
@@ -81,7 +78,7 @@ fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
     let summary = one.summary();
     let cycles = count(&summary, "/cycles");
     expect_every_cycle_answered(&summary);
-    positioned_in(&one.bus_log(), 1).expect_whole(1, 790);
+    positioned(&one.bus_log(), 1).expect_whole(1, 790);
 
     // The core's time is the bus's: 10 ms before the first cycle and one for each.
     let report = json(&one.path("mcu.json"));
@@ -309,7 +306,7 @@ fn the_emulator_of_the_chip_differs_from_it_where_the_page_says() {
 
 #[test]
 fn after_a_bus_that_took_nothing_it_sends_the_newest_command_and_no_old_one() {
-    let said = run_script_of("hil", "stm32f103_stale.py", &[built().join("firmware-count.elf")]);
+    let said = run_script_of("hil", "stm32f103_stale.py", &[BUILT.path().join("firmware-count.elf")]);
     let seen: serde_json::Value = serde_json::from_str(&said).expect("JSON");
     assert_eq!(seen["given_up"], true, "the frame in a mailbox is taken back: {said}");
     assert_eq!(seen["command_cycles"], serde_json::json!([seen["newest_cycle"]]), "{said}");
@@ -354,7 +351,7 @@ fn a_fault_and_the_end_of_main_are_told_and_no_silence() {
 
 #[test]
 fn a_millisecond_of_it_fits_into_that_of_a_real_cortex_m3() {
-    let counted = run_script_of("hil", "cortex_m3_cycles.py", &[built().join("firmware-count.elf")]);
+    let counted = run_script_of("hil", "cortex_m3_cycles.py", &[BUILT.path().join("firmware-count.elf")]);
     eprintln!("{counted}");
     let counted: serde_json::Value = serde_json::from_str(&counted).expect("JSON");
     let clocks = |kind: &str| count(&counted[kind], "/clocks");
@@ -380,7 +377,7 @@ fn it_has_no_heap_and_the_build_tells_its_sizes() {
         assert!(!symbols.split_whitespace().any(|word| word == name), "{name} is linked");
     }
     // 64 KiB of flash and 20 KiB of RAM are the chip's; what the build reports is far from both.
-    let sizes = std::fs::read_to_string(built().join("firmware-stm32f103.elf.sizes")).expect("sizes");
+    let sizes = std::fs::read_to_string(BUILT.path().join("firmware-stm32f103.elf.sizes")).expect("sizes");
     let bytes = |section: &str| -> u64 {
         let line = sizes.lines().find(|line| line.split_whitespace().next() == Some(section));
         let number = line.and_then(|line| line.split_whitespace().nth(1)).and_then(|word| word.parse().ok());

@@ -6,14 +6,16 @@ use protocol::frames::{Frame, MainChainState};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 use std::time::Duration;
 use system_tests::firmware::{Positioned, build, positioned_where_it_ran};
 use system_tests::foreign_python::{python, tools_path};
 use system_tests::stalls::Stalls;
 use system_tests::{
-    Build, PATIENCE, Pace, Packet, Program, Running, Scene, count, executable, turn, workspace,
+    Build, PATIENCE, Pace, Packet, Program, Running, Scene, count, executable, shipped_programs, turn,
+    workspace,
 };
+use tempfile::TempDir;
 
 /// The first of two repetitions: out, a rest, back, a rest.
 const REPETITION_CYCLES: u32 = 8_000;
@@ -25,27 +27,23 @@ const STALL: Duration = Duration::from_millis(15);
 /// (docs/qemu.md).
 const QEMU_BROKE: &str = "fifo8_push: Assertion";
 
-fn built() -> &'static Path {
-    static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();
-    let made = || {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        for elf in ["firmware-qemu-r5f.elf", "firmware-zynqmp-r5f.elf"] {
-            build(folder.path(), &[folder.path().join(elf).to_str().expect("text")]);
-        }
-        folder
-    };
-    BUILT.get_or_init(made).path()
-}
+static BUILT: LazyLock<TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for elf in ["firmware-qemu-r5f.elf", "firmware-zynqmp-r5f.elf"] {
+        build(folder.path(), &[folder.path().join(elf).to_str().expect("text")]);
+    }
+    folder
+});
 
 fn elf() -> PathBuf {
-    built().join("firmware-qemu-r5f.elf")
+    BUILT.path().join("firmware-qemu-r5f.elf")
 }
 
 /// The same, but that it takes sensors for lost after half a second: to its clock a machine that stands still is a rig that is
 /// silent.
 fn patient_elf(folder: &Path) -> PathBuf {
     for codec in ["rig.c", "rig.h"] {
-        std::fs::copy(built().join(codec), folder.join(codec)).expect("the codec");
+        std::fs::copy(BUILT.path().join(codec), folder.join(codec)).expect("the codec");
     }
     let elf = folder.join("firmware-qemu-r5f.elf");
     build(folder, &["DEFINES=-DSENSORS_LOST_MS=500", elf.to_str().expect("text")]);
@@ -58,10 +56,9 @@ fn scene() -> Scene {
 
 /// `scripts/qemu-r5f`, before what only computes, if that is allowed.
 fn script() -> Command {
-    let programs = executable(Program::Bench, Build::Shipped);
     let mut command = Command::new("nice");
     command.args(["-n", "-10"]).arg(workspace().join("scripts/qemu-r5f"));
-    command.env("AIRBENCH_BIN_DIR", programs.parent().expect("a folder")).env("PATH", tools_path());
+    command.env("AIRBENCH_BIN_DIR", shipped_programs()).env("PATH", tools_path());
     command
 }
 
@@ -230,10 +227,9 @@ fn gdb_stops_it_while_the_rig_goes_on_and_a_fault_is_told() {
 
 #[test]
 fn its_clocks_go_at_the_rates_that_the_port_takes_them_for() {
-    let programs = executable(Program::Bench, Build::Shipped);
     let _turn = turn::take();
     let mut command = Command::new(workspace().join("scripts/qemu-clock"));
-    command.env("AIRBENCH_BIN_DIR", programs.parent().expect("a folder"));
+    command.env("AIRBENCH_BIN_DIR", shipped_programs());
     command.env("AIRBENCH_PYTHON", python()).env("PATH", tools_path()).arg("10");
     let ended = Running::start("qemu-clock", &mut command).wait().expect_code(0);
     eprintln!("{}", ended.stdout);
@@ -269,7 +265,7 @@ fn what_it_cannot_run_is_refused_in_words() {
 #[test]
 fn the_chips_own_elf_is_built_too_and_has_no_heap() {
     for name in ["zynqmp-r5f", "qemu-r5f"] {
-        let path = built().join(format!("firmware-{name}.elf.sizes"));
+        let path = BUILT.path().join(format!("firmware-{name}.elf.sizes"));
         let sizes = std::fs::read_to_string(&path).expect("sizes");
         let size = |section: &str| -> u64 {
             let line = sizes.lines().find(|line| line.split_whitespace().next() == Some(section));

@@ -10,12 +10,13 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 use system_tests::door::{Door, DoorClient};
 use system_tests::foreign_python::{light_path, python};
-use system_tests::{PATIENCE, Pace, Packet, Peer, Running, SHORT, Scene, count, turn, wait_until, workspace};
+use system_tests::{
+    PATIENCE, Pace, Packet, Peer, Running, SHORT, Scene, count, text, turn, wait_until, workspace,
+};
 
 /// Identifiers and data of a candump log, without time and interface.
 fn frames(log: &Path) -> Vec<String> {
-    let text = std::fs::read_to_string(log).unwrap_or_else(|error| panic!("{}: {error}", log.display()));
-    text.lines().map(|line| line.split(' ').nth(2).expect("a frame").to_owned()).collect()
+    text(log).lines().map(|line| line.split(' ').nth(2).expect("a frame").to_owned()).collect()
 }
 
 /// A program of python-can, or another module, with Ctrl-C as a terminal would have it.
@@ -87,9 +88,7 @@ fn python_can_records_a_run_to_the_frame_and_cantools_decodes_it() {
 
 #[test]
 fn python_can_sends_to_the_bus_and_to_the_other_clients() {
-    let scene = Scene::new(SHORT);
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, _host, peer) = Scene::with_bus();
     let mut door = Door::open(&scene, "");
     let mut other = DoorClient::on_the_bus(&door);
     let port = door.address.port();
@@ -121,9 +120,7 @@ fn python_can_sends_to_the_bus_and_to_the_other_clients() {
 
 #[test]
 fn python_can_replays_a_log_onto_the_bus() {
-    let scene = Scene::new(SHORT);
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, _host, peer) = Scene::with_bus();
     let door = Door::open(&scene, "");
     let line = |n: usize| format!("(1700000000.{:06}) can0 5A5#{n:04X}\n", n * 200);
     let log = scene.write("replay.log", &(0..200).map(line).collect::<String>());
@@ -139,9 +136,7 @@ fn python_can_replays_a_log_onto_the_bus() {
 
 #[test]
 fn who_may_only_read_sends_nothing() {
-    let scene = Scene::new(SHORT);
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, _host, peer) = Scene::with_bus();
     let door = Door::open(&scene, "--read-only");
     let mut client = DoorClient::on_the_bus(&door);
     client.say("< send 108 2 1 0 >");

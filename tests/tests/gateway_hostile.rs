@@ -10,7 +10,7 @@ use std::io::Write;
 use std::net::{Shutdown, TcpStream};
 use std::time::Duration;
 use system_tests::door::{Door, DoorClient};
-use system_tests::{Peer, SHORT, Scene, count, wait_until};
+use system_tests::{Peer, Scene, count, find, wait_until};
 
 /// What the gateway may need over what it had before, KiB: 32 clients with full queues would be 14 MiB.
 const MORE_MEMORY_KIB: u64 = 24 << 10;
@@ -27,9 +27,7 @@ fn misses_nothing(peer: &Peer, client: &mut DoorClient, numbers: std::ops::Range
 
 #[test]
 fn a_thousand_connections_leave_the_memory_and_the_clients_as_they_were() {
-    let scene = Scene::new(SHORT);
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, _host, peer) = Scene::with_bus();
     let mut door = Door::open(&scene, "");
     let mut good = DoorClient::on_the_bus(&door);
     misses_nothing(&peer, &mut good, 0..256);
@@ -62,16 +60,13 @@ fn a_thousand_connections_leave_the_memory_and_the_clients_as_they_were() {
 /// What was counted of the client that came from this connection.
 fn of_client<'a>(report: &'a Value, stream: &TcpStream) -> &'a Value {
     let address = stream.local_addr().expect("connected").to_string();
-    let clients = report["clients"].as_array().expect("clients");
-    clients.iter().find(|client| client["address"] == address.as_str()).expect("the client is in the report")
+    find(&report["clients"], "address", &address)
 }
 
 #[test]
 fn a_client_that_does_not_read_loses_frames_alone_and_each_is_counted() {
     const FRAMES: u32 = 1 << 17;
-    let scene = Scene::new(SHORT);
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, _host, peer) = Scene::with_bus();
     let mut door = Door::open(&scene, "--queue-frames 1000");
     let slow: Vec<DoorClient> = (0..4).map(|_| DoorClient::on_the_bus(&door)).collect();
     let half_open = DoorClient::on_the_bus(&door);
@@ -97,9 +92,7 @@ fn a_client_that_does_not_read_loses_frames_alone_and_each_is_counted() {
 
 #[test]
 fn babble_and_other_protocols_are_parted_with_and_put_nothing_on_the_bus() {
-    let scene = Scene::new(SHORT);
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, _host, peer) = Scene::with_bus();
     let door = Door::open(&scene, "");
     let mut good = DoorClient::on_the_bus(&door);
     let post = "POST /x HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n< open bus >< rawmode >< send 108 2 1 0 >";

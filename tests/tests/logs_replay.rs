@@ -2,7 +2,6 @@
 
 use protocol::can::CanFrame;
 use runlog::candump::read_line;
-use rustix::process::Signal;
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
@@ -30,10 +29,6 @@ fn received(peer: &Peer, least: usize) -> Vec<CanFrame> {
     }
 }
 
-fn frames_of(log: &str) -> Vec<CanFrame> {
-    log.lines().map(|line| read_line(line).expect("a line").frame).collect()
-}
-
 /// A command of the drive every 10 ms, as many as said; the data are right.
 fn commands(count: u64) -> String {
     let line = |number: u64| {
@@ -56,11 +51,11 @@ fn every_frame_of_a_run_is_on_the_bus_again_in_its_order() {
         format!("({}.{:06})", (last / 1_000_000 + ms) / 1000, (last / 1_000_000 + ms) % 1000 * 1000)
     };
     short += &format!("{} bus0 1ABCDEF0#01\n{} bus0 7FF#R3\n", later(20), later(30));
+    let expected: Vec<_> = short.lines().map(|line| read_line(line).expect("a line").frame).collect();
     let short = scene.write("short.log", &short);
     let _host = scene.bus_host("");
     let peer = scene.peer();
     let replayed = replay(&scene, &short, "");
-    let expected = frames_of(&fs::read_to_string(&short).expect("it was written"));
     let came = received(&peer, expected.len());
     assert!(came == expected, "first difference: {:?}", came.iter().zip(&expected).position(|(a, b)| a != b));
     let reported = replayed.wait().expect_code(0).stdout;
@@ -91,8 +86,7 @@ fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
     replay(&scene, &log, "--leave-out commands,rig").wait().expect_code(0);
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!((count(&report, "/frames_sent"), count(&report, "/frames_left_out")), (1, 4));
-    emulator.signal(Signal::INT);
-    emulator.wait();
+    emulator.interrupt();
     let summary = scene.summary();
     assert_eq!(count(&summary, "/stale_commands"), 0);
     let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the rig's own log");
@@ -101,10 +95,8 @@ fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
 
 #[test]
 fn a_rig_that_comes_alive_ends_a_replay_that_would_disturb_it() {
-    let scene = Scene::new(SHORT);
+    let (scene, _host, peer) = Scene::with_bus();
     let log = scene.write("long.log", &commands(6000));
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
     let replayed = replay(&scene, &log, "");
     let before = received_some(&peer, 5);
     peer.send(&CanFrame::new(0x120, &[0; 8]).to_bytes());
@@ -127,10 +119,8 @@ fn received_some(peer: &Peer, count: usize) -> usize {
 
 #[test]
 fn an_interrupted_replay_keeps_what_was_done() {
-    let scene = Scene::new(SHORT);
+    let (scene, _host, peer) = Scene::with_bus();
     let log = scene.write("long.log", &commands(6000));
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
     let replayed = replay(&scene, &log, "--spin-us 100");
     let before = received_some(&peer, 10);
     replayed.interrupt();
@@ -143,9 +133,7 @@ fn an_interrupted_replay_keeps_what_was_done() {
 
 #[test]
 fn nothing_is_sent_of_a_log_that_is_not_right_to_its_last_line() {
-    let scene = Scene::new(SHORT);
-    let _host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, _host, peer) = Scene::with_bus();
     let later = "(9999999999.000000) can0 110#0000000000\n";
     for (more, words) in [
         ("(1700000001.0) can0 11#00\n\n", ":4:21: an identifier has 3 digits"),

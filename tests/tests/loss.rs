@@ -11,11 +11,9 @@
 //! before the first frame that it saw, nor after the last.
 
 use protocol::can::CanFrame;
-use rustix::process::Signal;
 use serde_json::Value;
-use std::path::Path;
 use system_tests::account::{command_counters, gaps, of_sensors};
-use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, json, turn};
+use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, turn};
 
 const WIRE: &str = "loss=0.01&seed=7";
 
@@ -161,10 +159,8 @@ fn in_real_time_both_sums_agree_for_each_identifier() {
     scene.wait_for_peers(2);
     let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
     both_good(emulator, controller);
-    host.signal(Signal::INT);
-    let host = host.wait().expect_code(130);
+    let host = host.interrupt();
     let host: Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
-    let read = |file: &str| json(Path::new(&scene.path(file)));
-    let (summary, controller) = (read("emulator/summary.json"), read("controller/controller.json"));
+    let (summary, controller) = (scene.summary(), scene.report());
     Counted { received: trace.join().expect("the listener listens"), host, summary, controller }.check();
 }

@@ -1,7 +1,7 @@
 //! An own algorithm as a shared library, from its C file to the end of a run; and libraries that fail while the carriage moves.
 
 use protocol::frames::{EmergencyStopReason, Frame};
-use system_tests::bus_cycles::read;
+use system_tests::bus_cycles::by_cycle;
 use system_tests::{Ended, Pace, SHORT, Scene, own, turn};
 
 /// A scene whose drive is controlled by the scene's own_algorithm.so.
@@ -53,7 +53,7 @@ fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the
     // In the very cycle, and for good, though the set-point is slower later on.
     assert!(enabled[failed..].iter().all(|enabled| *enabled == 0.0), "the valve is shut from then on");
     assert!(table.numbers("opening")[failed..].iter().all(|opening| *opening == 0.0));
-    let stop = read(&scene.path("emulator/bus.log")).into_iter().find_map(|logged| match logged.frame {
+    let stop = by_cycle(&scene.bus_log()).into_iter().find_map(|logged| match logged.frame {
         Frame::DriveEmergencyStop(stop) => Some((logged.cycle, stop)),
         _ => None,
     });

@@ -7,11 +7,11 @@ use protocol::frames::{
     EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand, ValveCommand,
 };
 use rustix::process::Signal;
-use std::path::PathBuf;
-use system_tests::bus_cycles::{Logged, read, read_to_last_whole_line};
+use system_tests::bus_cycles::{Logged, by_cycle};
 use system_tests::exit::BOUND_BROKEN;
 use system_tests::{
-    AxisTable, Ended, LINKED, Pace, Running, SHORT, Scene, count, events, json, run_both, turn,
+    Ended, LINKED, Pace, Running, SHORT, Scene, bus_log_to_last_whole_line, count, events, json, run_both,
+    turn,
 };
 
 /// Range of the echo as rig.dbc has it, not as the code does.
@@ -105,10 +105,6 @@ fn expect_lost(log: &[Logged], lost: &str, other: &str, grace: u64) {
     assert!(since_death <= LOST_AT_LATEST + grace, "{lost} was given up {since_death} cycles after its end");
 }
 
-fn log_of(scene: &Scene) -> PathBuf {
-    scene.path("emulator/bus.log")
-}
-
 fn expect_partner_lost(ended: Ended, axis: &str) -> Ended {
     let named = format!("stopped before the end: {axis}: partner-lost");
     ended.expect_code(BOUND_BROKEN).expect_said(&[named.as_str(), "fell silent for 100 ms"])
@@ -122,7 +118,7 @@ fn a_controller_that_is_killed_is_noticed_by_the_other_which_shuts_its_valve_and
         expect_partner_lost(left.wait(), other);
         // Two seconds after the fault nobody is left in the barrier.
         emulator.wait().expect_code(3);
-        expect_lost(&read(&log_of(&scene)), lost, other, 0);
+        expect_lost(&by_cycle(&scene.bus_log()), lost, other, 0);
         let report = json(&scene.path("controller").join(format!("controller-{other}.json")));
         assert_eq!(report["axes"][other]["chain_state"], "fault");
         assert_eq!(report["axes"][other]["emergency_stop_state"], "waiting-for-release");
@@ -151,7 +147,7 @@ fn a_controller_that_stands_still_is_noticed_by_the_other_and_ends_too_when_it_g
         failing.wait().expect_code(BOUND_BROKEN).expect_said(&["stopped before the end"]);
         emulator.interrupt();
         // In real time the last status may have been a cycle that was missed: one more period.
-        expect_lost(&read(&log_of(&scene)), lost, other, 10);
+        expect_lost(&by_cycle(&scene.bus_log()), lost, other, 10);
     }
 }
 
@@ -240,10 +236,6 @@ fn run_control(command: RunControlCommand, experiment: u8) -> Option<Frame> {
     Some(Frame::RunControl(RunControl { command, experiment }))
 }
 
-fn table(scene: &Scene, axis: &str) -> AxisTable {
-    scene.axis_table(axis)
-}
-
 #[test]
 fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
     const ABORT: u32 = 3500;
@@ -253,7 +245,7 @@ fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
         ended.expect_code(BOUND_BROKEN).expect_said(&["aborted: the console ended the run"]);
     }
     for axis in ["drive", "load"] {
-        let table = table(&scene, axis);
+        let table = scene.axis_table(axis);
         let aborted = table.first("main_chain", "aborted", 0);
         // Said in a cycle, heard in the next.
         assert_eq!(table.cycles()[aborted], ABORT as usize + 1, "{axis}");
@@ -261,7 +253,7 @@ fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
         assert!(table.numbers("enabled")[aborted..].iter().all(|enabled| *enabled == 0.0), "{axis}");
         assert_eq!(table.states("emergency_stop_chain"), ["ready"], "{axis}");
     }
-    let log = read_to_last_whole_line(&log_of(&scene));
+    let log = by_cycle(&bus_log_to_last_whole_line(&scene.path("emulator/bus.log")));
     let stops =
         log.iter().filter(|logged| ["drive", "load"].iter().any(|axis| stop(&logged.frame, axis).is_some()));
     assert_eq!(stops.count(), 0, "no emergency stop");
@@ -281,7 +273,7 @@ fn a_run_that_starts_on_command_waits_in_settling_for_its_own_number() {
     let (scene, ended) = with_console(&on_start, 60_000, say);
     ended.into_iter().for_each(|ended| drop(ended.expect_code(0)));
     for axis in ["drive", "load"] {
-        let table = table(&scene, axis);
+        let table = scene.axis_table(axis);
         let settling = table.cycles()[table.first("main_chain", "settling", 0)];
         assert!(settling < 4000, "{axis} was ready for long: {settling}");
         let began = table.cycles()[table.first("main_chain", "experiment", 0)];

@@ -3,12 +3,7 @@
 
 use std::process::Command;
 use system_tests::foreign_python::of;
-use system_tests::{Build, Ended, Program, Running, executable, turn, workspace};
-
-fn with_programs(command: &mut Command) -> &mut Command {
-    let emulator = executable(Program::Emulator, Build::Shipped);
-    command.env("AIRBENCH_BIN_DIR", emulator.parent().expect("a program lies in a folder"))
-}
+use system_tests::{Ended, Running, shipped_programs, turn, workspace};
 
 /// Lines of `pytest -v` that end in a word such as PASSED.
 fn ended_so(ended: &Ended, word: &str) -> Vec<String> {
@@ -24,7 +19,8 @@ fn python_cans_own_tests_and_ours_pass_on_the_embedded_bus() {
     let python = workspace().join("python");
     // Those of the rig are `python_rig.rs`'s.
     pytest.arg(&python).arg("--ignore").arg(python.join("tests/rig"));
-    let ended = Running::start("pytest", with_programs(&mut pytest)).wait().expect_code(0);
+    pytest.env("AIRBENCH_BIN_DIR", shipped_programs());
+    let ended = Running::start("pytest", &mut pytest).wait().expect_code(0);
     let (passed, skipped) = (ended_so(&ended, "PASSED"), ended_so(&ended, "SKIPPED"));
     assert!(ended_so(&ended, "FAILED").is_empty());
     // Two of time, and two that python-can skips everywhere, in both classes.
@@ -56,7 +52,7 @@ fn the_example_of_a_job_tests_can_software_at_a_rig_without_root_or_vcan() {
     );
     assert!(workflow.contains("path: airbench\n") && workflow.contains("runs-on: ubuntu-24.04"));
     let mut job = Command::new(folder.join("job.sh"));
-    job.arg(workspace()).env("PYTHON", of("hil"));
-    let ended = Running::start("job.sh", with_programs(&mut job)).wait().expect_code(0);
+    job.arg(workspace()).env("PYTHON", of("hil")).env("AIRBENCH_BIN_DIR", shipped_programs());
+    let ended = Running::start("job.sh", &mut job).wait().expect_code(0);
     ended.expect_printed(&["2 passed"]);
 }

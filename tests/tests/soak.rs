@@ -2,7 +2,9 @@
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
-use system_tests::{Program, RESTLESS, Running, Scene, count, expect_whole_lines, json, turn, wait_until};
+use system_tests::{
+    Program, RESTLESS, Running, Scene, count, expect_whole_lines, find, json, turn, wait_until,
+};
 
 /// A soak in the scene's folder `soak`, in segments of 8 s, with a program that does nothing as its load generator.
 fn soak(scene: &Scene, minutes: f64) -> Running {
@@ -24,10 +26,7 @@ fn results(scene: &Scene) -> Value {
 }
 
 fn check<'a>(segment: &'a Value, name: &str) -> &'a str {
-    let checks = segment["checks"].as_array().expect("checks");
-    let check =
-        checks.iter().find(|check| check["name"] == name).unwrap_or_else(|| panic!("no check {name}"));
-    check["result"].as_str().expect("a result")
+    find(&segment["checks"], "name", name)["result"].as_str().expect("a result")
 }
 
 /// Processes of this name that `parent` has started.
@@ -126,8 +125,7 @@ fn a_soak_that_was_killed_or_interrupted_goes_on_with_all_it_had() {
 
     let running = soak(&scene, 0.6);
     scene.wait_for_rows(&segment_folder(3), 2000);
-    running.signal(Signal::INT);
-    let ended = running.wait().expect_code(130);
+    let ended = running.interrupt();
     assert!(ended.stderr.contains("may be trusted: 2 segments"), "{}", ended.stderr);
     let second = results(&scene);
     let segments = second["segments"].as_array().expect("segments");

@@ -1,13 +1,12 @@
 //! `bench can` answers as the kernel does: programs whose output was recorded on vcan (`vm_vcan.rs`) print the same on the
 //! embedded bus, without CAN in the kernel.
 
-use rustix::process::Signal;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use system_tests::foreign_python::tools_path;
 use system_tests::socketcan::{self, built, expected, guest, start};
-use system_tests::{Build, Ended, Program, Running, SHORT, Scene, executable, turn, wait_until, workspace};
+use system_tests::{Ended, Running, SHORT, Scene, shipped_programs, turn, wait_until, workspace};
 
 /// What a program prints, on a bus of its own.
 #[track_caller]
@@ -66,8 +65,7 @@ fn texts_of(script: &str) -> BTreeMap<String, String> {
     let script = socketcan::payload().join(script);
     let command = ["sh".as_ref(), script.as_os_str(), "vcan2".as_ref(), folder.as_os_str()];
     let mut can = guest(&scene, &format!("--interface {url}"), &command);
-    let programs = executable(Program::Bench, Build::Shipped);
-    let mut path = programs.parent().unwrap().as_os_str().to_owned();
+    let mut path = shipped_programs().into_os_string();
     path.push(":");
     path.push(tools_path());
     can.env("PATH", path);
@@ -143,8 +141,7 @@ fn a_listener_is_told_that_the_bus_went_down_as_on_vcan() {
         peer.send(&protocol::can::CanFrame::new(0x7E0, &[]).to_bytes());
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
-    host.signal(Signal::INT);
-    host.wait();
+    host.interrupt();
     told.wait_for("Network is down");
     let ended = told.wait();
     let recorded = fs::read_to_string(expected().join("can-utils/down")).unwrap();

@@ -76,9 +76,7 @@ const SENDER: &str = include_str!("../python/guests/fills_the_bus.py");
 
 #[test]
 fn a_bus_that_stands_still_refuses_with_enobufs_holds_native_senders_and_loses_nothing_it_accepted() {
-    let scene = Scene::new(SHORT);
-    let host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, host, peer) = Scene::with_bus();
     let mut running = start_python(&scene, "", SENDER);
     wait_until("the sender", || running.stdout().contains("ready"));
     host.stop();
@@ -136,9 +134,7 @@ fn used_s(process: u32) -> f64 {
 
 #[test]
 fn a_bus_that_stands_still_holds_native_messages_of_the_transport_protocol_and_loses_none() {
-    let scene = Scene::new(SHORT);
-    let host = scene.bus_host("");
-    let peer = scene.peer();
+    let (scene, host, peer) = Scene::with_bus();
     let mut running = start_python(&scene, "", TRANSPORT_SENDER);
     wait_until("the sender", || running.stdout().contains("ready"));
     host.stop();

@@ -10,7 +10,7 @@ use system_tests::foreign_python::python;
 use system_tests::socketcan::{built, guest, shell, start};
 use system_tests::{
     Build, PATIENCE, Pace, Packet, Program, Running, SHORT, Scene, count, executable, firmware, install,
-    json, turn, wait_until, workspace,
+    json, shipped_programs, turn, wait_until, workspace,
 };
 use tempfile::TempDir;
 
@@ -63,12 +63,11 @@ fn the_firmware_for_socketcan_controls_the_rig_on_the_embedded_bus() {
 fn scripts_run_takes_the_interface_for_a_bus() {
     let _turn = turn::take();
     let scene = Scene::new(SHORT);
-    let programs = executable(Program::Bench, Build::Shipped);
     let run = workspace().join("scripts/run");
     let (out, experiment) = (scene.path("run"), scene.path("experiment.toml"));
     let command: [&dyn AsRef<OsStr>; 6] = [&run, &"--bus", &"can://vcan0", &"--out", &out, &experiment];
     let mut can = guest(&scene, "--pair", &command);
-    let ended = Running::start("scripts/run", can.env("AIRBENCH_BIN_DIR", programs.parent().unwrap())).wait();
+    let ended = Running::start("scripts/run", can.env("AIRBENCH_BIN_DIR", shipped_programs())).wait();
     ended.expect_printed(&["can://vcan0"]);
     let summary = json(&out.join("summary.json"));
     let commands = count(&summary, "/drive_commands/accepted");

@@ -4,7 +4,7 @@
 //! do not come to the same order of frames by chance: a run of thousands of cycles would show it.
 
 use std::time::Duration;
-use system_tests::{AxisTable, LINKED, Launch, Pace, SHORT, Scene, bus_log, json, workspace};
+use system_tests::{AxisTable, LINKED, Pace, SHORT, Scene, bus_log, json, text, workspace};
 
 /// What a rehearsal leaves too.
 const TABLES: [&str; 4] = ["measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv"];
@@ -17,18 +17,12 @@ enum Cast {
     Rehearsal,
 }
 
-/// The shipped programs, for what names them.
-fn with_programs(launch: Launch) -> Launch {
-    let programs = workspace().join("controller/programs");
-    launch.with(&format!("--programs {}", programs.display()))
-}
-
 /// Runs the experiment to its end, everything into one folder, as `scripts/run` does.
 fn run(experiment: &str, cast: Cast) -> Scene {
     let scene = Scene::new(experiment);
     let out = scene.path("run");
     if cast == Cast::Rehearsal {
-        with_programs(scene.rehearsal().out(&out)).start().wait().expect_code(0);
+        scene.rehearsal().out(&out).with_shipped_programs().start().wait().expect_code(0);
         return scene;
     }
     let axes: &[&str] = match cast {
@@ -41,7 +35,8 @@ fn run(experiment: &str, cast: Cast) -> Scene {
     let controllers: Vec<_> = axes
         .iter()
         .map(|axis| {
-            let controller = with_programs(scene.axis_controller(Pace::Lockstep, axis).out(&out)).start();
+            let controller =
+                scene.axis_controller(Pace::Lockstep, axis).out(&out).with_shipped_programs().start();
             // Long enough for the first to be on the bus before the second.
             std::thread::sleep(Duration::from_millis(100));
             controller
@@ -73,8 +68,7 @@ fn expect_all_the_same(experiment: &str) -> Scene {
 }
 
 fn shipped(name: &str) -> String {
-    let file = workspace().join(format!("controller/experiments/{name}.toml"));
-    std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
+    text(&workspace().join(format!("controller/experiments/{name}.toml")))
 }
 
 fn states(scene: &Scene, axis: &str) -> Vec<String> {

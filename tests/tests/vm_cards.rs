@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::foreign_python::python;
-use system_tests::guest::{Guest, InterfaceCounters, compare_candump, data_frames, link};
-use system_tests::{Table, account, count, json, workspace};
+use system_tests::guest::{Guest, InterfaceCounters, compare_candump, data_frames};
+use system_tests::{Table, account, count, find, json, workspace};
 
 const LOG_OF_CAN1: &str = "candump-can1.log";
 /// What `job-cards` lets cangen send.
@@ -85,7 +85,7 @@ fn vm_preempt_rt_kernel_with_cards_accounts_for_every_frame_and_survives_what_ca
 
 fn the_cards_are_set_up_as_asked(facts: &Value) {
     for card in ["can0", "can1"] {
-        let link = link(&facts["links"], card);
+        let link = find(&facts["links"], "ifname", card);
         assert_eq!(link["txqlen"], 10, "{card}");
         let data = &link["linkinfo"]["info_data"];
         assert_eq!(

@@ -163,7 +163,7 @@ fn the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
     );
 
     let log = fs::read_to_string(run.join("bus.log")).unwrap();
-    let done = firmware::positioned(&data_frames(&log));
+    let done = firmware::positioned(&data_frames(&log), firmware::REPETITIONS);
     eprintln!("{done:?}, {} of {} cycles skipped", count(&summary, "/skipped"), count(&summary, "/cycles"));
     assert!(done.cycles > 14_000 && done.set_points > 1400 && done.keeps_the_bounds(), "{done:?}");
 

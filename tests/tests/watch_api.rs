@@ -9,8 +9,8 @@ use std::process::{Command, Stdio};
 use system_tests::foreign_python::python;
 use system_tests::onlooker::LivePage;
 use system_tests::{
-    Build, LINKED, Pace, Program, RESTLESS, Running, Scene, Table, count, executable, json, turn, wait_until,
-    workspace,
+    Build, LINKED, Pace, Program, RESTLESS, Running, Scene, Table, count, executable, json, shipped_programs,
+    turn, wait_until, workspace,
 };
 
 /// Emulator and controller of a scene, watched with controls.
@@ -377,12 +377,11 @@ fn without_telemetry_the_page_shows_what_is_on_the_bus() {
 fn a_run_with_its_page_is_one_command() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let bench = executable(Program::Bench, Build::Shipped);
     // A script cannot trap what was ignored when it began, as Ctrl-C is below a shell's background.
     let mut command = Command::new("env");
     command.arg("--default-signal=INT").arg(workspace().join("scripts/run"));
     // Built already: the test is of the script, and a build would want the machine for itself.
-    command.env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
+    command.env("AIRBENCH_BIN_DIR", shipped_programs());
     command.args(["--watch", "--http", "127.0.0.1:0", "--seconds", "60", "--bus", &scene.url()]);
     command.arg("--out").arg(scene.path("run")).arg(scene.path("experiment.toml"));
     let page = LivePage::announced_by(Running::start("scripts/run --watch", &mut command));
