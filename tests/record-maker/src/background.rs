@@ -33,7 +33,6 @@ pub struct Background {
 
 impl Background {
     /// JSON of `truth.json` and `draws.json`, with the effects as the caller formats them.
-    #[must_use]
     pub fn as_json(&self, effects: Vec<Value>) -> Value {
         json!({
             "effects": effects,

@@ -21,7 +21,6 @@ impl Form {
     pub const ALL: [Form; 3] = [Form::Catalogue, Form::Near, Form::Far];
 
     /// Name on the command line and in `truth.json`.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Form::Catalogue => "catalogue",
@@ -31,7 +30,6 @@ impl Form {
     }
 
     /// Whether it is not the form of the catalogue.
-    #[must_use]
     pub const fn is_foreign(self) -> bool {
         !matches!(self, Form::Catalogue)
     }

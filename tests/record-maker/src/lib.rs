@@ -192,47 +192,20 @@ pub struct TrueAxis {
 
 /// Why no record was made.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // each says itself what it is
 pub enum MakeError {
-    /// No parameter of [`PARAMETERS`], or a factor outside 0.5 to 2.
     #[error("{name} = {factor}: allowed are the names {PARAMETERS:?}, with factors from 0.5 to 2")]
-    WrongParameter {
-        /// Name as the recipe has it.
-        name: String,
-        /// Factor as the recipe has it.
-        factor: f64,
-    },
-    /// No effect of the catalogue.
+    WrongParameter { name: String, factor: f64 },
     #[error("{name}: the catalogue has no such effect; see plant::effects::SHEETS")]
-    UnknownEffect {
-        /// Name as the recipe has it.
-        name: String,
-    },
+    UnknownEffect { name: String },
     /// An effect at a place that its sheet or the record does not have.
     #[error("{name} at {place}: {rule}")]
-    Place {
-        /// Name of the effect.
-        name: &'static str,
-        /// Place as the recipe has it.
-        place: Place,
-        /// The rule that it breaks.
-        rule: &'static str,
-    },
-    /// Numbers of an effect that its sheet does not allow.
+    Place { name: &'static str, place: Place, rule: &'static str },
+    /// Numbers of an effect, in the units of the rig file, that its sheet does not allow.
     #[error("{name}: {numbers:?}: allowed is {allowed}")]
-    Numbers {
-        /// Name of the effect.
-        name: &'static str,
-        /// Numbers as the recipe has them, in the units of the rig file.
-        numbers: Vec<f64>,
-        /// Names and ranges of the keys.
-        allowed: String,
-    },
-    /// A held-out experiment that does not exist.
+    Numbers { name: &'static str, numbers: Vec<f64>, allowed: String },
     #[error("held-out experiment {number}: allowed are 0 and 1")]
-    Experiment {
-        /// Number of the recipe.
-        number: u8,
-    },
+    Experiment { number: u8 },
     /// The files of the experiment are not valid.
     #[error(transparent)]
     Run(#[from] InputError),
@@ -241,38 +214,16 @@ pub enum MakeError {
     Scene(#[from] SceneError),
     /// An experiment with hands or events, which the record maker does not simulate.
     #[error("{file}: the record maker plays no [[rig.hand]] and no [[rig.event]]")]
-    People {
-        /// The experiment file.
-        file: String,
-    },
-    /// A controller tripped the emergency stop.
+    People { file: String },
     #[error("a controller tripped the emergency stop at {at_s} s")]
-    Stopped {
-        /// Time of the record, s.
-        at_s: f64,
-    },
+    Stopped { at_s: f64 },
     /// A proposed experiment that does not end within the time that a record may last.
     #[error("{file}: is not done after {length_s} s")]
-    Unfinished {
-        /// The experiment file.
-        file: String,
-        /// Simulated time, s.
-        length_s: f64,
-    },
+    Unfinished { file: String, length_s: f64 },
     /// A state with a number that is not finite, or a pressure that is not positive.
     #[error("the {axis} axis is in no state of a rig at {at_s} s")]
-    NoState {
-        /// Name of the axis.
-        axis: &'static str,
-        /// Time of the record, s.
-        at_s: f64,
-    },
+    NoState { axis: &'static str, at_s: f64 },
     /// A file could not be read or written.
     #[error("{path}: {error}")]
-    File {
-        /// Path of the file.
-        path: String,
-        /// What the operating system says.
-        error: std::io::Error,
-    },
+    File { path: String, error: std::io::Error },
 }
