@@ -54,7 +54,7 @@ pub(super) struct Axis {
     dead_m3: [f64; 2],
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Air {
     pub(super) pressure_pa: [f64; 2],
     pub(super) volume_m3: [f64; 2],

@@ -265,17 +265,11 @@ impl RecordedRig {
         let (mut made, laws) = hidden::rig(recipe, numbers, steps_per_ms)?;
         // Both axes may move without being linked.
         made.coupling = made.coupling.filter(|_| scene.linked);
-        let mut axis = 0;
-        let sensing = laws.map(|laws| {
+        let slow_noise_ratio = background.map(|background| background.slow_noise_ratio);
+        let noise = (recipe.noise, recipe.coloured_noise, slow_noise_ratio);
+        let mut sensing = [0, 1].map(|axis| {
             let streams = |channel| Stream::new(recipe.seed, (4 * axis + channel) as u64);
-            let noise = (
-                recipe.noise,
-                recipe.coloured_noise,
-                background.map(|background| background.slow_noise_ratio),
-            );
-            let sensing = Sensing::new(laws, rig.sensors(), axis, made.step_s(), streams, noise);
-            axis += 1;
-            sensing
+            Sensing::new(laws[axis].clone(), rig.sensors(), axis, made.step_s(), streams, noise)
         });
         let carriage_m = scene.carriage_position_m;
         let load_m = if scene.linked { stroke_m - carriage_m } else { 0.0 };
@@ -284,10 +278,9 @@ impl RecordedRig {
             *extension_m = axis.motion.beside_the_stops(*extension_m);
         }
         let state = made.start(extension_m);
-        let mut sensing: [Sensing; 2] = sensing;
         for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| !made.active[*i]) {
             // A resting axis is sampled once.
-            let mut evaluated = Evaluated::NONE;
+            let mut evaluated = Evaluated::default();
             evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
             sensing.see(made.sensed(&state, &evaluated, i));
         }

@@ -58,13 +58,12 @@ pub(super) fn rig(
             _ => laws[usize::from(hidden.place.part == Part::Load)].switch_on(hidden, &n)?,
         }
     }
-    let mut axis = 0;
-    let axes = [&laws[0], &laws[1]].map(|laws| {
+    let axes = [0, 1].map(|axis| {
+        let laws = &laws[axis];
         let silencer = laws.silencer.map(|silencer| Node::silencer(&numbers, silencer, form));
         let valve = Valve::new(&numbers, laws.valve.clone());
         let ports = Ports::new(&numbers, laws.port.clone());
         let motion = Motion::new(&numbers, axis, laws.motion.clone());
-        axis += 1;
         Axis::new(&numbers, valve, ports, silencer, laws.air.clone(), motion)
     });
     let rig = Rig {

@@ -48,7 +48,7 @@ pub(super) struct Rig {
     pub(super) steps_per_ms: usize,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct State {
     pub(super) y: [Y; 2],
     /// Deflection of the bristles, m.
@@ -73,7 +73,8 @@ struct Line {
     leaves: [f64; 2],
 }
 
-#[derive(Debug, Clone, Copy)]
+/// Rates and forces of both axes; those of the default are of axes at rest.
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Evaluated {
     pub(super) rates: [Y; 2],
     pub(super) air: [Air; 2],
@@ -91,19 +92,7 @@ impl Rig {
             let steps = longest.map_or(0, |steps| (steps.ceil() as usize + 2).next_power_of_two());
             Line { ring: vec![[0.0; 2]; steps], leaves: [0.0; 2] }
         };
-        State {
-            y,
-            bristles: [0.0; 2],
-            direction: [0.0; 2],
-            rest_since_s: [0.0; 2],
-            last_break_away: [[0.0; 2]; 2],
-            supply_pa: self.axes[0].numbers.supply_pa,
-            play: [Play::default(); 2],
-            late: [0.0; 2],
-            commands: [[0.0; KEPT_COMMANDS]; 2],
-            lines: [line(0), line(1)],
-            steps: 0,
-        }
+        State { y, supply_pa: self.axes[0].numbers.supply_pa, lines: [line(0), line(1)], ..State::default() }
     }
 
     /// Sets the smooth states of the baseline to those of a record.
@@ -240,7 +229,7 @@ impl Rig {
         lines: [Option<[f64; 2]>; 2],
         may_break_away: bool,
     ) -> Evaluated {
-        let mut evaluated = Evaluated::NONE;
+        let mut evaluated = Evaluated::default();
         let mut drawn = 0.0;
         for i in 0..2 {
             if !self.active[i] {
@@ -411,26 +400,6 @@ struct Instant<'a> {
     supply_pa: f64,
     rest_s: [f64; 2],
     last_break_away: [[f64; 2]; 2],
-}
-
-impl Evaluated {
-    const NO_AIR: Air = Air {
-        pressure_pa: [0.0; 2],
-        volume_m3: [0.0; 2],
-        edge_flow: [0.0; 2],
-        drawn: 0.0,
-        vented: 0.0,
-        exhaust_pa: 0.0,
-        force_n: 0.0,
-    };
-    /// At rest.
-    pub(super) const NONE: Evaluated = Evaluated {
-        rates: [[0.0; 14]; 2],
-        air: [Self::NO_AIR; 2],
-        contact_n: 0.0,
-        friction_n: [0.0; 2],
-        supply_rate: 0.0,
-    };
 }
 
 #[inline(always)]
