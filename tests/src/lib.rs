@@ -70,7 +70,7 @@ pub use launch::{Launch, Pace, both_good, run_both};
 pub use peer::{Packet, Peer};
 pub use process::{Ended, PATIENCE, Running, wait_until};
 pub use records::{
-    Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, dropped_at_queue, expect_whole_lines,
-    find, json, text, timing_rows,
+    Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, dropped_at_queue, expect_same,
+    expect_whole_lines, find, json, same, text, timing_rows,
 };
 pub use scene::{LINKED, PROGRAM, RESTLESS, SHORT, Scene};

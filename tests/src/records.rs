@@ -39,6 +39,20 @@ pub fn dropped_at_queue(summary: &Value, process: u32, id: &str) -> u64 {
     count_of_id(&peer["dropped_at_queue"], id)
 }
 
+pub fn same(one: &Path, other: &Path) -> bool {
+    let read =
+        |path: &Path| std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    read(one) == read(other)
+}
+
+/// Holds that files of two folders are the same to the byte; of one that is not it is said that it `differs`, or what `what` says.
+#[track_caller]
+pub fn expect_same(one: &Path, other: &Path, files: &[&str], what: &str) {
+    for file in files {
+        assert!(same(&one.join(file), &other.join(file)), "{file} {what}");
+    }
+}
+
 /// The rows of a timing table.
 pub fn timing_rows(path: &Path) -> Vec<CycleTiming> {
     timing::read(&text(path)).unwrap_or_else(|error| panic!("{}: {error}", path.display()))

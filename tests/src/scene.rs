@@ -187,12 +187,6 @@ impl Scene {
     pub fn axis_table(&self, axis: &str) -> AxisTable {
         AxisTable::read(&self.path("controller").join(format!("controller-{axis}.csv")))
     }
-
-    pub fn same(&self, one: &Path, other: &Path) -> bool {
-        let read =
-            |path: &Path| std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        read(one) == read(other)
-    }
 }
 
 /// Lines of a file; none of one that cannot be read.

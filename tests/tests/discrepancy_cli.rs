@@ -4,14 +4,14 @@
 //!
 //! The record is the record maker's, whose integrator and laws are not the plant's.
 
-use plant::RigParameters;
-use record_maker::{Experiment, Hidden, Recipe, simulate, write};
+use crate::discrepancy_steps::record;
+use record_maker::{Experiment, Hidden, Recipe};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::exit::{BAD_INPUT, GOOD, INTERRUPTED};
 use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, find, json};
@@ -21,8 +21,6 @@ use tempfile::TempDir;
 const EFFECT: &str = "inclination";
 const FORCE_N: f64 = 12.0;
 
-/// 8 s: rests, ramps, steps and half a chirp.
-const ROWS: usize = 8000;
 /// Line of the first row in a measurement file: a comment and the head stand before it.
 const FIRST_ROW: usize = 3;
 
@@ -33,27 +31,19 @@ struct Records {
     test: PathBuf,
 }
 
-fn records() -> &'static Records {
-    static RECORDS: OnceLock<Records> = OnceLock::new();
-    RECORDS.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder");
-        let sheet = plant::effects::sheet(EFFECT).expect("an effect of the catalogue");
-        let place = sheet.place_named("drive").expect("the drive can be inclined");
-        let hidden = vec![Hidden { name: sheet.name, place, numbers: vec![FORCE_N] }];
-        let make = |name: &str, experiment, seed| {
-            let recipe = Recipe { seed, experiment, hidden: hidden.clone(), ..Recipe::default() };
-            let mut record = simulate(&recipe, &RigParameters::baseline()).expect("a record");
-            record.rows.truncate(ROWS);
-            let out = folder.path().join(name);
-            write(&record, &out, &folder.path().join("truth").join(name))
-                .expect("a folder that can be written");
-            out.join("measurement.csv")
-        };
-        let train = make("train", Experiment::Train, 1);
-        let test = make("test", Experiment::HeldOut(0), 2);
-        Records { folder, train, test }
-    })
-}
+static RECORDS: LazyLock<Records> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sheet = plant::effects::sheet(EFFECT).expect("an effect of the catalogue");
+    let place = sheet.place_named("drive").expect("the drive can be inclined");
+    let hidden = vec![Hidden { name: sheet.name, place, numbers: vec![FORCE_N] }];
+    let make = |name: &str, experiment, seed| {
+        let recipe = Recipe { seed, experiment, hidden: hidden.clone(), ..Recipe::default() };
+        record(folder.path(), name, &recipe)
+    };
+    let train = make("train", Experiment::Train, 1);
+    let test = make("test", Experiment::HeldOut(0), 2);
+    Records { folder, train, test }
+});
 
 fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> Ended {
     let rig = rig();
@@ -65,7 +55,7 @@ fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> Ended {
 
 /// The training record with its lines changed: `change` gets the number of the row and its cells, and hands back none to lose it.
 fn spoilt(folder: &Path, change: impl Fn(usize, Vec<&str>) -> Option<String>) -> PathBuf {
-    let text = fs::read_to_string(&records().train).expect("the record");
+    let text = fs::read_to_string(&RECORDS.train).expect("the record");
     let mut lines = text.lines();
     let mut spoilt: Vec<String> = lines.by_ref().take(FIRST_ROW - 1).map(str::to_owned).collect();
     spoilt.extend(lines.enumerate().filter_map(|(row, line)| change(row, line.split(',').collect())));
@@ -99,7 +89,7 @@ fn effects(report: &Value, list: &str) -> Vec<String> {
 #[test]
 fn a_hidden_effect_is_named_in_the_same_bytes_whatever_the_threads_and_the_held_out_record_changes_gap_alone()
 {
-    let own = records();
+    let own = &*RECORDS;
     let folder = tempfile::tempdir().expect("a folder");
     let out = |name: &str| folder.path().join(name);
     let test = own.test.to_str().expect("a path in ASCII");
@@ -179,7 +169,7 @@ fn the_steps_after_a_report(closed: &Path) {
     let read = |path: &Path| fs::read_to_string(path).expect("a rig file");
     assert_eq!(read(&extended), read(&closed.join("rig.toml")));
 
-    let (test, out) = (&records().test, closed.join("verified"));
+    let (test, out) = (&RECORDS.test, closed.join("verified"));
     let verified =
         discrepancy(&[&"verify", &"--rig", &rig, &"--extended", &extended, &"--test", test, &"--out", &out]);
     let confirmed = json(&report)["verification"]["confirmed"].as_bool().expect("a verification");
@@ -202,7 +192,7 @@ fn the_steps_after_a_report(closed: &Path) {
 #[test]
 fn the_steps_before_a_report_run_alone() {
     let folder = tempfile::tempdir().expect("a folder");
-    let train = &records().train;
+    let train = &RECORDS.train;
     let check = on("check", train, folder.path(), &[]).expect_code(GOOD);
     check.expect_printed(&["8000 rows", "can be used", "drive_force_N: noise 0.5"]);
     assert_eq!(json(&folder.path().join("checks.json"))[0]["usable"], true);
@@ -303,7 +293,7 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
 #[test]
 fn what_is_read_is_never_written_over_and_no_record_is_both_trained_on_and_held_out() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (train, own) = (&records().train, folder.path().join("rig.toml"));
+    let (train, own) = (&RECORDS.train, folder.path().join("rig.toml"));
     fs::copy(rig(), &own).expect("a folder that can be written");
     let close = |more: &[&dyn AsRef<OsStr>]| {
         let out = folder.path();
@@ -329,7 +319,7 @@ fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves
     }
     // Without a column that the simulation needs: reported as any other defect, with a report.
     let record = folder.path().join("narrow.csv");
-    let text = fs::read_to_string(&records().train).expect("the record");
+    let text = fs::read_to_string(&RECORDS.train).expect("the record");
     fs::write(&record, text.replace("drive_pressure_b_Pa", "drive_presure_b_Pa")).expect("room");
     let check = on("check", &record, &out, &[]).expect_code(BAD_INPUT);
     check.expect_printed(&["cannot be used", "column drive_presure_b_Pa", "no column drive_pressure_b_Pa"]);
@@ -341,7 +331,7 @@ fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves
     let empty = folder.path().join("empty");
     let mut command = Program::Discrepancy.command();
     command.args([OsStr::new("close"), OsStr::new("--rig"), rig().as_os_str(), OsStr::new("--train")]);
-    command.args([records().train.as_os_str(), OsStr::new("--out"), empty.as_os_str()]);
+    command.args([RECORDS.train.as_os_str(), OsStr::new("--out"), empty.as_os_str()]);
     let mut running = Running::start("discrepancy", &mut command);
     running.wait_for("screening");
     running.signal(Signal::INT);
@@ -378,7 +368,7 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
         }
     }
     on("close", &headless, &path("out"), &[]).expect_code(BAD_INPUT);
-    let train = &records().train;
+    let train = &RECORDS.train;
     // What is missing is missed before anything is computed.
     let nowhere = missing.to_str().expect("a path in ASCII");
     let began = std::time::Instant::now();
@@ -429,5 +419,5 @@ fn help_tells_every_step_every_option_and_the_exit_codes() {
         help.expect_printed(parts);
     }
     discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_said(&["--rig", "--train"]);
-    assert!(records().folder.path().exists());
+    assert!(RECORDS.folder.path().exists());
 }

@@ -10,22 +10,24 @@ use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::exit::{BAD_INPUT, GOOD};
 use system_tests::json;
 
-const ROWS: usize = 8000;
+/// 8 s: rests, ramps, steps and half a chirp.
+pub(crate) const ROWS: usize = 8000;
 
-/// A record of an axis in which nothing is hidden.
-fn record(folder: &Path, axis: Axis) -> PathBuf {
-    let recipe = Recipe { axis, ..Recipe::default() };
-    let mut record = simulate(&recipe, &RigParameters::baseline()).expect("a record");
+/// The measurement of so many rows of a recipe's record, in a folder of this name below `folder`.
+pub(crate) fn record(folder: &Path, name: &str, recipe: &Recipe) -> PathBuf {
+    let mut record = simulate(recipe, &RigParameters::baseline()).expect("a record");
     record.rows.truncate(ROWS);
-    let out = folder.join(axis.name());
-    write(&record, &out, &folder.join("truth").join(axis.name())).expect("a folder that can be written");
+    let out = folder.join(name);
+    write(&record, &out, &folder.join("truth").join(name)).expect("a folder that can be written");
     out.join("measurement.csv")
 }
 
 #[test]
 fn steps_alone_refuse_records_that_do_not_go_together() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [train, other] = &[Axis::Drive, Axis::Load].map(|axis| record(folder.path(), axis));
+    // Records of two axes in which nothing is hidden.
+    let of_axis = |axis: Axis| record(folder.path(), axis.name(), &Recipe { axis, ..Recipe::default() });
+    let [train, other] = &[Axis::Drive, Axis::Load].map(of_axis);
     for step in ["calibrate", "locate"] {
         let twice = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", train];
         discrepancy(&twice).expect_code(BAD_INPUT).expect_said(&["--train", "given twice"]);

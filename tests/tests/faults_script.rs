@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use system_tests::broken::{Left, Plan};
-use system_tests::{Pace, Program, SHORT, Scene, workspace};
+use system_tests::{Pace, Program, SHORT, Scene, expect_same, same, workspace};
 
 #[test]
 fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() {
@@ -11,19 +11,18 @@ fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() 
                   [[fault]]\nname = \"chamber-leak\"\nat = \"load.b\"\nleakage_nl_per_min = 50\n";
     let run = |faults: &str| Plan { faults, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
     let [one, other] = [run(script), run(script)];
-    for name in ["measurement.csv", "truth.csv", "bus.log", "faults.csv"] {
-        let path = |left: &Left| left.scene.path("emulator").join(name);
-        assert!(one.scene.same(&path(&one), &path(&other)), "{name} differs");
-    }
+    let folder = |left: &Left| left.scene.path("emulator");
+    let files = ["measurement.csv", "truth.csv", "bus.log", "faults.csv"];
+    expect_same(&folder(&one), &folder(&other), &files, "differs");
     let drawn_anew = run(&script.replace("seed = 3", "seed = 4"));
     for name in ["measurement.csv", "bus.log"] {
-        let path = |left: &Left| left.scene.path("emulator").join(name);
-        assert!(!one.scene.same(&path(&one), &path(&drawn_anew)), "{name}: another seed, other draws");
+        let is_same = same(&folder(&one).join(name), &folder(&drawn_anew).join(name));
+        assert!(!is_same, "{name}: another seed, other draws");
     }
     let later = "[[fault]]\nname = \"valve-dead\"\nat = \"drive\"\nfrom_s = 50\n";
     let [without, waiting] = [run(""), run(later)];
-    let path = |left: &Left| left.scene.path("emulator/measurement.csv");
-    assert!(without.scene.same(&path(&without), &path(&waiting)), "a fault that waits changes nothing");
+    let [one, other] = [&without, &waiting].map(|left| folder(left).join("measurement.csv"));
+    assert!(same(&one, &other), "a fault that waits changes nothing");
     assert!(!without.scene.path("emulator/faults.csv").exists());
 }
 

@@ -8,7 +8,7 @@ use std::process::Command;
 use std::sync::LazyLock;
 use system_tests::bus_cycles::by_cycle;
 use system_tests::firmware::{REPETITIONS, build, expect_every_cycle_answered, positioned};
-use system_tests::{Pace, Running, Scene, both_good, bus_log, json, workspace};
+use system_tests::{Pace, Running, Scene, both_good, bus_log, expect_same, json, workspace};
 use tempfile::TempDir;
 
 static BUILT: LazyLock<TempDir> = LazyLock::new(|| {
@@ -42,9 +42,7 @@ fn it_positions_within_the_figures_and_in_lockstep_always_alike() {
     positioned(&bus_log(&folder.join("bus.log")), REPETITIONS).expect_whole(2, 1590);
 
     let again = run(&scene, "again", 30.0);
-    for file in ["bus.log", "measurement.csv"] {
-        assert!(scene.same(&folder.join(file), &again.join(file)), "{file} differs in a second run");
-    }
+    expect_same(&folder, &again, &["bus.log", "measurement.csv"], "differs in a second run");
 }
 
 #[test]

@@ -14,7 +14,8 @@ use std::sync::LazyLock;
 use system_tests::firmware::{build, expect_every_cycle_answered, positioned};
 use system_tests::foreign_python::{light_path, run_script_of, tools_path};
 use system_tests::{
-    Build, Pace, Program, Running, Scene, both_good, count, count_of_id, executable, json, workspace,
+    Build, Pace, Program, Running, Scene, both_good, count, count_of_id, executable, expect_same, json,
+    workspace,
 };
 use tempfile::TempDir;
 
@@ -267,9 +268,8 @@ fn gdb_stops_the_core_while_the_rig_waits_and_the_run_is_the_same_to_the_byte() 
         scene
     };
     let [plain, debugged] = [run(false), run(true)];
-    for file in ["emulator/bus.log", "emulator/measurement.csv"] {
-        assert!(plain.same(&plain.path(file), &debugged.path(file)), "{file} differs under the debugger");
-    }
+    let [plain, debugged] = [&plain, &debugged].map(|scene| scene.path("emulator"));
+    expect_same(&plain, &debugged, &["bus.log", "measurement.csv"], "differs under the debugger");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::foreign_python::run_script;
-use system_tests::{Ended, Program, Running, SHORT, Scene, Table};
+use system_tests::{Ended, Program, Running, SHORT, Scene, Table, same};
 
 /// Largest difference that is none: the numbers go through a CSV with all their digits.
 const TOLERANCE: f64 = 1e-9;
@@ -160,7 +160,7 @@ fn the_same_rig_gives_the_same_file_and_what_is_none_is_refused() {
     for out in [&one, &other] {
         export(&scene.path("rig.toml"), out, &[]).expect_code(0);
     }
-    assert!(scene.same(&one, &other));
+    assert!(same(&one, &other));
     let bad = scene.rig_with("bad.toml", "pressure_bar = 7.0", "pressure_bar = 70");
     let out = scene.path("bad.fmu");
     export(&bad, &out, &[]).expect_code(2).expect_said(&["bad.toml:", "pressure_bar = 70 is out of range"]);

@@ -6,7 +6,7 @@ use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
 use rehearsal::{Rehearsal, RehearsalParts};
 use std::path::Path;
 use system_tests::events::{Event, all, times};
-use system_tests::{Build, Pace, Running, SHORT, Scene, bus_log, count, turn, wait_until};
+use system_tests::{Build, Pace, Running, SHORT, Scene, bus_log, count, expect_same, turn, wait_until};
 
 /// The experiment of the other tests, with more in its `[rig]`.
 fn with_people(rig: &str) -> Scene {
@@ -132,10 +132,8 @@ fn a_run_with_people_in_it_is_the_same_to_the_byte() {
         scene
     };
     let [one, other] = [run(&people), run(&people)];
-    for file in ["bus.log", "measurement.csv", "truth.csv"] {
-        let path = |scene: &Scene| scene.path("emulator").join(file);
-        assert!(one.same(&path(&one), &path(&other)), "{file} differs");
-    }
+    let [folder, again] = [&one, &other].map(|scene| scene.path("emulator"));
+    expect_same(&folder, &again, &["bus.log", "measurement.csv", "truth.csv"], "differs");
     let events = all(&one.summary());
     assert_eq!(cycles_of(&events, "link-given-up"), [1200]);
     assert_eq!(times(&events, "weights"), 1);

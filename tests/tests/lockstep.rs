@@ -4,7 +4,7 @@ use protocol::frames::{Frame, ValveCommand};
 use rustix::process::Signal;
 use std::time::Duration;
 use system_tests::load::BusyLoops;
-use system_tests::{Pace, SHORT, Scene, both_good};
+use system_tests::{Pace, SHORT, Scene, both_good, expect_same, same};
 
 /// Files of emulator and controller that must be the same.
 const FILES: [&str; 4] =
@@ -67,9 +67,8 @@ fn two_runs_give_the_same_files_to_the_byte_whatever_the_circumstances() {
         Circumstance::ListenerThatNeverReads,
     ] {
         let again = run(circumstance, "");
-        for file in FILES {
-            assert!(first.same(&first.path(file), &again.path(file)), "{file} differs with {circumstance:?}");
-        }
+        let what = format!("differs with {circumstance:?}");
+        expect_same(&first.path(""), &again.path(""), &FILES, &what);
         for figure in ["position_error_dynamic_m", "position_error_static_m"] {
             let of = |scene: &Scene| scene.report()["axes"]["drive"][figure].clone();
             assert_eq!(of(&first), of(&again), "{figure} with {circumstance:?}");
@@ -100,7 +99,7 @@ fn an_answer_to_the_last_cycle_is_logged_however_long_it_takes() {
 fn another_seed_gives_another_log() {
     let (one, other) = (run(Circumstance::EmulatorFirst, ""), run(Circumstance::EmulatorFirst, "--seed 2"));
     for file in FILES {
-        assert!(!one.same(&one.path(file), &other.path(file)), "{file} does not depend on the seed");
+        assert!(!same(&one.path(file), &other.path(file)), "{file} does not depend on the seed");
     }
 }
 

@@ -5,19 +5,18 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 use system_tests::foreign_python::{light_path, python, run_script};
 use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, Table, run_both};
 
 fn run_folder() -> PathBuf {
-    static RUN: OnceLock<Scene> = OnceLock::new();
-    let scene = RUN.get_or_init(|| {
+    static RUN: LazyLock<Scene> = LazyLock::new(|| {
         let scene = Scene::new(SHORT);
         let folder = scene.path("emulator");
         run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep).out(&folder));
         scene
     });
-    scene.path("emulator")
+    RUN.path("emulator")
 }
 
 fn export(source: &Path, format: &str, out: &Path, options: &[&str]) -> Ended {

@@ -6,7 +6,7 @@
 use crate::malformed_table::{COUNTERS, Counter, Injection, table};
 use protocol::frames::{Frame, Tick, ValveCommand};
 use serde_json::Value;
-use system_tests::{Pace, Peer, SHORT, Scene, both_good, count, json};
+use system_tests::{Pace, Peer, SHORT, Scene, both_good, count, expect_same, json, same};
 
 /// The carriage moves from here on; before, an open valve would show as well, but later is closer to what matters.
 const FIRST_CYCLE: u32 = 750;
@@ -53,9 +53,7 @@ fn each_malformed_frame_is_counted_where_it_belongs_and_changes_nothing() {
     assert!(injections.len() >= 20, "the table has {} entries", injections.len());
     let without = run(None);
     let with = run(Some(&mut |peer, cycle| inject(&injections, peer, cycle)));
-    for file in FILES {
-        assert!(without.same(&without.path(file), &with.path(file)), "{file} was changed");
-    }
+    expect_same(&without.path(""), &with.path(""), &FILES, "was changed");
     for counter in COUNTERS {
         let sent: Vec<&str> =
             injections.iter().filter(|one| one.counter == counter).map(|one| one.what.as_str()).collect();
@@ -100,7 +98,7 @@ fn one_good_command_from_elsewhere_does_change_the_run() {
         }
     }));
     for file in FILES {
-        assert!(!without.same(&without.path(file), &with.path(file)), "{file} was not changed");
+        assert!(!same(&without.path(file), &with.path(file)), "{file} was not changed");
     }
 }
 

@@ -13,7 +13,7 @@ use plant::effects::sheet::Switched;
 use plant::effects::{SHEETS, sheet};
 use protocol::frames::{DRIVE_SENSORS, MESSAGES};
 use system_tests::hidden::{Extreme, LIVELY, drawn, everything, rig_with};
-use system_tests::{Pace, Program, Scene, Table, both_good, bus_log, json, run_both, turn};
+use system_tests::{Pace, Program, Scene, Table, both_good, bus_log, expect_same, json, run_both, turn};
 
 const SEALED_RUNS: u64 = 20;
 /// Shorter texts of numbers stand anywhere by chance.
@@ -191,9 +191,8 @@ fn an_empty_seal_changes_no_byte() {
     let scene = Scene::new(LIVELY);
     let (emulator, controller) = scene.start(Pace::Lockstep, "--seconds 1.3", "--repeat");
     both_good(emulator, controller);
-    for file in ["bus.log", "measurement.csv", "truth.csv"] {
-        assert!(scene.same(&scene.path("emulator").join(file), &sealed.path(file)), "{file} differs");
-    }
+    let files = ["bus.log", "measurement.csv", "truth.csv"];
+    expect_same(&scene.path("emulator"), &sealed.path(""), &files, "differs");
     assert_eq!(scene.run_description()["sealed"], false);
 }
 
@@ -211,9 +210,8 @@ fn a_sealed_effect_is_that_of_a_rig_file_and_wins_over_it_without_a_word() {
     let option = format!("--sealed {}", scene.path("sealed.toml").display());
     for (folder, rig) in [("plain", scene.path("rig.toml")), ("over", rig_with(&scene, &others))] {
         let sealed = lockstep(&scene, &rig, folder, &option);
-        for file in ["emulator/bus.log", "emulator/truth.csv"] {
-            assert!(scene.same(&open.join(file), &sealed.join(file)), "{file} differs, {folder}");
-        }
+        let what = format!("differs, {folder}");
+        expect_same(&open, &sealed, &["emulator/bus.log", "emulator/truth.csv"], &what);
     }
 }
 
@@ -226,7 +224,7 @@ fn an_experiment_may_name_the_sealed_file_and_no_controller_reads_it() {
     let named = LIVELY.replacen("[rig]\n", "[rig]\nsealed = \"mine.toml\"\n", 1);
     scene.write("experiment.toml", &named);
     let sealed = lockstep(&scene, &scene.path("rig.toml"), "sealed", "");
-    assert!(scene.same(&open.join("emulator/bus.log"), &sealed.join("emulator/bus.log")));
+    expect_same(&open, &sealed, &["emulator/bus.log"], "differs");
     // A file that is not there stops the rig and not the controllers, which end for want of a rig.
     scene.write("experiment.toml", &named.replacen("mine", "gone", 1));
     scene.emulator(Pace::Lockstep).start().wait().expect_code(2).expect_said(&["cannot read", "gone.toml"]);
@@ -244,9 +242,8 @@ fn a_controller_takes_the_nominal_numbers_of_a_rig_file_with_effects() {
     let emulator = start(scene.emulator(Pace::Lockstep).rig(&rig).with("--seconds 1.3"), "emulator");
     let controller = start(scene.controller(Pace::Lockstep).with("--repeat"), "controller");
     both_good(emulator, controller);
-    for file in ["emulator/bus.log", "controller/controller-drive.csv", "controller/controller-load.csv"] {
-        assert!(scene.same(&both.join(file), &folder.join(file)), "{file} differs");
-    }
+    let files = ["emulator/bus.log", "controller/controller-drive.csv", "controller/controller-load.csv"];
+    expect_same(&both, &folder, &files, "differs");
 }
 
 #[test]
@@ -256,10 +253,8 @@ fn emulator_and_rehearsal_write_the_same_truth() {
     let run = lockstep(&scene, &rig, "run", "");
     let rehearsal = scene.rehearsal().rig(&rig).with("--seconds 1.3 --repeat").start();
     rehearsal.wait().expect_code(0);
-    for file in ["measurement.csv", "truth.csv"] {
-        let rehearsed = scene.path("controller").join(file);
-        assert!(scene.same(&run.join("emulator").join(file), &rehearsed), "{file} differs");
-    }
+    let (run, rehearsed) = (run.join("emulator"), scene.path("controller"));
+    expect_same(&run, &rehearsed, &["measurement.csv", "truth.csv"], "differs");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! do not come to the same order of frames by chance: a run of thousands of cycles would show it.
 
 use std::time::Duration;
-use system_tests::{AxisTable, LINKED, Pace, SHORT, Scene, bus_log, json, text, workspace};
+use system_tests::{AxisTable, LINKED, Pace, SHORT, Scene, bus_log, expect_same, json, text, workspace};
 
 /// What a rehearsal leaves too.
 const TABLES: [&str; 4] = ["measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv"];
@@ -47,22 +47,16 @@ fn run(experiment: &str, cast: Cast) -> Scene {
     scene
 }
 
-fn expect_same(one: &Scene, other: &Scene, files: &[&str], what: &str) {
-    for file in files {
-        let path = |scene: &Scene| scene.path("run").join(file);
-        assert!(one.same(&path(one), &path(other)), "{file} differs, {what}");
-    }
-}
-
 /// Holds all four ways against each other. Returns the run of one process.
 fn expect_all_the_same(experiment: &str) -> Scene {
     let one = run(experiment, Cast::OneProcess);
     for cast in [Cast::DriveFirst, Cast::LoadFirst] {
         let two = run(experiment, cast);
-        expect_same(&one, &two, &[&TABLES[..], &["bus.log"]].concat(), &format!("{cast:?}"));
+        let files = [&TABLES[..], &["bus.log"]].concat();
+        expect_same(&one.path("run"), &two.path("run"), &files, &format!("differs, {cast:?}"));
     }
     let rehearsal = run(experiment, Cast::Rehearsal);
-    expect_same(&one, &rehearsal, &TABLES, "rehearsed");
+    expect_same(&one.path("run"), &rehearsal.path("run"), &TABLES, "differs, rehearsed");
     assert!(!rehearsal.path("run/bus.log").exists(), "a rehearsal has no bus");
     one
 }
