@@ -17,7 +17,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use benchmarks::Floor;
+use benchmarks::{Floor, FloorAxis};
 use divan::Bencher;
 use plant::{Batch, Inputs, Plant, Registers, RigParameters};
 
@@ -77,16 +77,7 @@ fn check_the_same_scheme(rig: &RigParameters, scenario: &Scenario) {
         plant.step(inputs);
         floor.step(inputs);
         for (ours, theirs) in plant.state().axes.iter().zip(&floor.axes) {
-            let ours = [
-                ours.extension_m,
-                ours.rod_velocity_m_per_s,
-                ours.spool,
-                ours.stored_air_a_j,
-                ours.stored_air_b_j,
-                ours.flow_a_m3_per_s,
-                ours.flow_b_m3_per_s,
-            ];
-            for ((ours, theirs), scale) in ours.iter().zip(&theirs.0).zip(scale) {
+            for ((ours, theirs), scale) in FloorAxis::of(ours).0.iter().zip(&theirs.0).zip(scale) {
                 worst = worst.max((ours - theirs).abs() / scale);
                 assert!(worst <= 1e-9, "{k} ms: the floor is another scheme, {ours} against {theirs}");
             }

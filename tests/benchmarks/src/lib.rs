@@ -24,6 +24,20 @@ struct FloorRig {
 #[derive(Clone, Copy, Debug)]
 pub struct FloorAxis(pub [f64; 7]);
 
+impl FloorAxis {
+    pub fn of(axis: &AxisState) -> Self {
+        Self([
+            axis.extension_m,
+            axis.rod_velocity_m_per_s,
+            axis.spool,
+            axis.stored_air_a_j,
+            axis.stored_air_b_j,
+            axis.flow_a_m3_per_s,
+            axis.flow_b_m3_per_s,
+        ])
+    }
+}
+
 unsafe extern "C" {
     fn floor_size() -> c_ulong;
     fn floor_new(plant: *mut u64, rig: *const FloorRig);
@@ -66,18 +80,7 @@ impl Floor {
         // SAFETY: the buffer has the size that C asked for and is aligned for doubles; FloorRig has the layout of
         // struct rig, doubles only.
         unsafe { floor_new(constants.as_mut_ptr(), &numbers) };
-        let axes = axes.map(|axis| {
-            FloorAxis([
-                axis.extension_m,
-                axis.rod_velocity_m_per_s,
-                axis.spool,
-                axis.stored_air_a_j,
-                axis.stored_air_b_j,
-                axis.flow_a_m3_per_s,
-                axis.flow_b_m3_per_s,
-            ])
-        });
-        Floor { constants, axes }
+        Floor { constants, axes: axes.each_ref().map(FloorAxis::of) }
     }
 
     /// One period of 1 ms, linked.
