@@ -53,7 +53,6 @@ pub fn expect_same(one: &Path, other: &Path, files: &[&str], what: &str) {
     }
 }
 
-/// The rows of a timing table.
 pub fn timing_rows(path: &Path) -> Vec<CycleTiming> {
     timing::read(&text(path)).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }

@@ -52,7 +52,6 @@ pub fn recorded_but_for(file: &str, differences: &[(&str, &str)]) -> String {
     expected
 }
 
-/// The sources of the programs.
 pub fn sources() -> PathBuf {
     workspace().join("tests/c/socketcan")
 }

@@ -139,15 +139,9 @@ pub(crate) fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<Draw
         members.sort_by(|left, right| right.cosine.total_cmp(&left.cosine));
         let reported = members.iter().take_while(|member| member.cosine > REPORTED_COSINE).count();
         members.truncate(reported.max(1));
-        let two_sided = sheet.keys[0].signed;
-        let strength = length(&own) / threshold(two_sided);
-        hidden_classes.push(HiddenClass {
-            effect: hidden.name.to_owned(),
-            place,
-            strength,
-            members,
-            nearest: None,
-        });
+        let strength = length(&own) / threshold(sheet.keys[0].signed);
+        let effect = hidden.name.to_owned();
+        hidden_classes.push(HiddenClass { effect, place, strength, members, nearest: None });
     }
     Ok(DrawClasses { schema_version: SCHEMA_VERSION, number: draw.number, hidden: hidden_classes })
 }
@@ -182,6 +176,7 @@ pub(crate) fn with_parameter(
     name: &str,
     factor: f64,
 ) -> Result<RigParameters, ParameterError> {
+    let one = |key, value: f64| rig.with(key, &[value * factor]);
     let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect::<Vec<_>>();
     let (friction, cylinder, valve) = (rig.friction(), rig.cylinder(), rig.valve());
     match name {
@@ -190,23 +185,15 @@ pub(crate) fn with_parameter(
             .with("mass.carriage_kg", &[rig.mass().carriage_kg * factor])?
             .with("mass.load_kg", &[rig.mass().load_kg * factor]),
         "parameter:viscous-friction" => {
-            rig.with("friction.viscous_n_per_mm_per_s", &[friction.viscous_n_s_per_m / 1e3 * factor])
+            one("friction.viscous_n_per_mm_per_s", friction.viscous_n_s_per_m / 1e3)
         }
-        "parameter:sliding-friction" => {
-            rig.with("friction.sliding_force_n", &[friction.sliding_force_n * factor])
-        }
-        "parameter:break-away-force" => {
-            rig.with("friction.break_away_force_n", &[friction.break_away_force_n * factor])
-        }
-        "parameter:supply-pressure" => {
-            rig.with("supply.pressure_bar", &[rig.supply().pressure_pa / 1e5 * factor])
-        }
+        "parameter:sliding-friction" => one("friction.sliding_force_n", friction.sliding_force_n),
+        "parameter:break-away-force" => one("friction.break_away_force_n", friction.break_away_force_n),
+        "parameter:supply-pressure" => one("supply.pressure_bar", rig.supply().pressure_pa / 1e5),
         "parameter:spool-time-constant" => {
-            rig.with("valve.spool_time_constant_ms", &[valve.spool_time_constant_s * 1e3 * factor])
+            one("valve.spool_time_constant_ms", valve.spool_time_constant_s * 1e3)
         }
-        "parameter:flow-lag" => {
-            rig.with("valve.flow_lag_time_constant_ms", &[valve.flow_lag_time_constant_s * 1e3 * factor])
-        }
+        "parameter:flow-lag" => one("valve.flow_lag_time_constant_ms", valve.flow_lag_time_constant_s * 1e3),
         "parameter:kv-scale" => rig
             .with("valve.kv_supply_m3_per_h", &scaled(&valve.kv_supply_m3_per_h))?
             .with("valve.kv_exhaust_m3_per_h", &scaled(&valve.kv_exhaust_m3_per_h)),

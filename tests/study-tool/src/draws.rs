@@ -110,7 +110,6 @@ pub enum Kind {
 pub struct Draw {
     /// Number within the study, from 0.
     pub number: usize,
-    /// What is hidden.
     pub kind: Kind,
     /// Recipe of the train record; the other records differ in the experiment only.
     pub recipe: Recipe,
@@ -275,16 +274,10 @@ impl Generator {
         Recipe {
             seed: self.recipe_seed(),
             axis,
-            both_axes: false,
-            hidden: Vec::new(),
-            form: Form::Catalogue,
             wrong_parameters,
             coloured_noise: coloured,
             jitter: coloured,
-            noise: 1.0,
-            background: None,
-            unlinked: false,
-            experiment: Experiment::Train,
+            ..Recipe::default()
         }
     }
 

@@ -191,11 +191,13 @@ fn stands_for<'a>(
 }
 
 fn place_right(name: &Named, hidden: &Hidden, class: &[Member]) -> bool {
-    let own = name.sheet.name == hidden.name && name.place == hidden.place;
-    let twin = |member: &Member| {
-        member.is_twin() && member.effect == name.sheet.name && member.place == name.place.to_string()
-    };
-    own || class.iter().any(twin)
+    is_of_class(name.sheet.name, &name.place.to_string(), hidden, class)
+}
+
+/// Whether an effect at a place is the hidden one, or one of its class.
+pub(crate) fn is_of_class(effect: &str, place: &str, hidden: &Hidden, class: &[Member]) -> bool {
+    let twin = |member: &Member| member.is_twin() && member.effect == effect && member.place == place;
+    effect == hidden.name && place == hidden.place.to_string() || class.iter().any(twin)
 }
 
 /// Assigns names to hidden effects: most effects, and among those assignments most right places.

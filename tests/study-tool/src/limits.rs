@@ -63,7 +63,6 @@ impl Scale {
     }
 
     /// Excursion of a value; `None` for one on the other side.
-    #[must_use]
     pub(crate) fn excursion(self, value: f64) -> Option<f64> {
         match self {
             Scale::Zero => Some(value.abs()),
@@ -76,7 +75,6 @@ impl Scale {
         }
     }
 
-    #[must_use]
     pub(crate) fn value(self, excursion: f64) -> f64 {
         match self {
             Scale::Zero | Scale::None => excursion,

@@ -9,6 +9,7 @@
 use crate::classes::Member;
 use crate::draws::{Draw, Kind};
 use crate::interval::wilson;
+use crate::judge::is_of_class;
 use crate::report::Report;
 use discrepancy::report::{EffectPlace, Explanation, ExplanationKind};
 use record_maker::Hidden;
@@ -79,14 +80,9 @@ fn stand_for(set: &[EffectPlace], hidden: &[Hidden], classes: &[Vec<Member>]) ->
         let (mut others, mut twins) = (hidden.to_vec(), classes.to_vec());
         twins.resize(hidden.len(), Vec::new());
         let (own, class) = (others.remove(at), twins.remove(at));
-        stands_for(first, &own, &class) && stand_for(&set[1..], &others, &twins)
+        is_of_class(&first.effect, &first.place.to_string(), &own, &class)
+            && stand_for(&set[1..], &others, &twins)
     })
-}
-
-fn stands_for(named: &EffectPlace, hidden: &Hidden, class: &[Member]) -> bool {
-    let place = named.place.to_string();
-    let twin = |member: &Member| member.is_twin() && member.effect == named.effect && member.place == place;
-    named.effect == hidden.name && place == hidden.place.to_string() || class.iter().any(twin)
 }
 
 /// Explanations of similar probabilities.

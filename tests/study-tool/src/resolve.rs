@@ -228,7 +228,6 @@ fn measure(draw: &Draw, name: &str, toml: &str, empty: &Path, folder: &Path) -> 
         .map_err(|error| format!("the experiment cannot be run: {error}"))
 }
 
-/// Reads the resolution of a draw.
 pub(crate) fn read_resolution(path: &Path) -> Result<Resolution, FolderError> {
     read_versioned(path, "resolution", |resolution: &Resolution| resolution.schema_version)
 }

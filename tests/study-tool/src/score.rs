@@ -117,7 +117,9 @@ pub struct ScoreInputs<'a> {
 pub fn score(folders: &[PathBuf], label: &str, known: ScoreInputs<'_>) -> Result<Score, ScoreError> {
     let studies = folders.iter().map(|folder| Study::open(folder)).collect::<Result<Vec<_>, _>>()?;
     let first = studies.first().ok_or(ScoreError::Empty)?;
-    check_same_study(first, &studies)?;
+    if let Some(other) = studies.iter().find(|study| study.plan != first.plan) {
+        return Err(ScoreError::DifferentStudies { left: name(first), right: name(other) });
+    }
     let leave_out = leaves_out(&studies, label)?;
     let mut cases = Vec::new();
     let mut program: Option<Identity> = None;
@@ -162,12 +164,8 @@ pub fn one(study: &Study, draw: &Draw, label: &str, known: ScoreInputs<'_>) -> R
     case(study, draw, label, &result, classes.as_ref(), known)
 }
 
-fn check_same_study(first: &Study, studies: &[Study]) -> Result<(), ScoreError> {
-    let name = |study: &Study| study.root.display().to_string();
-    match studies.iter().find(|study| study.plan != first.plan) {
-        Some(other) => Err(ScoreError::DifferentStudies { left: name(first), right: name(other) }),
-        None => Ok(()),
-    }
+fn name(study: &Study) -> String {
+    study.root.display().to_string()
 }
 
 /// The study that has the result of each draw.
@@ -177,7 +175,6 @@ fn places<'a>(
     leave_out: bool,
     partly: bool,
 ) -> Result<Vec<(&'a Study, &'a Draw)>, ScoreError> {
-    let name = |study: &Study| study.root.display().to_string();
     let mut places = Vec::new();
     let mut missing = Vec::new();
     // With effects left out, only draws of one effect are run.

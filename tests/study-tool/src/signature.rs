@@ -95,7 +95,6 @@ impl Observer {
         self.between(&self.readings(rig), &self.baseline)
     }
 
-    /// The readings of a rig.
     pub(crate) fn readings(&self, rig: &RigParameters) -> Run {
         self.run(rig).0
     }

@@ -293,7 +293,6 @@ impl From<FolderError> for StepEnd {
     }
 }
 
-/// Reads the result of a run.
 pub(crate) fn read_result(path: &Path) -> Result<RunResult, FolderError> {
     read_versioned(path, "result", |result: &RunResult| result.schema_version)
 }

@@ -5,7 +5,6 @@ use plant::{Inputs, RigParameters, State};
 /// Length of a window, rows of 1 ms.
 pub(crate) const WINDOW: usize = 100;
 
-/// The true trajectory of a record.
 #[derive(Debug, Clone)]
 pub(crate) struct TrueTrajectory {
     pub(crate) rig: RigParameters,
@@ -34,7 +33,6 @@ pub(crate) const POINT_NUMBERS: usize = 4;
 
 impl Point {
     /// The point with one of its numbers increased by less than the sensors' noise, so that the trajectory hardly changes.
-    #[must_use]
     pub(crate) fn perturbed(mut self, number: usize) -> Self {
         match number {
             0 => self.extension_m += 2e-6,

@@ -82,7 +82,6 @@ pub(crate) struct Model {
 #[serde(deny_unknown_fields)]
 pub struct Twin {
     pub(crate) number: usize,
-    /// Number of its start.
     pub(crate) start: usize,
     pub(crate) recipe_seed: u64,
     pub(crate) axis: String,
@@ -105,7 +104,6 @@ pub struct Twin {
 #[serde(deny_unknown_fields)]
 pub struct Twins {
     pub(crate) schema_version: u32,
-    /// Seed of all random numbers.
     pub seed: u64,
     /// Number of starts that were tried.
     pub(crate) starts: usize,
@@ -183,8 +181,7 @@ impl Twins {
         let recipes: Vec<Recipe> = exact.iter().cloned().chain(beside).collect();
         let draw = |(number, recipe)| Draw { number, kind: Kind::Single, recipe };
         let draws = recipes.into_iter().enumerate().map(draw).collect();
-        let shape = Shape { each: 0, nulls: 0, parameters: 0, pairs: 0, triples: 0, ..Shape::default() };
-        Study { root: root.to_owned(), plan: Plan::new(self.seed, shape), draws }
+        Study { root: root.to_owned(), plan: Plan::new(self.seed, Shape::NO_DRAW), draws }
     }
 
     /// The twin of a draw of [`Twins::study`].

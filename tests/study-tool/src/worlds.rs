@@ -3,7 +3,6 @@
 
 use crate::draws::Kind;
 use crate::interval::Rate;
-use crate::judge::NumberJudgement;
 use crate::leave_out::LeaveOutJudgement;
 use crate::leave_out::tables::STILL_CLOSED;
 use crate::probability::{JudgedExplanation, Reliability, by_marginal};
@@ -112,22 +111,23 @@ impl Worlds {
     /// The results of a score with the whole catalogue, of one with the hidden effects left out, and of other programs; `draws`
     /// is the number of draws of the study.
     pub fn of(score: &Score, left: Option<&Score>, others: &[Score], draws: usize) -> Self {
-        let in_world = |score: &Score, background| -> Vec<Case> {
-            score.cases.iter().filter(|case| case.background == background).cloned().collect()
+        let in_worlds = |score: Option<&Score>| {
+            [false, true].map(|background| -> Vec<Case> {
+                let cases = score.into_iter().flat_map(|score| &score.cases);
+                cases.filter(|case| case.background == background).cloned().collect()
+            })
         };
-        let worlds = [false, true].map(|background| in_world(score, background));
         let without_classes = score.without_classes + left.map_or(0, |left| left.without_classes);
-        let left =
-            [false, true].map(|background| left.map_or_else(Vec::new, |left| in_world(left, background)));
+        let (worlds, left) = (in_worlds(Some(score)), in_worlds(left));
         let mut rows = rows(&worlds);
         rows.extend(left_out_rows(&left));
-        let reliability = [0, 1].map(|world: usize| {
-            let all = worlds[world].iter().chain(&left[world]);
-            Reliability::of(&all.map(|case| (case.kind, &case.explanations[..])).collect::<Vec<_>>())
+        let of_both = |world: usize| worlds[world].iter().chain(&left[world]);
+        let reliability = [0, 1].map(|world| {
+            let all = of_both(world).map(|case| (case.kind, &case.explanations[..]));
+            Reliability::of(&all.collect::<Vec<_>>())
         });
-        let rules = [0, 1].map(|world: usize| {
-            let all = worlds[world].iter().chain(&left[world]);
-            let both: Vec<(Kind, &[JudgedExplanation], Vec<JudgedExplanation>)> = all
+        let rules = [0, 1].map(|world| {
+            let both: Vec<(Kind, &[JudgedExplanation], Vec<JudgedExplanation>)> = of_both(world)
                 .filter_map(|case| {
                     Some((case.kind, &case.explanations[..], by_marginal(&case.explanations)?))
                 })
@@ -160,7 +160,6 @@ impl Worlds {
         }
     }
 
-    /// The tables in Markdown.
     pub fn markdown(&self) -> String {
         let mut text = format!(
             "{} of {} draws, and {} with what is hidden left out of the catalogue; {} without a good report, which count as \
@@ -190,7 +189,6 @@ impl Worlds {
         text
     }
 
-    /// Rows of the table for the wall times.
     fn wall_time_rows(&self) -> String {
         let mut text = String::new();
         for (at, (name, limits_s)) in [("median", MEDIAN_S), ("longest", LONGEST_S)].into_iter().enumerate() {
@@ -369,8 +367,9 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
     let of_form = |foreign: bool| {
         let reported = |case: &Case| -> Vec<bool> {
             let counts = case.kind == Kind::Single && case.foreign_form == foreign;
-            let numbers = hidden_numbers(case).iter().filter(|_| counts);
-            numbers.filter_map(|number| number.covered).collect()
+            let numbers =
+                case.judgement.hidden.first().filter(|_| counts).map_or(&[][..], |own| &own.numbers);
+            numbers.iter().filter_map(|number| number.covered).collect()
         };
         worlds.each_ref().map(|world| Rate::of(world.iter().flat_map(reported), |covered| covered))
     };
@@ -418,10 +417,6 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
         ),
         Row::new("the same, another form", of_form(true), [AtLeast(85); 2]),
     ]
-}
-
-fn hidden_numbers(case: &Case) -> &[NumberJudgement] {
-    case.judgement.hidden.first().map_or(&[], |own| &own.numbers)
 }
 
 fn left_out_rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {

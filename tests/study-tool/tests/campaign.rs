@@ -2,11 +2,9 @@
 
 use rustix::process::{Pid, Signal, test_kill_process};
 use std::fs;
-use std::path::Path;
 use std::process::Command;
-use std::time::{Duration, Instant};
 use system_tests::exit::{BAD_INPUT, GOOD, INTERRUPTED};
-use system_tests::{Build, Ended, PATIENCE, Program, Running, executable, install, workspace};
+use system_tests::{Build, Ended, Program, Running, executable, install, wait_until, workspace};
 use tempfile::TempDir;
 
 /// Two draws with nothing hidden, and a pair.
@@ -76,10 +74,12 @@ fn shards_fill_one_folder_and_the_study_is_scored() {
 fn a_study_that_is_stopped_ends_its_programs_and_goes_on() {
     let place = Place::new("echo $$ >\"$0.number\"; exec sleep 1000", 3);
     let campaign = Running::start("campaign", &mut place.campaign("out", &["--jobs", "1"]));
-    let number = wait_for_text(&place.folder.path().join("program.number"));
+    let said = place.folder.path().join("program.number");
+    wait_until("the program's number", || fs::read_to_string(&said).is_ok_and(|text| text.ends_with('\n')));
     campaign.signal(Signal::INT);
     let _ = campaign.wait().expect_code(INTERRUPTED).expect_said(&["the same command goes on"]);
-    let number = Pid::from_raw(number.trim().parse().expect("a number")).expect("a process");
+    let number = place.text("program.number").trim().parse().expect("a number");
+    let number = Pid::from_raw(number).expect("a process");
     assert!(test_kill_process(number).is_err(), "the program that was judged is still there");
     assert!(!place.folder.path().join("study/runs/fake/0000").exists(), "a draw is done or absent");
 }
@@ -124,15 +124,4 @@ fn shipped_studies_are_campaigns_of_all_their_draws() {
         seen += 1;
     }
     assert!(seen >= 3, "{seen} studies");
-}
-
-fn wait_for_text(path: &Path) -> String {
-    let began = Instant::now();
-    loop {
-        match fs::read_to_string(path) {
-            Ok(text) if text.ends_with('\n') => return text,
-            _ => assert!(began.elapsed() < PATIENCE, "{} does not come", path.display()),
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
 }

@@ -33,13 +33,11 @@ pub(crate) trait Problem {
     fn squares(fit: &Self::Fit) -> f64;
     /// Its terms, with the numbers that were fitted.
     fn terms(fit: &Self::Fit) -> &[Self::Term];
-    /// Numbers of a term.
     fn numbers(term: &Self::Term) -> usize;
     /// Whether two terms are one at different numbers.
     fn is_same(one: &Self::Term, other: &Self::Term) -> bool;
 }
 
-/// The criterion of a fit.
 pub(crate) fn criterion<P: Problem>(problem: &P, fit: &P::Fit) -> f64 {
     let count = problem.count();
     let numbers: usize = P::terms(fit).iter().map(P::numbers).sum();

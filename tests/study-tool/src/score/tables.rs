@@ -39,11 +39,9 @@ pub struct Tables {
 /// A rate and its target.
 #[derive(Debug, Clone, Serialize)]
 pub struct Line {
-    /// What the rate is of.
     pub name: String,
     /// Count, total and intervals.
     pub rate: Rate,
-    /// The target in words.
     pub wanted: &'static str,
 }
 

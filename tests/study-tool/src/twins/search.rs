@@ -109,14 +109,11 @@ pub fn search(
 
 type Trial = (usize, Result<Twin, Refusal>);
 
-fn try_start(seed: u64, number: usize) -> Result<Twin, Refusal> {
-    twin_of(&start(seed, number).ok_or(Refusal::Linked)?, number)
-}
-
 /// The starts of all effects once, in their order.
 fn of_round(pool: &ThreadPool, seed: u64, round: usize, stop: &AtomicBool) -> Vec<Trial> {
     let numbers = round * SHEETS.len()..(round + 1) * SHEETS.len();
-    let one = |number| (!stop.load(Ordering::Relaxed)).then(|| (number, try_start(seed, number)));
+    let twin = |number| twin_of(&start(seed, number).ok_or(Refusal::Linked)?, number);
+    let one = |number| (!stop.load(Ordering::Relaxed)).then(|| (number, twin(number)));
     pool.install(|| numbers.into_par_iter().with_max_len(1).filter_map(one).collect())
 }
 

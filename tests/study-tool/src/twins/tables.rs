@@ -83,7 +83,6 @@ impl Table {
         Ok(Table { schema_version: SCHEMA_VERSION, label, program: resolved.program, seed, cases })
     }
 
-    /// The tables in Markdown.
     pub fn markdown(&self) -> String {
         let program = self.program.as_ref().map_or_else(|| "no program".to_owned(), Identity::reported);
         let mut text = format!("{} ({program}), twins of seed {}.\n\n", self.label, self.seed);

@@ -52,7 +52,6 @@ fn an_oracle_is_right_as_often_as_the_normal_distribution_says() {
     }
 }
 
-/// The first start of an effect.
 fn start_of(effect: &str) -> (usize, Start) {
     let mut all = (0..).filter_map(|number| Some((number, start(31, number)?)));
     all.find(|(_, start)| start.recipe.hidden[0].name == effect).unwrap()
