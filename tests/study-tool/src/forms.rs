@@ -21,94 +21,11 @@ use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The far form of each effect in words, in the order of the catalogue.
-const FAR: [(&str, &str); 38] = [
-    (
-        "critical-pressure-ratio",
-        "the ports differ: what b lies below 0.5 is 1.75 of it at chamber a, 0.25 at b",
-    ),
-    (
-        "valve-characteristic",
-        "the notches differ: 1.42 of bend and edge ratio as the rod extends, 0.58 as it retracts",
-    ),
-    ("valve-dead-zone", "the overlaps differ: 1.65 d as the rod extends, 0.35 d as it retracts"),
-    ("valve-hysteresis", "the solenoids differ: 1.5 h at positive commands, 0.5 h at negative ones"),
-    ("valve-offset", "drifts by 70 % with a period of 13 s as the valve warms up"),
-    (
-        "valve-null-leakage",
-        "the lands are worn differently: a floor of 1.6 at the edges of chamber a, 0.4 at those of b",
-    ),
-    ("spool-second-order", "a spring helps to close: 1.22 w towards the middle, 0.78 w away from it"),
-    ("spool-rate-limit", "a spring helps to close: 1.5 of the rate towards the middle, 0.5 away from it"),
-    ("line-delay", "lines of different length: 1.5 l to chamber a, 0.5 l to b"),
-    (
-        "line-resistance",
-        "filters of sintered bronze in the lines: the drop is linear in the flow, 1.25 of it at a, 0.75 at b",
-    ),
-    ("check-valve-restriction", "springs that differ: 1.5 of the cracking pressure at chamber a, 0.5 at b"),
-    (
-        "silencer-back-pressure",
-        "porous, by Darcy's law: flow in proportion to the difference of the squared pressures, the same at twice the atmosphere",
-    ),
-    ("supply-droop", "the regulator falls with the root of the flow, 0.6 of the droop at full flow"),
-    (
-        "command-dead-time",
-        "clocks that are not synchronised: it slides from 0.34 to 1.66 of the time every 0.37 s",
-    ),
-    ("heat-exchange", "the near form"),
-    ("dead-volume", "the change is shared 1.75 : 0.25 between chambers a and b"),
-    (
-        "piston-leakage",
-        "an orifice as the near form, scored where the piston is most of its time: 1 - 0.45 cos(2 pi x / L)",
-    ),
-    (
-        "rod-leakage",
-        "an orifice as the near form, scored where the rod is most of its time: 1 - 0.52 cos(2 pi x / L)",
-    ),
-    (
-        "stribeck-friction",
-        "lips that do not face both ways: 1.52 of the excess as the rod extends, 0.48 as it retracts",
-    ),
-    ("presliding", "lips that do not face both ways: 1.65 s_0 as the rod extends, 0.35 s_0 as it retracts"),
-    ("friction-asymmetry", "a bent rod: a (1 + 0.9 (x - L/2) / (L/2))"),
-    (
-        "pressure-dependent-friction",
-        "lips pressed on by what they seal: 0.2 of the sum and 1.8 of the difference of both pressures",
-    ),
-    ("position-dependent-friction", "1.55 of it as the rod extends, 0.45 as it retracts"),
-    ("inclination", "a bent rail: twice as steep at one end, level at the other"),
-    (
-        "position-dependent-force",
-        "a hose that hangs loose in the middle: cubic; a third harmonic of 0.5 on the ripple",
-    ),
-    (
-        "rest-time-dependent-break-away",
-        "the growth does not end with the break-away: it fades over 1 mm of way, as the film of oil is built again",
-    ),
-    ("coupling-backlash", "worn edges: a parabola over half of the gap"),
-    ("coupling-compliance", "overlap to the power 1.5 (Hertz), the same at 200 N"),
-    (
-        "end-cushion",
-        "the near form, and its lip does not lift quite: a chamber that fills goes through 7 K_V",
-    ),
-    (
-        "position-sensor-lag",
-        "a lag of 0.82 of the time, then a cycle of its own of 0.36 of it that holds the value",
-    ),
-    ("position-sensor-offset", "drifts by 55 % with a period of 13 s"),
-    ("position-sensor-gain", "bent: -0.4 + 2.8 x/L of it"),
-    ("pressure-sensor-lag", "a snubber: 0.5 of the time as the pressure rises, 1.5 as it falls"),
-    ("pressure-sensor-offset", "drifts by 70 % with a period of 13 s"),
-    ("pressure-sensor-gain", "drifts by 70 % with a period of 13 s"),
-    ("force-sensor-offset", "drifts by 70 % with a period of 13 s"),
-    (
-        "force-sensor-gain",
-        "85 % more in compression than on average, as much less in tension, tanh(F / 40 N)",
-    ),
-    (
-        "time-skew",
-        "clocks that are not synchronised: it slides every 0.37 s, of a position by 28 %, a force 50 %, a pressure 80 %",
-    ),
-];
+const FAR: &str = include_str!("forms/far.txt");
+
+fn far() -> impl Iterator<Item = (&'static str, &'static str)> {
+    FAR.lines().map(|line| line.split_once(": ").expect("an effect and its form"))
+}
 
 /// The forms that are not the catalogue's.
 pub const OTHERS: [Form; 2] = [Form::Near, Form::Far];
@@ -202,7 +119,7 @@ pub fn table(residuals: &[FormResidual]) -> String {
             |form| residuals.iter().find(|residual| residual.effect == sheet.name && residual.form == form);
         let shares =
             OTHERS.map(|form| of(form).map_or_else(String::new, |residual| percent(&residual.shares)));
-        let words = FAR.iter().find(|(effect, _)| *effect == sheet.name).map_or("", |(_, words)| words);
+        let words = far().find(|(effect, _)| *effect == sheet.name).map_or("", |(_, words)| words);
         let _ = writeln!(table, "| {} | {words} | {} |", sheet.name, shares.join(" | "));
     }
     table
@@ -214,9 +131,9 @@ mod tests {
 
     #[test]
     fn the_far_form_of_every_effect_is_said_in_words() {
-        let named: Vec<_> = FAR.iter().map(|(effect, _)| *effect).collect();
+        let named: Vec<_> = far().map(|(effect, _)| effect).collect();
         assert_eq!(named, SHEETS.iter().map(|sheet| sheet.name).collect::<Vec<_>>());
-        assert!(FAR.iter().all(|(_, words)| !words.is_empty()));
+        assert!(far().all(|(_, words)| !words.is_empty()));
     }
 
     #[test]

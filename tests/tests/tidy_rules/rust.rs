@@ -202,8 +202,7 @@ pub(super) const EFFECTS_BY_NAME: Rule = Rule {
     name: "effects-by-name",
     applies: |path| {
         let reads = ["campaign/src/", "discrepancy/src/", "front/src/", "tests/study-tool/src/"];
-        // Each far form of the record maker is of one effect.
-        let others = ["tests.rs", "/page/samples.rs", "study-tool/src/forms.rs"];
+        let others = ["tests.rs", "/page/samples.rs"];
         let is_other = others.iter().any(|end| path.ends_with(end));
         is_rust(path) && !is_other && reads.iter().any(|folder| path.starts_with(folder))
     },
