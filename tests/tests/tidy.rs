@@ -8,16 +8,13 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate stands in the workspace")
-}
+use system_tests::workspace;
 
 /// Tracked files that are text, and the complaints about size, which need no reading.
 fn tracked() -> (Vec<File>, Vec<String>) {
     // A checkout that belongs to another user, as in a container, is none for git otherwise.
     let output = Command::new("git")
-        .current_dir(root())
+        .current_dir(workspace())
         .args(["-c", "safe.directory=*", "ls-files", "--stage", "-z"])
         .output()
         .expect("git is installed");
@@ -32,7 +29,7 @@ fn tracked() -> (Vec<File>, Vec<String>) {
     for entry in list.split_terminator('\0') {
         let (stage, path) = entry.split_once('\t').expect("MODE OBJECT STAGE<tab>PATH");
         // Deleted, and the deletion not yet committed: nothing to read.
-        let Ok(bytes) = fs::read(root().join(path)) else { continue };
+        let Ok(bytes) = fs::read(workspace().join(path)) else { continue };
         problems.extend(too_large(bytes.len()).map(|advice| format!("{path}:1: {advice}")));
         if let Ok(text) = String::from_utf8(bytes) {
             files.push(File { path: path.into(), executable: stage.starts_with("100755"), text });
@@ -59,7 +56,7 @@ fn the_tracked_files_are_tidy() {
 #[test]
 fn the_python_distribution_carries_the_licence_texts() {
     for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
-        let read = |folder: &str| fs::read_to_string(root().join(folder).join(name)).unwrap();
+        let read = |folder: &str| fs::read_to_string(workspace().join(folder).join(name)).unwrap();
         assert_eq!(read("python"), read("."), "copy {name} into python/");
     }
 }

@@ -4,7 +4,7 @@ use crate::SCHEMA_VERSION;
 use crate::classes::{Classes, DrawClasses, classes_of, read_draw};
 use crate::draws::Draw;
 use crate::folder::{FolderError, Study, write_whole};
-use crate::limits::{Limits, MeasuredAxes, limits_in};
+use crate::limits::{Limits, limits_in};
 use crate::nearest::nearest_law;
 use crate::signature::Observer;
 use crate::trajectory::{Point, TrueTrajectory, WINDOW};
@@ -34,9 +34,9 @@ pub enum ComputeError {
 pub fn limits(seed: u64, say: &(dyn Fn(&str) + Sync)) -> Result<Limits, ComputeError> {
     let rig = RigParameters::baseline();
     let mut limits = Vec::new();
-    for measured in [MeasuredAxes::One(Axis::Drive), MeasuredAxes::One(Axis::Load), MeasuredAxes::Both] {
-        let axis = if let MeasuredAxes::One(axis) = measured { axis } else { Axis::Drive };
-        let recipe = Recipe { seed, axis, both_axes: measured == MeasuredAxes::Both, ..Recipe::default() };
+    for measured in [Some(Axis::Drive), Some(Axis::Load), None] {
+        let axis = measured.unwrap_or(Axis::Drive);
+        let recipe = Recipe { seed, axis, both_axes: measured.is_none(), ..Recipe::default() };
         let record = simulate(&recipe, &rig).map_err(|error| ComputeError::Make { number: 0, error })?;
         let observer = Observer::new(trajectory(&record, &rig));
         limits.extend(limits_in(&observer, measured, say)?);

@@ -161,36 +161,24 @@ fn side(scale: Scale) -> Option<String> {
     }
 }
 
-/// Records from which the limits are computed: of one axis, or of both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum MeasuredAxes {
-    One(Axis),
-    Both,
+/// The axis whose record the limit of an effect at a place is computed from; `None` for a record of both.
+fn measured_axis(kind: PlaceKind, place: Place) -> Option<Axis> {
+    axis_of(place).filter(|_| !needs_both_axes(kind))
 }
 
-impl MeasuredAxes {
-    /// The record for the limit of an effect at a place.
-    pub(crate) fn of(kind: PlaceKind, place: Place) -> Self {
-        match axis_of(place) {
-            Some(axis) if !needs_both_axes(kind) => MeasuredAxes::One(axis),
-            _ => MeasuredAxes::Both,
-        }
-    }
-}
-
-/// The limits of all effects at all places that show in such records.
+/// The limits of all effects at all places that show in a record of one axis; in one of both where `measured` is `None`.
 ///
 /// # Errors
 /// [`ParameterError`] when a value of a sheet's range is refused, which is a fault of the catalogue.
 pub(crate) fn limits_in(
     observer: &Observer,
-    measured: MeasuredAxes,
+    measured: Option<Axis>,
     say: &(dyn Fn(&str) + Sync),
 ) -> Result<Vec<Limit>, ParameterError> {
     let mut cases = Vec::new();
     for sheet in SHEETS {
         for place in
-            sheet.place.places().iter().filter(|place| MeasuredAxes::of(sheet.place, **place) == measured)
+            sheet.place.places().iter().filter(|place| measured_axis(sheet.place, **place) == measured)
         {
             cases.extend(Scale::of(&sheet.keys[0]).into_iter().map(|scale| (sheet, *place, scale)));
         }

@@ -38,15 +38,12 @@ pub(crate) enum Refusal {
     Linked,
     /// Its record cannot be made, or cannot be compared with the catalogue.
     NoRecord,
-    /// No other effect resembles it.
     NoRival,
     /// The nearest law of another effect leaves too much, or is outside the drawn range.
     NotAlike,
     /// An observer hardly detects it at the noise that would hide the difference.
     NotSeen,
-    /// No experiment distinguishes the two.
     NoExperiment,
-    /// There are enough twins of this pair.
     Enough,
 }
 
