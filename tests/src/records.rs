@@ -45,7 +45,7 @@ pub fn same(one: &Path, other: &Path) -> bool {
     read(one) == read(other)
 }
 
-/// Holds that files of two folders are the same to the byte; of one that is not it is said that it `differs`, or what `what` says.
+/// Holds that files of two folders are the same to the byte; of one that is not `what` is said, such as `differs`.
 #[track_caller]
 pub fn expect_same(one: &Path, other: &Path, files: &[&str], what: &str) {
     for file in files {

@@ -47,7 +47,6 @@ pub(crate) struct Member {
     pub(crate) cosine: f64,
 }
 
-/// Class of one hidden effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HiddenClass {

@@ -205,8 +205,8 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
         (None, weakest(key, strength_at)?)
     } else {
         let ends = Ends { least: scale.least(key), most: scale.most(key)[0], drawn: scale.most(key)[1] };
-        let found = search(&ends, |excursion| strength_at(scale.value(excursion)))?;
-        (found.limit.map(|excursion| scale.value(excursion)), found.strength)
+        let (limit, strength) = search(&ends, |excursion| strength_at(scale.value(excursion)))?;
+        (limit.map(|excursion| scale.value(excursion)), strength)
     };
     Ok(Limit {
         effect: sheet.name.to_owned(),
@@ -240,13 +240,9 @@ struct Ends {
     drawn: f64,
 }
 
-struct SearchResult {
-    limit: Option<f64>,
-    strength: f64,
-}
-
-/// The excursion at which the strength crosses 1: searched from the strongest drawn one, down to the least or up to the most.
-fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result<SearchResult, E> {
+/// The excursion at which the strength crosses 1, searched from the strongest drawn one, down to the least or up to the most; and
+/// the strength at the drawn one.
+fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result<(Option<f64>, f64), E> {
     let &Ends { least, most, drawn } = ends;
     let strength = strength_at(drawn)?;
     let least = least.max(drawn * LEAST_SHARE);
@@ -254,7 +250,7 @@ fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result
         if strength >= 1.0 { (least, least, drawn) } else { (most, drawn, most) };
     let there = strength_at(beyond)?;
     if (there >= 1.0) == (strength >= 1.0) {
-        return Ok(SearchResult { limit: None, strength });
+        return Ok((None, strength));
     }
     let mut next = drawn / strength;
     while high / low > PRECISION {
@@ -272,7 +268,7 @@ fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result
         let overshoot = if here >= 1.0 { 1.0 / PRECISION.sqrt() } else { PRECISION.sqrt() };
         next = if here > 0.0 { at / here * overshoot } else { 0.0 };
     }
-    Ok(SearchResult { limit: Some(high), strength })
+    Ok((Some(high), strength))
 }
 
 #[cfg(test)]
@@ -302,7 +298,7 @@ mod tests {
     #[test]
     fn the_search_finds_where_the_strength_passes_one() {
         let ends = Ends { least: 0.0, most: 100.0, drawn: 10.0 };
-        let find = |law: fn(f64) -> f64| search(&ends, |at| Ok::<_, ()>(law(at))).unwrap().limit;
+        let find = |law: fn(f64) -> f64| search(&ends, |at| Ok::<_, ()>(law(at))).unwrap().0;
         for law in [|at| at / 3.0, |at: f64| (at / 3.0).powi(2), |at: f64| (at / 3.0).sqrt()] {
             let found = find(law).unwrap();
             assert!((3.0..=3.0 * PRECISION * PRECISION).contains(&found), "{found}");

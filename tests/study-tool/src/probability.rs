@@ -17,7 +17,6 @@ use serde::Serialize;
 
 /// Edges between the bins before small ones are merged.
 const EDGES: [f64; 5] = [0.01, 0.1, 0.5, 0.9, 0.99];
-/// Fewest explanations of a bin.
 const LEAST_IN_BIN: usize = 60;
 /// Lower end of a bin that tests high probabilities.
 const HIGH: f64 = 0.5;
@@ -27,7 +26,6 @@ const CONFIDENCE: f64 = 0.95;
 /// Smallest probability in a log loss: a single 0 would dominate the mean.
 const LEAST_PROBABILITY: f64 = 1e-6;
 
-/// One explanation of a report and whether it is right.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct JudgedExplanation {
     pub(crate) probability: f64,

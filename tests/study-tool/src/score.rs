@@ -97,7 +97,6 @@ pub enum ScoreError {
     NoExpectations,
 }
 
-/// Inputs of a score besides the results.
 #[derive(Debug, Clone, Copy)]
 pub struct ScoreInputs<'a> {
     /// The committed limits; without them no case has a ratio to its limit.

@@ -98,6 +98,23 @@ pub struct RunResult {
     pub(crate) without: Vec<String>,
 }
 
+impl<'a> Step<'a> {
+    /// A step of the whole catalogue that repeats nothing, keeps the records without truth.csv, and asks for no free space.
+    pub fn new(study: &'a Study, label: &'a str, make: Make<'a>, stop: &'a AtomicBool) -> Self {
+        Step {
+            study,
+            label,
+            make,
+            without: None,
+            keep_truth: false,
+            drop_records: false,
+            again: false,
+            least_free_mib: 0,
+            stop,
+        }
+    }
+}
+
 impl Step<'_> {
     /// Makes the records of a draw, unless they exist.
     ///

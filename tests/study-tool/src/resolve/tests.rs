@@ -169,17 +169,7 @@ fi"#
     }
 
     fn step<'a>(&'a self, label: &'a str, again: bool) -> Step<'a> {
-        Step {
-            study: &self.study,
-            label,
-            make: &make_record,
-            without: None,
-            keep_truth: false,
-            drop_records: false,
-            again,
-            least_free_mib: 0,
-            stop: &self.stop,
-        }
+        Step { again, ..Step::new(&self.study, label, &make_record, &self.stop) }
     }
 
     /// Runs the draw, then what was proposed for it.

@@ -36,7 +36,6 @@ pub struct Tables {
     pub(crate) errors: BTreeMap<String, usize>,
 }
 
-/// A rate and its target.
 #[derive(Debug, Clone, Serialize)]
 pub struct Line {
     pub name: String,

@@ -54,17 +54,7 @@ impl Bench {
             write(truth.join("truth.json"), "{}")
         };
         let one = |draw: &Draw| {
-            let mut step = Step {
-                study: &self.study,
-                label: "fake",
-                make: &make,
-                without: None,
-                keep_truth: false,
-                drop_records: false,
-                again: false,
-                least_free_mib: 0,
-                stop: &self.stop,
-            };
+            let mut step = Step::new(&self.study, "fake", &make, &self.stop);
             change(draw, &mut step);
             step.run(draw, &self.program)
         };

@@ -124,15 +124,11 @@ fn step<'a>(
     (again, stop): (bool, &'a AtomicBool),
 ) -> Step<'a> {
     Step {
-        study,
-        label: &arguments.label,
-        make,
-        without: None,
         keep_truth: arguments.keep_truth,
         drop_records: arguments.drop_records,
         again,
         least_free_mib: arguments.least_free,
-        stop,
+        ..Step::new(study, &arguments.label, make, stop)
     }
 }
 
