@@ -6,10 +6,10 @@
 pub(crate) mod differences;
 pub(crate) mod overlay;
 
-use crate::drawing::Picture;
-use crate::picture::programs;
 use crate::runs::{Run, rows};
 use figures::SummaryError;
+use figures::drawing::Picture;
+use figures::picture::programs;
 use pagekit::grid::Grid;
 use pagekit::number::{in_use, without_unit};
 use pagekit::page::{document, escaped};

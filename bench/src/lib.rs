@@ -1,11 +1,9 @@
-//! The program `bench` and its smaller commands: comparisons and pictures of runs, reference measurements, soaks, logs,
+//! The program `bench` and its smaller commands: comparisons of runs, reference measurements, soaks, logs,
 //! gateways to the bus. Figures of a run, latency reports and the live page are crates of their own: `figures`, `latency`,
 //! `live`; the style of all pages is `pagekit`.
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`drawing`] | panels on one time axis, as SVG |
-//! | [`picture`] | the pictures of a run: the whole, and around its step or its emergency stop |
 //! | [`runs`] | several runs: whether they are of one experiment, their figures |
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
 //! | [`spread`] | the spread of figures over repetitions |
@@ -27,12 +25,10 @@ mod can;
 pub mod cli;
 mod compare;
 mod conformance;
-mod drawing;
 mod export;
 mod export_fmu;
 mod gateway;
 mod junit;
-mod picture;
 mod ping_pong;
 mod probe;
 pub mod program;

@@ -7,13 +7,13 @@ use crate::ping_pong::{self, PingPongError};
 use crate::replay::ReplayError;
 use crate::runs::{self, Run, RunsError};
 use crate::soak::processes::become_child;
-use crate::{can, compare, export, export_fmu, picture, probe, replay, say, soak, spread};
+use crate::{can, compare, export, export_fmu, probe, replay, say, soak, spread};
 use clap::Parser;
-use figures::{SummaryError, join, table, thresholds};
+use figures::{SummaryError, sum_up, thresholds};
 use latency::ReportError;
 use live::LiveError;
 use protocol::exit::Exit;
-use runlog::run_folder::{FileError, read_text, write_json};
+use runlog::run_folder::{FileError, write_json};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -30,7 +30,7 @@ pub fn main() -> ExitCode {
             print(&figures::list());
             Exit::Good.into()
         }
-        Command::CheckExperiment { file } => bad_input(check(&file)),
+        Command::CheckExperiment { file } => bad_input(thresholds::check_file(&file).map(|()| Exit::Good)),
         Command::LatencyTable(arguments) => bad_input(latency::table::table(&arguments).map(|text| {
             print(&text);
             Exit::Good
@@ -72,16 +72,9 @@ fn print(text: &str) {
 }
 
 fn sum_up(folder: &Path) -> Result<Exit, SummaryError> {
-    let joined = join::join(folder)?;
-    let pictures = picture::draw(folder, &joined.record)?;
-    print(&table::table(&joined));
-    let others = if joined.is_rehearsal() { "" } else { "bus.log, " };
-    print(&format!(
-        "\n  files in {}: {}, summary.json, measurement.csv, truth.csv, {others}…",
-        folder.display(),
-        pictures.join(", ")
-    ));
-    Ok(if joined.passed() { Exit::Good } else { Exit::BoundBroken })
+    let summed_up = sum_up::sum_up(folder)?;
+    print(&summed_up.text);
+    Ok(if summed_up.passed { Exit::Good } else { Exit::BoundBroken })
 }
 
 fn read_runs(folders: &[PathBuf], anyway: bool) -> Result<Vec<Run>, RunsError> {
@@ -141,13 +134,5 @@ fn name_cause(file: &Path) -> Result<Exit, ReportError> {
     let (name, sentence) = latency::report_cause::name(&latency::report_cause::read(file)?);
     eprintln!("{sentence}");
     print(&name);
-    Ok(Exit::Good)
-}
-
-fn check(file: &Path) -> Result<Exit, SummaryError> {
-    let experiment: toml::Table = read_text(file)?.parse().map_err(|error| FileError::read(file, error))?;
-    let passed = experiment.get("passed").map(|passed| passed.as_table().ok_or("[passed] is no table"));
-    let passed = passed.transpose().map_err(|error| FileError::read(file, error))?;
-    passed.map_or(Ok(()), thresholds::check)?;
     Ok(Exit::Good)
 }

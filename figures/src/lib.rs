@@ -1,4 +1,4 @@
-//! What a run adds up to: the tables of its folder, its figures, and whether they keep the bounds of its experiment.
+//! What a run adds up to: the tables of its folder, its figures, whether they keep the bounds of its experiment, its pictures.
 //!
 //! | file | holds |
 //! |---|---|
@@ -11,16 +11,22 @@
 //! | [`thresholds`] | `[passed]` of the experiment file held against the summary |
 //! | [`top`] | the figures at the top of a summary, in one list |
 //! | [`table`] | the summary as a short table |
+//! | [`drawing`] | panels on one time axis, as SVG |
+//! | [`picture`] | the pictures of a run: the whole, and around its step or its emergency stop |
+//! | [`sum_up`](mod@sum_up) | all of this for one folder: joined, judged, drawn, and a text |
 //! | [`median`](mod@median) | a median with its interval |
 
 #![warn(missing_docs)] // an interface of other crates
 
+pub mod drawing;
 mod families;
 pub mod join;
 pub mod median;
+pub mod picture;
 pub mod record;
 mod reports;
 pub mod series;
+pub mod sum_up;
 pub mod table;
 pub mod tables_read;
 pub mod thresholds;

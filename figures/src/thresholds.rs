@@ -14,10 +14,11 @@
 
 use crate::top;
 use crate::{SummaryError, families};
-use runlog::run_folder::in_order;
+use runlog::run_folder::{FileError, in_order, read_text};
 use runlog::summary::{JoinedSummary, JudgedBound};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Keys at the top of the summary that have parts of their own, such as `wakeup_ns.p99`.
 const WITH_PARTS: &[&str] = &[
@@ -156,6 +157,18 @@ pub fn check(passed: &toml::Table) -> Result<(), SummaryError> {
         }
     }
     Ok(())
+}
+
+/// The same for `[passed]` of the experiment in `file`.
+///
+/// # Errors
+///
+/// A file that cannot be read, or a bound that makes no sense.
+pub fn check_file(file: &Path) -> Result<(), SummaryError> {
+    let experiment: toml::Table = read_text(file)?.parse().map_err(|error| FileError::read(file, error))?;
+    let passed = experiment.get("passed").map(|passed| passed.as_table().ok_or("[passed] is no table"));
+    let passed = passed.transpose().map_err(|error| FileError::read(file, error))?;
+    passed.map_or(Ok(()), check)
 }
 
 fn refusal(key: &str, bound: &toml::Value, problem: &str) -> SummaryError {

@@ -1,8 +1,8 @@
 //! `airbench run`: an experiment with emulator and controllers as processes on one bus, and its companion programs.
 //!
 //! ```text
-//!   bench check-experiment ──► emulator, controller (one or one for each axis) ──► bench summary
-//!                              bench gateway, bench watch: end with the run
+//!   bounds checked ──► emulator, controller (one or one for each axis) ──► joined, judged, drawn
+//!                      bench gateway, bench watch: end with the run
 //! ```
 //!
 //! A process that fails ends the others, after [`GRACE`], in which they notice the failure, report it and trip the emergency
@@ -12,6 +12,7 @@ use crate::children::{Children, Event, code};
 use crate::cli::RunArguments;
 use crate::private::{PrivateFolder, RunBus};
 use crate::{Front, FrontError, make_folder, say};
+use figures::{sum_up, thresholds};
 use protocol::exit::Exit;
 use runlog::Axis;
 use runlog::run_folder::SUMMARY_JSON;
@@ -34,15 +35,14 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     check(arguments)?;
     let file = front.experiment(&arguments.experiment, |name| format!("no experiment '{name}'"))?;
     let program = |name: &str| front.places.program(name);
-    let (emulator, controller, bench) = (program("emulator")?, program("controller")?, program("bench")?);
+    let (emulator, controller) = (program("emulator")?, program("controller")?);
+    // Gateway and page alone are commands of this one.
+    let bench = if arguments.gateway || arguments.watch { program("bench")? } else { PathBuf::new() };
     let (rig, programs) = (front.places.data("rig.toml")?, front.places.data("programs")?);
-    let mut children = Children::watch()?;
+    let children = Children::watch()?;
 
     // A typo in the bounds is reported before the run, not after it.
-    let checked = children.call(Command::new(&bench).arg("check-experiment").arg(&file))?;
-    if checked != 0 {
-        return Ok(checked);
-    }
+    thresholds::check_file(&file).map_err(|error| FrontError::Input(error.to_string()))?;
     if children.interrupted() {
         return Ok(Exit::Interrupted as u8);
     }
@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     if first_code == Exit::BadInput as u8 {
         return Ok(first_code);
     }
-    let summary_code = sum_up(&bench, &out)?;
+    let summary_code = sum_up(&out)?;
     Ok(match (first_code, interrupted) {
         (0, false) => summary_code,
         (0, true) => Exit::Interrupted as u8,
@@ -127,13 +127,14 @@ fn start_page(
     Ok(())
 }
 
-/// Judges and draws the run in `out`; returns the exit code of `bench summary`, 0 where the run left no results.
-fn sum_up(bench: &Path, out: &Path) -> Result<u8, FrontError> {
+/// Judges and draws the run in `out`; the exit code is good where the run left no results.
+fn sum_up(out: &Path) -> Result<u8, FrontError> {
     if !out.join(SUMMARY_JSON).is_file() {
-        return Ok(0);
+        return Ok(Exit::Good as u8);
     }
-    let summary = Command::new(bench).arg("summary").arg(out).status();
-    summary.map(code).map_err(|reason| FrontError::Start { program: bench.display().to_string(), reason })
+    let summed_up = sum_up::sum_up(out).map_err(|error| FrontError::Input(error.to_string()))?;
+    say(summed_up.text.trim_end());
+    Ok(if summed_up.passed { Exit::Good } else { Exit::BoundBroken } as u8)
 }
 
 /// Prints name and subject of each shipped experiment.

@@ -5,8 +5,8 @@
 //! not subtracted.
 
 use super::{change, overlay};
-use crate::drawing::{COLOURS, Curve, Panel, Picture};
 use crate::runs::Run;
+use figures::drawing::{COLOURS, Curve, Panel, Picture};
 use figures::record::MEASURED;
 use figures::series::Series;
 use pagekit::grid::Grid;

@@ -1,11 +1,10 @@
 //! The curves of several runs on the same axes: over the whole experiment, and around its step.
 
-use crate::drawing::{COLOURS, Curve, Panel, Picture};
-use crate::picture::{self, METRE_IN_MM, PER_CENT};
 use crate::runs::Run;
+use figures::drawing::{BLACK, COLOURS, Curve, Panel, Picture};
+use figures::picture::{self, METRE_IN_MM, PER_CENT};
 use figures::record::Record;
 use figures::series::{Series, Span};
-use plotters::style::BLACK;
 
 /// Range of the picture around a step, s.
 const AROUND: Span = Span { from_s: -0.2, to_s: 0.6 };

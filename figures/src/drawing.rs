@@ -4,21 +4,23 @@
 //! width too, for black and white. Of the samples in a pixel column the smallest and the largest are drawn: no spike is lost,
 //! and the size of the file does not depend on the length. Legends stand above the curves.
 
-use figures::series::{Series, Span};
+use crate::series::{Series, Span};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+pub use plotters::style::BLACK;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Colours in the order of their use.
-pub(crate) const COLOURS: [RGBColor; 7] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK];
+pub const COLOURS: [RGBColor; 7] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK];
 /// Measured values.
-pub(crate) const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub const BLUE: RGBColor = RGBColor(0, 114, 178);
 /// Set-points.
-pub(crate) const VERMILION: RGBColor = RGBColor(213, 94, 0);
+pub const VERMILION: RGBColor = RGBColor(213, 94, 0);
 /// A second measured value.
-pub(crate) const GREEN: RGBColor = RGBColor(0, 158, 115);
-pub(crate) const PURPLE: RGBColor = RGBColor(204, 121, 167);
+pub const GREEN: RGBColor = RGBColor(0, 158, 115);
+/// A third measured value.
+pub const PURPLE: RGBColor = RGBColor(204, 121, 167);
 const ORANGE: RGBColor = RGBColor(230, 159, 0);
 const SKY: RGBColor = RGBColor(86, 180, 233);
 
@@ -39,9 +41,12 @@ const GAP_S: f64 = 0.05;
 /// Mean width of a letter, relative to the height of its font.
 const LETTER: f64 = 0.53;
 
+/// A line of a panel.
 #[derive(Clone, Debug)]
-pub(crate) struct Curve {
+pub struct Curve {
+    /// Entry of the legend.
     pub name: String,
+    /// Line colour.
     pub colour: RGBColor,
     /// Line width, pixels.
     pub width: u32,
@@ -51,7 +56,7 @@ pub(crate) struct Curve {
 
 /// A pair of axes with its curves.
 #[derive(Clone, Debug)]
-pub(crate) struct Panel {
+pub struct Panel {
     /// Quantity and unit.
     pub title: String,
     /// Its curves, drawn in this order.
@@ -60,22 +65,27 @@ pub(crate) struct Panel {
 
 /// A named interval of the time axis.
 #[derive(Clone, Debug)]
-pub(crate) struct Band {
+pub struct Band {
+    /// Text in the strip.
     pub label: String,
+    /// Where the interval lies.
     pub span: Span,
     /// Whether the interval is the subject of the picture, which stays white.
     pub is_main: bool,
 }
 
+/// Panels one below the other, on one time axis.
 #[derive(Clone, Debug)]
-pub(crate) struct Picture {
+pub struct Picture {
     /// Heading.
     pub title: String,
     /// Text below the heading, wrapped.
     pub caption: String,
+    /// Name and unit of the time axis.
     pub time_name: String,
     /// Time range of the picture.
     pub range: Span,
+    /// Instant of a vertical line, s.
     pub mark_s: Option<f64>,
     /// Intervals of the strip above the panels; no strip when empty.
     pub bands: Vec<Band>,
@@ -87,7 +97,12 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Failure = Box<dyn std::error::Error>;
 
 impl Picture {
-    pub(crate) fn svg(&self) -> Result<String, String> {
+    /// The picture as SVG.
+    ///
+    /// # Errors
+    ///
+    /// The plotting library's own words, if it cannot draw.
+    pub fn svg(&self) -> Result<String, String> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|error| error.to_string())?;
         Ok(text)

@@ -2,19 +2,21 @@
 //!
 //! Panels are drawn for existing data: an idle load axis has none. The strip on top shows the states of the main chain.
 
+use crate::SummaryError;
 use crate::drawing::{BLUE, Band, Curve, GREEN, PURPLE, Panel, Picture, VERMILION};
-use figures::SummaryError;
-use figures::emergency_stop;
-use figures::record::{Record, largest_step};
-use figures::series::{Series, Span};
+use crate::emergency_stop;
+use crate::record::{Record, largest_step};
+use crate::series::{Series, Span};
 use plotters::style::RGBColor;
 use runlog::Axis;
 use runlog::run_folder::{FileError, PICTURE_SVG, STEP_SVG, STOP_SVG};
 use std::path::Path;
 
-pub(crate) const METRE_IN_MM: f64 = 1e3;
+/// Millimetres in a metre.
+pub const METRE_IN_MM: f64 = 1e3;
 const PASCAL_IN_BAR: f64 = 1e-5;
-pub(crate) const PER_CENT: f64 = 100.0;
+/// Per cent in one.
+pub const PER_CENT: f64 = 100.0;
 /// Time before and after the instant of a zoom.
 const BEFORE_S: f64 = 0.2;
 const AFTER_S: f64 = 0.6;
@@ -22,7 +24,11 @@ const AFTER_S: f64 = 0.6;
 const APART_M: f64 = 0.002;
 
 /// Draws the pictures of a run into `folder`; returns their names.
-pub(crate) fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
+///
+/// # Errors
+///
+/// A picture that cannot be drawn or written.
+pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
     let whole = whole(record);
     let mut pictures = vec![(PICTURE_SVG, whole.clone())];
     if let Some((what, at_s)) = step(record) {
@@ -44,7 +50,7 @@ pub(crate) fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, 
 }
 
 /// Name and time of the largest step of a run: of the force, else of the position.
-pub(crate) fn step(record: &Record) -> Option<(String, f64)> {
+pub fn step(record: &Record) -> Option<(String, f64)> {
     let spans = record.experiments();
     let force = largest_step(record.load.numbers("set_force_N"), &spans, 10.0)
         .map(|step| (format!("step of the force by {:.0} N", step.height_value()), step.at_s));
@@ -90,7 +96,7 @@ fn text(record: &Record, path: &[&str]) -> Option<String> {
 }
 
 /// The programs that the experiment names, each behind its axis.
-pub(crate) fn programs(record: &Record) -> Vec<String> {
+pub fn programs(record: &Record) -> Vec<String> {
     let program = |axis: &str| text(record, &[axis, "program"]).map(|program| format!("{axis}: {program}"));
     Axis::NAMES.into_iter().filter_map(program).collect()
 }
@@ -106,7 +112,7 @@ fn caption(record: &Record) -> String {
 /// Intervals of the states of the main chain.
 fn bands(record: &Record) -> Vec<Band> {
     let states = record.leader().states("main_chain").iter();
-    let band = |entry: &figures::tables_read::StateSpan| Band {
+    let band = |entry: &crate::tables_read::StateSpan| Band {
         label: entry.state.replace('-', " "),
         span: entry.span,
         is_main: entry.state == "experiment",
@@ -185,7 +191,7 @@ fn panels(record: &Record) -> Vec<Panel> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use figures::record::made::{chain, each_ms, table};
+    use crate::record::made::{chain, each_ms, table};
 
     fn record() -> Record {
         let measured = table(&[
