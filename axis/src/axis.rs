@@ -54,8 +54,9 @@ pub struct AxisParts {
 }
 
 pub struct AxisController {
-    axis: Axis,
-    program: Program,
+    pub axis: Axis,
+    /// Its variables may be changed between two cycles.
+    pub program: Program,
     work: Work,
     leading: Leading,
     main_config: MainConfig,
@@ -63,13 +64,14 @@ pub struct AxisController {
     changes: Changes,
     supply_pressure_pa: f64,
     record_every: u64,
-    figures: PositionFigures,
+    pub figures: PositionFigures,
     average: Average,
     range: Range,
     /// What the rig said of itself last, however long ago.
     rig: Option<RigStatus>,
     fault: Option<Fault>,
-    algorithm_fault: Option<AlgorithmFault>,
+    /// Why the algorithm is no longer asked.
+    pub algorithm_fault: Option<AlgorithmFault>,
     asked: Option<Asked>,
     slow: Slow,
     alive: u8,
@@ -247,10 +249,6 @@ impl AxisController {
         (self.rig, self.fault, self.algorithm_fault, self.asked, self.alive) = (None, None, None, None, 0);
     }
 
-    pub fn axis(&self) -> Axis {
-        self.axis
-    }
-
     pub fn state(&self) -> MainChainState {
         self.status().main_chain
     }
@@ -265,24 +263,6 @@ impl AxisController {
 
     pub fn emergency_stop(&self) -> EmergencyStopChainState {
         self.leading.stop.state()
-    }
-
-    /// Its program, whose variables may be changed between two cycles.
-    pub fn program_mut(&mut self) -> &mut Program {
-        &mut self.program
-    }
-
-    pub fn program(&self) -> &Program {
-        &self.program
-    }
-
-    pub fn figures(&self) -> &PositionFigures {
-        &self.figures
-    }
-
-    /// Why the algorithm is no longer asked.
-    pub fn algorithm_fault(&self) -> Option<AlgorithmFault> {
-        self.algorithm_fault
     }
 
     /// How often the experiment has been driven through.

@@ -56,7 +56,8 @@ pub struct Experiment {
     pub drive: Option<AxisExperiment>,
     /// What the load axis does; `None`: its valve is held shut.
     pub load: Option<AxisExperiment>,
-    pub recording: Recording,
+    /// Cycles between two rows of an axis's file.
+    pub record_every_cycles: u32,
     pub rig: toml::Table,
     pub passed: toml::Table,
 }
@@ -72,12 +73,6 @@ pub struct RunSection {
     /// What starts the experiment once both axes have settled.
     pub start: Start,
     pub after_emergency_stop: AfterStop,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Recording {
-    /// Cycles between two rows of an axis's file.
-    pub every_cycles: u32,
 }
 
 static NUMBER: Parameter = Parameter::new(("number", ""), [1.0, 255.0], 1.0, "name on the bus");
@@ -113,13 +108,15 @@ impl Experiment {
         };
         let drive = axis("drive", algorithms::algorithm::Quantity::Position)?;
         let load = axis("load", algorithms::algorithm::Quantity::Force)?;
-        let recording = Recording::read(root.section_or_empty("recording")?)?;
+        let mut recording = root.section_or_empty("recording")?;
+        let record_every_cycles = recording.whole_or_default(&EVERY)?;
+        recording.finish()?;
         let [rig, passed] = [root.opaque("rig")?, root.opaque("passed")?];
         root.finish()?;
         if drive.is_none() && load.is_none() {
             return Err(root.wrong("[drive] or [load] is needed: nothing moves without"));
         }
-        Ok(Self { title, about, number, run, drive, load, recording, rig, passed })
+        Ok(Self { title, about, number, run, drive, load, record_every_cycles, rig, passed })
     }
 
     /// How long one repetition takes, s: the longer of both axes.
@@ -151,14 +148,6 @@ impl RunSection {
         }
         section.finish()?;
         Ok(run)
-    }
-}
-
-impl Recording {
-    fn read(mut section: Section<'_>) -> Result<Self, SettingsError> {
-        let every_cycles = section.whole_or_default(&EVERY)?;
-        section.finish()?;
-        Ok(Self { every_cycles })
     }
 }
 

@@ -152,7 +152,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         mut port_of: impl FnMut(Axis) -> Option<P>,
     ) -> Self {
         let member = |controller: AxisController| Member {
-            port: port_of(controller.axis()),
+            port: port_of(controller.axis),
             controller,
             mail: FrameDelay::new(),
             answered: 0,
@@ -217,7 +217,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         let mut answered: [Option<(u64, Sensors, ValveCommand)>; 2] = [None; 2];
         self.take_changes();
         for place in 0..self.members.len() {
-            let axis = self.members[place].controller.axis();
+            let axis = self.members[place].controller.axis;
             if let Some((cycle, sensors)) = self.view.fresh_sensors(axis) {
                 let status = self.view.status().copied();
                 let member = &mut self.members[place];
@@ -240,10 +240,10 @@ impl<P: CalibrationPort> ControllerNode<P> {
         // When all valves have their commands.
         for Member { controller, port, .. } in &mut self.members {
             if let Some(port) = port {
-                if let Some((cycle, sensors, command)) = &answered[controller.axis().index()] {
+                if let Some((cycle, sensors, command)) = &answered[controller.axis.index()] {
                     port.observe(controller, *cycle, sensors, command);
                 }
-                port.serve(controller.program_mut(), bus);
+                port.serve(&mut controller.program, bus);
             }
         }
         let cycles = answered.map(|answer| answer.map(|(cycle, ..)| cycle));
@@ -264,13 +264,13 @@ impl<P: CalibrationPort> ControllerNode<P> {
 
     /// The rig goes on, and sensors of the axis do not come: after each tick the axis says what a fault has to say.
     fn speak_without_sensors(&mut self, place: usize, bus: &mut dyn Bus) {
-        let Some(cycle) = self.view.cycle() else { return };
+        let Some(cycle) = self.view.cycle else { return };
         let member = &mut self.members[place];
         if member.answered == 0 {
             // It never had any: it waits for its rig.
             return;
         }
-        let axis = member.controller.axis();
+        let axis = member.controller.axis;
         let stop = member.controller.without_sensors(cycle);
         member.stopped_for += if member.controller.may_restart() { 0 } else { TICK_CYCLES };
         member.silent_ticks = SILENT_TICKS - 1;
@@ -288,7 +288,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn Bus) {
-        let axis = self.members[place].controller.axis();
+        let axis = self.members[place].controller.axis;
         send(bus, &frame(axis, [Frame::DriveValveCommand, Frame::LoadValveCommand], answer.command));
         let frames = [
             answer.emergency_stop.map(|stop| emergency_stop_frame(axis, stop)),
@@ -317,10 +317,10 @@ impl<P: CalibrationPort> ControllerNode<P> {
 
     fn take_changes(&mut self) {
         while let Ok(change) = self.outlets.changes.try_recv() {
-            let of_axis = |member: &&mut Member<P>| member.controller.axis() == change.axis;
+            let of_axis = |member: &&mut Member<P>| member.controller.axis == change.axis;
             let Some(member) = self.members.iter_mut().find(of_axis) else { continue };
             // Checked by whoever sent it.
-            let _ = member.controller.program_mut().set(change.place, change.value);
+            let _ = member.controller.program.set(change.place, change.value);
         }
     }
 
@@ -338,7 +338,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     fn member(&self, axis: Axis) -> Option<&Member<P>> {
-        self.members.iter().find(|member| member.controller.axis() == axis)
+        self.members.iter().find(|member| member.controller.axis == axis)
     }
 
     pub fn done(&self) -> bool {

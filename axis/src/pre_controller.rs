@@ -98,17 +98,13 @@ struct Memory {
 
 #[derive(Clone, Debug)]
 pub struct PreController {
-    geometry: Geometry,
+    pub(crate) geometry: Geometry,
     memory: Option<Memory>,
 }
 
 impl PreController {
     pub fn new(geometry: Geometry) -> Self {
         Self { geometry, memory: None }
-    }
-
-    pub fn geometry(&self) -> &Geometry {
-        &self.geometry
     }
 
     /// Takes another offset of the position sensor, m; no velocity comes of it.

@@ -120,7 +120,7 @@ impl Program {
     /// # Errors
     /// [`AlgorithmFault`], latched until [`Program::restart_algorithms`]: the valve is to be shut.
     pub fn control(&mut self, cycle: u64, demand: &Demand, hand: Hand) -> Result<Output, AlgorithmFault> {
-        let geometry = self.pre.geometry();
+        let geometry = &self.pre.geometry;
         let direction = geometry.direction();
         let ready = &mut self.ready;
         ready.set_position_m = geometry.extension_m(demand.position.position_m);
@@ -197,12 +197,12 @@ impl Program {
 
     /// Position of the axis, less the sensor's offset, m, rig coordinates.
     pub fn position_m(&self) -> f64 {
-        self.pre.geometry().position_m(self.ready.position_m)
+        self.pre.geometry.position_m(self.ready.position_m)
     }
 
     /// What the axis does, in rig coordinates.
     pub fn actual(&self) -> Actual {
-        let direction = self.pre.geometry().direction();
+        let direction = self.pre.geometry.direction();
         Actual {
             position_m: self.position_m(),
             velocity_m_per_s: direction * self.ready.velocity_m_per_s,
@@ -216,7 +216,7 @@ impl Program {
     }
 
     pub fn geometry(&self) -> &Geometry {
-        self.pre.geometry()
+        &self.pre.geometry
     }
 
     /// Takes what the position sensor reads too much, m.

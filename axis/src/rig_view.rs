@@ -69,7 +69,8 @@ struct Account {
 
 #[derive(Default)]
 pub struct RigView {
-    cycle: Option<u64>,
+    /// The newest cycle that is known; `None` before the first tick.
+    pub cycle: Option<u64>,
     pub skipped: u64,
     sensors: [Option<Sensors>; 2],
     recent: [Recent; 2],
@@ -190,11 +191,6 @@ impl RigView {
         // The other axis's sensors, or a tick, may already be of the next cycle.
         let behind = (ALIVE_RANGE + cycle % ALIVE_RANGE - u64::from(sensors.alive)) % ALIVE_RANGE;
         Some((cycle.saturating_sub(behind), sensors))
-    }
-
-    /// The newest cycle that is known; `None` before the first tick.
-    pub fn cycle(&self) -> Option<u64> {
-        self.cycle
     }
 
     /// What the rig says of itself; `None` until it said something, and when that is older than 100 cycles.

@@ -98,10 +98,6 @@ pub struct Motion {
 }
 
 impl Motion {
-    pub(crate) fn new(start_m: f64, laws: Vec<Arc<dyn Law>>) -> Self {
-        Self { row: Row::new(start_m, laws) }
-    }
-
     /// The set-point `time_s` after the start: the start before it, the end from the end on.
     pub fn at(&self, time_s: f64) -> SetPoint {
         let moment = match self.row.place(time_s) {

@@ -212,7 +212,7 @@ impl Inputs {
             main,
             supply_pressure_pa: self.rig.supply().pressure_pa,
             changes,
-            record_every: u64::from(self.experiment.recording.every_cycles),
+            record_every: u64::from(self.experiment.record_every_cycles),
         }))
     }
 

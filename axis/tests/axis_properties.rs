@@ -110,7 +110,7 @@ fn happening() -> impl Strategy<Value = Happening> {
 fn echo_partner(controller: &mut AxisController, answer: &Answer) {
     let Some(status) = answer.status else { return };
     let status = ChainStatus { ok: true, ..status };
-    controller.hear(&match controller.axis() {
+    controller.hear(&match controller.axis {
         Axis::Drive => Frame::LoadChainStatus(status),
         Axis::Load => Frame::DriveChainStatus(status),
     });
@@ -122,7 +122,7 @@ fn check(answer: &Answer, controller: &AxisController) -> Result<(), TestCaseErr
     prop_assert!(command.opening.is_finite() && command.opening.abs() <= 1.0, "{command:?}");
     let without_control = matches!(controller.state(), WaitingForRig | Aborted | Fault)
         || controller.emergency_stop() != EmergencyStopChainState::Ready
-        || controller.algorithm_fault().is_some();
+        || controller.algorithm_fault.is_some();
     prop_assert!(!without_control || !command.enable, "{:?} and {command:?}", controller.state());
     prop_assert!(command.enable || command.opening == 0.0, "{command:?}");
     // What goes out fits the wire.
@@ -159,7 +159,7 @@ fn drive_through(
             }
             Happening::Stop(frame) | Happening::Console(frame) => controller.hear(frame),
             Happening::Parameter(place, share) => {
-                let program = controller.program_mut();
+                let program = &mut controller.program;
                 let place = place % program.variables().len();
                 let parameter = &program.variables()[place].parameter;
                 let value = parameter.least + share * (parameter.most - parameter.least);

@@ -58,7 +58,7 @@ fn step(controller: &mut AxisController, cycle: u64, sensors: &Sensors, rig: Opt
             ChainStatus { ok: true, ..status },
             ChainValues { averaged_position_m: 0.0992, ..ChainValues::default() },
         );
-        let frames = match controller.axis() {
+        let frames = match controller.axis {
             Axis::Drive => [Frame::LoadChainStatus(status), Frame::LoadChainValues(values)],
             Axis::Load => [Frame::DriveChainStatus(status), Frame::DriveChainValues(values)],
         };
@@ -115,7 +115,7 @@ fn a_restarted_controller_answers_as_a_new_one() {
         let mut used = controller(axis, "load-step", true);
         let cycles = run_to(&mut used, MainChainState::Experiment, &linked());
         if axis == Axis::Load {
-            assert!((used.program().geometry().offset_m - 0.8e-3).abs() < 1e-4, "the offset was matched");
+            assert!((used.program.geometry().offset_m - 0.8e-3).abs() < 1e-4, "the offset was matched");
         }
         for cycle in cycles..cycles + 333 {
             step(&mut used, cycle, &sensors(cycle), Some(&linked()));
@@ -131,7 +131,7 @@ fn a_restarted_controller_answers_as_a_new_one() {
             });
             assert_eq!(one, other, "{axis:?}, cycle {cycle}");
         }
-        assert_eq!(format!("{:?}", used.figures()), format!("{:?}", new.figures()));
+        assert_eq!(format!("{:?}", used.figures), format!("{:?}", new.figures));
     }
 }
 

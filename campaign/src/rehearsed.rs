@@ -68,12 +68,12 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
     let broken = rehearsal.off_the_wire().map(|error| format!("the simulated rig broke: {error}"));
     let (ended, because) = match stopped {
         _ if broken.is_some() => (EndState::Failed, broken.unwrap_or_default()),
-        Some(axis) => (EndState::Stopped, format!("{}: {}", axis.axis().name(), axis.cause())),
+        Some(axis) => (EndState::Stopped, format!("{}: {}", axis.axis.name(), axis.cause())),
         None if rehearsal.node().done() => (EndState::Done, String::new()),
         None => (EndState::TimeOver, "the longest time was over before the experiment was done".to_owned()),
     };
     let drive =
-        controllers().find(|controller| controller.axis() == Axis::Drive).map(AxisController::figures);
+        controllers().find(|controller| controller.axis == Axis::Drive).map(|controller| &controller.figures);
     let top = [
         drive.and_then(|figures| figures.dynamic_m()).or_else(|| position::error_dynamic_m(record)),
         drive.and_then(|figures| figures.static_m()).or_else(|| position::error_static_m(record)),

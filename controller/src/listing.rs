@@ -25,7 +25,7 @@ pub(crate) fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> 
     let mut texts = Vec::new();
     for axis in Axis::ALL.into_iter().filter(|axis| inputs.programs[axis.index()].is_some()) {
         let controller = controller(&inputs, axis)?;
-        let program = controller.program();
+        let program = &controller.program;
         texts.push(parameter_set::text(axis, program.variables(), program.values()));
     }
     // A closed pipe, as of `| head`, is no error.
@@ -43,7 +43,7 @@ pub(crate) fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
     let described = AxisDescription {
         axis,
         title: &inputs.program_title(axis),
-        variables: controller.program().variables(),
+        variables: controller.program.variables(),
     };
     let text = a2l::text(&described).map_err(RunError::input)?;
     let _ = writeln!(io::stdout(), "{text}");

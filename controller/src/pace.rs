@@ -152,7 +152,7 @@ impl RigActivity {
 
     /// Counts of the rig's frames, sensors and ticks; those of other nodes do not count.
     fn counts(node: &Node) -> (PerAxis, Option<u64>) {
-        (node.view.received, node.view.cycle())
+        (node.view.received, node.view.cycle)
     }
 
     /// Duration of its silence; reports when the silence begins.

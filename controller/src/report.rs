@@ -19,23 +19,23 @@ fn of_axis<P: CalibrationPort>(
     inputs: &Inputs,
 ) -> AxisReport {
     let view = &node.view;
-    let program = controller.program();
-    let source = inputs.programs[controller.axis().index()].as_ref();
+    let program = &controller.program;
+    let source = inputs.programs[controller.axis.index()].as_ref();
     let values = program.values().iter();
     AxisReport {
         chain_state: controller.state().name().into(),
         chain_cause: controller.cause().to_string(),
         emergency_stop_state: controller.emergency_stop().name().into(),
         repetitions_done: Some(controller.repetitions_done()),
-        algorithm_fault: controller.algorithm_fault().map(|fault| fault.to_string()),
-        position_error_dynamic_m: controller.figures().dynamic_m(),
-        position_error_static_m: controller.figures().static_m(),
-        cycles_answered: node.answered_by(controller.axis()),
-        sensors_received: view.received.get(controller.axis()),
-        sensors_lost: Some(view.lost.get(controller.axis())),
-        sensors_late: view.late.get(controller.axis()),
-        sensors_duplicate: view.duplicate.get(controller.axis()),
-        sensors_missed_before_first_tick: Some(view.missed_before_first_tick.get(controller.axis())),
+        algorithm_fault: controller.algorithm_fault.map(|fault| fault.to_string()),
+        position_error_dynamic_m: controller.figures.dynamic_m(),
+        position_error_static_m: controller.figures.static_m(),
+        cycles_answered: node.answered_by(controller.axis),
+        sensors_received: view.received.get(controller.axis),
+        sensors_lost: Some(view.lost.get(controller.axis)),
+        sensors_late: view.late.get(controller.axis),
+        sensors_duplicate: view.duplicate.get(controller.axis),
+        sensors_missed_before_first_tick: Some(view.missed_before_first_tick.get(controller.axis)),
         matched_offset_m: program.geometry().offset_m,
         program_toml: source.map(|source| source.text.clone()),
         program_file: source.map(|source| source.path.display().to_string()),
@@ -54,8 +54,7 @@ pub(crate) fn of_node<P: CalibrationPort>(
     node: &ControllerNode<P>,
     inputs: &Inputs,
 ) -> BTreeMap<String, AxisReport> {
-    let of =
-        |controller: &AxisController| (controller.axis().name().into(), of_axis(controller, node, inputs));
+    let of = |controller: &AxisController| (controller.axis.name().into(), of_axis(controller, node, inputs));
     node.controllers().map(of).collect()
 }
 

@@ -144,7 +144,7 @@ fn open_xcp(
     let (note_sender, notes) = bounded(NOTE_QUEUE);
     let (mut ports, mut axes) = (Vec::new(), Vec::new());
     for controller in controllers {
-        let (axis, program) = (controller.axis(), controller.program());
+        let (axis, program) = (controller.axis, &controller.program);
         let (returned_sender, returned) = bounded(RETURNED_QUEUE);
         let queues = Queues { notes: note_sender.clone(), returned };
         let title = inputs.program_title(axis);

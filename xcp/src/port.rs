@@ -124,7 +124,7 @@ impl Port {
         random: [u8; 16],
         queues: Queues,
     ) -> Result<Self, A2lError> {
-        let (axis, program) = (controller.axis(), controller.program());
+        let (axis, program) = (controller.axis, &controller.program);
         let variables = program.variables();
         let a2l::Description { bytes, texts } =
             a2l::description(&AxisDescription { axis, title, variables })?;
@@ -210,8 +210,8 @@ impl CalibrationPort for Port {
         command: &ValveCommand,
     ) {
         let record = controller.record(cycle, sensors, command);
-        let signals = signals::sample(&View { ready: controller.program().ready(), sensors, record });
-        self.slave.cycle(cycle, &signals, controller.program().values());
+        let signals = signals::sample(&View { ready: controller.program.ready(), sensors, record });
+        self.slave.cycle(cycle, &signals, controller.program.values());
         self.cycle = cycle;
         self.daq_budget = self.slave.daq.per_cycle;
     }

@@ -115,7 +115,7 @@ impl Work {
                 let position = match output.phase {
                     Phase::Shut => return None,
                     Phase::Approach { elapsed_s, from_m, duration_s } => {
-                        SmoothWay::new(from_m, *start_m, duration_s).position(elapsed_s)
+                        SmoothWay::new(from_m, *start_m, duration_s).at(elapsed_s).into()
                     }
                     Phase::Prepare | Phase::RampForce { .. } | Phase::HoldStart => {
                         SetPoint::at_rest(*start_m)
@@ -288,7 +288,7 @@ impl Pressing {
         let initial_n = self.plan.source.profile().initial_force_n();
         match phase {
             Phase::RampForce { elapsed_s } => {
-                SmoothWay::new(0.0, initial_n, self.plan.initial_ramp_s).force(elapsed_s)
+                SmoothWay::new(0.0, initial_n, self.plan.initial_ramp_s).at(elapsed_s).into()
             }
             Phase::Experiment { elapsed_s } => {
                 let planned = self.plan.source.at(elapsed_s, &program.actual());

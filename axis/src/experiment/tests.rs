@@ -62,7 +62,7 @@ fn a_good_file_is_read() {
         ..USUAL
     };
     assert_eq!(experiment.run, expected);
-    assert_eq!(experiment.recording.every_cycles, 10);
+    assert_eq!(experiment.record_every_cycles, 10);
     assert!(experiment.rig.contains_key("carriage_position_m") && experiment.passed["anything"].is_table());
     let (drive, load) = (experiment.drive.unwrap(), experiment.load.unwrap());
     assert_eq!(
@@ -91,7 +91,7 @@ fn a_program_is_a_name_beside_the_experiments_or_a_path_from_them() {
 #[test]
 fn a_file_with_little_in_it_has_its_defaults() {
     let experiment = read("title = \"t\"\n[drive]\nprogram = \"p\"\nstart_m = 0.1\n").unwrap();
-    assert_eq!((experiment.run, experiment.recording.every_cycles), (USUAL, 1));
+    assert_eq!((experiment.run, experiment.record_every_cycles), (USUAL, 1));
     assert!(experiment.load.is_none() && experiment.rig.is_empty());
     assert_eq!((experiment.number, experiment.duration_s()), (1, 0.0));
 }

@@ -64,7 +64,7 @@ fn a_late_frame_is_counted_and_answered_by_nobody() {
     let _ = view.fresh_sensors(Axis::Drive);
     view.take_sensors(Axis::Drive, sensors(95));
     assert!(view.fresh_sensors(Axis::Drive).is_none());
-    assert_eq!((view.cycle(), view.late), (Some(97), PerAxis { drive: 1, load: 0 }));
+    assert_eq!((view.cycle, view.late), (Some(97), PerAxis { drive: 1, load: 0 }));
     play(&mut view, 98..201, &[]);
     assert_eq!(view.lost, PerAxis { drive: 0, load: 1 }, "what came late did come");
 }
@@ -160,7 +160,7 @@ fn a_status_holds_for_a_hundred_cycles() {
     view.take_tick(&tick(5000, 0));
     assert!(view.status().is_some());
     play(&mut view, 5001..5101, &[]);
-    assert!(view.status().is_some(), "in cycle {:?}", view.cycle());
+    assert!(view.status().is_some(), "in cycle {:?}", view.cycle);
     view.take_sensors(Axis::Drive, sensors(5101));
     assert!(view.status().is_none());
     view.take_status(RigStatus::default());
@@ -195,7 +195,7 @@ fn sensors_that_pass_others_at_arbitration_are_no_round_of_the_counter() {
     for cycle in 100..110 {
         view.take_sensors(Axis::Drive, sensors(cycle + 1));
         view.take_sensors(Axis::Load, sensors(cycle));
-        assert_eq!(view.cycle(), Some(cycle + 1));
+        assert_eq!(view.cycle, Some(cycle + 1));
         assert_eq!(view.fresh_sensors(Axis::Load).map(|(of, _)| of), Some(cycle));
         assert_eq!(view.fresh_sensors(Axis::Drive).map(|(of, _)| of), Some(cycle + 1));
     }

@@ -6,7 +6,6 @@
 //! Source: VDI 2143 part 1 (inclined sine line); [Neugebauer 2011] calls it Bestehorn sinoid.
 
 use super::law::{BOTH, Kind, Law, Moment, Shaped};
-use super::{ForceSetPoint, SetPoint};
 use std::f64::consts::TAU;
 
 pub const KIND: Kind = Kind {
@@ -36,18 +35,8 @@ impl SmoothWay {
         Self { from, to, duration_s }
     }
 
-    /// The position set-point `time_s` after its start.
-    pub fn position(&self, time_s: f64) -> SetPoint {
-        self.at(time_s).into()
-    }
-
-    /// The force set-point `time_s` after its start.
-    pub fn force(&self, time_s: f64) -> ForceSetPoint {
-        self.at(time_s).into()
-    }
-
     /// The set-point `time_s` after its start, in the unit of its values.
-    pub(crate) fn at(&self, time_s: f64) -> Moment {
+    pub fn at(&self, time_s: f64) -> Moment {
         let Self { from, to, duration_s } = *self;
         if time_s < 0.0 {
             return Moment::at_rest(from);
@@ -77,9 +66,9 @@ mod tests {
     #[test]
     fn a_smooth_way_rests_before_and_behind() {
         let way = SmoothWay::new(0.1, 0.4, 3.0);
-        assert_eq!(way.position(-1.0), SetPoint::at_rest(0.1));
-        assert_eq!(way.position(3.0), SetPoint::at_rest(0.4));
-        assert_eq!(SmoothWay::new(0.0, 100.0, 0.0).force(0.0), ForceSetPoint::at_rest(100.0));
-        assert!(way.position(1.0).moving && way.position(1.0).velocity_m_per_s > 0.0);
+        assert_eq!(way.at(-1.0), Moment::at_rest(0.1));
+        assert_eq!(way.at(3.0), Moment::at_rest(0.4));
+        assert_eq!(SmoothWay::new(0.0, 100.0, 0.0).at(0.0), Moment::at_rest(100.0));
+        assert!(way.at(1.0).moving && way.at(1.0).rate > 0.0);
     }
 }

@@ -76,15 +76,11 @@ impl Segment {
 /// Force over time: a start and a row of segments. It does not change while it runs; see [`ForceSource`].
 #[derive(Clone, Debug)]
 pub struct ForceProfile {
-    row: Row<Segment>,
-    limit_n: f64,
+    pub(super) row: Row<Segment>,
+    pub(super) limit_n: f64,
 }
 
 impl ForceProfile {
-    pub(super) fn new(initial_force_n: f64, limit_n: f64, segments: Vec<Segment>) -> Self {
-        Self { row: Row::new(initial_force_n, segments), limit_n }
-    }
-
     pub fn duration_s(&self) -> f64 {
         self.row.duration_s()
     }

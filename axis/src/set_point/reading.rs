@@ -2,7 +2,7 @@
 
 use super::force::{self, ForceProfile, Segment, at_position::AtPosition};
 use super::law::{self, Given, Law, Scale};
-use super::row::Lasting;
+use super::row::{Lasting, Row};
 use super::{Motion, table};
 use algorithms::algorithm::Quantity;
 use settings::{Section, SettingsError};
@@ -50,21 +50,11 @@ fn stated_quantity(segment: &Section<'_>) -> Option<Quantity> {
 /// A row of positions within the stroke.
 pub(crate) fn motion(
     start_m: f64,
-    segments: Vec<Section<'_>>,
+    sections: Vec<Section<'_>>,
     stroke_m: f64,
 ) -> Result<Motion, SettingsError> {
     let scale = Scale { quantity: Quantity::Position, stroke_m, force_limit_n: 0.0 };
-    let mut from = start_m;
-    let mut laws = Vec::new();
-    for mut section in segments {
-        let name = section.needed_text("law", &names(scale.quantity))?.text;
-        let mut given = Given { section: &mut section, from, scale };
-        let law = timed(&name, &mut given)?;
-        section.finish()?;
-        from = law.extent().end;
-        laws.push(law);
-    }
-    Ok(Motion::new(start_m, laws))
+    Ok(Motion { row: row(start_m, sections, scale, timed)? })
 }
 
 /// A row of forces up to a limit: from an initial force and the limit, both in N.
@@ -74,23 +64,34 @@ pub(crate) fn forces(
     stroke_m: f64,
 ) -> Result<ForceProfile, SettingsError> {
     let scale = Scale { quantity: Quantity::Force, stroke_m, force_limit_n: limit_n };
-    let mut from = initial_n;
+    let segment = |name: &str, given: &mut Given<'_, '_>| {
+        let at_position = name == super::step::KIND.name && given.section.has(force::at_position::KEY);
+        Ok(match force::KINDS.iter().find(|kind| kind.name == name) {
+            Some(kind) => Segment::read_load(kind, given)?,
+            None if at_position => Segment::AtPosition(AtPosition::read(given)?),
+            None => Segment::Timed(timed(name, given)?),
+        })
+    };
+    Ok(ForceProfile { row: row(initial_n, sections, scale, segment)?, limit_n })
+}
+
+/// A row from `start` on, whose segments are read by their names, each from where the one before it ends.
+fn row<S: Lasting>(
+    start: f64,
+    sections: Vec<Section<'_>>,
+    scale: Scale,
+    read: impl Fn(&str, &mut Given<'_, '_>) -> Result<S, SettingsError>,
+) -> Result<Row<S>, SettingsError> {
+    let mut from = start;
     let mut segments = Vec::new();
     for mut section in sections {
         let name = section.needed_text("law", &names(scale.quantity))?.text;
-        let at_position = name == super::step::KIND.name && section.has(force::at_position::KEY);
-        let mut given = Given { section: &mut section, from, scale };
-        let load = force::KINDS.iter().find(|kind| kind.name == name);
-        let segment = match load {
-            Some(kind) => Segment::read_load(kind, &mut given)?,
-            None if at_position => Segment::AtPosition(AtPosition::read(&mut given)?),
-            None => Segment::Timed(timed(&name, &mut given)?),
-        };
+        let segment = read(&name, &mut Given { section: &mut section, from, scale })?;
         section.finish()?;
         (_, from) = segment.duration_and_end();
         segments.push(segment);
     }
-    Ok(ForceProfile::new(initial_n, limit_n, segments))
+    Ok(Row::new(start, segments))
 }
 
 /// The law called `name`, within the limits of its row.

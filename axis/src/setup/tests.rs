@@ -88,7 +88,7 @@ fn what_is_read_at_the_start_only_may_be_set_but_no_change_of_it_planned() {
         expect_refused(controllers(&change(name, value), LOAD, &[]), &words);
         let set = format!("load.{name}={value}");
         let made = controllers(EXPERIMENT, LOAD, &[&set]).unwrap();
-        let program = made[1].program();
+        let program = &made[1].program;
         assert_eq!(program.values()[program.place(name).unwrap()], value);
     }
     assert!(controllers(&change("force-chain.high_force_n", 90.0), LOAD, &[]).is_ok());

@@ -156,7 +156,7 @@ impl Bench {
         duration_s: f64,
     ) -> Result<Vec<f64>, AlgorithmFault> {
         let cycles = (duration_s * 1e3).round() as usize;
-        (0..cycles).map(|cycle| self.cycle(program, way.position(cycle as f64 * 1e-3))).collect()
+        (0..cycles).map(|cycle| self.cycle(program, way.at(cycle as f64 * 1e-3).into())).collect()
     }
 
     /// One cycle; the command that answers it acts from the next one on.

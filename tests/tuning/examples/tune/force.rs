@@ -189,6 +189,6 @@ fn number(value: f64, decimals: usize) -> String {
 fn shipped(case: &Case, name: &str) -> Option<f64> {
     let mode = axis_control::setup::Mode { partner_needed: true, real_time: false, forever: false };
     let controller = case.inputs.controller(plant::Axis::Load, mode).ok()?;
-    let program = controller.program();
+    let program = &controller.program;
     program.place(name).map(|place| program.values()[place])
 }
