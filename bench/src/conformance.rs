@@ -141,7 +141,7 @@ fn with_priority(
     std::thread::scope(|scope| {
         let thread = scope.spawn(move || {
             let grants = realtime::acquire(&Request::for_a_loop(FIFO_PRIORITY, None));
-            let refusals = grants.refusals().iter().filter(|_| report_refusals);
+            let refusals = grants.refusals.iter().filter(|_| report_refusals);
             refusals.for_each(|refusal| eprintln!("bench: warning: {refusal}"));
             part(session)
         });

@@ -173,7 +173,7 @@ pub(crate) fn grants(priority: Option<u8>, cpu: Option<usize>) -> Grants {
         None => Request { cpu, ..Request::default() },
     };
     let grants = realtime::acquire(&request);
-    grants.refusals().iter().for_each(|refusal| warn(&format!("warning: {refusal}")));
+    grants.refusals.iter().for_each(|refusal| warn(&format!("warning: {refusal}")));
     grants
 }
 
@@ -195,8 +195,8 @@ fn figures(arguments: &PingPongArguments, rally: &PingPongResult, grants: &Grant
         cpu: arguments.cpu,
         peer_cpu: arguments.peer_cpu,
         bus: arguments.bus.as_ref().map(ToString::to_string),
-        granted: grants.granted().to_vec(),
-        refused: grants.refusals().iter().map(ToString::to_string).collect(),
+        granted: grants.granted.clone(),
+        refused: grants.refusals.iter().map(ToString::to_string).collect(),
     }
 }
 

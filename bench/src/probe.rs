@@ -154,7 +154,7 @@ fn cpus(list: Option<&str>) -> Result<Vec<usize>, ProbeError> {
 /// Pins the calling thread to its CPU, at the lowest priority.
 fn begin(cpu: usize) -> Result<(), ProbeError> {
     let grants = realtime::acquire(&Request { cpu: Some(cpu), ..Request::default() });
-    if let Some(refusal) = grants.refusals().first() {
+    if let Some(refusal) = grants.refusals.first() {
         return Err(ProbeError::Thread { cpu, reason: refusal.to_string() });
     }
     let idle = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Idle);

@@ -84,7 +84,7 @@ impl RecordedLog {
         }
         let Some(first): Option<&LogLine> = frames.first() else { return Err(RecordedLogError::Empty(file)) };
         let cycle_zero_ns = reported_zero_ns(&file, first.record.stamp_ns);
-        Ok(Self { file, cut_line: reader.cut_line(), frames, seen_at, interfaces, cycle_zero_ns })
+        Ok(Self { file, cut_line: reader.cut_line, frames, seen_at, interfaces, cycle_zero_ns })
     }
 
     /// Origin of times, ns since the log's epoch: cycle 0, or the first frame.

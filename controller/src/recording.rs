@@ -129,14 +129,18 @@ impl Writer {
             if finished || last_flush.elapsed() > FLUSH_PERIOD {
                 last_flush = Instant::now();
                 note(&mut failure, tables.write_out());
-                note(&mut failure, timing.as_mut().map_or(Ok(()), TimingQueues::write_out));
+                note(&mut failure, timing.as_mut().map_or(Ok(()), |timing| timing.recorder.write_out()));
             }
             if let Some(failure) = &failure {
                 protocol::say!("controller: cannot write {failure}; free space or choose another --out");
                 failed();
             }
             if finished || failure.is_some() {
-                return WriterResult { reported, failure, timing: timing.map(|timing| timing.figures()) };
+                return WriterResult {
+                    reported,
+                    failure,
+                    timing: timing.map(|timing| timing.recorder.figures()),
+                };
             }
             std::thread::sleep(POLL_PERIOD);
         }

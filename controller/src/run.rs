@@ -271,7 +271,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
         return Grants::default();
     }
     let grants = realtime::acquire(&Request::for_a_loop(arguments.fifo_priority, arguments.cpu));
-    grants.refusals().iter().for_each(|refusal| protocol::say!("controller: warning: {refusal}"));
+    grants.refusals.iter().for_each(|refusal| protocol::say!("controller: warning: {refusal}"));
     grants
 }
 
@@ -330,8 +330,8 @@ fn save(arguments: &RunArguments, inputs: &Inputs, run: FinishedRun) -> Result<E
         records_dropped: Some(finished.records_dropped),
         sensors_before_start: outcome.stopwatch.before_start,
         timing_dropped: outcome.stopwatch.dropped,
-        realtime_granted: grants.granted().to_vec(),
-        realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
+        realtime_granted: grants.granted.clone(),
+        realtime_refused: grants.refusals.iter().map(ToString::to_string).collect(),
         axes,
         news: written.reported,
     };

@@ -31,6 +31,7 @@ use realtime::{
     allocations,
 };
 use runlog::flight_dump::{self, Log};
+use runlog::process::Process;
 use runlog::run_folder::{RUN_JSON, SCHEMA_VERSION, clear_results, write_json};
 use runlog::summary::RunDescription;
 use runlog::timing_recorder::{Due, TimingSetup};
@@ -245,7 +246,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
         return Grants::default();
     }
     let grants = realtime::acquire(&Request::for_a_loop(arguments.fifo_priority, arguments.cpu));
-    grants.refusals().iter().for_each(|refusal| protocol::say!("emulator: warning: {refusal}"));
+    grants.refusals.iter().for_each(|refusal| protocol::say!("emulator: warning: {refusal}"));
     grants
 }
 
@@ -321,7 +322,7 @@ fn open_folder(
         faults: can_break(arguments),
         timing: started.unix_s.map(|started_unix_s| TimingSetup {
             folder: folder.into(),
-            process: PROCESS.into(),
+            process: Process::Emulator,
             due: Due::EveryPeriod,
             full_timing: arguments.full_timing,
             flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
@@ -386,8 +387,8 @@ fn describe(
         faults_toml: script.map(|script| script.toml.clone()),
         rig_setup: inputs.scene.clone(),
         sealed: inputs.sealed,
-        realtime_granted: grants.granted().to_vec(),
-        realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
+        realtime_granted: grants.granted.clone(),
+        realtime_refused: grants.refusals.iter().map(ToString::to_string).collect(),
         machine: Machine::read(env!("AIRBENCH_BUILD_COMMIT")),
     };
     let path = arguments.out.join(RUN_JSON);

@@ -47,8 +47,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     println!("compare: {}", cyclictest_for(request, config, cycles));
 
     let grants = acquire(request);
-    grants.granted().iter().for_each(|line| println!("granted: {line}"));
-    grants.refusals().iter().for_each(|refusal| println!("warning: {refusal}"));
+    grants.granted.iter().for_each(|line| println!("granted: {line}"));
+    grants.refusals.iter().for_each(|refusal| println!("warning: {refusal}"));
 
     let started = SystemTime::now().duration_since(UNIX_EPOCH)?;
     let clock = MonotonicClock;
@@ -72,9 +72,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if let Some(overrun) = stopped {
         println!("{overrun}");
     }
-    report(periodic.statistics());
+    report(&periodic.statistics);
     if let Some(path) = hlog {
-        let LoopStatistics { wakeup_ns, execution_ns, period_error_ns, .. } = periodic.statistics();
+        let LoopStatistics { wakeup_ns, execution_ns, period_error_ns, .. } = &periodic.statistics;
         let parts = [
             ("wakeup_ns", wakeup_ns.histogram()),
             ("execution_ns", execution_ns.histogram()),

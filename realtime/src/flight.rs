@@ -38,7 +38,6 @@
 //! assert_eq!(named, [Severity::Late { ns: 600_000 }]);
 //! ```
 
-use std::cmp::Ordering;
 use std::collections::VecDeque;
 use std::fmt;
 use std::io;
@@ -64,8 +63,8 @@ pub trait Stamped {
     fn at_ns(&self) -> u64;
 }
 
-/// What happened. Ordered: the greater, the more severe.
-#[derive(Clone, Copy, Debug)]
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// A cycle woke late.
     Late {
@@ -89,7 +88,7 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// Late and slow are one kind, whose length counts.
+    /// The greater, the more severe. Late and slow are one kind, whose length counts.
     fn rank(self) -> (u8, u64) {
         match self {
             Self::Late { ns } | Self::Slow { ns } => (0, ns),
@@ -97,27 +96,6 @@ impl Severity {
             Self::Fault => (2, 0),
             Self::Signal => (3, 0),
         }
-    }
-}
-
-/// Equal is what is equally severe, so that equality and order agree.
-impl PartialEq for Severity {
-    fn eq(&self, other: &Self) -> bool {
-        self.rank() == other.rank()
-    }
-}
-
-impl Eq for Severity {}
-
-impl PartialOrd for Severity {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Severity {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.rank().cmp(&other.rank())
     }
 }
 
@@ -225,7 +203,8 @@ pub struct FlightRecorder<R, F> {
     /// Windows that wait for their end, which follow one another.
     pending: VecDeque<Pending>,
     kept: Vec<Trigger>,
-    dropped: u64,
+    /// Dumps that were not kept, or that gave way to more severe ones.
+    pub dropped: u64,
 }
 
 impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
@@ -245,7 +224,7 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
         match self.pending.back_mut() {
             Some(pending) if trigger.at <= pending.to => {
                 pending.from = pending.from.min(from);
-                if trigger.severity > pending.trigger.severity {
+                if trigger.severity.rank() > pending.trigger.severity.rank() {
                     pending.trigger = trigger;
                 }
             }
@@ -261,7 +240,7 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
     pub fn will_keep(&self, severity: Severity) -> bool {
         let kept = self.kept.iter().map(|trigger| trigger.severity);
         let pending = self.pending.iter().map(|pending| pending.trigger.severity);
-        kept.chain(pending).filter(|other| *other >= severity).count() <= MOST_DUMPS
+        kept.chain(pending).filter(|other| other.rank() >= severity.rank()).count() <= MOST_DUMPS
     }
 
     /// Hands out each window that is over at `now`. Asked at each poll, after rows and frames were taken.
@@ -300,9 +279,9 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
         }
         self.dropped += 1;
         // Of equals the newest goes: what began a trouble tells more than its hundredth repetition.
-        let least = self.kept.iter().enumerate().rev().min_by_key(|(_, kept)| kept.severity);
+        let least = self.kept.iter().enumerate().rev().min_by_key(|(_, kept)| kept.severity.rank());
         match least.map(|(place, kept)| (place, kept.severity)) {
-            Some((place, severity)) if severity < trigger.severity => {
+            Some((place, severity)) if severity.rank() < trigger.severity.rank() => {
                 Room::InPlaceOf(self.kept.remove(place))
             }
             _ => Room::None,
@@ -313,12 +292,6 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
     #[must_use]
     pub fn dumps(&self) -> u64 {
         self.kept.len() as u64
-    }
-
-    /// Dumps that were not kept, or that gave way to more severe ones.
-    #[must_use]
-    pub fn dropped(&self) -> u64 {
-        self.dropped
     }
 }
 

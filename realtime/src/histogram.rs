@@ -39,7 +39,8 @@ const SIGNIFICANT_DIGITS: u8 = 3;
 #[derive(Clone)]
 pub struct Recorder {
     histogram: Histogram<u64>,
-    beyond_bound: u64,
+    /// How many samples were above [`BOUND_NS`] and stand in the last bin.
+    pub beyond_bound: u64,
 }
 
 impl Recorder {
@@ -64,11 +65,6 @@ impl Recorder {
         }
         // Clipped here too: the histogram's last bins reach beyond the bound that it was given.
         self.histogram.saturating_record_n(ns.min(BOUND_NS), n);
-    }
-
-    /// How many samples were above [`BOUND_NS`] and stand in the last bin.
-    pub fn beyond_bound(&self) -> u64 {
-        self.beyond_bound
     }
 
     /// The usual percentiles of all samples so far.
@@ -285,14 +281,14 @@ mod tests {
     fn values_beyond_the_bound_are_kept_at_the_bound_and_counted() {
         let mut recorder = Recorder::new();
         recorder.record(BOUND_NS);
-        assert_eq!(recorder.beyond_bound(), 0);
+        assert_eq!(recorder.beyond_bound, 0);
         recorder.record(BOUND_NS + 1);
         recorder.record_n(u64::MAX, 2);
-        assert_eq!(recorder.beyond_bound(), 3);
+        assert_eq!(recorder.beyond_bound, 3);
         assert_eq!(recorder.percentiles().count, 4);
         // 65 s lies beyond the bound and within the last bins of the histogram.
         recorder.record(65_000_000_000);
-        assert_eq!(recorder.beyond_bound(), 4);
+        assert_eq!(recorder.beyond_bound, 4);
         let at_bound = recorder.histogram().highest_equivalent(BOUND_NS);
         assert_eq!(recorder.percentiles().max, Some(at_bound));
     }
@@ -303,6 +299,6 @@ mod tests {
         recorder.record(u64::MAX);
         recorder.reset();
         assert_eq!(recorder.percentiles(), Recorder::new().percentiles());
-        assert_eq!(recorder.beyond_bound(), 0);
+        assert_eq!(recorder.beyond_bound, 0);
     }
 }

@@ -60,12 +60,6 @@ impl TaggedRecorder {
     pub fn percentiles(&self) -> Percentiles {
         self.whole.percentiles()
     }
-
-    /// Samples of the whole run, ns.
-    #[must_use]
-    pub fn whole(&self) -> &Recorder {
-        &self.whole
-    }
 }
 
 /// A log of which lines up to the last full second are in the file.

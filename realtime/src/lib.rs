@@ -42,7 +42,7 @@
 //!     // … the work of cycle.index …
 //!     periodic.end_of_work();
 //! }
-//! assert_eq!(periodic.statistics().wakeup_ns.percentiles().max, Some(0));
+//! assert_eq!(periodic.statistics.wakeup_ns.percentiles().max, Some(0));
 //! ```
 
 #![warn(missing_docs)] // an interface of other crates

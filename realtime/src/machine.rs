@@ -29,7 +29,7 @@ mod kernel;
 mod memory;
 mod processors;
 mod sharing;
-mod text;
+pub(crate) mod text;
 mod throttling;
 
 pub use build::{Build, BuildProfile};

@@ -184,7 +184,8 @@ pub struct LoopStatistics {
 /// Hands out one cycle at each deadline and keeps the account. Nothing allocates after `new`.
 #[derive(Debug)]
 pub struct PeriodicLoop<C: Clock> {
-    clock: C,
+    /// What the loop runs on.
+    pub clock: C,
     config: PeriodicConfig,
     period_ns: u64,
     start: Instant,
@@ -192,7 +193,8 @@ pub struct PeriodicLoop<C: Clock> {
     working: Option<Cycle>,
     previous_latency: Option<Duration>,
     stopped: Option<Overrun>,
-    statistics: LoopStatistics,
+    /// The account so far.
+    pub statistics: LoopStatistics,
 }
 
 impl<C: Clock> PeriodicLoop<C> {
@@ -261,21 +263,6 @@ impl<C: Clock> PeriodicLoop<C> {
             self.statistics.late_completions += 1;
         }
         Some(now)
-    }
-
-    /// The account so far.
-    pub fn statistics(&self) -> &LoopStatistics {
-        &self.statistics
-    }
-
-    /// Ends the loop and gives its account away.
-    pub fn into_statistics(self) -> LoopStatistics {
-        self.statistics
-    }
-
-    /// The clock that the loop runs on.
-    pub fn clock(&self) -> &C {
-        &self.clock
     }
 
     /// When cycle `index` is due. The re-arm rule, and the only place where it stands.

@@ -14,6 +14,7 @@
 //! `man 7 sched`, `man 2 mlockall`, `man 2 prctl` (`PR_SET_TIMERSLACK`), and in the kernel's tree
 //! `Documentation/power/pm_qos_interface.rst`.
 
+use crate::machine::text::stored_as_text;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::fs::{File, OpenOptions};
@@ -124,42 +125,20 @@ impl From<&str> for Grant {
     }
 }
 
-impl From<String> for Grant {
-    fn from(line: String) -> Self {
-        Self::from(line.as_str())
-    }
-}
-
-impl From<Grant> for String {
-    fn from(grant: Grant) -> Self {
-        grant.to_string()
-    }
-}
+stored_as_text!(Grant);
 
 /// What the system gave, and what it refused. Dropping it gives the DMA latency back; the rest stays.
 #[derive(Debug, Default)]
 pub struct Grants {
+    /// Keeps the CPUs out of deep sleep while it is open.
     dma_latency: Option<File>,
-    granted: Vec<Grant>,
-    refusals: Vec<Refusal>,
+    /// What was given, for the run's record.
+    pub granted: Vec<Grant>,
+    /// What was refused, to be shown to a person.
+    pub refusals: Vec<Refusal>,
 }
 
 impl Grants {
-    /// What was given, for the run's record.
-    pub fn granted(&self) -> &[Grant] {
-        &self.granted
-    }
-
-    /// What was refused, to be shown to a person.
-    pub fn refusals(&self) -> &[Refusal] {
-        &self.refusals
-    }
-
-    /// Whether the CPUs are being kept out of deep sleep.
-    pub fn holds_dma_latency(&self) -> bool {
-        self.dma_latency.is_some()
-    }
-
     fn note(&mut self, outcome: Result<Grant, Refusal>) {
         match outcome {
             Ok(grant) => self.granted.push(grant),
@@ -353,19 +332,21 @@ mod tests {
     #[test]
     fn nothing_asked_is_nothing_granted_and_nothing_refused() {
         let grants = acquire(&Request::default());
-        assert!(grants.granted().is_empty() && grants.refusals().is_empty() && !grants.holds_dma_latency());
+        assert!(grants.granted.is_empty() && grants.refusals.is_empty() && grants.dma_latency.is_none());
     }
 
     #[test]
     fn a_cpu_that_does_not_exist_is_refused_with_those_that_do() {
         for cpu in [10_000, usize::MAX] {
             let grants = acquire(&Request { cpu: Some(cpu), ..Request::default() });
-            let [refusal] = grants.refusals() else { panic!("one refusal, not {:?}", grants.refusals()) };
+            let [refusal] = grants.refusals.as_slice() else {
+                panic!("one refusal, not {:?}", grants.refusals)
+            };
             let line = refusal.to_string();
             let online = listed(&online_cpus());
             assert!(line.contains(&format!("CPU {cpu} does not exist, online are {online}; ")), "{line}");
             assert!(!refusal.remedy.is_empty() && !line.contains('\n'));
-            assert!(grants.granted().is_empty());
+            assert!(grants.granted.is_empty());
         }
     }
 
@@ -373,7 +354,9 @@ mod tests {
     fn a_priority_out_of_range_is_refused_with_the_range() {
         for priority in [0, 100, 255] {
             let grants = acquire(&Request { fifo_priority: Some(priority), ..Request::default() });
-            let [refusal] = grants.refusals() else { panic!("one refusal, not {:?}", grants.refusals()) };
+            let [refusal] = grants.refusals.as_slice() else {
+                panic!("one refusal, not {:?}", grants.refusals)
+            };
             let start = format!("no FIFO priority: {priority} is outside 1 to 99; ask for");
             assert!(refusal.to_string().starts_with(&start), "{refusal}");
         }
@@ -384,7 +367,7 @@ mod tests {
         let cpu = core_affinity::get_core_ids().expect("an affinity")[0].id;
         // On a thread of its own: the pin would stay on the test's.
         let granted = std::thread::spawn(move || {
-            acquire(&Request { cpu: Some(cpu), ..Request::default() }).granted().to_vec()
+            acquire(&Request { cpu: Some(cpu), ..Request::default() }).granted.clone()
         });
         let granted = granted.join().expect("no panic");
         assert_eq!(granted, [Grant::Cpu(cpu)]);
@@ -402,7 +385,7 @@ mod tests {
                 timer_slack: true,
             };
             let grants = acquire(&all);
-            (grants.granted().len(), grants.refusals().to_vec())
+            (grants.granted.len(), grants.refusals.clone())
         });
         let (granted, refusals) = outcome.join().expect("no panic");
         assert_eq!(granted + refusals.len(), 5);

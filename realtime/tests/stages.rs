@@ -45,7 +45,7 @@ fn run(
     let log = IntervalLog::create(&folder.join("emulator.hlog"), 1_763_600_000.0, Instant::from_nanos(0));
     account.log_to(log.expect("made"));
     while let Ok(cycle) = periodic.next_cycle() {
-        periodic.clock().advance(work(cycle.index));
+        periodic.clock.advance(work(cycle.index));
         let done = periodic.end_of_work().expect("a cycle");
         let row = CycleStages {
             cycle: cycle.index,
@@ -75,9 +75,9 @@ fn without_dropped_rows_the_log_adds_up_to_what_the_loop_counted() {
         cycle => Duration::from_nanos(100_000 + cycle * 17 % 9000),
     };
     let (periodic, mut account) = run(folder.path(), 3500, work);
-    let end = periodic.clock().now();
+    let end = periodic.clock.now();
     let figures = account.finish(end).expect("written");
-    let statistics = periodic.statistics();
+    let statistics = &periodic.statistics;
     assert_eq!(figures.wakeup_ns.count, statistics.cycles + statistics.skipped);
     let lines = lines(&folder.path().join("emulator.hlog"));
     assert_eq!(lines.len(), 7, "{:?}", lines.keys());
@@ -101,7 +101,7 @@ fn a_stall_of_fifty_milliseconds_leaves_fifty_samples_a_millisecond_apart() {
     let folder = tempfile::tempdir().expect("a folder");
     let work = |cycle| Duration::from_micros(if cycle == 100 { 51_000 } else { 10 });
     let (periodic, mut account) = run(folder.path(), 200, work);
-    account.finish(periodic.clock().now()).expect("written");
+    account.finish(periodic.clock.now()).expect("written");
     let lines = lines(&folder.path().join("emulator.hlog"));
     // The cycle that follows the stall is done 10 us after it woke, and with it those that it made good.
     for (tag, after_ns) in [("emulator-wakeup", 0), ("emulator-completion", 10_000)] {
@@ -134,7 +134,7 @@ fn each_second_has_its_own_line_and_its_own_maximum() {
     let folder = tempfile::tempdir().expect("a folder");
     let work = |cycle| Duration::from_micros(100 * (1 + cycle / 1000));
     let (periodic, mut account) = run(folder.path(), 2500, work);
-    account.finish(periodic.clock().now()).expect("written");
+    account.finish(periodic.clock.now()).expect("written");
     let lines = lines(&folder.path().join("emulator.hlog"));
     let execution = &lines["emulator-execution"];
     let starts: Vec<_> = execution.iter().map(|(start, ..)| *start).collect();

@@ -8,7 +8,7 @@
 //! ```
 
 use crate::candump::{self, FrameRecord};
-use crate::run_folder::{BUS_LOG, SCHEMA_VERSION, named, write_json};
+use crate::run_folder::{BUS_LOG, named, write_json};
 use crate::timing::{CycleTiming, write_head, write_row};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -19,10 +19,10 @@ use std::path::{Path, PathBuf};
 pub const FOLDER: &str = "flight";
 
 /// What happened, and when; as it stands in `event.json`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Event {
-    /// See [`SCHEMA_VERSION`].
+    /// See [`crate::run_folder::SCHEMA_VERSION`].
     pub schema_version: u32,
     /// Whose recorder: `emulator`, `controller`, `controller-drive`, `controller-load`.
     pub process: String,
@@ -134,23 +134,6 @@ fn write_file(
         out.flush()
     });
     written.map_err(|error| named(path, &error))
-}
-
-/// An event with the version of the files that describe it.
-impl Default for Event {
-    fn default() -> Self {
-        Self {
-            schema_version: SCHEMA_VERSION,
-            process: String::new(),
-            trigger: String::new(),
-            cycle: 0,
-            at_monotonic_ns: 0,
-            late_ns: 0,
-            slow_ns: 0,
-            window_from_ns: 0,
-            window_to_ns: 0,
-        }
-    }
 }
 
 #[cfg(test)]

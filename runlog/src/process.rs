@@ -61,24 +61,14 @@ impl Process {
     /// Log of its distributions.
     #[must_use]
     pub fn hlog(self) -> String {
-        hlog_of(self.name())
+        format!("{}{HLOG_END}", self.name())
     }
 
     /// Table of the stages of its cycles.
     #[must_use]
     pub fn timing(self) -> String {
-        timing_of(self.name())
+        format!("{}{TIMING_END}", self.name())
     }
-}
-
-/// [`Process::hlog`] by a name.
-pub(crate) fn hlog_of(process: &str) -> String {
-    format!("{process}{HLOG_END}")
-}
-
-/// [`Process::timing`] by a name.
-pub(crate) fn timing_of(process: &str) -> String {
-    format!("{process}{TIMING_END}")
 }
 
 #[cfg(test)]

@@ -11,16 +11,15 @@
 
 use crate::candump::FrameRecord;
 use crate::flight_dump::{self, Event, Log};
-use crate::process::{hlog_of, timing_of};
-use crate::run_folder::LineFile;
+use crate::process::Process;
+use crate::run_folder::{LineFile, SCHEMA_VERSION};
 use crate::timing::{self, CycleTiming};
 use protocol::frames::{Frame, MessageSpec};
 use protocol::periods::CYCLE;
 use realtime::flight::{Dump, Lateness, MOST_DUMPS, keep_first};
-use realtime::stages::Further;
 use realtime::{
-    ArrivalFigures, Arrivals, CycleStages, FlightRecorder, Instant, IntervalLog, Percentiles, Severity,
-    StageAccount, StageFigures, Stamped, Trigger, VitalTotals,
+    ArrivalFigures, Arrivals, CycleStages, FlightRecorder, Instant, IntervalLog, Severity, StageAccount,
+    StageFigures, Stamped, Trigger, VitalTotals,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -50,8 +49,8 @@ pub enum Due {
 pub struct TimingSetup {
     /// The run's folder.
     pub folder: PathBuf,
-    /// Name of the process in files and tags.
-    pub process: String,
+    /// Whose name its files and tags have.
+    pub process: Process,
     /// When its cycles are due.
     pub due: Due,
     /// Whether every row is written.
@@ -64,7 +63,7 @@ pub struct TimingSetup {
     pub started_unix_s: f64,
     /// The same moment on the monotonic clock.
     pub started: Instant,
-    /// Whether the lines of the `.hlog` are kept for [`TimingRecorder::new_lines`].
+    /// Whether the lines of the `.hlog` are kept for [`StageAccount::take_copy`].
     pub copies_lines: bool,
 }
 
@@ -121,10 +120,11 @@ type Ring = FlightRecorder<CycleTiming, FrameRecord>;
 /// Records the timing of a process.
 pub struct TimingRecorder {
     folder: PathBuf,
-    process: String,
+    process: Process,
     due: Due,
     log: Log,
-    account: StageAccount,
+    /// The histograms, to which further ones may be added.
+    pub account: StageAccount,
     table: Option<LineFile>,
     arrivals: BTreeMap<u16, Arrivals>,
     flight: Option<(Ring, Lateness)>,
@@ -155,12 +155,12 @@ impl TimingRecorder {
     /// What the system says, with the file's name.
     pub fn create(setup: TimingSetup) -> io::Result<Self> {
         let TimingSetup { folder, process, due, log, .. } = setup;
-        let mut account = StageAccount::new(&process, CYCLE);
-        let hlog = folder.join(hlog_of(&process));
+        let mut account = StageAccount::new(process.name(), CYCLE);
+        let hlog = folder.join(process.hlog());
         let hlog = IntervalLog::create(&hlog, setup.started_unix_s, setup.started)?;
         account.log_to(if setup.copies_lines { hlog.with_copy() } else { hlog });
         let table = setup.full_timing.then(|| {
-            let mut table = LineFile::create(&folder.join(timing_of(&process)))?;
+            let mut table = LineFile::create(&folder.join(process.timing()))?;
             timing::write_head(table.lines())?;
             Ok::<_, io::Error>(table)
         });
@@ -180,22 +180,6 @@ impl TimingRecorder {
             vitals: VitalTotals::default(),
             waiting: Vec::new(),
         })
-    }
-
-    /// Adds a histogram under a tag.
-    pub fn add(&mut self, tag: &str) -> Further {
-        self.account.add(tag)
-    }
-
-    /// Records a sample of an added histogram.
-    pub fn record_further(&mut self, further: Further, ns: u64) {
-        self.account.record_further(further, ns);
-    }
-
-    /// Percentiles of an added histogram.
-    #[must_use]
-    pub fn further(&self, further: Further) -> Percentiles {
-        self.account.further(further)
     }
 
     /// Records a cycle.
@@ -277,7 +261,7 @@ impl TimingRecorder {
         self.freeze(Trigger::other(Severity::Signal, self.newest.cycle, now));
         let Some((ring, _)) = &self.flight else { return };
         let folder = self.folder.join(flight_dump::FOLDER);
-        let (program, folder) = (self.process.split('-').next().unwrap_or_default(), folder.display());
+        let (program, folder) = (self.process.name().split('-').next().unwrap_or_default(), folder.display());
         if ring.will_keep(Severity::Signal) {
             eprintln!("{program}: asked for the last seconds; they go to {folder}");
         } else {
@@ -309,13 +293,8 @@ impl TimingRecorder {
     fn advance_flight(&mut self, now: Instant) -> io::Result<()> {
         let Self { flight: Some((ring, _)), folder, process, log, .. } = self else { return Ok(()) };
         let mut written = Ok(());
-        ring.advance(now, |dump| keep_first(&mut written, write_dump(&dump, folder, process, log)));
+        ring.advance(now, |dump| keep_first(&mut written, write_dump(&dump, folder, *process, log)));
         written
-    }
-
-    /// New lines of the `.hlog`.
-    pub fn new_lines(&mut self) -> Vec<u8> {
-        self.account.take_copy()
     }
 
     /// Writes the rows of the table out.
@@ -335,7 +314,7 @@ impl TimingRecorder {
         let mut written = self.account.finish(now).map(drop);
         keep_first(&mut written, self.write_out());
         let Self { flight: Some((ring, _)), folder, process, log, .. } = self else { return written };
-        ring.finish(|dump| keep_first(&mut written, write_dump(&dump, folder, process, log)));
+        ring.finish(|dump| keep_first(&mut written, write_dump(&dump, folder, *process, log)));
         written
     }
 
@@ -343,7 +322,7 @@ impl TimingRecorder {
     #[must_use]
     pub fn figures(&self) -> TimingFigures {
         let dumps =
-            |(ring, _): &(Ring, Lateness)| FlightFigures { dumps: ring.dumps(), dropped: ring.dropped() };
+            |(ring, _): &(Ring, Lateness)| FlightFigures { dumps: ring.dumps(), dropped: ring.dropped };
         TimingFigures {
             stages: self.account.figures(),
             arrivals: self.arrivals.values().map(Arrivals::figures).collect(),
@@ -372,16 +351,17 @@ fn arrivals_of(spec: &'static MessageSpec, period: Duration) -> Arrivals {
 fn write_dump(
     dump: &Dump<'_, CycleTiming, FrameRecord>,
     folder: &Path,
-    process: &str,
+    process: Process,
     log: &Log,
 ) -> io::Result<()> {
     if let Some(replaced) = dump.replaces {
-        let name = flight_dump::name(process, replaced.cycle, &replaced.severity.to_string());
+        let name = flight_dump::name(process.name(), replaced.cycle, &replaced.severity.to_string());
         flight_dump::remove(folder, &name)?;
     }
     let Trigger { severity, cycle, at, late_ns, slow_ns } = dump.trigger;
     let event = Event {
-        process: process.into(),
+        schema_version: SCHEMA_VERSION,
+        process: process.name().into(),
         trigger: severity.to_string(),
         cycle,
         at_monotonic_ns: at.as_nanos(),
@@ -389,7 +369,6 @@ fn write_dump(
         slow_ns,
         window_from_ns: dump.from.as_nanos(),
         window_to_ns: dump.to.as_nanos(),
-        ..Event::default()
     };
     flight_dump::write(folder, &event, dump.rows.iter().copied(), dump.frames.iter().copied(), log)
 }

@@ -5,7 +5,7 @@ use crossbeam_channel::Receiver;
 use realtime::flight::keep_first;
 use realtime::{Clock, Freeze, MonotonicClock};
 use runlog::candump::FrameRecord;
-use runlog::timing_recorder::{TimingFigures, TimingRecorder};
+use runlog::timing_recorder::TimingRecorder;
 use std::io;
 
 /// The receivers of the stopwatch, and the recorder of its samples.
@@ -48,19 +48,11 @@ impl TimingQueues {
         self.recorder.fault(cycle, MonotonicClock.now());
     }
 
-    pub(crate) fn write_out(&mut self) -> io::Result<()> {
-        self.recorder.write_out()
-    }
-
     /// Empties the queues a last time and writes everything.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         let mut written = self.empty();
         keep_first(&mut written, self.recorder.finish(MonotonicClock.now()));
         written
-    }
-
-    pub(crate) fn figures(&self) -> TimingFigures {
-        self.recorder.figures()
     }
 }
 

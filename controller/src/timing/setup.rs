@@ -49,7 +49,7 @@ pub(crate) fn begin(
     let interface = arguments.bus.interface().unwrap_or(EMBEDDED_INTERFACE);
     let recorder = TimingRecorder::create(TimingSetup {
         folder: arguments.files.out.clone(),
-        process: report::process(arguments.axis.list()).name().into(),
+        process: report::process(arguments.axis.list()),
         due: Due::OnArrival,
         full_timing: arguments.full_timing,
         flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),

@@ -89,7 +89,7 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
         send_last_ticks(&mut context, &mut inbox, cycles);
     }
     let cycle_zero_ns = start.as_nanos();
-    RunOutcome { end, cycles, cycle_zero_ns, statistics: Some(periodic.into_statistics()), allocations }
+    RunOutcome { end, cycles, cycle_zero_ns, statistics: Some(periodic.statistics), allocations }
 }
 
 fn length_ns(from: realtime::Instant, to: realtime::Instant) -> u64 {

@@ -48,8 +48,8 @@ pub(crate) struct RigTiming {
 impl RigTiming {
     pub(crate) fn create(setup: TimingSetup) -> io::Result<Self> {
         let mut recorder = TimingRecorder::create(setup)?;
-        let round_trip = Axis::ALL.map(|axis| recorder.add(&format!("{}-round-trip", axis.name())));
-        let command_age = Axis::ALL.map(|axis| recorder.add(&format!("{}-command-age", axis.name())));
+        let round_trip = Axis::ALL.map(|axis| recorder.account.add(&format!("{}-round-trip", axis.name())));
+        let command_age = Axis::ALL.map(|axis| recorder.account.add(&format!("{}-command-age", axis.name())));
         Ok(Self {
             recorder,
             round_trip,
@@ -78,7 +78,7 @@ impl RigTiming {
         self.record_trips(row.cycle);
         for (axis, cycle) in axes.iter().enumerate() {
             if let Some(ns) = cycle.age_ns(row.due_ns) {
-                self.recorder.record_further(self.command_age[axis], ns);
+                self.recorder.account.record_further(self.command_age[axis], ns);
             }
             if cycle.age_cycles > 0 {
                 let ages = if axis == 0 { &mut self.ages.drive } else { &mut self.ages.load };
@@ -96,7 +96,7 @@ impl RigTiming {
     /// Records the round trips up to this cycle.
     fn record_trips(&mut self, cycle: u64) {
         while let Some(RoundTrip { axis, ns, .. }) = self.trips.pop_front_if(|trip| trip.cycle <= cycle) {
-            self.recorder.record_further(self.round_trip[axis], ns);
+            self.recorder.account.record_further(self.round_trip[axis], ns);
         }
     }
 
@@ -127,7 +127,7 @@ impl RigTiming {
     pub(crate) fn finish(mut self, now: realtime::Instant) -> (RigTimingReport, io::Result<()>) {
         self.record_trips(u64::MAX);
         let written = self.recorder.finish(now);
-        let of = |further: [Further; 2]| further.map(|further| self.recorder.further(further));
+        let of = |further: [Further; 2]| further.map(|further| self.recorder.account.further(further));
         let report = RigTimingReport {
             timing: self.recorder.figures(),
             round_trip_ns: of(self.round_trip),

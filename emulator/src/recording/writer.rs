@@ -185,7 +185,7 @@ impl Writer {
     fn serve(&mut self) {
         let Some(telemetry) = &mut self.setup.telemetry else { return };
         if let Some(timing) = &mut self.timing {
-            telemetry.histograms(&timing.recorder.new_lines());
+            telemetry.histograms(&timing.recorder.account.take_copy());
         }
         telemetry.serve(&self.report.events, self.dropped_events);
     }

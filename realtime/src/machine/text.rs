@@ -26,7 +26,7 @@ macro_rules! stored_as_text {
     )+};
 }
 
-pub(super) use stored_as_text;
+pub(crate) use stored_as_text;
 
 #[cfg(test)]
 mod tests {

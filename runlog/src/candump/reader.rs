@@ -54,20 +54,15 @@ pub struct LogReader<R> {
     input: R,
     bytes: Vec<u8>,
     line: u64,
-    cut: Option<u64>,
+    /// The last line, when it is not whole; known at the end.
+    pub cut_line: Option<u64>,
     ended: bool,
 }
 
 impl<R: BufRead> LogReader<R> {
     /// A reader before the first line.
     pub fn new(input: R) -> Self {
-        Self { input, bytes: Vec::with_capacity(128), line: 0, cut: None, ended: false }
-    }
-
-    /// The last line, when it is not whole; known at the end.
-    #[must_use]
-    pub fn cut_line(&self) -> Option<u64> {
-        self.cut
+        Self { input, bytes: Vec::with_capacity(128), line: 0, cut_line: None, ended: false }
     }
 
     /// The next frame with its interface; the iterator leaves that out.
@@ -112,7 +107,7 @@ impl<R: BufRead> LogReader<R> {
         match problem {
             Some(_) if !whole => {
                 self.ended = true;
-                self.cut = Some(line);
+                self.cut_line = Some(line);
                 Ok(None)
             }
             Some((column, problem)) => Err(self.fails(column, problem)),
@@ -151,7 +146,7 @@ mod tests {
                 Err(wrong) => error = Some(wrong.to_string()),
             }
         }
-        (read, reader.cut_line(), error)
+        (read, reader.cut_line, error)
     }
 
     #[test]

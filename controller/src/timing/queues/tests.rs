@@ -6,8 +6,9 @@ use protocol::can::CanFrame;
 use protocol::frames::{Frame, Sensors, Tick};
 use realtime::{Instant, VitalCounts};
 use runlog::flight_dump::{self, Log};
+use runlog::process::Process;
 use runlog::timing::{self, CycleTiming};
-use runlog::timing_recorder::{Due, FlightFigures, TimingSetup};
+use runlog::timing_recorder::{Due, FlightFigures, TimingFigures, TimingSetup};
 use std::fs;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -30,7 +31,7 @@ impl Bench {
         let started = MonotonicClock.now();
         let recorder = TimingRecorder::create(TimingSetup {
             folder: run.path().into(),
-            process: "controller".into(),
+            process: Process::Controller,
             due: Due::OnArrival,
             full_timing,
             flight_late: Some(Duration::from_micros(500)),
@@ -75,7 +76,7 @@ fn each_row_and_each_wait_is_a_sample() {
     // Nobody answers after these.
     bench.measured.send(TimingSample::Waited { arrived_ns: 1000, woke_ns: 91_000 }).unwrap();
     bench.queues.finish().unwrap();
-    let TimingFigures { stages, flight, .. } = bench.queues.figures();
+    let TimingFigures { stages, flight, .. } = bench.queues.recorder.figures();
     assert_eq!((stages.wakeup_ns.count, stages.execution_ns.count, stages.completion_ns.count), (3, 2, 3));
     let about = |value: Option<u64>, exact: u64| value.is_some_and(|ns| ns.abs_diff(exact) <= exact / 500);
     assert!(about(stages.wakeup_ns.max, 90_000), "{stages:?}");
@@ -103,7 +104,7 @@ fn sensors_that_were_overtaken_are_answered_when_the_row_after_them_is_done() {
     }
     bench.tell(row);
     bench.queues.finish().unwrap();
-    let TimingFigures { stages, .. } = bench.queues.figures();
+    let TimingFigures { stages, .. } = bench.queues.recorder.figures();
     assert_eq!((stages.wakeup_ns.count, stages.completion_ns.count), (50, 50));
     assert!(stages.completion_ns.max >= stages.wakeup_ns.max, "{stages:?}");
     let completion_ns = 50 * MS + 60_000;
@@ -193,7 +194,7 @@ fn cyclic_frames_that_came_have_an_account_and_sent_and_broken_ones_have_none() 
         bench.frames.send(StampedFrame { stamp_ns: ms * MS, frame, sent }).unwrap();
     }
     bench.queues.poll().unwrap();
-    let arrivals = bench.queues.figures().arrivals;
+    let arrivals = bench.queues.recorder.figures().arrivals;
     let of = |name: &str| arrivals.iter().find(|arrivals| arrivals.frame == name).unwrap();
     assert_eq!((of("DriveSensors").count, of("DriveSensors").gaps), (3, 1));
     assert_eq!(
@@ -212,7 +213,7 @@ fn vitals_count_after_the_first_second() {
         bench.tell(CycleTiming { vitals, ..bench.row(cycle, 0, 0) });
     }
     bench.queues.poll().unwrap();
-    let counted = bench.queues.figures().vitals;
+    let counted = bench.queues.recorder.figures().vitals;
     assert_eq!((counted.minor_faults, counted.continued), (2, 4));
 }
 

@@ -17,7 +17,7 @@ const MS: u64 = 1_000_000;
 fn rig_timing(folder: &Path, full_timing: bool) -> RigTiming {
     let setup = TimingSetup {
         folder: folder.into(),
-        process: PROCESS.into(),
+        process: Process::Emulator,
         due: Due::EveryPeriod,
         full_timing,
         flight_late: Some(Duration::from_micros(500)),
