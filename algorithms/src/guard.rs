@@ -85,6 +85,7 @@ pub struct Guarded {
     clock: Option<Box<dyn Clock + Send>>,
     /// Successive steps over [`LONGEST_EACH`].
     slow: u32,
+    /// The fault since which the algorithm is not asked any more; `None` before one.
     fault: Option<AlgorithmFault>,
 }
 
@@ -93,12 +94,6 @@ impl Guarded {
     #[must_use]
     pub fn new(algorithm: Box<dyn Algorithm>, clock: Option<Box<dyn Clock + Send>>) -> Self {
         Self { algorithm, clock, slow: 0, fault: None }
-    }
-
-    /// The fault since which the algorithm is not asked any more; `None` before one.
-    #[must_use]
-    pub fn fault(&self) -> Option<AlgorithmFault> {
-        self.fault
     }
 
     /// Takes the fault away: for the chain's restart and nobody else. A [`Guarded::reset`] follows before the next step.
@@ -239,7 +234,7 @@ mod tests {
             );
             assert_eq!(bench.calls(), 2);
             bench.guarded.restart();
-            assert_eq!((bench.guarded.fault(), bench.step(0.2, 0.0)), (None, Ok(0.2)));
+            assert_eq!((bench.guarded.fault, bench.step(0.2, 0.0)), (None, Ok(0.2)));
         }
     }
 

@@ -8,6 +8,14 @@ use proptest::test_runner::TestRunner;
 /// A result beyond this is out of proportion to any rig, m/s; P may reach 200 1/s * 0.5 m + 2 * 1 m/s.
 const BOUND_M_PER_S: f64 = 102.0;
 
+/// At rest where it should be, 0.2 m out.
+pub(super) fn at_rest() -> Ready {
+    let (position_m, set_position_m) = (0.2, 0.2);
+    let (pressure_a_pa, pressure_b_pa, supply_pressure_pa) = (3.1e5, 3.5e5, 7e5);
+    let air = Ready { pressure_a_pa, pressure_b_pa, supply_pressure_pa, ..Ready::default() };
+    Ready { period_s: 1e-3, position_m, set_position_m, ..air }
+}
+
 /// Anything that a rig of half a metre can be in.
 fn any_ready() -> impl Strategy<Value = Ready> {
     let position = (0.0..0.5_f64, -1.0..1.0_f64, -50.0..50.0_f64);

@@ -231,12 +231,8 @@ impl Chambers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laws::at_rest;
     use proptest::prelude::*;
-
-    fn at_rest() -> Ready {
-        let (pressure_a_pa, pressure_b_pa, supply_pressure_pa) = (3.1e5, 3.5e5, 7e5);
-        Ready { position_m: 0.2, pressure_a_pa, pressure_b_pa, supply_pressure_pa, ..Ready::default() }
-    }
 
     #[test]
     fn full_opening_is_the_choked_exhausts_velocity() {

@@ -79,14 +79,7 @@ impl ControlLaw for PositionPid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::{self, Stuck};
-
-    fn at_rest() -> Ready {
-        let (position_m, set_position_m) = (0.2, 0.2);
-        let (pressure_a_pa, pressure_b_pa, supply_pressure_pa) = (3.1e5, 3.5e5, 7e5);
-        let air = Ready { pressure_a_pa, pressure_b_pa, supply_pressure_pa, ..Ready::default() };
-        Ready { period_s: 1e-3, position_m, set_position_m, ..air }
-    }
+    use crate::laws::{self, Stuck, at_rest};
 
     #[test]
     fn its_parts_add_up() {

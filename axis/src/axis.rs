@@ -173,7 +173,7 @@ impl AxisController {
 
     fn measurement(&self, sensors: &Sensors) -> AxisMeasurement {
         let error = match &self.asked {
-            Some(Asked { demand, hand: Hand::User }) => self.work.error(demand, self.program.ready()),
+            Some(Asked { demand, hand: Hand::User }) => self.work.error(demand, &self.program.ready),
             _ => ControlError::None,
         };
         AxisMeasurement { position_m: sensors.position_m - self.program.geometry().offset_m, error }

@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         Some(config) => open_xcp(arguments, &inputs, config, &controllers, &change_sender)?,
         None => (Vec::new(), None),
     };
-    let port_of = |axis| Some(ports.swap_remove(ports.iter().position(|port: &Port| port.axis() == axis)?));
+    let port_of = |axis| Some(ports.swap_remove(ports.iter().position(|port: &Port| port.axis == axis)?));
     let node = ControllerNode::with_ports(controllers, outlets, port_of);
     let reloader = arguments.watch.then(|| Reloader::new(&inputs, axes, change_sender));
     let started = RunStart::now();

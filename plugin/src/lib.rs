@@ -55,15 +55,8 @@ pub struct Description {
 
 /// An algorithm of a shared library.
 pub struct Plugin {
-    description: Description,
+    pub description: Description,
     instance: foreign::Instance,
-}
-
-impl Plugin {
-    #[must_use]
-    pub fn description(&self) -> &Description {
-        &self.description
-    }
 }
 
 impl Algorithm for Plugin {
@@ -85,9 +78,7 @@ pub fn load(path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
 /// [`load`] with a trier that is named.
 pub fn load_tried_by(trier: &TrialRunner, path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
     let made = || {
-        let file = absolute(path)?;
-        trier.try_out(&file)?;
-        let offer = foreign::open(&file, &mut |_| ())?;
+        let offer = tried_out(trier, path)?;
         let instance = foreign::Instance::create(&offer, &rig.into())?;
         Ok(Plugin { description: offer.description, instance })
     };
@@ -96,12 +87,14 @@ pub fn load_tried_by(trier: &TrialRunner, path: &Path, rig: &RigParameters) -> R
 
 /// What the library of `path` offers, after a trial in a child process.
 pub fn describe(trier: &TrialRunner, path: &Path) -> Result<Description, PluginError> {
-    let reported = || {
-        let file = absolute(path)?;
-        trier.try_out(&file)?;
-        Ok(foreign::open(&file, &mut |_| ())?.description)
-    };
-    reported().map_err(|wrong| PluginError { library: path.to_owned(), wrong })
+    let offer = tried_out(trier, path).map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
+    Ok(offer.description)
+}
+
+fn tried_out(trier: &TrialRunner, path: &Path) -> Result<foreign::Offer, Wrong> {
+    let file = absolute(path)?;
+    trier.try_out(&file)?;
+    foreign::open(&file, &mut |_| ())
 }
 
 /// The trial itself, in this process: opens, asks and runs the library with the shipped rig's numbers, every parameter

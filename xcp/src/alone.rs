@@ -3,7 +3,7 @@
 use crate::a2l::{self, AxisDescription};
 use crate::image::{Image, ParameterActions};
 use crate::lock::Lock;
-use crate::slave::{Slave, SlaveParts};
+use crate::slave::Slave;
 use axis_control::program::file::Source;
 use nominal::{Axis, RigParameters};
 
@@ -32,10 +32,6 @@ pub fn slave(secret: Option<&[u8]>) -> Slave {
     let described =
         AxisDescription { axis: Axis::Drive, title: &source.title, variables: program.variables() };
     let description = a2l::description(&described).unwrap_or_else(|error| panic!("{error}"));
-    Slave::new(SlaveParts {
-        image: Image::new(description.bytes, program.variables().to_vec(), program.values()),
-        texts: description.texts,
-        lock: Lock::new(secret.map(<[u8]>::to_vec), [0; 16]),
-        daq_per_cycle: 1,
-    })
+    let image = Image::new(description.bytes, program.variables().to_vec(), program.values());
+    Slave::new(image, description.texts, Lock::new(secret.map(<[u8]>::to_vec), [0; 16]), 1)
 }

@@ -43,13 +43,12 @@ impl XcpConfig {
         match option {
             None => Ok(None),
             Some(None) => Ok(Some(Self::default())),
-            Some(Some(path)) => Self::read(path).map(Some),
+            Some(Some(path)) => {
+                let text = std::fs::read_to_string(path);
+                let text = text.map_err(|error| SettingsError::unreadable(path, &error))?;
+                Self::from_toml(&text, path).map(Some)
+            }
         }
-    }
-
-    fn read(path: &Path) -> Result<Self, SettingsError> {
-        let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
-        Self::from_toml(&text, path)
     }
 
     /// The configuration in a text; `file` names it in messages.

@@ -69,12 +69,13 @@ struct PartialValue {
 /// Description, parameters, controls, signals and trigger buffer of an axis under their addresses.
 #[derive(Clone)]
 pub struct Image {
-    description: Vec<u8>,
+    pub(crate) description: Vec<u8>,
     variables: Vec<Variable>,
-    parameters: Vec<f64>,
+    /// Values of the parameters, in the order of the variables.
+    pub parameters: Vec<f64>,
     controls: [f64; CONTROLS.len()],
     signals: [f64; COUNT],
-    trace: Trace,
+    pub(crate) trace: Trace,
     partial: Option<PartialValue>,
 }
 
@@ -97,20 +98,6 @@ impl Image {
         self.signals = *signals;
         self.parameters.copy_from_slice(parameters);
         self.trace.take(cycle, signals);
-    }
-
-    pub(crate) fn restart(&mut self) {
-        self.trace.restart();
-    }
-
-    /// Values of the parameters, in the order of the variables.
-    pub fn parameters(&self) -> &[f64] {
-        &self.parameters
-    }
-
-    #[cfg(test)]
-    pub(crate) fn description(&self) -> &[u8] {
-        &self.description
     }
 
     /// Discards the first bytes of a value that is not complete.
@@ -451,7 +438,7 @@ pub(super) mod tests {
             let (mut image, mut notes) = (image(), Notes::default());
             assert_eq!(image.write(PARAMETERS, &bytes(values), &mut notes), Err(refusal), "{values:?}");
             assert!(notes.set.is_empty(), "{values:?}");
-            assert_eq!(image.parameters(), [25.0, 1.0, 15.0]);
+            assert_eq!(image.parameters, [25.0, 1.0, 15.0]);
         }
         let (mut image, mut notes) = (image(), Notes::default());
         image.write(PARAMETERS, &bytes([30.0, 2.0, 15.0]), &mut notes).unwrap();

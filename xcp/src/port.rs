@@ -12,7 +12,7 @@ use crate::lock::Lock;
 use crate::packet::{BYTES, Packet};
 use crate::parameter_files::{Note, ParameterCopy};
 use crate::signals::{self, View};
-use crate::slave::{Slave, SlaveCounters, SlaveParts};
+use crate::slave::{Slave, SlaveCounters};
 use axis_control::axis::AxisController;
 use axis_control::node::CalibrationPort;
 use axis_control::program::Program;
@@ -98,7 +98,8 @@ impl ParameterActions for ProgramActions<'_> {
 
 /// An XCP slave with its two identifiers on the bus and its queues to the worker for files.
 pub struct Port {
-    axis: Axis,
+    /// The axis of its controller.
+    pub axis: Axis,
     command_id: u16,
     response_id: u16,
     slave: Slave,
@@ -129,12 +130,9 @@ impl Port {
         let a2l::Description { bytes, texts } =
             a2l::description(&AxisDescription { axis, title, variables })?;
         let (command_id, response_id) = identifiers(axis);
-        let slave = Slave::new(SlaveParts {
-            image: Image::new(bytes, variables.to_vec(), program.values()),
-            texts,
-            lock: Lock::new(config.key.clone(), random),
-            daq_per_cycle: config.daq_packets_per_cycle,
-        });
+        let image = Image::new(bytes, variables.to_vec(), program.values());
+        let lock = Lock::new(config.key.clone(), random);
+        let slave = Slave::new(image, texts, lock, config.daq_packets_per_cycle);
         Ok(Self {
             axis,
             command_id,
@@ -149,21 +147,16 @@ impl Port {
         })
     }
 
-    /// The axis of its controller.
-    pub fn axis(&self) -> Axis {
-        self.axis
-    }
-
     /// What it counted since the start.
     pub fn counters(&self) -> PortCounters {
         let daq_dropped = self.counters.daq_dropped + self.slave.daq.dropped;
-        PortCounters { slave: *self.slave.counters(), daq_dropped, ..self.counters }
+        PortCounters { slave: self.slave.counters, daq_dropped, ..self.counters }
     }
 
     /// Reports right and wrong keys since `before`.
     fn report_keys(&mut self, before: &SlaveCounters) {
         let (axis, cycle) = (self.axis, self.cycle);
-        let after = self.slave.counters();
+        let after = &self.slave.counters;
         if after.unlocked > before.unlocked {
             let _ = self.queues.notes.try_send(Note::Unlocked { axis, cycle });
         }
@@ -199,7 +192,7 @@ impl CalibrationPort for Port {
     }
 
     fn restart(&mut self) {
-        self.slave.restart();
+        self.slave.image.trace.restart();
     }
 
     fn observe(
@@ -210,7 +203,7 @@ impl CalibrationPort for Port {
         command: &ValveCommand,
     ) {
         let record = controller.record(cycle, sensors, command);
-        let signals = signals::sample(&View { ready: controller.program.ready(), sensors, record });
+        let signals = signals::sample(&View { ready: &controller.program.ready, sensors, record });
         self.slave.cycle(cycle, &signals, controller.program.values());
         self.cycle = cycle;
         self.daq_budget = self.slave.daq.per_cycle;
@@ -224,7 +217,7 @@ impl CalibrationPort for Port {
         }
         for _ in 0..COMMANDS {
             let Some(frame) = self.inbox.pop_front() else { break };
-            let before = *self.slave.counters();
+            let before = self.slave.counters;
             let mut act = ProgramActions {
                 axis: self.axis,
                 cycle: self.cycle,

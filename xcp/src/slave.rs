@@ -58,14 +58,6 @@ pub(crate) struct Texts {
     pub event: (u32, u32),
 }
 
-pub(crate) struct SlaveParts {
-    pub image: Image,
-    pub texts: Texts,
-    pub lock: Lock,
-    /// DAQ packets that may be sent in a cycle.
-    pub daq_per_cycle: u32,
-}
-
 /// What a slave counted since the start of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub(crate) struct SlaveCounters {
@@ -91,7 +83,8 @@ struct Block {
 /// A slave: session, lock, DAQ lists and image.
 #[derive(Clone)]
 pub struct Slave {
-    image: Image,
+    /// The memory that clients see.
+    pub image: Image,
     texts: Texts,
     lock: Lock,
     pub(crate) daq: Daq,
@@ -101,13 +94,12 @@ pub struct Slave {
     /// Where the next transfer begins; `None` until it is set.
     address: Option<u32>,
     block: Block,
-    counters: SlaveCounters,
+    pub(crate) counters: SlaveCounters,
 }
 
 impl Slave {
-    /// A slave without a session.
-    pub(crate) fn new(parts: SlaveParts) -> Self {
-        let SlaveParts { image, texts, lock, daq_per_cycle } = parts;
+    /// A slave without a session, which may send so many DAQ packets in a cycle.
+    pub(crate) fn new(image: Image, texts: Texts, lock: Lock, daq_per_cycle: u32) -> Self {
         Self {
             image,
             texts,
@@ -122,18 +114,9 @@ impl Slave {
         }
     }
 
-    /// The memory that clients see.
-    pub fn image(&self) -> &Image {
-        &self.image
-    }
-
     /// Whether the session may write.
     pub fn is_unlocked(&self) -> bool {
-        self.lock.is_open()
-    }
-
-    pub(crate) fn counters(&self) -> &SlaveCounters {
-        &self.counters
+        self.lock.open
     }
 
     /// Ends a cycle of the rig: takes its signals, in the order of their table, and the current parameters, in the order of the
@@ -146,10 +129,6 @@ impl Slave {
             self.lock.shut();
         }
         self.daq.cycle(cycle, &self.image);
-    }
-
-    pub(crate) fn restart(&mut self) {
-        self.image.restart();
     }
 
     /// The next DAQ packet to send; `None` when none waits.
@@ -271,7 +250,7 @@ impl Slave {
 
     /// Resources that need a key.
     fn protected(&self) -> u8 {
-        if self.lock.is_open() { 0 } else { CALIBRATION }
+        if self.lock.open { 0 } else { CALIBRATION }
     }
 
     fn identify(&mut self, kind: u8) -> Packet {
@@ -291,7 +270,7 @@ impl Slave {
             return Err(Refusal::OutOfRange);
         }
         self.check_unlocked()?;
-        if self.storing || !actions.store(self.image.parameters()) {
+        if self.storing || !actions.store(&self.image.parameters) {
             return Err(Refusal::Busy);
         }
         self.storing = true;
@@ -299,7 +278,7 @@ impl Slave {
     }
 
     fn check_unlocked(&self) -> Result<(), Refusal> {
-        if self.lock.is_open() { Ok(()) } else { Err(Refusal::AccessLocked) }
+        if self.lock.open { Ok(()) } else { Err(Refusal::AccessLocked) }
     }
 
     fn seed(&mut self, fields: Fields<'_>) -> Result<Packet, Refusal> {

@@ -247,12 +247,9 @@ impl Trace {
 
     /// Samples that can be read: none before the trigger.
     pub(crate) fn samples(&self) -> usize {
-        if self.trigger_cycle_known() { self.held } else { 0 }
-    }
-
-    fn trigger_cycle_known(&self) -> bool {
-        matches!(self.state, State::Triggered | State::Ready)
-            || self.state == State::Idle && self.trigger_cycle != 0
+        let triggered = matches!(self.state, State::Triggered | State::Ready)
+            || self.state == State::Idle && self.trigger_cycle != 0;
+        if triggered { self.held } else { 0 }
     }
 
     /// Cycle of sample `number`, the oldest being 0; 0 for one that is not there.

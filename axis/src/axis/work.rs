@@ -207,7 +207,7 @@ impl Pressing {
         self.fault = self.fault.or(self.not_linked(output.state, linked));
         let matching = asked != ForceAsked::Idle && self.preparing(output.phase) == Some(Prepare::Match);
         self.advance_matching(matching, linked, seen, program);
-        let ready = *program.ready();
+        let ready = program.ready;
         let chain = self.force.advance(
             &ForceInputs {
                 cycle: seen.cycle,
@@ -285,7 +285,7 @@ impl Pressing {
     }
 
     fn set_point(&mut self, phase: Phase, program: &Program) -> ForceSetPoint {
-        let initial_n = self.plan.source.profile().initial_force_n();
+        let initial_n = self.plan.source.profile.initial_force_n();
         match phase {
             Phase::RampForce { elapsed_s } => {
                 SmoothWay::new(0.0, initial_n, self.plan.initial_ramp_s).at(elapsed_s).into()

@@ -176,7 +176,7 @@ impl Reader<'_> {
             (None, Some(library)) => {
                 let plugin = plugin::load(&section.beside(&library.text), self.rig)
                     .map_err(|error| section.wrong_at("library", &format!("library: {error}")))?;
-                let description = plugin.description().clone();
+                let description = plugin.description.clone();
                 (Box::new(plugin), description.controls, description.parameters)
             }
             _ => {

@@ -88,7 +88,7 @@ fn at(program: &mut Program, cycle: u64, position_m: f64) -> (f64, f64) {
     let sensors = Sensors { position_m, force_n: 50.0, ..Sensors::default() };
     program.observe(cycle, &sensors, 7e5);
     let _ = program.control(cycle, &demand(), Hand::User).unwrap();
-    (program.ready().velocity_m_per_s, program.wanted_m_per_s(Hand::User))
+    (program.ready.velocity_m_per_s, program.wanted_m_per_s(Hand::User))
 }
 
 #[test]

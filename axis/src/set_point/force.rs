@@ -114,7 +114,7 @@ struct Memory {
 /// A profile being driven; asked once a cycle, with time that does not go back.
 #[derive(Clone, Debug)]
 pub struct ForceSource {
-    profile: Arc<ForceProfile>,
+    pub(crate) profile: Arc<ForceProfile>,
     memory: Memory,
 }
 
@@ -125,10 +125,6 @@ impl ForceSource {
 
     pub fn reset(&mut self) {
         self.memory = Memory::default();
-    }
-
-    pub fn profile(&self) -> &ForceProfile {
-        &self.profile
     }
 
     /// The set-point `time_s` after the start: the initial force before it, [`Self::end`] from the end on.

@@ -15,7 +15,7 @@ fn example() -> Plugin {
 }
 
 fn defaults(plugin: &Plugin) -> Vec<f64> {
-    plugin.description().parameters.iter().map(|parameter| parameter.default).collect()
+    plugin.description.parameters.iter().map(|parameter| parameter.default).collect()
 }
 
 /// Positions of the unlinked drive after each ms of 5 s with its set-point at `target_m`, from 0.1 m, under the example.
@@ -49,7 +49,7 @@ fn drive_to(target_m: f64, change: impl Fn(&mut [f64])) -> Vec<f64> {
 #[test]
 fn the_description_is_the_table_of_the_c_file() {
     let plugin = example();
-    let description = plugin.description();
+    let description = &plugin.description;
     assert_eq!((description.name.as_str(), description.controls), ("position-pi", Quantity::Position));
     let names: Vec<_> = description.parameters.iter().map(|parameter| parameter.name.as_ref()).collect();
     assert_eq!(
@@ -129,7 +129,7 @@ fn the_example_in_rust_gives_the_same_bits_and_is_the_text_of_the_document() {
     laws::check(&KIND);
     let mut in_c = example();
     let values = defaults(&in_c);
-    assert_eq!(in_c.description().parameters, KIND.parameters, "the tables");
+    assert_eq!(in_c.description.parameters, KIND.parameters, "the tables");
     let mut in_rust = (KIND.make)(&RigParameters::baseline());
     let mut ready = Ready { period_s: 0.001, ..Ready::default() };
     in_rust.reset(&ready, &values);

@@ -67,13 +67,13 @@ fn the_identification_is_another_when_a_table_is() {
 #[test]
 fn the_slave_hands_out_what_the_file_says_of_it() {
     let slave = alone::slave(None);
-    let description = slave.image().description();
+    let description = &slave.image.description;
     let file = String::from_utf8(description.to_vec()).unwrap();
     let module = read(&file[file.find("ASAP2_VERSION").unwrap()..]);
     let about = module.mod_par.unwrap();
     let address = about.addr_epk[0].address;
     let epk = about.epk.unwrap().identifier;
     let mut bytes = vec![0; epk.len()];
-    slave.image().read(address, &mut bytes).unwrap();
+    slave.image.read(address, &mut bytes).unwrap();
     assert_eq!(bytes, epk.as_bytes());
 }

@@ -19,7 +19,7 @@ impl Talk {
     fn new() -> Self {
         let texts = Texts { a2l: (0, 11), file: (1, 2), epk: (3, 4), event: (5, 6) };
         let lock = Lock::new(Some(SECRET.to_vec()), [9; 16]);
-        let slave = Slave::new(SlaveParts { image: image(), texts, lock, daq_per_cycle: 1 });
+        let slave = Slave::new(image(), texts, lock, 1);
         Self { slave, notes: Notes::default() }
     }
 
@@ -144,7 +144,7 @@ fn a_wrong_key_ends_the_session_and_measuring_needs_none() {
     assert_eq!(talk.say(&[0xFD]), None, "the session is over");
     talk.good(&[0xFF, 0]);
     talk.refused(&[0xF8, 0, 1], Refusal::AccessDenied);
-    assert_eq!(talk.slave.counters().wrong_keys, 1);
+    assert_eq!(talk.slave.counters.wrong_keys, 1);
 }
 
 #[test]
@@ -300,12 +300,12 @@ proptest! {
             if let Some(answer) = talk.say(packet) {
                 prop_assert!(answer[0] >= ERROR);
             }
-            let parameters: [f64; 3] = talk.slave.image().parameters().try_into().unwrap();
+            let parameters: [f64; 3] = talk.slave.image.parameters.as_slice().try_into().unwrap();
             talk.slave.cycle(cycle, &[cycle as f64; COUNT], &parameters);
             let _ = talk.slave.next_daq();
         }
         prop_assert!(unlocked || talk.notes.set.is_empty());
-        let [gain, every, timeout]: [f64; 3] = talk.slave.image().parameters().try_into().unwrap();
+        let [gain, every, timeout]: [f64; 3] = talk.slave.image.parameters.as_slice().try_into().unwrap();
         prop_assert!((0.0..=200.0).contains(&gain) && (1.0..=1000.0).contains(&every) && every.fract() == 0.0);
         prop_assert_eq!(timeout, 15.0, "it is read at the start only");
     }

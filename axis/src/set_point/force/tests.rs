@@ -29,7 +29,7 @@ fn a_row_of_forces_begins_with_the_initial_force_and_goes_on_where_it_stood() {
     assert_eq!([force_n(-1.0), force_n(0.5), force_n(2.0), force_n(3.0)], [100.0, 100.0, 200.0, 50.0]);
     assert_eq!([force_n(4.5), force_n(5.0)], [80.0, 80.0]);
     assert_eq!(source.at(2.0, &at(0.2)).rate_n_per_s, 100.0);
-    assert_eq!((source.profile().duration_s(), source.end()), (5.0, ForceSetPoint::at_rest(80.0)));
+    assert_eq!((source.profile.duration_s(), source.end()), (5.0, ForceSetPoint::at_rest(80.0)));
 }
 
 #[test]
