@@ -321,7 +321,7 @@ impl EmulatorNode {
 
     /// Whether any valve command was accepted.
     pub(crate) fn controller_received(&self) -> bool {
-        self.node.commands().iter().any(|intake| intake.counters().accepted > 0)
+        self.node.commands().iter().any(|intake| intake.counters.accepted > 0)
     }
 
     pub(crate) fn skipped(&self) -> u64 {
@@ -332,7 +332,7 @@ impl EmulatorNode {
     pub(crate) fn into_figures(self) -> NodeFigures {
         NodeFigures {
             frames: self.frames,
-            commands: self.node.commands().each_ref().map(|intake| *intake.counters()),
+            commands: self.node.commands().each_ref().map(|intake| intake.counters),
             skipped: self.node.skipped(),
             records_dropped: self.recorder.dropped,
         }

@@ -187,10 +187,10 @@ pub trait Bus: Send {
 pub fn open(url: &BusUrl, clock: StampClock) -> Result<Box<dyn Bus>, BusError> {
     match url {
         BusUrl::Can { interface } => {
-            Ok(Box::new(socket_peer::SocketPeer::open(can_link::CanLink::new(interface), url, clock)?))
+            Ok(Box::new(socket_peer::SocketPeer::open(can_link::CanLink(interface.clone()), url, clock)?))
         }
         BusUrl::Unix { path, .. } => {
-            Ok(Box::new(socket_peer::SocketPeer::lazy(unix_link::UnixLink::new(path), url, clock)))
+            Ok(Box::new(socket_peer::SocketPeer::lazy(unix_link::UnixLink(path.clone()), url, clock)))
         }
     }
 }

@@ -57,9 +57,11 @@ pub struct CommandIntake {
     last: Option<ValveCommand>,
     /// An accepted command was there, and grew stale.
     expired: bool,
-    disputed: bool,
+    /// Whether the valve is shut because two senders dispute it.
+    pub disputed: bool,
     refused_since_accepted: u64,
-    counters: CommandCounters,
+    /// Counters since the start.
+    pub counters: CommandCounters,
 }
 
 impl CommandIntake {
@@ -72,7 +74,7 @@ impl CommandIntake {
         };
         self.counters.late += u64::from(age > 1);
         self.counters.duplicate += u64::from(self.last.replace(command) == Some(command));
-        match self.sources.note(command.alive, live.count(), live.count() - age) {
+        match self.sources.note(command.alive, live.sent, live.sent - age) {
             // A refused frame leaves a gap in the counters of those accepted, but it came.
             Step::Continues { lost } => {
                 self.counters.lost += lost.saturating_sub(self.refused_since_accepted);
@@ -96,7 +98,7 @@ impl CommandIntake {
             self.counters.expired += 1;
         }
         // In cycles that were sent, as all ages are: a stall of the rig is no silence of the sender.
-        let disputed = self.sources.two_sources(live.count());
+        let disputed = self.sources.two_sources(live.sent);
         let quarrel_changed = disputed != self.disputed;
         self.disputed = disputed;
         self.counters.two_sources += u64::from(quarrel_changed && disputed);
@@ -138,18 +140,6 @@ impl CommandIntake {
     #[must_use]
     pub fn stale(&self) -> bool {
         self.acting.is_none()
-    }
-
-    /// Whether the valve is shut because two senders dispute it.
-    #[must_use]
-    pub fn disputed(&self) -> bool {
-        self.disputed
-    }
-
-    /// Counters since the start.
-    #[must_use]
-    pub fn counters(&self) -> &CommandCounters {
-        &self.counters
     }
 }
 
@@ -239,7 +229,7 @@ mod tests {
             let command = bench.command(-1.0, echo);
             assert!(!bench.intake.take(command, &bench.live), "echo {echo}");
         }
-        assert_eq!((bench.intake.opening(), bench.intake.counters().refused_stale), (0.5, 4));
+        assert_eq!((bench.intake.opening(), bench.intake.counters.refused_stale), (0.5, 4));
     }
 
     #[test]
@@ -250,7 +240,7 @@ mod tests {
         let stale = bench.command(0.5, 2);
         bench.intake.take(stale, &bench.live);
         bench.cycle(Some(0.5));
-        assert_eq!((bench.intake.counters().refused_stale, bench.intake.counters().lost), (1, 0));
+        assert_eq!((bench.intake.counters.refused_stale, bench.intake.counters.lost), (1, 0));
     }
 
     #[test]
@@ -283,11 +273,11 @@ mod tests {
         bench.cycle(None);
         let late = bench.command(0.25, 0);
         assert!(bench.intake.take(late, &bench.live));
-        assert_eq!((bench.intake.counters().late, bench.intake.counters().duplicate), (1, 0));
+        assert_eq!((bench.intake.counters.late, bench.intake.counters.duplicate), (1, 0));
         bench.cycle(Some(0.5));
         let again = ValveCommand { alive: bench.alive, ..bench.intake.acting.unwrap() };
         assert!(bench.intake.take(again, &bench.live));
-        assert_eq!((bench.intake.counters().late, bench.intake.counters().duplicate), (1, 1));
+        assert_eq!((bench.intake.counters.late, bench.intake.counters.duplicate), (1, 1));
         assert_eq!(bench.intake.opening(), 0.5);
     }
 
@@ -301,8 +291,8 @@ mod tests {
             bench.intake.take(command, &bench.live);
             bench.cycle(None);
         }
-        assert_eq!((bench.intake.opening(), bench.intake.counters().two_sources), (0.0, 1));
-        assert_eq!(bench.intake.counters().duplicate, 30);
+        assert_eq!((bench.intake.opening(), bench.intake.counters.two_sources), (0.0, 1));
+        assert_eq!(bench.intake.counters.duplicate, 30);
     }
 
     #[test]
@@ -319,6 +309,6 @@ mod tests {
         assert_eq!((changes.as_slice(), bench.intake.opening()), (&[Change::TwoSources][..], 0.0));
         let changes: Vec<_> = (0..30).filter_map(|_| bench.cycle(Some(0.5))).collect();
         assert_eq!((changes.as_slice(), bench.intake.opening()), (&[Change::OneSource][..], 0.5));
-        assert_eq!(bench.intake.counters().two_sources, 1);
+        assert_eq!(bench.intake.counters.two_sources, 1);
     }
 }

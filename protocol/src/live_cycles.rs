@@ -16,16 +16,11 @@ use crate::frames::ECHO_RANGE;
 pub struct LiveCycles {
     /// For each low part of a cycle number, how many cycles had been sent when its sensors were.
     sent_count: Box<[Option<u64>; ECHO_RANGE as usize]>,
-    sent: u64,
+    /// Cycles sent so far.
+    pub(crate) sent: u64,
 }
 
 impl LiveCycles {
-    /// No cycle was sent yet.
-    #[must_use]
-    pub fn new() -> Self {
-        Self { sent_count: Box::new([None; ECHO_RANGE as usize]), sent: 0 }
-    }
-
     /// The cycles from `first` on, `count` of them, were skipped.
     pub fn skipped(&mut self, first: u64, count: u64) {
         // More than the whole range says the same as the whole range.
@@ -40,12 +35,6 @@ impl LiveCycles {
         self.sent_count[slot(cycle)] = Some(self.sent);
     }
 
-    /// Cycles sent so far.
-    #[must_use]
-    pub fn count(&self) -> u64 {
-        self.sent
-    }
-
     /// Cycles sent since the one that `echo` answers, the newest sent cycle having age 0; `None` when the echo's
     /// cycle was never sent.
     #[must_use]
@@ -54,9 +43,10 @@ impl LiveCycles {
     }
 }
 
+/// No cycle was sent yet.
 impl Default for LiveCycles {
     fn default() -> Self {
-        Self::new()
+        Self { sent_count: Box::new([None; ECHO_RANGE as usize]), sent: 0 }
     }
 }
 
@@ -69,7 +59,7 @@ mod tests {
     use super::*;
 
     fn sent_up_to(cycle: u64) -> LiveCycles {
-        let mut cycles = LiveCycles::new();
+        let mut cycles = LiveCycles::default();
         (0..=cycle).for_each(|cycle| cycles.sent(cycle));
         cycles
     }

@@ -36,7 +36,7 @@ impl Acting {
     pub(super) fn new(first: u64, logged_by: LoggedBy) -> Self {
         Self {
             intakes: Default::default(),
-            live: LiveCycles::new(),
+            live: LiveCycles::default(),
             logged_by,
             waiting: VecDeque::new(),
             holders: [false; 4],
@@ -112,6 +112,6 @@ impl Acting {
 
     /// Commands that the counters miss, and times that two senders were at work, by axis.
     pub(super) fn counted(&self) -> [(u64, u64); 2] {
-        self.intakes.each_ref().map(|intake| (intake.counters().lost, intake.counters().two_sources))
+        self.intakes.each_ref().map(|intake| (intake.counters.lost, intake.counters.two_sources))
     }
 }

@@ -71,7 +71,7 @@ impl<R: SimulatedRig> RigNode<R> {
         Self {
             rig,
             commands: Default::default(),
-            live: LiveCycles::new(),
+            live: LiveCycles::default(),
             saturated: Default::default(),
             skipped: 0,
             lockstep,

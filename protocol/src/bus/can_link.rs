@@ -11,21 +11,15 @@ use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 const RECEIVE_BUFFER_BYTES: usize = 2 << 20;
 
 /// A SocketCAN interface by name.
-pub(super) struct CanLink {
-    interface: String,
-}
+pub(super) struct CanLink(pub(super) String);
 
 impl CanLink {
-    pub(super) fn new(interface: &str) -> Self {
-        Self { interface: interface.into() }
-    }
-
     /// A socket on an interface that is down opens without a word and then drops everything, so ask first. The socket is asked,
     /// and not /sys, where an interface of `bench can` does not stand.
     fn check_up(&self, socket: BorrowedFd<'_>) -> io::Result<()> {
         // SAFETY: a plain C structure for which all zeros is a valid value.
         let mut request: libc::ifreq = unsafe { std::mem::zeroed() };
-        for (to, from) in request.ifr_name.iter_mut().zip(self.interface.bytes()) {
+        for (to, from) in request.ifr_name.iter_mut().zip(self.0.bytes()) {
             *to = from as libc::c_char;
         }
         // SAFETY: the kernel reads the name, which ends with a zero, and writes the flags.
@@ -47,7 +41,7 @@ impl Link for CanLink {
     const REMEDY: &'static str = "make it with 'ip link add dev vcan0 type vcan' and 'ip link set vcan0 up', or use --bus unix:///PATH";
 
     fn connect(&self) -> io::Result<OwnedFd> {
-        let socket = CanSocket::open(&self.interface).map_err(|error| match error.raw_os_error() {
+        let socket = CanSocket::open(&self.0).map_err(|error| match error.raw_os_error() {
             Some(libc::ENODEV) => io::Error::new(io::ErrorKind::NotFound, "no such network interface"),
             _ => error,
         })?;

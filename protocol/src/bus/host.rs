@@ -450,7 +450,7 @@ fn listening(socket_file: &SocketFile, timed: Option<&TimedWire>) -> io::Result<
     let flags = epoll::EventFlags::IN | epoll::EventFlags::ET;
     epoll::add(&epoll, socket_file, epoll::EventData::new_u64(LISTENER), flags)?;
     if let Some(timed) = timed {
-        epoll::add(&epoll, timed.timer(), epoll::EventData::new_u64(TIMER), epoll::EventFlags::IN)?;
+        epoll::add(&epoll, &timed.timer, epoll::EventData::new_u64(TIMER), epoll::EventFlags::IN)?;
     }
     Ok(epoll)
 }

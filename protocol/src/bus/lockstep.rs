@@ -90,7 +90,7 @@ pub(super) struct Barrier {
     /// Controllers that have to join by name before the first cycle.
     expected: usize,
     phase: Phase,
-    cycle: u32,
+    pub(super) cycle: u32,
     rig: Option<PeerId>,
     members: BTreeMap<PeerId, Member>,
     foreign_members: Vec<ForeignMember>,
@@ -111,10 +111,6 @@ impl Barrier {
             from_rig: Vec::new(),
             from_others: Vec::new(),
         }
-    }
-
-    pub(super) fn cycle(&self) -> u32 {
-        self.cycle
     }
 
     /// Whether it is the members' turn, who have the rig's frames then.

@@ -222,7 +222,7 @@ impl Clocks {
     }
 }
 
-fn ns_of(clock: ClockId) -> u64 {
+pub(super) fn ns_of(clock: ClockId) -> u64 {
     let now = clock_gettime(clock);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }

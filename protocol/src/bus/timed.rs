@@ -16,15 +16,16 @@
 
 use super::host_report::PeerReport;
 use super::lockstep::PeerId;
+use super::packets::ns_of;
 use super::url::WireOptions;
 use crate::can::CanFrame;
 use crate::wire_time::{Lateness, NodeId, WireEvent, WireModel, WireTimeReport};
 use rustix::time::{
-    ClockId, Itimerspec, TimerfdClockId, TimerfdFlags, TimerfdTimerFlags, Timespec, clock_gettime,
-    timerfd_create, timerfd_settime,
+    ClockId, Itimerspec, TimerfdClockId, TimerfdFlags, TimerfdTimerFlags, Timespec, timerfd_create,
+    timerfd_settime,
 };
 use std::collections::BTreeMap;
-use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::fd::OwnedFd;
 
 const NS_PER_S: u64 = 1_000_000_000;
 
@@ -41,11 +42,11 @@ pub(super) enum Reported {
 
 /// The model, and who is which of its nodes.
 pub(super) struct TimedWire {
-    model: WireModel,
+    pub(super) model: WireModel,
     nodes: BTreeMap<PeerId, NodeId>,
     /// For each node, the receiver of its reports.
     reported: Vec<Reported>,
-    timer: OwnedFd,
+    pub(super) timer: OwnedFd,
     /// What the timer was set to, ns of the model's time.
     armed_ns: Option<u64>,
     /// Time 0 of the model by the machine's clock, ns.
@@ -64,7 +65,7 @@ impl TimedWire {
             reported: Vec::new(),
             timer: timerfd_create(TimerfdClockId::Monotonic, flags)?,
             armed_ns: None,
-            zero_ns: monotonic_ns(),
+            zero_ns: ns_of(ClockId::Monotonic),
             late: Lateness::default(),
         }))
     }
@@ -100,22 +101,12 @@ impl TimedWire {
 
     /// Time of the model by the machine's clock, of what happened so many ns ago.
     pub(super) fn time_ns(&self, age_ns: u64) -> u64 {
-        monotonic_ns().saturating_sub(self.zero_ns).saturating_sub(age_ns)
+        ns_of(ClockId::Monotonic).saturating_sub(self.zero_ns).saturating_sub(age_ns)
     }
 
-    /// Time up to which the model has gone, ns.
-    pub(super) fn now_ns(&self) -> u64 {
-        self.model.now_ns()
-    }
-
-    /// The same by the machine's clock, ns.
+    /// Time up to which the model has gone, by the machine's clock, ns.
     pub(super) fn read_up_to_ns(&self) -> u64 {
-        self.zero_ns + self.model.now_ns()
-    }
-
-    /// What happened up to `to_ns`, in order.
-    pub(super) fn advance(&mut self, to_ns: u64, events: &mut Vec<WireEvent>) {
-        self.model.advance(to_ns, events);
+        self.zero_ns + self.model.now_ns
     }
 
     /// What happens next, up to `limit_ns`: one instant's events. False when nothing does.
@@ -130,14 +121,10 @@ impl TimedWire {
         self.late.note(self.time_ns(0).saturating_sub(ended_ns));
     }
 
-    pub(super) fn timer(&self) -> BorrowedFd<'_> {
-        self.timer.as_fd()
-    }
-
     /// Sets the timer to what the model does next. Setting it clears what it has reported, so that it need not be read.
     pub(super) fn arm(&mut self) -> rustix::io::Result<()> {
         let next_ns = self.model.next_ns();
-        let told = self.armed_ns.is_some_and(|armed_ns| armed_ns <= self.model.now_ns());
+        let told = self.armed_ns.is_some_and(|armed_ns| armed_ns <= self.model.now_ns);
         if next_ns == self.armed_ns && !told {
             return Ok(());
         }
@@ -162,9 +149,4 @@ impl TimedWire {
         }
         report
     }
-}
-
-fn monotonic_ns() -> u64 {
-    let now = clock_gettime(ClockId::Monotonic);
-    now.tv_sec as u64 * NS_PER_S + now.tv_nsec as u64
 }

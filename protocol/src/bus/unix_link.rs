@@ -10,15 +10,7 @@ use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 
 /// The embedded bus by the path of its socket.
-pub(super) struct UnixLink {
-    path: PathBuf,
-}
-
-impl UnixLink {
-    pub(super) fn new(path: &Path) -> Self {
-        Self { path: path.into() }
-    }
-}
+pub(super) struct UnixLink(pub(super) PathBuf);
 
 impl Link for UnixLink {
     const HAS_BARRIER: bool = true;
@@ -32,7 +24,7 @@ impl Link for UnixLink {
             SocketFlags::CLOEXEC | SocketFlags::NONBLOCK,
             None,
         )?;
-        connect(&socket, &SocketAddrUnix::new(&self.path)?)?;
+        connect(&socket, &SocketAddrUnix::new(&self.0)?)?;
         Ok(socket)
     }
 }

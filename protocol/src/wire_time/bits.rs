@@ -30,7 +30,8 @@ const CRC: Crc<u16> = Crc::<u16>::new(&CRC_15_CAN);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BitSequence {
     bits: u128,
-    count: u32,
+    /// Bits put in so far.
+    pub count: u32,
 }
 
 impl BitSequence {
@@ -43,12 +44,6 @@ impl BitSequence {
     /// The CRC-15 of all bits so far. It starts at 0, so that zeros ahead of the first bit change nothing.
     fn crc(self) -> u32 {
         u32::from(CRC.checksum(&self.bits.to_be_bytes()))
-    }
-
-    /// Bits put in so far.
-    #[must_use]
-    pub fn count(self) -> u32 {
-        self.count
     }
 
     /// The bits, the first one first.
@@ -100,7 +95,7 @@ pub fn sequence(frame: &CanFrame) -> BitSequence {
 #[must_use]
 pub fn on_the_wire(frame: &CanFrame) -> u32 {
     let sequence = sequence(frame);
-    sequence.count() + sequence.stuffing() + TAIL_BITS
+    sequence.count + sequence.stuffing() + TAIL_BITS
 }
 
 /// Rank of a frame in arbitration: the lower wins. Bits in the order in which they are sent: standard before extended with the
@@ -137,7 +132,7 @@ mod tests {
         assert_eq!(CRC.checksum(b"123456789"), 0x059E);
         let sequence = sequence(&CanFrame::new(0x123, &[1, 2, 3]));
         let crc = (sequence.bits & 0x7FFF) as u32;
-        assert_eq!(crc_of_the_standard(sequence.iter().take(sequence.count() as usize - 15)), crc);
+        assert_eq!(crc_of_the_standard(sequence.iter().take(sequence.count as usize - 15)), crc);
     }
 
     /// Nothing but zeros: 34 of them up to a CRC that is 0 too, one bit stuffed in after each fifth.
@@ -158,7 +153,7 @@ mod tests {
         let extended = sequence(&CanFrame::from_raw(EXTENDED_FLAG | REMOTE_FLAG | 0x1555_5555, &[0; 3]));
         let bits: String = extended.iter().map(|bit| if bit { '1' } else { '0' }).collect();
         assert_eq!(bits[..39], *"010101010101110101010101010101011000011");
-        assert_eq!(extended.count(), 39 + 15, "a request carries no data");
+        assert_eq!(extended.count, 39 + 15, "a request carries no data");
     }
 
     /// Five equal bits, then fours that alternate: the worst sequence that stuffing knows.
@@ -169,7 +164,7 @@ mod tests {
         while worst.count < 98 {
             worst.push(u32::from((worst.count - 1) / 4 % 2 == 1), 1);
         }
-        assert_eq!(worst.count() + worst.stuffing() + TAIL_BITS, worst_case_bits(8));
+        assert_eq!(worst.count + worst.stuffing() + TAIL_BITS, worst_case_bits(8));
         assert_eq!(worst_case_bits(8), 135);
         // The longest real frame of 8 bytes.
         let frame = CanFrame::new(0x7FE, &[0x01, 0xE1, 0xE1, 0xE1, 0xE7, 0xC3, 0xC0, 0x1E]);
@@ -207,7 +202,7 @@ mod tests {
         fn the_crc_is_always_that_of_the_standard(raw_id in 0..0x2000_0000_u32, extended: bool, data: [u8; 8]) {
             let raw_id = if extended { EXTENDED_FLAG | raw_id } else { raw_id & 0x7FF };
             let sequence = sequence(&CanFrame::from_raw(raw_id, &data));
-            let expected = crc_of_the_standard(sequence.iter().take(sequence.count() as usize - 15));
+            let expected = crc_of_the_standard(sequence.iter().take(sequence.count as usize - 15));
             prop_assert_eq!((sequence.bits & 0x7FFF) as u32, expected);
         }
     }

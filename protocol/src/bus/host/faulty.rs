@@ -65,7 +65,7 @@ impl Host {
 
     fn deliver_through_faults(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
         let now_ns = match &self.barrier {
-            Some(barrier) => u64::from(barrier.cycle()) * CYCLE_NS,
+            Some(barrier) => u64::from(barrier.cycle) * CYCLE_NS,
             None => self.began.elapsed().as_nanos() as u64,
         };
         let mut fates = std::mem::take(&mut self.fates);

@@ -18,7 +18,7 @@ impl Host {
     pub(super) fn advance_wire(&mut self, to_ns: u64) -> io::Result<()> {
         let Some(timed) = &mut self.timed else { return Ok(()) };
         let mut events = std::mem::take(&mut self.wire_events);
-        timed.advance(to_ns, &mut events);
+        timed.model.advance(to_ns, &mut events);
         for event in events.drain(..) {
             let ended_ns = match &event {
                 WireEvent::Delivered { ended_ns, .. } => Some(*ended_ns),
@@ -39,7 +39,7 @@ impl Host {
         let Some(timed) = &mut self.timed else { return };
         let begins_ns = u64::from(release.cycle) * CYCLE_NS;
         // The rig speaks as its cycle begins; the others when they have heard it.
-        let enters_ns = if members_turn { begins_ns } else { timed.now_ns() };
+        let enters_ns = if members_turn { begins_ns } else { timed.model.now_ns };
         let mut beside = Vec::new();
         for (frame, from) in &release.frames {
             if frame.raw_id() & ERROR_FLAG == 0 {
@@ -88,7 +88,7 @@ impl Host {
     fn carry_until(&mut self, to_ns: u64) {
         let mut events = std::mem::take(&mut self.wire_events);
         if let Some(timed) = &mut self.timed {
-            timed.advance(to_ns, &mut events);
+            timed.model.advance(to_ns, &mut events);
         }
         events.drain(..).for_each(|event| self.happen(event));
         self.wire_events = events;
