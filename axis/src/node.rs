@@ -15,7 +15,7 @@ use crate::rig_view::{RigView, TickNews};
 use crossbeam_channel::{Receiver, Sender};
 use nominal::Axis;
 use protocol::frames::{DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand};
-use protocol::{bus::Bus, can::CanFrame, periods::TICK_CYCLES};
+use protocol::{bus::FrameSink, can::CanFrame, periods::TICK_CYCLES};
 use runlog::controller_report::IgnoredFrames;
 use std::collections::VecDeque;
 
@@ -116,7 +116,7 @@ pub trait CalibrationPort {
     fn observe(&mut self, _: &AxisController, _: u64, _: &Sensors, _: &ValveCommand) {}
 
     /// Answers waiting commands and sends what is due, once all valves have their commands.
-    fn serve(&mut self, _: &mut Program, _: &mut dyn Bus) {}
+    fn serve(&mut self, _: &mut Program, _: &mut dyn FrameSink) {}
 }
 
 /// The port of a controller without measurement and calibration; it has no value.
@@ -210,7 +210,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// Answers fresh sensors; returns for each axis the cycle that was answered.
-    pub fn answer(&mut self, bus: &mut dyn Bus) -> [Option<u64>; 2] {
+    pub fn answer(&mut self, bus: &mut dyn FrameSink) -> [Option<u64>; 2] {
         if self.ending {
             return [None; 2];
         }
@@ -263,7 +263,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// The rig goes on, and sensors of the axis do not come: after each tick the axis says what a fault has to say.
-    fn speak_without_sensors(&mut self, place: usize, bus: &mut dyn Bus) {
+    fn speak_without_sensors(&mut self, place: usize, bus: &mut dyn FrameSink) {
         let Some(cycle) = self.view.cycle else { return };
         let member = &mut self.members[place];
         if member.answered == 0 {
@@ -280,14 +280,14 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// Onto the bus, and to the partner if it lives in this process.
-    fn send_to_all(&mut self, place: usize, cycle: u64, frame: &Frame, bus: &mut dyn Bus) {
+    fn send_to_all(&mut self, place: usize, cycle: u64, frame: &Frame, bus: &mut dyn FrameSink) {
         send(bus, frame);
         self.members.iter_mut().enumerate().filter(|(other, _)| *other != place).for_each(|(_, member)| {
             member.mail.post(cycle, as_received(frame));
         });
     }
 
-    fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn Bus) {
+    fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn FrameSink) {
         let axis = self.members[place].controller.axis;
         send(bus, &frame(axis, [Frame::DriveValveCommand, Frame::LoadValveCommand], answer.command));
         let frames = [
@@ -377,7 +377,7 @@ pub(crate) fn as_received(frame: &Frame) -> Frame {
 }
 
 /// Sends a frame that a controller made itself; what the bus does not take is counted there.
-fn send(bus: &mut dyn Bus, frame: &Frame) {
+fn send(bus: &mut dyn FrameSink, frame: &Frame) {
     let _ = bus.send(&encode(frame));
 }
 

@@ -57,7 +57,7 @@ pub(crate) struct RunOutcome {
 /// Answers frames as they arrive, under a stopwatch.
 pub(crate) fn run_real(
     context: RunContext<'_>,
-    mut stopwatch: Stopwatch<impl Clock + Send>,
+    mut stopwatch: Stopwatch<impl Clock>,
     continued: Continued,
 ) -> RunOutcome {
     let RunContext { node, bus, grace, interrupt } = context;

@@ -26,7 +26,7 @@ mod timed_bus;
 
 use crossbeam_channel::Sender;
 use nominal::Axis;
-use protocol::bus::Bus;
+use protocol::bus::FrameSink;
 use protocol::can::CanFrame;
 use realtime::{Clock, VitalCounts};
 use runlog::timing::{CycleTiming, Exchange};
@@ -94,7 +94,7 @@ pub(crate) struct Stopwatch<C> {
     newest: Option<u64>,
 }
 
-impl<C: Clock + Send> Stopwatch<C> {
+impl<C: Clock> Stopwatch<C> {
     /// A stopwatch for a process with these axes, of which the first wakes it.
     ///
     /// # Panics
@@ -144,8 +144,8 @@ impl<C: Clock + Send> Stopwatch<C> {
         self.wake_up.received_ns = self.now_ns();
     }
 
-    pub(crate) fn bus<'a>(&'a mut self, bus: &'a mut dyn Bus) -> TimedBus<'a, C> {
-        TimedBus::new(self, bus)
+    pub(crate) fn bus<'a>(&'a mut self, bus: &'a mut dyn FrameSink) -> TimedBus<'a, C> {
+        TimedBus { stopwatch: self, bus }
     }
 
     /// The axes answered these cycles. When that completes a row, `vitals` returns the kernel counters since its last call.

@@ -130,15 +130,18 @@ pub struct BusCounters {
     pub received_by_id: FrameTally,
 }
 
-/// A CAN bus as a peer sees it. Nothing here blocks but [`Bus::wait_readable`], and [`Bus::receive`] in a barrier.
-pub trait Bus: Send {
+/// What frames are sent to.
+pub trait FrameSink {
     /// Puts a frame on the bus and tells when it was handed over, in ns of the bus's clock.
     ///
     /// # Errors
     /// [`SendError`] when the frame was dropped; it is counted and never queued for later, since a command that
     /// arrives late is worse than none.
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError>;
+}
 
+/// A CAN bus as a peer sees it. Nothing here blocks but [`Bus::wait_readable`], and [`Bus::receive`] in a barrier.
+pub trait Bus: FrameSink + Send {
     /// Takes the oldest waiting frame. Tries to come back when the bus was down. A member of the lockstep barrier, which has
     /// nothing to do before its turn, waits a little for a packet.
     fn receive(&mut self) -> Received;

@@ -21,12 +21,10 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use plant::scene::Action;
 use plant::tables::CycleRecord;
 use plant::{Axis, People, Plant, RigParameters, Scene, Sensors, SetupError};
-use protocol::bus::control::Role;
-use protocol::bus::{Bus, BusCounters, BusError, Received, SendError};
+use protocol::bus::{FrameSink, SendError};
 use protocol::can::CanFrame;
 use protocol::frames::{EncodeError, Frame, ValveCommand};
 use rig_node::{PeopledPlant, RigNode, SimulatedRig};
-use std::time::Duration;
 
 /// Rows and news of a cycle: two and some.
 const OUTLET_ROOM: usize = 64;
@@ -63,7 +61,6 @@ pub struct Rehearsed<C = CycleRecord> {
 /// Frames that the controllers sent in a cycle and that a rig obeys, by identifier.
 #[derive(Default)]
 struct Wire {
-    counters: BusCounters,
     /// Stops of drive and load, then their commands.
     sent: [Option<Frame>; 4],
 }
@@ -192,9 +189,8 @@ impl Wire {
     }
 }
 
-impl Bus for Wire {
+impl FrameSink for Wire {
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError> {
-        self.counters.sent += 1;
         let Ok(frame) = Frame::decode(frame) else { return Ok(0) };
         let place = match frame {
             Frame::DriveEmergencyStop(_) => 0,
@@ -206,24 +202,4 @@ impl Bus for Wire {
         self.sent[place] = Some(frame);
         Ok(0)
     }
-
-    fn receive(&mut self) -> Received {
-        Received::Nothing
-    }
-
-    fn wait_readable(&mut self, _timeout: Duration) {}
-
-    fn is_up(&self) -> bool {
-        true
-    }
-
-    fn counters(&self) -> &BusCounters {
-        &self.counters
-    }
-
-    fn join_lockstep(&mut self, _role: Role, name: &str) -> Result<(), BusError> {
-        Err(BusError::NoBarrier { url: name.to_owned() })
-    }
-
-    fn done(&mut self, _cycle: u32) {}
 }

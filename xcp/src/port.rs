@@ -18,7 +18,7 @@ use axis_control::node::CalibrationPort;
 use axis_control::program::Program;
 use crossbeam_channel::{Receiver, Sender, TrySendError};
 use nominal::Axis;
-use protocol::bus::Bus;
+use protocol::bus::FrameSink;
 use protocol::can::CanFrame;
 use protocol::frames::{Sensors, ValveCommand};
 use std::collections::VecDeque;
@@ -165,7 +165,7 @@ impl Port {
         }
     }
 
-    fn answer(&mut self, packet: Option<Packet>, bus: &mut dyn Bus) {
+    fn answer(&mut self, packet: Option<Packet>, bus: &mut dyn FrameSink) {
         if let Some(packet) = packet
             && !self.send(packet, bus)
         {
@@ -173,7 +173,7 @@ impl Port {
         }
     }
 
-    fn send(&self, packet: [u8; BYTES], bus: &mut dyn Bus) -> bool {
+    fn send(&self, packet: [u8; BYTES], bus: &mut dyn FrameSink) -> bool {
         bus.send(&CanFrame::new(self.response_id, &packet)).is_ok()
     }
 }
@@ -209,7 +209,7 @@ impl CalibrationPort for Port {
         self.daq_budget = self.slave.daq.per_cycle;
     }
 
-    fn serve(&mut self, program: &mut Program, bus: &mut dyn Bus) {
+    fn serve(&mut self, program: &mut Program, bus: &mut dyn FrameSink) {
         while let Ok(ParameterCopy { values, stored }) = self.queues.returned.try_recv() {
             self.spare = Some(values);
             let event = self.slave.stored().filter(|_| stored);

@@ -6,13 +6,11 @@ use axis_control::node::{self, ControllerNode};
 use axis_control::setup::{Inputs, Mode};
 use clap::Parser;
 use crossbeam_channel::{Receiver, bounded};
-use protocol::bus::control::Role;
-use protocol::bus::{BusCounters, BusError, Received, SendError};
+use protocol::bus::SendError;
 use protocol::frames::{Frame, Sensors, Tick, ValveCommand};
 use realtime::Instant;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 /// Time passes when the test says so.
 #[derive(Clone, Default)]
@@ -38,35 +36,14 @@ impl Clock for Moved {
 struct Wire {
     clock: Moved,
     full: bool,
-    counters: BusCounters,
 }
 
-impl Bus for Wire {
+impl FrameSink for Wire {
     fn send(&mut self, _frame: &CanFrame) -> Result<u64, SendError> {
         let handed_over_ns = self.clock.now().as_nanos();
         self.clock.pass(3);
         if self.full { Err(SendError::QueueFull) } else { Ok(handed_over_ns) }
     }
-
-    fn receive(&mut self) -> Received {
-        Received::Nothing
-    }
-
-    fn wait_readable(&mut self, _timeout: Duration) {}
-
-    fn is_up(&self) -> bool {
-        true
-    }
-
-    fn counters(&self) -> &BusCounters {
-        &self.counters
-    }
-
-    fn join_lockstep(&mut self, _role: Role, name: &str) -> Result<(), BusError> {
-        Err(BusError::NoBarrier { url: name.into() })
-    }
-
-    fn done(&mut self, _cycle: u32) {}
 }
 
 struct Bench {
@@ -85,7 +62,7 @@ impl Bench {
         let (frame_sender, frames) = bounded(64);
         let outlets = Outlets { measured: measured_sender, frames: frame_sender };
         let stopwatch = Stopwatch::new(clock.clone(), axes, outlets);
-        let wire = Wire { clock: clock.clone(), full: false, counters: BusCounters::default() };
+        let wire = Wire { clock: clock.clone(), full: false };
         Self { clock, wire, stopwatch, measured, frames }
     }
 

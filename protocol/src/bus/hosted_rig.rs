@@ -5,7 +5,7 @@
 
 use super::control::Role;
 use super::host::{ForRig, FromRig, Host, HostReport};
-use super::{Bus, BusCounters, BusError, Received, SendError, StampClock};
+use super::{Bus, BusCounters, BusError, FrameSink, Received, SendError, StampClock};
 use crate::can::{CanFrame, ERROR_FLAG};
 use rustix::time::Timespec;
 use std::time::Duration;
@@ -48,14 +48,16 @@ impl HostedRig {
     }
 }
 
-impl Bus for HostedRig {
+impl FrameSink for HostedRig {
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError> {
         self.counters.sent += 1;
         self.counters.sent_by_id.count(frame);
         self.host.take_from_rig(FromRig::Frame(*frame));
         Ok((self.clock)(0))
     }
+}
 
+impl Bus for HostedRig {
     fn receive(&mut self) -> Received {
         if let Some(received) = self.take() {
             return received;

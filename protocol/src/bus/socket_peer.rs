@@ -6,7 +6,7 @@
 use super::control::{CONTROL_BYTES, Control, Kind, Role};
 use super::packets::{self, Inbox, Outbox, Packet, Wait};
 use super::url::BusUrl;
-use super::{Bus, BusCounters, BusError, Received, SendError, StampClock};
+use super::{Bus, BusCounters, BusError, FrameSink, Received, SendError, StampClock};
 use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt::Timeout;
@@ -239,7 +239,7 @@ fn enter_barrier(socket: &OwnedFd, join: &Control) -> rustix::io::Result<()> {
     send(socket, &join.to_bytes(), SendFlags::DONTWAIT).map(drop)
 }
 
-impl<L: Link> Bus for SocketPeer<L> {
+impl<L: Link> FrameSink for SocketPeer<L> {
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError> {
         let bytes = frame.to_bytes();
         // Before the frame leaves: a host of higher priority may run, and its answer arrive, before the call returns.
@@ -257,7 +257,9 @@ impl<L: Link> Bus for SocketPeer<L> {
         }
         result.map(|()| handed_over_ns)
     }
+}
 
+impl<L: Link> Bus for SocketPeer<L> {
     fn receive(&mut self) -> Received {
         loop {
             while let Some(packet) = self.inbox.take() {
