@@ -18,33 +18,6 @@ fn host(path: &Path, members: usize) -> RunningHost {
     RunningHost::start(path, WireOptions::default(), Some(barrier))
 }
 
-fn joined(path: &Path, role: Role, name: &str) -> Box<dyn Bus> {
-    let mut peer = open(path);
-    peer.join_lockstep(role, name).unwrap();
-    peer
-}
-
-/// Frames up to the next word of the barrier, and that word.
-fn until_word(peer: &mut dyn Bus) -> (Vec<CanFrame>, Control) {
-    let mut frames = Vec::new();
-    loop {
-        match next(peer) {
-            Received::Frame(frame, _) => frames.push(frame),
-            Received::Barrier(control) => return (frames, control),
-            Received::Nothing => unreachable!("next waits"),
-        }
-    }
-}
-
-fn go(peer: &mut dyn Bus, cycle: u32) -> Vec<CanFrame> {
-    let (frames, control) = until_word(peer);
-    assert!(
-        matches!(control.kind, Kind::Go { .. }) && control.cycle == cycle,
-        "expected Go({cycle}): {control:?}"
-    );
-    frames
-}
-
 fn frame(id: u16, name: u8, cycle: u32) -> CanFrame {
     let [low, high, ..] = cycle.to_le_bytes();
     CanFrame::new(id, &[name, low, high])

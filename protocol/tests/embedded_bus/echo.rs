@@ -1,10 +1,10 @@
 //! A foreign controller in lockstep: it joins by its echo, and neither a lossy wire nor its own full queue holds the barrier.
 
 use super::support::*;
-use protocol::bus::control::{Kind, Role};
+use protocol::bus::control::Role;
 use protocol::bus::host::Host;
 use protocol::bus::lockstep::BarrierConfig;
-use protocol::bus::{Bus, Received, WireOptions};
+use protocol::bus::{Bus, WireOptions};
 use protocol::can::CanFrame;
 use protocol::frames::{ALIVE_RANGE, DRIVE_VALVE_COMMAND, ECHO_RANGE, Frame, Sensors, ValveCommand};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,23 +28,7 @@ fn command(cycle: u64) -> CanFrame {
 
 /// Waits for the rig's turn, and counts the commands that came before it.
 fn commands_until_go(rig: &mut dyn Bus, cycle: u32) -> u32 {
-    let mut commands = 0;
-    loop {
-        match next(rig) {
-            Received::Frame(..) => commands += 1,
-            Received::Barrier(control) => {
-                assert!(matches!(control.kind, Kind::Go { .. }) && control.cycle == cycle, "{control:?}");
-                return commands;
-            }
-            Received::Nothing => unreachable!("next waits"),
-        }
-    }
-}
-
-fn rig_on(place: &Place) -> Box<dyn Bus> {
-    let mut rig = open(&place.socket());
-    rig.join_lockstep(Role::Rig, "rig").unwrap();
-    rig
+    go(rig, cycle).len() as u32
 }
 
 /// A stranger that never saw the sensors of a cycle once held the barrier until its time-out.
@@ -53,7 +37,7 @@ fn lost_frames_do_not_hold_the_barrier_of_a_stranger() {
     const CYCLES: u32 = 500;
     let place = Place::new();
     let host = host(&place, 0.05);
-    let mut rig = rig_on(&place);
+    let mut rig = joined(&place.socket(), Role::Rig, "rig");
     let mut stranger = open(&place.socket());
     let answered = std::thread::scope(|scope| {
         // Answers sensors as they come, and knows the cycle by the counter alone, which jumps over what is lost.
@@ -118,7 +102,7 @@ fn the_full_queue_of_a_stranger_does_not_hold_the_barrier() {
     let timeout = Duration::from_millis(300);
     let host = Host::bind(&place.socket(), WireOptions::default(), Some(barrier)).unwrap();
     let host = RunningHost::serve(host.with_barrier_timeout(timeout));
-    let mut rig = rig_on(&place);
+    let mut rig = joined(&place.socket(), Role::Rig, "rig");
     let mut stranger = open(&place.socket());
     fill_the_queue_of(stranger.as_mut(), rig.as_mut());
     commands_until_go(rig.as_mut(), 2);
@@ -136,7 +120,7 @@ fn the_full_queue_of_a_stranger_does_not_hold_the_barrier() {
 fn a_stranger_that_lost_its_sensors_is_waited_for_until_it_has_read_the_rest() {
     let place = Place::new();
     let host = host(&place, 0.0);
-    let mut rig = rig_on(&place);
+    let mut rig = joined(&place.socket(), Role::Rig, "rig");
     let mut stranger = open(&place.socket());
     fill_the_queue_of(stranger.as_mut(), rig.as_mut());
     let has_read = AtomicBool::new(false);

@@ -1,5 +1,6 @@
 //! A running host, connected peers, raw clients, and waits that have a limit.
 
+use protocol::bus::control::{Control, Kind, Role};
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{self, Bus, BusUrl, Received, StampClock, WireOptions};
@@ -81,6 +82,13 @@ pub(crate) fn open(path: &Path) -> Box<dyn Bus> {
     let clock: StampClock = Box::new(|age_ns| now_ns().saturating_sub(age_ns));
     let url = BusUrl::Unix { path: path.into(), wire: WireOptions::default() };
     bus::open(&url, clock).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A peer in the lockstep barrier.
+pub(crate) fn joined(path: &Path, role: Role, name: &str) -> Box<dyn Bus> {
+    let mut peer = open(path);
+    peer.join_lockstep(role, name).unwrap();
+    peer
 }
 
 /// `N` peers that the host has accepted: it accepts in the order of connecting, so when the last is heard, all are in.
@@ -181,6 +189,28 @@ pub(crate) fn next_frame(peer: &mut dyn Bus) -> (CanFrame, u64) {
         Received::Frame(frame, stamp_ns) => (frame, stamp_ns),
         other => panic!("expected a frame, received {other:?}"),
     }
+}
+
+/// Frames up to the next word of the barrier, and that word.
+pub(crate) fn until_word(peer: &mut dyn Bus) -> (Vec<CanFrame>, Control) {
+    let mut frames = Vec::new();
+    loop {
+        match next(peer) {
+            Received::Frame(frame, _) => frames.push(frame),
+            Received::Barrier(control) => return (frames, control),
+            Received::Nothing => unreachable!("next waits"),
+        }
+    }
+}
+
+/// Frames up to the turn of `cycle`.
+pub(crate) fn go(peer: &mut dyn Bus, cycle: u32) -> Vec<CanFrame> {
+    let (frames, control) = until_word(peer);
+    assert!(
+        matches!(control.kind, Kind::Go { .. }) && control.cycle == cycle,
+        "expected Go({cycle}): {control:?}"
+    );
+    frames
 }
 
 /// Frames up to the one that is the `last`, which is left out, as are all hellos.
