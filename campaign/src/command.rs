@@ -40,7 +40,6 @@ pub(crate) struct Invocation<'a> {
     pub(crate) again: bool,
 }
 
-/// Why there is no result.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CommandError {
     /// The program cannot be started, or not be waited for.

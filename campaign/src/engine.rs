@@ -16,7 +16,6 @@ use std::time::{Duration, Instant};
 /// Least time between two lines of progress.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(2);
 
-/// Statistics of a start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StartReport {
     /// Runs that this start did.

@@ -22,7 +22,6 @@ use settings::{Section, SettingsError};
 use std::fmt;
 use toml::de::DeValue;
 
-/// A factor and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Factor {
     /// Name of its column.
@@ -118,7 +117,6 @@ impl fmt::Display for Value {
 }
 
 impl Value {
-    /// The number, where it is one.
     pub(crate) fn number(&self) -> Option<f64> {
         match self {
             Value::Number(number) => Some(*number),

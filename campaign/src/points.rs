@@ -45,7 +45,6 @@ pub(crate) struct TooManyRuns;
 pub(crate) const MOST_RUNS: u64 = 1_000_000_000;
 
 impl Points {
-    /// The runs of these factors.
     pub(crate) fn new(factors: &[Factor], draws: u64, seed: u64) -> Result<Self, TooManyRuns> {
         let combinations = factors
             .iter()

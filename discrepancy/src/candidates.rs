@@ -38,7 +38,6 @@ pub struct Candidate {
     present: Option<[f64; MOST_KEYS]>,
 }
 
-/// Scaling of a key.
 #[derive(Clone, Copy, Debug)]
 enum Scale {
     Linear { neutral: f64, unit: f64 },

@@ -35,7 +35,6 @@ use text::{in_words, quantity_in_words, significant};
 /// Keys without which the report of a rig file says nothing of an extended one.
 const OF_RIG: [&str; 3] = ["named", "parameters", "inputs"];
 
-/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
     #[error(transparent)]

@@ -48,7 +48,6 @@ pub(crate) struct Products {
     information: Arc<[Vec<f64>]>,
 }
 
-/// A fit of some columns.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     /// Coefficient of each column that took part.
@@ -154,7 +153,6 @@ impl Products {
         loss(squares, &self.dof)
     }
 
-    /// Weights of windows with these squares.
     pub(crate) fn weights(&self, squares: &[f64]) -> Vec<f64> {
         let weight = |(square, dof): (&f64, &f64)| dof / square.max(LEAST * dof);
         squares.iter().zip(&self.dof).map(weight).collect()

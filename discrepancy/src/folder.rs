@@ -91,7 +91,6 @@ impl Folder {
     }
 }
 
-/// Writes a file by [`write_whole`].
 pub(crate) fn write(file: &Path, text: &str) -> Result<(), FolderError> {
     write_whole(file, text).map_err(|why| FolderError::Write { file: file.to_owned(), why })
 }

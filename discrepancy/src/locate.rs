@@ -64,7 +64,6 @@ const SERIES: usize = 1500;
 /// Regressor of an unknown input.
 #[derive(Clone, Copy, Debug)]
 pub struct WindowVariable {
-    /// As reports have it.
     pub name: &'static str,
     /// Its unit; empty for a number.
     pub unit: &'static str,

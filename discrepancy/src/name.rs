@@ -97,7 +97,6 @@ pub struct SelectionResult {
     /// The model to report: parameters that it does not need are back at the rig file's values. Where the model is no
     /// explanation, the calibration alone.
     pub reported: Refit,
-    /// Alternatives to each of its effects.
     pub alternatives: Vec<Vec<Alternative>>,
     /// Share of the excess that each effect removes.
     pub shares: Vec<f64>,

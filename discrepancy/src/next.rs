@@ -163,7 +163,6 @@ impl Proposal {
     }
 }
 
-/// The probability in words, for a number of trials.
 fn probability_in_words(probability: Probability, trials: usize) -> String {
     let Probability { value, low, high } = probability;
     format!("in {:.0} % of {trials} rehearsed records ({:.0} to {:.0} %)", 1e2 * value, 1e2 * low, 1e2 * high)

@@ -42,7 +42,6 @@ const LOCATED: usize = 2;
 /// Fewest windows of a balance.
 const MIN_WINDOWS: usize = 100;
 
-/// A balance with its tests.
 struct BalanceTests<'a> {
     series: &'a UnknownSeries,
     sample: Sample,

@@ -121,7 +121,6 @@ pub(crate) fn rig_of(
     })
 }
 
-/// Prior precisions of the parameter factors.
 pub(crate) fn parameter_precisions() -> Vec<f64> {
     PARAMETERS.iter().map(|parameter| parameter.prior_std.powi(-2)).collect()
 }
@@ -139,7 +138,6 @@ pub(crate) fn model_penalty(effect_parameters: usize, factors: &[f64; COUNT]) ->
     EFFECT_PARAMETER_PENALTY * effect_parameters as f64 + PARAMETER_COSTS * soft_count_off(factors)
 }
 
-/// Prior precision of a coordinate.
 pub(crate) fn coordinate_precision(candidate: &Candidate, key: usize) -> f64 {
     let prior_std = if candidate.is_shape(key) { SHAPE_PRIOR_STD } else { AMPLITUDE_PRIOR_STD };
     prior_std.powi(-2)

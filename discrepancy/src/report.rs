@@ -4,7 +4,6 @@ use crate::refit::EffectEstimate;
 use plant::effects::sheet::{Part, Place};
 pub use runlog::discrepancy_report::*;
 
-/// A place as a report has it.
 #[must_use]
 pub fn place_of(place: Place) -> Where {
     let named = Where::named(&place.to_string());

@@ -97,7 +97,6 @@ impl Suspect {
         Suspect { declared, sheet, place }
     }
 
-    /// As a report has it.
     pub(crate) fn reported(&self) -> DeclaredSuspect {
         DeclaredSuspect {
             effect: self.declared.name().to_owned(),

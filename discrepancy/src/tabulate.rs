@@ -137,7 +137,6 @@ fn parse_balance(balance: &str) -> Option<(Axis, Balance)> {
     Some((axis, Balance::ALL.into_iter().find(|known| known.name() == name)?))
 }
 
-/// The search for tables of a balance.
 struct TableSearch<'a> {
     engine: &'a Engine<'a>,
     axis: Axis,
@@ -228,7 +227,6 @@ impl TableSearch<'_> {
         VARIABLES.iter().position(|known| known.name == variable.name())
     }
 
-    /// Value of a variable in a window.
     fn value(variable: Variable, point: &UnknownPoint) -> f64 {
         let of =
             |variable: Variable| Self::variable_index(variable).map_or(0.0, |index| point.variables[index]);
@@ -327,7 +325,6 @@ fn knots(sorted_samples: &[f64], count: usize) -> Vec<f64> {
     at
 }
 
-/// A table as in the report.
 fn term(table: &Tabulated) -> TableTerm {
     TableTerm {
         balance: format!("{}.{}", table.axis.name(), table.balance.name()),

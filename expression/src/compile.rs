@@ -35,7 +35,6 @@ pub trait Compile {
     /// Where an expression stands, if names mean different things at different places.
     type Scope: Copy;
 
-    /// The node at a place.
     fn at(&self, place: Place) -> Node;
 
     /// Where operations are collected.

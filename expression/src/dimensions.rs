@@ -12,7 +12,6 @@ pub trait Dimensions {
     /// Where an expression stands, if names mean different things at different places.
     type Scope: Copy;
 
-    /// The node at a place.
     fn at(&self, place: Place) -> Node;
 
     /// The dimension of a name.

@@ -163,7 +163,6 @@ impl Names<'_> {
         variables.get(place).unwrap_or_else(|| &parameters[place - variables.len()])
     }
 
-    /// The place of a table of this name.
     fn table(&self, name: &str) -> Option<usize> {
         self.known.tables.iter().position(|table| table.name == name)
     }

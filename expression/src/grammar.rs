@@ -353,7 +353,6 @@ impl Parser<'_> {
     }
 }
 
-/// Whether a character may stand in a name.
 pub fn is_of_name(character: char) -> bool {
     character.is_alphanumeric() || character == '_'
 }

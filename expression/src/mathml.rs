@@ -29,13 +29,9 @@ const GREEK: &str = "alpha beta gamma delta epsilon zeta eta theta iota kappa la
 pub enum Operand {
     /// By itself.
     None,
-    /// The first term of a sum.
     FirstTerm,
-    /// Another term of it.
     Term,
-    /// The first factor of a product.
     FirstFactor,
-    /// Another factor of it.
     Factor,
 }
 

@@ -188,7 +188,6 @@ impl Past {
         [of(values(share)), of(rates(share)) / length_s]
     }
 
-    /// Adds the derivatives of a leaf at a time.
     pub(crate) fn add_slopes(&self, leaf: Register, time_s: f64, sums: &mut [f64]) {
         let place = self.place(leaf);
         let Some((slot, share, _)) = self.at(time_s) else {

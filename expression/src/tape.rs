@@ -101,7 +101,6 @@ impl Builder {
         })
     }
 
-    /// The tape that computes these registers.
     pub fn tape(self, results: &[Register], curves: Vec<Curve>) -> Tape {
         let (leaves, constants) = (self.leaves.count(), self.constants.len());
         let is_fixed = self.fixed();
@@ -267,7 +266,6 @@ impl Registers {
 }
 
 impl Tape {
-    /// Operations in an evaluation.
     #[must_use]
     pub fn operations(&self) -> usize {
         self.operations.len()
@@ -322,7 +320,6 @@ impl Tape {
         }
     }
 
-    /// How many registers it has.
     #[must_use]
     pub fn registers(&self) -> usize {
         self.leaves.count() + self.constants.len() + self.operations.len()

@@ -29,7 +29,6 @@ pub struct Dimension([i16; 7]);
 pub struct Unit {
     /// As it is written.
     pub text: String,
-    /// What it measures.
     pub dimension: Dimension,
     /// SI units in one of it.
     pub factor: f64,
@@ -40,23 +39,19 @@ pub struct Unit {
 pub struct UnitError {
     /// Byte of the text.
     pub at: usize,
-    /// What is wrong.
     pub why: String,
 }
 
 impl Dimension {
     /// Of a pure number.
     pub const NONE: Self = Self([0; 7]);
-    /// Of a time.
     pub const TIME: Self = Self([0, 0, 12, 0, 0, 0, 0]);
 
-    /// Of a product.
     #[must_use]
     pub fn times(self, other: Self) -> Self {
         self.combined(other, 1)
     }
 
-    /// Of a quotient.
     #[must_use]
     pub fn over(self, other: Self) -> Self {
         self.combined(other, -1)

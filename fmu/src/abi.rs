@@ -55,7 +55,6 @@ struct Component {
     dead: bool,
 }
 
-/// The importer's log.
 struct ImporterLog {
     name: CString,
     logger: Option<Logger>,

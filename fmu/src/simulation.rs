@@ -33,7 +33,6 @@ enum Mode {
     Failed,
 }
 
-/// The plant while it runs.
 #[derive(Clone, Debug)]
 struct RunningPlant {
     plant: Plant,
@@ -91,7 +90,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// Sets the start time, s.
     pub(crate) fn set_start(&mut self, start_s: f64) -> Result<(), Refusal> {
         self.check_mode(&[Mode::Instantiated], "fmi2SetupExperiment", "fmi2Instantiate or fmi2Reset")?;
         if !start_s.is_finite() {
@@ -101,7 +99,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// Enters the initialisation.
     pub(crate) fn enter_initialisation(&mut self) -> Result<(), Refusal> {
         self.check_mode(
             &[Mode::Instantiated],
@@ -160,7 +157,6 @@ impl Simulation {
         Ok(warning)
     }
 
-    /// Time of the plant, s.
     pub(crate) fn time_s(&self) -> f64 {
         self.start_s + self.running.as_ref().map_or(0, |running| running.period) as f64 * PERIOD_S
     }
@@ -201,7 +197,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// The values of Boolean variables.
     pub(crate) fn booleans(&mut self, references: &[u32], values: &mut [bool]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
@@ -220,7 +215,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// The values of Integer variables.
     pub(crate) fn integers(&self, references: &[u32], values: &mut [i32]) -> Result<(), Refusal> {
         find(&self.variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
         values.fill(self.settings.seed);

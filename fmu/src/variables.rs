@@ -38,7 +38,6 @@ pub(crate) enum Role {
     Measured(usize, usize),
     /// The valve command in effect in this cycle.
     Acting(usize),
-    /// Whether the rods are linked.
     Linked,
 }
 

@@ -11,7 +11,6 @@ use expression::dimensions::{Dimensions, Measure};
 use expression::grammar::{Kind, Node, Place, Wrong};
 use std::collections::HashMap;
 
-/// Checks a model.
 pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
     let mut dimensions = Checker { model, known: HashMap::new(), open: Vec::new() };
     for index in 0..model.definitions.len() {

@@ -55,7 +55,6 @@ fn tape<'a>(
     Ok(compiler.builder.tape(&results, model.tables.iter().map(|table| table.curve.clone()).collect()))
 }
 
-/// The tapes with these suspects.
 pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
     let is_there = |owner: Option<usize>| model.is_there(owner, suspects);
     let states: Vec<usize> =

@@ -182,7 +182,6 @@ fn scale(section: &mut Section<'_>) -> Result<f64> {
     }
 }
 
-/// The range of a section in SI.
 fn range(section: &mut Section<'_>, unit: &Unit) -> Result<[f64; 2]> {
     match section.numbers("range")?.as_slice() {
         [] => Ok([f64::NEG_INFINITY, f64::INFINITY]),

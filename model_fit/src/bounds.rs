@@ -12,7 +12,6 @@ const UNEXPECTED: f64 = 3.0;
 /// What is left of a held-out record over what is left of the training records, from which on it is remarked.
 const MUCH_WORSE: f64 = 3.0;
 
-/// Whether a value is at an end of its range.
 pub(super) fn is_at_bound(value_si: f64, range_si: [f64; 2]) -> bool {
     let width = range_si[1] - range_si[0];
     range_si.iter().filter(|end| end.is_finite()).any(|end| {

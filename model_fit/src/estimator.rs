@@ -17,7 +17,6 @@
 
 pub use runlog::discrepancy_report::{Convergence, Outcome};
 
-/// Options of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Most accepted steps.

@@ -11,9 +11,7 @@ use model::{
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// A model file explained.
 pub struct Explained {
-    /// As text.
     pub text: String,
     /// As a page, its equations set.
     pub page: String,
@@ -239,7 +237,6 @@ fn equation(model: &Model, state: &model::State) -> String {
     format!("d{}/dt = {}    {} in {}, {start}", state.name, state.derivative.text, state.name, unit.text)
 }
 
-/// Definitions of the model itself, or of a suspect.
 fn definitions(model: &Model, suspect: Option<usize>) -> impl Iterator<Item = String> {
     let of_suspect = model.definitions.iter().enumerate().filter(move |(_, one)| one.suspect == suspect);
     of_suspect.map(|(index, one)| {

@@ -40,7 +40,6 @@ const FASTEST: f64 = 0.25;
 const STEPS_OF_START: usize = 10;
 const STEPS_OF_SAMPLE: usize = 30;
 
-/// What is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum What {
     /// A parameter, of all records.
@@ -83,7 +82,6 @@ pub(crate) struct Fitting<'a> {
 /// Of each output of a record what is left, and what the model says.
 pub(crate) type OfRecord = Vec<[Vec<f64>; 2]>;
 
-/// A point of a fit.
 #[derive(Clone, Debug)]
 pub(crate) struct Point {
     pub(crate) values_si: Vec<f64>,
@@ -316,7 +314,6 @@ impl<'a> Fitting<'a> {
         Ok(simulator.steps())
     }
 
-    /// A point with its loss.
     pub(crate) fn at(&self, values_si: Vec<f64>) -> Result<Point, Failure> {
         let mut squares = vec![0.0; self.model.outputs.len()];
         let mut steps = 0;
@@ -335,7 +332,6 @@ impl<'a> Fitting<'a> {
         Ok(Point { values_si, loss, squares, is_at_bound, steps })
     }
 
-    /// Where the fit starts.
     pub(crate) fn start(&self) -> Vec<f64> {
         self.unknowns.iter().map(|unknown| unknown.start_si).collect()
     }

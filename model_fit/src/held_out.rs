@@ -127,7 +127,6 @@ pub(crate) fn alternatives(
     rivals.iter().filter(|rival| !rival.is_near).map(of_rival).collect()
 }
 
-/// Of what is left from a row on.
 fn rms_of(left: &[f64], first_row: usize) -> f64 {
     let scored = left[first_row..].iter().filter(|value| value.is_finite());
     let (count, squares) =

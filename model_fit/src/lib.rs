@@ -145,7 +145,6 @@ pub fn read(file: &Path) -> Result<Model, ModelError> {
     Ok(Model::parse(&text, file)?)
 }
 
-/// Result of closing a model.
 #[derive(Clone, Debug)]
 pub struct ClosedModel {
     pub report: ModelReport,
@@ -259,7 +258,6 @@ pub fn close_with(
     Ok(ClosedModel { report, not_judged, page, extended })
 }
 
-/// Whether a formula is searched.
 fn is_searched(found: &select::Found<'_>, search: Search) -> Result<bool, ModelError> {
     Ok(found.taken.is_empty()
         && match search {

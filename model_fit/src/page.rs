@@ -163,7 +163,6 @@ fn term_curves(curves: &[TermCurve]) -> String {
     charts(&drawn.collect::<Vec<_>>())
 }
 
-/// A name with its unit.
 fn labelled(name: &str, unit: &str) -> String {
     if unit == "1" { name.into() } else { format!("{name} {unit}") }
 }

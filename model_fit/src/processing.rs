@@ -232,7 +232,6 @@ fn filled(time_s: &[f64], values: &[Option<f64>], hold: Hold, factor: f64) -> Ve
         .collect()
 }
 
-/// Times of what is known.
 fn known_s(time_s: &[f64], values: &[Option<f64>]) -> Vec<f64> {
     time_s.iter().zip(values).filter(|(_, value)| value.is_some()).map(|(time_s, _)| *time_s).collect()
 }

@@ -308,7 +308,6 @@ pub(super) fn columns(
 pub(super) struct Beside {
     pub(super) scale: Vec<f64>,
     pub(super) said: DVector<f64>,
-    /// What it leaves.
     pub(super) left: DVector<f64>,
     columns: DMatrix<f64>,
 }

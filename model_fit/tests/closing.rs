@@ -13,7 +13,6 @@ pub(crate) fn random(state: &mut u64) -> f64 {
     (*state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
 }
 
-/// A file of this name and text.
 pub(crate) fn file(folder: &Path, name: &str, text: &str) -> PathBuf {
     let path = folder.join(name);
     fs::write(&path, text).unwrap();

@@ -64,7 +64,6 @@ fn motion() -> Scenario {
     scenario::record(&RigParameters::baseline(), kind, BEGIN + PERIODS)
 }
 
-/// Names of all rigs.
 fn names() -> Vec<&'static str> {
     let each = SHEETS.iter().map(|sheet| sheet.name);
     ["none"].into_iter().chain(each).chain(["ten", "all"]).collect()

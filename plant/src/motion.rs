@@ -40,7 +40,6 @@ pub(crate) struct Levels {
     pub(crate) sliding_n: [f64; 2],
     /// Break-away force, N, not below the sliding friction.
     pub(crate) break_away_n: [f64; 2],
-    /// Viscous friction, N s/m.
     pub(crate) viscous_n_s_per_m: [f64; 2],
 }
 

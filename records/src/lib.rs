@@ -65,7 +65,6 @@ pub enum LoggedBy {
     Listener,
 }
 
-/// Which form a record had.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// `measurement.csv`.

@@ -42,7 +42,6 @@ pub(super) fn section(
     text
 }
 
-/// Values of the factors in this run.
 fn values(campaign: &Campaign, run: u64) -> String {
     let point = campaign.points.point(run);
     let reported =

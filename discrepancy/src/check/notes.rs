@@ -21,7 +21,6 @@ impl<'a> Notes<'a> {
         self.push(kind, channel.column(), row, fatal, &format!("{channel}: {text}"));
     }
 
-    /// The same for time.
     pub(super) fn add_time(&mut self, kind: &str, row: Option<usize>, fatal: bool, text: &str) {
         self.push(kind, "time_s".into(), row, fatal, text);
     }

@@ -239,7 +239,6 @@ fn jitter(notes: &mut Notes, period_s: f64) {
     }
 }
 
-/// Values that are not there.
 fn absent(notes: &mut Notes) {
     let record = notes.record;
     for channel in record.channels() {

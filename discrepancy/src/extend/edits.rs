@@ -9,7 +9,6 @@ use toml_edit::{Document, Item, Table, TableLike};
 /// What is to be done to a text.
 pub(super) struct Edits<'t> {
     text: &'t str,
-    /// What the file ends its lines with.
     line_end: &'static str,
     edits: Vec<(Range<usize>, String)>,
 }

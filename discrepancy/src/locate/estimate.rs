@@ -187,7 +187,6 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     );
 }
 
-/// Simulations of a window.
 struct Runs {
     baseline: Readings,
     /// With a nudge each, in the order of [`NUMBERS`].

@@ -3,9 +3,7 @@
 use super::{MEMORY, UnknownPoint, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Surface};
 
-/// Bins of a map.
 pub(crate) const BINS: usize = 20;
-/// Maps of a balance.
 const MAPS: usize = 2;
 /// Bins of a surface: of its first variable, and of its second.
 const SURFACE: [usize; 2] = [10, 3];
@@ -52,7 +50,6 @@ pub(crate) fn map(series: &UnknownSeries, variable: usize) -> Curve {
     curve
 }
 
-/// The surface of a series over two variables.
 pub(crate) fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
     let places = [0, 1].map(|side| {
         let values: Vec<f64> = series.points.iter().map(|point| point.variables[variables[side]]).collect();

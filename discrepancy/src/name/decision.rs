@@ -74,7 +74,6 @@ impl NotExplained {
     }
 }
 
-/// What the search found.
 pub(super) struct Searched {
     pub(super) selection: Selection,
     /// Its rounds before effects were eliminated.

@@ -20,7 +20,6 @@ const THRESHOLD_FACTOR_SEVERAL: f64 = 3.0;
 /// Share of the loss reduction of all effects together below which an effect is eliminated, whatever the threshold.
 const MIN_SHARE_OF_REDUCTION: f64 = 0.002;
 
-/// What the search selected.
 #[derive(Clone)]
 pub(super) struct Selection {
     /// Parameters without effects.

@@ -47,7 +47,6 @@ pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 
-/// A simulated model.
 struct Simulated {
     effects: Vec<EffectEstimate>,
     factors: [f64; COUNT],
@@ -115,7 +114,6 @@ fn coordinates(effects: &[EffectEstimate]) -> usize {
     effects.iter().map(|effect| effect.coordinates.len()).sum()
 }
 
-/// Linearisation at a point.
 struct JointLinearisation {
     /// Sensitivities, parameters first.
     columns: Vec<Vec<f64>>,

@@ -324,7 +324,6 @@ impl<'a> Model<'a> {
     }
 }
 
-/// All but one.
 fn without<T>(all: &[T], left_out: usize) -> impl Iterator<Item = &T> {
     all.iter().enumerate().filter(move |(at, _)| *at != left_out).map(|(_, one)| one)
 }

@@ -15,7 +15,6 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Noise of the readings of both axes.
 #[derive(Clone, Debug)]
 pub struct ReadingNoise {
     /// Standard deviations, SI.

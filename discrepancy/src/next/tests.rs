@@ -10,7 +10,6 @@ use std::collections::BTreeSet;
 const TARGET_DIVERGENCE: f64 = 25.0;
 /// Nearest way to an end of the stroke that an experiment may come, m.
 const FROM_END_M: f64 = 0.005;
-/// Longest experiment, s.
 const LONGEST_S: f64 = 25.0;
 
 /// An effect, its place, its numbers.

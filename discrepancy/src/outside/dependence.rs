@@ -68,7 +68,6 @@ impl Bins {
 }
 
 impl Sample {
-    /// Takes the sample of a series.
     pub(crate) fn of(series: &UnknownSeries) -> Self {
         let points = &series.points;
         Sample {

@@ -267,7 +267,6 @@ fn surface_figure(surface: &Surface) -> String {
     )
 }
 
-/// A name with its unit, where it has one.
 fn labelled(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }

@@ -40,7 +40,6 @@ pub(super) struct FittedTable {
 }
 
 impl FittedTable {
-    /// Whether a point acts in a window.
     fn acts(&self, point: usize, ranges: &VariableRanges) -> bool {
         let Tabulated { axis, variable, at, .. } = &self.table;
         let before = point.checked_sub(1).map_or(f64::NEG_INFINITY, |before| at[before]);

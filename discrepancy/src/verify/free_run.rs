@@ -17,7 +17,6 @@ const BEYOND_M: f64 = 1e-9;
 pub(super) struct FreeRun {
     /// Of each axis and channel, rms error in percent of the range of the readings; `None` where there are none.
     pub(super) nrmse_percent: [[Option<f64>; CHANNELS]; 2],
-    /// Unphysical events.
     pub(super) unphysical: Vec<String>,
 }
 

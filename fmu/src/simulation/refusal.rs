@@ -17,7 +17,6 @@ pub(crate) enum Refusal {
     /// The value is out of range, or not finite.
     #[error("{name} = {value}: allowed are {least} to {most}{}", spaced(unit))]
     OutOfRange { name: String, value: f64, least: f64, most: f64, unit: &'static str },
-    /// Parameters that are inconsistent.
     #[error("{0}")]
     Parameters(#[from] ParameterError),
     /// A set-up that the rig does not allow.

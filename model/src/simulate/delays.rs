@@ -47,11 +47,8 @@ const MOST_ROOM: f64 = 4096.0;
 /// What has earlier values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kept {
-    /// A state by its place.
     State(usize),
-    /// A memory by its place.
     Memory(usize),
-    /// The direction of a friction.
     Direction(usize),
 }
 

@@ -54,7 +54,6 @@ impl Simulator<'_> {
         }
     }
 
-    /// The speed of a friction.
     fn speed(&self, friction: usize) -> f64 {
         self.x[self.program.held[friction].0 * self.width()]
     }

@@ -78,7 +78,6 @@ impl Simulator<'_> {
         self.put_memories();
     }
 
-    /// Renews the memories at an instant.
     pub(super) fn renew(&mut self, inputs: &Inputs<'_>, instant: (usize, f64)) {
         if !self.memory.is_empty() {
             self.renew_at(inputs, instant, At::Head);

@@ -20,7 +20,6 @@ pub(super) struct Table {
     pub(super) head: Vec<String>,
     /// Units of the columns, where a row under the head has them.
     pub(super) units: Option<Vec<String>>,
-    /// Whether each column holds numbers.
     pub(super) is_number: Vec<bool>,
     /// Whether each column holds times of a calendar.
     pub(super) is_calendar: Vec<bool>,

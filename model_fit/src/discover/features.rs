@@ -46,7 +46,6 @@ pub(super) struct Variable {
     is_state: bool,
 }
 
-/// A term of the search.
 #[derive(Clone)]
 pub(super) struct Term {
     pub(super) name: String,
@@ -203,7 +202,6 @@ fn places(model: &Model) -> Vec<(Target, String)> {
     states.chain(outputs.map(|(index, output)| (Target::Output(index), output.unit.text.clone()))).collect()
 }
 
-/// A number with its unit.
 fn measured(value: f64, unit: &str) -> String {
     if unit == "1" { format!("{value}") } else { format!("{value}[{unit}]") }
 }
@@ -270,7 +268,6 @@ fn sign(variable: &Variable) -> Factor {
     }
 }
 
-/// What is remembered of a variable.
 fn memories(variable: &Variable, period_s: f64, length_s: f64) -> Vec<Factor> {
     let Variable { name, unit, size, mean, first, .. } = variable;
     let over = measured(*size, unit);

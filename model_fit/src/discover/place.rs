@@ -52,7 +52,6 @@ pub struct Located {
     pub alternatives: Vec<Place>,
 }
 
-/// A place with variables.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Place {
     pub place: String,

@@ -152,7 +152,6 @@ pub(crate) fn variables() -> Vec<Variable<'static>> {
         .collect()
 }
 
-/// The dimension of a unit of this module.
 pub(crate) fn dimension(unit: &str) -> Dimension {
     expression::units::Unit::parse(unit).map(|unit| unit.dimension).expect("a unit of this module")
 }
@@ -332,7 +331,6 @@ struct Acting {
     kept: Range<usize>,
 }
 
-/// The declared terms of an axis.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct DeclaredTerms {
     terms: Vec<Acting>,
@@ -345,7 +343,6 @@ pub(crate) struct DeclaredTerms {
 }
 
 impl DeclaredTerms {
-    /// Those of an axis that a rig has.
     pub(crate) fn of(rig: &RigParameters, axis: Axis) -> Self {
         let (mut terms, mut laws) = (Vec::new(), Vec::new());
         let mut follows_sensor = false;
@@ -367,12 +364,10 @@ impl DeclaredTerms {
         }
     }
 
-    /// Whether there are any.
     pub(crate) fn any(&self) -> bool {
         !self.terms.is_empty()
     }
 
-    /// Whether any adds to a target.
     pub(crate) fn adds(&self, target: Target) -> bool {
         self.terms.iter().any(|term| term.target == target)
     }

@@ -16,7 +16,6 @@ pub(crate) struct Rubbing {
     pub(crate) extension_m: f64,
     /// Gauge pressures of chambers a and b, Pa.
     pub(crate) gauge_pa: [f64; 2],
-    /// Time at rest, s.
     pub(crate) rest_s: f64,
 }
 

@@ -44,7 +44,6 @@ pub(crate) struct AxisMoving {
     pub(crate) port_flow_m3_per_s: [f64; 2],
     /// Deflection of the bristles, m.
     pub(crate) deflection_m: f64,
-    /// Time at rest, s.
     pub(crate) rest_s: f64,
     /// What lagging sensors show: position, pressure a, pressure b.
     pub(crate) shown: [f64; 3],

@@ -267,7 +267,6 @@ pub fn interpolated(at: &[f64], value: &[f64], x: f64) -> f64 {
     value[above - 1] + (value[above] - value[above - 1]) * share
 }
 
-/// The tables of an axis.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tables {
     laws: Vec<Law>,
@@ -276,7 +275,6 @@ pub(crate) struct Tables {
 }
 
 impl Tables {
-    /// Those of an axis that a rig has.
     pub(crate) fn of(rig: &RigParameters, axis: Axis) -> Self {
         let of_axis = rig.tabulated().iter().filter(|table| table.axis == axis);
         let laws = of_axis.map(|table| Law {

@@ -25,7 +25,6 @@ impl ParameterError {
         ParameterError(format!("{file}:{line}: {message}"))
     }
 
-    /// Of a declared term.
     pub(crate) fn of_term(name: &str, message: &str) -> Self {
         ParameterError(format!("term {name}: {message}"))
     }
