@@ -9,7 +9,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let file = arguments.next().ok_or("name a file, and for a foreign CSV its mapping")?;
     let options = ReadOptions { mapping: arguments.next(), ..ReadOptions::default() };
     let record = records::read(&file, &options)?;
-    println!("{}: {:?}, {} rows, {:?}", record.file().display(), record.form(), record.len(), record.setup());
+    println!("{}: {:?}, {} rows, {:?}", record.file.display(), record.form, record.len(), record.setup);
     for channel in record.channels() {
         let values = record.channel(channel).unwrap_or_default();
         let there: Vec<f64> = values.iter().copied().flatten().collect();
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let most = there.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         println!("{channel:24} {} values of {}, {least} to {most}", there.len(), values.len());
     }
-    for warning in record.warnings() {
+    for warning in &record.warnings {
         println!("line {:?}: {}", warning.line, warning.text);
     }
     Ok(())

@@ -27,13 +27,13 @@ pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> Refit {
 
 /// A parameter of a fit, in the unit of the rig file; of tables their common factor.
 pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
-    let (parameter, measured) = (PARAMETERS[at], engine.windows()[0].record().measured);
-    let (before, unit) = parameter.value(engine.rig(), measured);
+    let (parameter, measured) = (PARAMETERS[at], engine.windows[0].record.measured);
+    let (before, unit) = parameter.value(&engine.rig, measured);
     // The simulated value: numbers are clamped to their ranges, and the break-away force to the sliding force.
     let value = if unit.is_empty() {
         before * fit.factors[at]
     } else {
-        parameter.value(&with_factors(engine.rig(), &fit.factors), measured).0
+        parameter.value(&with_factors(&engine.rig, &fit.factors), measured).0
     };
     let error = fit.errors[fit.errors.len() - COUNT + at];
     Quantity {

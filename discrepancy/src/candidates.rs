@@ -125,7 +125,7 @@ impl Candidate {
             });
             Candidate { sheet: &suspect.sheet, place: suspect.place, suspect: Some(suspect), present }
         };
-        let shown = |suspect: &&&'static Suspect| measured[suspect.declared.axis().index()];
+        let shown = |suspect: &&&'static Suspect| measured[suspect.declared.axis.index()];
         suspects.iter().filter(shown).map(one).collect()
     }
 

@@ -75,7 +75,7 @@ impl Checked {
 
 pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     let mut notes = Notes::new(record);
-    for warning in record.warnings() {
+    for warning in &record.warnings {
         let (kind, line, text) = ("reader".into(), warning.line, warning.text.clone());
         notes.findings.push(Finding { kind, line, text, ..Finding::default() });
     }
@@ -92,7 +92,7 @@ pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     }
     let time_s = record.time_s();
     let report = RecordCheck {
-        file: record.file().display().to_string(),
+        file: record.file.display().to_string(),
         usable: !notes.is_fatal(),
         rows: record.len(),
         length_s: time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0),

@@ -146,7 +146,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     if let Some((name, experiment)) = proposed.zip(experiment.as_ref()) {
         out.write(name, experiment)?;
     }
-    progress(&format!("report.json and report.html are in {}", out.path().display()));
+    progress(&format!("report.json and report.html are in {}", out.path.display()));
     Ok(match not_judged {
         Some(_) => Exit::BadInput,
         None => exit_of(report, records.read.strict),

@@ -177,7 +177,7 @@ struct Term {
 
 impl Term {
     fn new(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<Self> {
-        let rig = rig_of(engine.rig(), beside.effects, &beside.factors)?;
+        let rig = rig_of(&engine.rig, beside.effects, &beside.factors)?;
         let simulated = engine.simulate(&rig);
         let residual = engine.residual(&simulated);
         let mut columns = linearise_at(engine, beside.effects, beside.factors).columns;
@@ -186,11 +186,11 @@ impl Term {
         let mut windows = Vec::new();
         let mut places: Vec<(&GriddedRecord, usize)> = Vec::new();
         let mut from = 0;
-        for part in engine.windows() {
+        for part in &engine.windows {
             let to = from + part.count() * part.rows();
             let columns: Vec<&[f64]> = all.iter().map(|column| &column[from..to]).collect();
-            windows.extend(part.input_products(&rig, &columns, engine.axis_by_axis())?);
-            places.extend(part.starts().iter().map(|start| (part.record(), *start)));
+            windows.extend(part.input_products(&rig, &columns, engine.axis_by_axis)?);
+            places.extend(part.starts.iter().map(|start| (part.record, *start)));
             from = to;
         }
         let mut values = [0, 1].map(|axis| UnknownKind::ALL.map(|kind| values_of(&places, axis, kind)));
@@ -200,7 +200,7 @@ impl Term {
             precisions: prior_precisions(beside.effects),
             offsets: prior_deviations(&beside.factors, beside.effects),
             windows,
-            axis_by_axis: engine.axis_by_axis(),
+            axis_by_axis: engine.axis_by_axis,
             measured: places.first().map_or([false; 2], |(record, _)| record.measured),
             values,
         })
@@ -219,7 +219,7 @@ impl Term {
             .filter_map(|(axis, kinds, over)| {
                 // A singular fit has no evidence.
                 let products = self.with_terms(axis, kinds, over);
-                let count = products.columns() - self.precisions.len();
+                let count = products.columns - self.precisions.len();
                 let evidence = |size: f64| {
                     let precision = size.powi(-2);
                     let precisions: Vec<f64> = self
@@ -322,11 +322,11 @@ fn values_of(places: &[(&GriddedRecord, usize)], axis: usize, kind: UnknownKind)
 /// Replaces the force readings by simulated ones: a term over the force would correlate with the noise of its own readings.
 fn simulated_forces(engine: &Engine<'_>, simulated: &[f64], values: &mut [[Vec<BlockValues>; 4]; 2]) {
     let mut window = 0;
-    for part in engine.windows() {
+    for part in &engine.windows {
         let rows = part.rows();
-        let width = part.outputs().len();
-        for (output, (axis, channel)) in part.outputs().iter().enumerate().filter(|(_, of)| of.1 == FORCE) {
-            let noise = part.record().noise[*axis][*channel];
+        let width = part.outputs.len();
+        for (output, (axis, channel)) in part.outputs.iter().enumerate().filter(|(_, of)| of.1 == FORCE) {
+            let noise = part.record.noise[*axis][*channel];
             for at in window..window + part.count() {
                 let readings: Vec<f64> =
                     simulated[at * rows..][..rows].iter().skip(output).step_by(width).copied().collect();

@@ -37,12 +37,14 @@ type Sensitivities = (RigParameters, [f64; COUNT], Vec<Vec<f64>>);
 /// Records, windows and the baseline rig.
 #[derive(Debug)]
 pub struct Engine<'a> {
-    windows: Vec<Windows<'a>>,
-    rig: RigParameters,
-    /// Whether each axis of a window counts as a window.
-    axis_by_axis: bool,
-    rows: usize,
-    scaled_dof: Vec<f64>,
+    pub windows: Vec<Windows<'a>>,
+    pub rig: RigParameters,
+    /// Whether each axis of a window counts as a window, the drive first.
+    pub(crate) axis_by_axis: bool,
+    /// Length of the residual vector of a window.
+    pub rows: usize,
+    /// Degrees of freedom of each window times the common variance factor.
+    pub scaled_dof: Vec<f64>,
     /// Common variance factor of the noise, by the quietest windows.
     variance_factor: f64,
     /// Whether [`Engine::simulate`] takes longer steps.
@@ -87,18 +89,13 @@ impl<'a> Engine<'a> {
     /// touch, so that each rig needs its own start states.
     pub(crate) fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
         let windows: Vec<Windows<'a>> =
-            self.windows.par_iter().map(|windows| Windows::new(windows.record(), rig)).collect();
+            self.windows.par_iter().map(|windows| Windows::new(windows.record, rig)).collect();
         let scaled_dof = windows
             .iter()
             .flat_map(|windows| windows.dof(self.axis_by_axis))
             .map(|scaled_dof| scaled_dof * self.variance_factor)
             .collect();
         self.on(windows, scaled_dof)
-    }
-
-    /// Start sensitivities of the windows of each record.
-    pub(crate) fn start_sensitivities(&self) -> Vec<Vec<Vec<Vec<f64>>>> {
-        self.windows.iter().map(Windows::sensitivities).collect()
     }
 
     /// Other records of the same runs in the same windows, whose start states are estimated with the sensitivities of these:
@@ -141,25 +138,7 @@ impl<'a> Engine<'a> {
 
     /// Whether a record was made with linked rods.
     pub(crate) fn is_linked(&self) -> bool {
-        self.windows.iter().any(|windows| windows.record().linked)
-    }
-
-    pub fn rig(&self) -> &RigParameters {
-        &self.rig
-    }
-
-    pub fn windows(&self) -> &[Windows<'a>] {
-        &self.windows
-    }
-
-    /// Length of the residual vector of a window.
-    pub fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// Whether each axis of a window counts as a window, the drive first.
-    pub(crate) fn axis_by_axis(&self) -> bool {
-        self.axis_by_axis
+        self.windows.iter().any(|windows| windows.record.linked)
     }
 
     /// The loss of windows with these squares, and their degrees of freedom, on some axes where each counts as a window.
@@ -168,11 +147,6 @@ impl<'a> Engine<'a> {
         let (squares, dof): (Vec<f64>, Vec<f64>) =
             (0..squares.len()).filter(counts).map(|at| (squares[at], self.scaled_dof[at])).unzip();
         (fit::loss(&squares, &dof), dof.iter().sum())
-    }
-
-    /// Degrees of freedom of each window times the common variance factor.
-    pub fn scaled_dof(&self) -> &[f64] {
-        &self.scaled_dof
     }
 
     /// Whether [`Engine::simulate`] takes the plant's own steps.

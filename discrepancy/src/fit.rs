@@ -37,7 +37,7 @@ pub(crate) fn loss(squares: &[f64], dof: &[f64]) -> f64 {
 /// Products of a residual and some columns, window by window.
 #[derive(Clone, Debug)]
 pub(crate) struct Products {
-    columns: usize,
+    pub(crate) columns: usize,
     /// Degrees of freedom of each window.
     dof: Vec<f64>,
     /// |e|^2 of each window.
@@ -144,11 +144,6 @@ impl Products {
         Products { columns, dof, squares, scores: scores.collect(), information: information.collect() }
     }
 
-    pub(crate) fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// The loss of windows with these squares.
     pub(crate) fn loss(&self, squares: &[f64]) -> f64 {
         loss(squares, &self.dof)
     }

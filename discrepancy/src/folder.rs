@@ -21,7 +21,7 @@ pub enum FolderError {
 /// A folder that takes the results of one run.
 #[derive(Debug)]
 pub(crate) struct Folder {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Files that are read, as the file system knows them.
     inputs: Vec<PathBuf>,
 }
@@ -36,10 +36,6 @@ impl Folder {
         // What is not there is missed by whoever reads it.
         let inputs = inputs.into_iter().filter_map(|file| fs::canonicalize(file).ok()).collect();
         Ok(Self { path: path.to_owned(), inputs })
-    }
-
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// A file of results that may be written.

@@ -135,11 +135,11 @@ impl GriddedRecord {
         checked: &Checked,
         rig: &RigParameters,
     ) -> Result<GriddedRecord, GriddingError> {
-        let file = record.file().display().to_string();
+        let file = record.file.display().to_string();
         // A parked, unlinked load carries no information, and its position may be clipped.
         let measured = Axis::ALL.map(|axis| {
             record.channel(Channel::Of(axis, Signal::Position)).is_some()
-                && (record.setup().linked || !checked.is_parked(axis))
+                && (record.setup.linked || !checked.is_parked(axis))
         });
         if measured == [false, false] {
             return Err(GriddingError::NoAxis { file });
@@ -159,8 +159,8 @@ impl GriddedRecord {
         }
         let mut gridded = GriddedRecord {
             name: file,
-            linked: record.setup().linked,
-            added_mass_kg: record.setup().added_mass_kg,
+            linked: record.setup.linked,
+            added_mass_kg: record.setup.added_mass_kg,
             measured,
             inputs: vec![Inputs::default(); length],
             samples: vec![[[None; CHANNELS]; 2]; length],

@@ -110,13 +110,6 @@ pub struct UnknownPoint {
     pub(crate) regimes: Regimes,
 }
 
-impl UnknownPoint {
-    /// The estimate over its standard deviation.
-    pub(crate) fn z_score(&self) -> f64 {
-        self.value / self.deviation
-    }
-}
-
 impl UnknownSeries {
     /// As in [`BalanceBar::birge_ratio`]. `None` without a point.
     pub fn birge_ratio(&self) -> Option<f64> {
@@ -127,7 +120,7 @@ impl UnknownSeries {
 fn birge_ratio<'a>(points: impl Iterator<Item = &'a UnknownPoint>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
     for point in points {
-        sum += point.z_score().powi(2);
+        sum += (point.value / point.deviation).powi(2);
         count += 1;
     }
     (count > 0).then(|| (sum / f64::from(count)).sqrt())

@@ -138,7 +138,7 @@ pub fn name(
     let calibrated = calibrate(engine, &linearisation);
     progress(&format!("screening {} candidates", candidates.len()));
     let columns = Columns::new(engine, candidates);
-    let baseline = engine.residual(&engine.simulate(engine.rig()));
+    let baseline = engine.residual(&engine.simulate(&engine.rig));
     let (null_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
@@ -224,7 +224,7 @@ pub fn name(
     let lacks_fit = lacks_fit || lacks_fit_on_an_axis(here, &selection.model);
     let not_explained = explained.as_ref().err().copied();
     let reported = explained.unwrap_or_else(|_| {
-        let rig = with_factors(engine.rig(), &selection.calibrated.factors);
+        let rig = with_factors(&engine.rig, &selection.calibrated.factors);
         let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
         with_needed(restarted.as_ref().unwrap_or(engine), &selection.calibrated)
     });
@@ -267,7 +267,7 @@ pub fn weigh_by_marginal_likelihood(engine: &Engine<'_>, found: &mut SelectionRe
 
 /// Refits the reported model on all of the records, where the search used a part of them.
 pub(crate) fn on_all(engine: &Engine<'_>, found: &mut SelectionResult) {
-    let Some(rig) = rig_of(engine.rig(), &found.reported.effects, &found.reported.factors) else { return };
+    let Some(rig) = rig_of(&engine.rig, &found.reported.effects, &found.reported.factors) else { return };
     let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
     let needed = found.reported.factors.map(|factor| factor != 1.0);
     if let Some(reported) = fit_selected(restarted.as_ref().unwrap_or(engine), &found.reported, &needed) {
@@ -301,7 +301,7 @@ fn axes_of(effects: &[EffectEstimate]) -> [bool; 2] {
 /// The loss of a fit on some axes, its penalties included; the whole one where the axes are not judged apart.
 fn loss_on(engine: &Engine<'_>, axes: [bool; 2], fit: &Refit) -> f64 {
     let of = |axes: [bool; 2]| engine.loss_on(axes, &fit.squares).0;
-    if engine.axis_by_axis() && axes != [true; 2] { fit.loss - of([true; 2]) + of(axes) } else { fit.loss }
+    if engine.axis_by_axis && axes != [true; 2] { fit.loss - of([true; 2]) + of(axes) } else { fit.loss }
 }
 
 /// The loss of a model on the axes that the last effect of another one acts on.
@@ -316,7 +316,7 @@ pub(crate) fn share_removed(before: f64, after: f64) -> f64 {
 
 /// Whether a model with this loss leaves more than noise.
 fn lacks_fit(engine: &Engine<'_>, loss: f64) -> bool {
-    loss > lack_of_fit_per_dof(engine.is_linked()) * engine.scaled_dof().iter().sum::<f64>()
+    loss > lack_of_fit_per_dof(engine.is_linked()) * engine.scaled_dof.iter().sum::<f64>()
 }
 
 /// Whether a model leaves more than noise on one of the axes, where each counts: the other one would hide it in the sum.
@@ -325,7 +325,7 @@ fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &Refit) -> bool {
         let (loss, dof) = engine.loss_on(axes, &model.squares);
         loss > lack_of_fit_per_dof(engine.is_linked()) * dof
     };
-    engine.axis_by_axis() && (lacks_on([true, false]) || lacks_on([false, true]))
+    engine.axis_by_axis && (lacks_on([true, false]) || lacks_on([false, true]))
 }
 
 /// Loss J over the degrees of freedom of all windows above which a model leaves more than noise.
@@ -384,7 +384,7 @@ fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<
 /// Screens all candidates against a model's residual, with the derivatives of its effects as extra columns.
 fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<Screened>) {
     let linearisation = linearise(engine, model);
-    let rig = rig_of(engine.rig(), &model.effects, &model.factors).expect("a model that was fitted is a rig");
+    let rig = rig_of(&engine.rig, &model.effects, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);
     let residual = engine.residual(&simulated);
     let model_sensitivities: Vec<Vec<f64>> = coordinates(&model.effects)

@@ -101,7 +101,7 @@ impl Linearisation {
     /// At the rig file's values.
     pub fn at_baseline(engine: &Engine<'_>) -> Self {
         let factors = [1.0; COUNT];
-        Linearisation { columns: engine.parameter_columns(engine.rig(), &factors), factors }
+        Linearisation { columns: engine.parameter_columns(&engine.rig, &factors), factors }
     }
 
     /// Deviations of the parameters from the prior means.
@@ -170,7 +170,7 @@ pub(crate) fn coordinates(effects: &[EffectEstimate]) -> Vec<(usize, usize)> {
 
 /// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
 pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, effects: &[EffectEstimate]) -> f64 {
-    let Some(rig) = rig_of(engine.rig(), effects, &linearisation.factors) else { return f64::INFINITY };
+    let Some(rig) = rig_of(&engine.rig, effects, &linearisation.factors) else { return f64::INFINITY };
     let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &linearisation.columns);
     let parameters: Vec<usize> = (0..COUNT).collect();
     let off = linearisation.deviations();
@@ -227,11 +227,11 @@ pub(crate) fn refit_steps(
             .sum()
     };
     let mut evaluate = |effects: Vec<EffectEstimate>| -> Option<Projected> {
-        let simulated = engine.simulate(&rig_of(engine.rig(), &effects, &linearisation.factors)?);
+        let simulated = engine.simulate(&rig_of(&engine.rig, &effects, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
             Some(products) => {
-                products.set_residual(&residual, &linearisation.columns, engine.rows());
+                products.set_residual(&residual, &linearisation.columns, engine.rows);
                 products
             }
             none => none.insert(engine.products(&residual, &linearisation.columns)),
@@ -311,7 +311,7 @@ pub(crate) fn linearise_at(
     effects: &[EffectEstimate],
     factors: [f64; COUNT],
 ) -> Linearisation {
-    let rig = rig_of(engine.rig(), effects, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
+    let rig = rig_of(&engine.rig, effects, &[1.0; COUNT]).unwrap_or_else(|| engine.rig.clone());
     Linearisation { columns: engine.parameter_columns(&rig, &factors), factors }
 }
 
@@ -376,7 +376,7 @@ pub(crate) fn derivative(
     let change = difference_step(&effects[at], key);
     let mut effects = effects.to_vec();
     effects[at].coordinates[key] += change;
-    let readings = engine.simulate(&rig_of(engine.rig(), &effects, factors)?);
+    let readings = engine.simulate(&rig_of(&engine.rig, &effects, factors)?);
     let mut column = engine.difference(&readings, simulated);
     column.iter_mut().for_each(|value| *value /= change);
     Some(column)

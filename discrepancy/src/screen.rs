@@ -37,7 +37,7 @@ pub(crate) struct Screened {
 impl Columns {
     /// Simulates all probes of some candidates.
     pub fn new(engine: &Engine<'_>, candidates: Vec<Candidate>) -> Self {
-        let baseline = engine.simulate_coarsely(engine.rig());
+        let baseline = engine.simulate_coarsely(&engine.rig);
         let tasks: Vec<(usize, Vec<f64>)> = candidates
             .iter()
             .enumerate()
@@ -46,7 +46,7 @@ impl Columns {
         let made: Vec<Option<Vec<f64>>> = tasks
             .par_iter()
             .map(|(at, probe)| {
-                let rig = candidates[*at].rig(engine.rig(), probe).ok()?;
+                let rig = candidates[*at].rig(&engine.rig, probe).ok()?;
                 Some(engine.difference(&engine.simulate_coarsely(&rig), &baseline))
             })
             .collect();

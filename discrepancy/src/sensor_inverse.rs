@@ -63,7 +63,7 @@ impl SensorInverse {
         }
         let of_readings = [Target::Position, Target::PressureA, Target::PressureB];
         let declared: Vec<Declared> =
-            rig.terms().iter().filter(|term| of_readings.contains(&term.target())).cloned().collect();
+            rig.terms().iter().filter(|term| of_readings.contains(&term.target)).cloned().collect();
         let is_true = declared.is_empty() && axes.iter().flatten().all(|reading| *reading == Reading::TRUE);
         SensorInverse { axes, declared, stroke_m: rig.cylinder().stroke_m, is_true }
     }
@@ -100,7 +100,7 @@ impl SensorInverse {
             ];
         }
         for term in &self.declared {
-            let i = term.axis().index();
+            let i = term.axis.index();
             let at = |period: usize| {
                 let (point, inputs) = (&record.smoothed_states[period][i], &record.inputs[period]);
                 let ([a, b], valve) = (point.pressures_pa, inputs.valve[i]);
@@ -108,12 +108,12 @@ impl SensorInverse {
                 term.value(&[point.extension_m, point.rod_velocity_m_per_s, a, b, valve, valve, time_s, 0.0])
             };
             let (now, next) = (at(period), at((period + 1).min(record.len() - 1)));
-            match term.target() {
+            match term.target {
                 Target::PressureA => points[i].pressures_pa[0] -= now,
                 Target::PressureB => points[i].pressures_pa[1] -= now,
                 _ => {
                     // The sensor reads the rig's coordinate.
-                    let along = if term.axis() == Axis::Load { -1.0 } else { 1.0 };
+                    let along = if term.axis == Axis::Load { -1.0 } else { 1.0 };
                     points[i].extension_m = (points[i].extension_m - along * now).clamp(0.0, self.stroke_m);
                     if points[i].rod_velocity_m_per_s != 0.0 {
                         points[i].rod_velocity_m_per_s -= along * (next - now) / PERIOD_S;

@@ -78,17 +78,17 @@ fn is_amplitude(one: &EntryParameter) -> bool {
 impl Suspect {
     fn of(declared: Declared) -> Suspect {
         let kept = |text: String| -> &'static str { Box::leak(text.into_boxed_str()) };
-        let target = declared.target();
+        let target = declared.target;
         let key = |number: &Number| key(number, kept(number.name.clone()), kept(number.unit.text.clone()));
         let sheet = Sheet {
-            name: kept(declared.name().to_owned()),
+            name: kept(declared.name.clone()),
             group: match target.kind() {
                 PlaceKind::Chamber => Group::Chamber,
                 PlaceKind::Channel => Group::Sensor,
                 _ => Group::Motion,
             },
             place: target.kind(),
-            law: kept(format!("adds {} to {}", declared.expression(), declared.place())),
+            law: kept(format!("adds {} to {}", declared.add, declared.place())),
             source: "a file of suspects",
             keys: Box::leak(declared.numbers().iter().map(key).collect::<Vec<_>>().into_boxed_slice()),
             ..Sheet::USUAL
@@ -99,11 +99,11 @@ impl Suspect {
 
     pub(crate) fn reported(&self) -> DeclaredSuspect {
         DeclaredSuspect {
-            effect: self.declared.name().to_owned(),
+            effect: self.declared.name.clone(),
             place: place_of(self.place),
             adds_to: self.declared.place(),
-            add: self.declared.expression().to_owned(),
-            twins: self.declared.twins().to_vec(),
+            add: self.declared.add.clone(),
+            twins: self.declared.twins.clone(),
             declaration: self.declared.toml("suspects"),
         }
     }

@@ -65,7 +65,7 @@ pub(crate) fn tabulate(
 ) -> Result<Tables, String> {
     let (axis, balance) = parse_balance(&outside.balance)
         .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
-    let rig = with_factors(engine.rig(), &calibrated.factors);
+    let rig = with_factors(&engine.rig, &calibrated.factors);
     let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
     let engine = restarted.as_ref().unwrap_or(engine);
     let free = reported.factors.map(|factor| factor != 1.0);
@@ -253,7 +253,7 @@ impl TableSearch<'_> {
         sorted_samples.sort_unstable_by(f64::total_cmp);
         let curve = Self::variable_index(variable).map(|index| map(series, index));
         let at = match (argument, variable) {
-            (Argument::Constant, _) => vec![0.0, self.engine.rig().cylinder().stroke_m],
+            (Argument::Constant, _) => vec![0.0, self.engine.rig.cylinder().stroke_m],
             (_, Variable::Direction) => vec![-1.0, 1.0],
             (_, Variable::DirectedExtension) => knots(&sorted_samples, DIRECTED_KNOTS),
             _ => knots(&sorted_samples, KNOTS),

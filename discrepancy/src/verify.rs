@@ -71,15 +71,15 @@ pub(crate) fn verify(
     let (before, after) = both(before, after, record);
     progress("held-out record: what noise alone would show");
     let part = record.thinned(searched_share(std::slice::from_ref(record)));
-    let part = part.as_ref().map(|part| Model::new(part, after.windows.rig()));
+    let part = part.as_ref().map(|part| Model::new(part, &after.windows.rig));
     let null = NullPower::new(&after, part.as_ref());
     progress("held-out record: free run");
     let (run_before, run_after) = rayon::join(
-        || free_run::free_run(record, before.windows.rig()),
-        || free_run::free_run(record, after.windows.rig()),
+        || free_run::free_run(record, &before.windows.rig),
+        || free_run::free_run(record, &after.windows.rig),
     );
 
-    let outputs = after.windows.outputs().len();
+    let outputs = after.windows.outputs.len();
     let models = [&before, &after]
         .map(|model| Power::new(&power::sums(&model.residual, outputs), &null.expected, outputs));
     let [power_before, power_after] = &models;
@@ -87,12 +87,12 @@ pub(crate) fn verify(
     let models = [power_before, power_after].map(|power| power.divided_by_levels(&levels));
     let [power_before, power_after] = &models;
 
-    let names: Vec<String> = after.windows.outputs().iter().map(|(axis, at)| column(*axis, *at)).collect();
+    let names: Vec<String> = after.windows.outputs.iter().map(|(axis, at)| column(*axis, *at)).collect();
     let mut misfit = BTreeMap::new();
     let mut whiteness = BTreeMap::new();
     let all_kept = kept(&power_before.smaller(power_after).joint());
     for (output, name) in names.iter().enumerate() {
-        let (axis, at) = after.windows.outputs()[output];
+        let (axis, at) = after.windows.outputs[output];
         let noise = record.noise[axis][at] * levels[output].sqrt();
         misfit.insert(name.clone(), signal_misfit(&models, output, noise, null.spreads[output]));
         let of = |model: &Model<'_>| power::neighbours(&model.residual, output, outputs, &all_kept);

@@ -43,14 +43,14 @@ const FINE_SUBSTEPS: u32 = 20;
 /// The windows of a record, with the subspaces that their start states span.
 #[derive(Clone, Debug)]
 pub struct Windows<'a> {
-    record: &'a GriddedRecord,
-    rig: RigParameters,
+    pub record: &'a GriddedRecord,
+    pub rig: RigParameters,
     /// First period of each window.
-    starts: Vec<usize>,
+    pub(crate) starts: Vec<usize>,
     /// Start state of each window, unjudged ones included.
     points: Vec<[AxisState; 2]>,
     /// Axis and channel of each output.
-    outputs: Vec<(usize, usize)>,
+    pub outputs: Vec<(usize, usize)>,
     /// Readings over their noise by window, period and output; 0 where there is none.
     readings: Vec<f64>,
     valid: Vec<bool>,
@@ -105,27 +105,9 @@ impl<'a> Windows<'a> {
         Windows { record, rig, starts, points, outputs, readings, valid, jitter_sensitivity, bases }
     }
 
-    pub fn rig(&self) -> &RigParameters {
-        &self.rig
-    }
-
-    pub fn record(&self) -> &'a GriddedRecord {
-        self.record
-    }
-
     /// Number of windows.
     pub fn count(&self) -> usize {
         self.starts.len()
-    }
-
-    /// First period of each window.
-    pub(crate) fn starts(&self) -> &[usize] {
-        &self.starts
-    }
-
-    /// Axis and channel of each output.
-    pub fn outputs(&self) -> &[(usize, usize)] {
-        &self.outputs
     }
 
     /// Length of the residual vector of a window.

@@ -75,7 +75,7 @@ fn some_lines(keep: impl Fn(usize, &str) -> bool) -> (tempfile::TempDir, PathBuf
 fn the_log_of_a_run_reads_as_its_measurement() {
     let (log, measured) = (read(&run().join("bus.log")), read(&run().join("measurement.csv")));
     assert_eq!(log.len(), measured.len());
-    assert_eq!(log.setup(), measured.setup());
+    assert_eq!(log.setup, measured.setup);
     assert_eq!(absent_beside(&log, &measured), 0);
     let valve = Channel::Of(Axis::Drive, Signal::Valve);
     let open = log.channel(valve).unwrap().iter().flatten().filter(|opening| **opening != 0.0).count();
@@ -93,7 +93,7 @@ fn lost_frames_are_gaps_and_nothing_else_changes() {
     let log = read(&path);
     let absent = absent_beside(&log, &measured);
     assert!(absent > 0 && absent.is_multiple_of(4), "four values for each lost frame: {absent}");
-    assert!(log.warnings().iter().any(|warning| warning.text.contains("sensors are not in the log")));
+    assert!(log.warnings.iter().any(|warning| warning.text.contains("sensors are not in the log")));
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn where_a_listener_missed_a_command_nobody_knows_what_acted() {
     let (rig, listener) = (read(LoggedBy::Rig), read(LoggedBy::Listener));
     assert_eq!(absent(&rig), 0, "what the rig did not hear did not act");
     // Eight frames are taken out; one falls into the emergency stop, in which valves are shut whatever was commanded.
-    let missed = rig.warnings().iter().filter(|warning| warning.text.contains("drive commands")).count();
+    let missed = rig.warnings.iter().filter(|warning| warning.text.contains("drive commands")).count();
     assert_eq!((missed, (4..=8).contains(&absent(&listener))), (1, true), "{}", absent(&listener));
     let _ = absent_beside(&listener, &self::read(&run().join("measurement.csv")));
 }

@@ -54,7 +54,7 @@ fn rigs_side_by_side_show_what_each_shows_alone() {
     // More than have room in one group, and one that does not run in lanes.
     let mut rigs: Vec<RigParameters> = (0..COUNT).map(off).collect();
     rigs[3] = hiding(&[("inclination", "drive", &[("force_n", 20.0)])]);
-    let windows = &engine.windows()[0];
+    let windows = &engine.windows[0];
     let together = windows.simulate_side_by_side(&rigs);
     for (rig, batched) in rigs.iter().zip(&together) {
         let alone = windows.simulate_coarsely(rig);
@@ -255,7 +255,7 @@ fn a_law_of_a_library_is_screened_beside_a_rig_and_named() {
                 parameters.slope = { range = [0, 500], prior = 100 }\n\
                 [[suspects]]\nuse = \"seals.toml/lip\"\nplace = \"drive.force\"\ntimes = \"-1\"\nwith.p = \"p_b - 1[bar]\"\n";
     let suspects = discrepancy::suspects::read(text, &file).unwrap_or_else(|error| panic!("{error}"));
-    let expressions: Vec<&str> = suspects.iter().map(|one| one.declared.expression()).collect();
+    let expressions: Vec<&str> = suspects.iter().map(|one| one.declared.add.as_str()).collect();
     assert_eq!(expressions, ["(-1)*(slope*x*(sign(v)))", "(-1)*(growth*sign(v)*max((p_b - 1[bar]), 0))"]);
     let rig = RigParameters::baseline();
     let hidden = rig.with_term(&suspects[0].declared.with(&[120.0]).unwrap());

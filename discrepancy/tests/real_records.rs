@@ -28,7 +28,7 @@ fn the_emps_records_read_with_their_mapping() {
     for name in ["emps_train.csv", "emps_test_pulses.csv"] {
         let record = read(&folder.join("emps").join(name), "emps.toml");
         assert_eq!(
-            (record.form(), record.warnings(), record.nominal_period_s()),
+            (record.form, &record.warnings[..], record.nominal_period_s),
             (Form::Foreign, &[][..], Some(1e-3))
         );
         assert!(record.len() > 20_000, "{name}: {} rows", record.len());
@@ -55,7 +55,7 @@ fn the_cylinder_records_read_with_their_mapping_holes_and_all() {
         for bar in [1, 3, 5, 7] {
             let name = format!("cyl25_friction_{seal}_{bar}bar.csv");
             let record = read(&folder.join("cylinder-friction").join(&name), "cylinder-friction.toml");
-            assert_eq!(record.warnings(), [], "{name}");
+            assert_eq!(record.warnings, [], "{name}");
             // Gauge in the file, absolute in the record; set within a tenth of a bar.
             let (least_pa, most_pa) = range(&record, PRESSURE);
             let set_pa = 101_325.0 + 1e5 * f64::from(bar);

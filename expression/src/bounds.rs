@@ -199,7 +199,7 @@ mod tests {
             let over = [one("x", [-2.0, 2.0]), one("y", [0.1, 3.0])];
             let known = Known { variables: &over, parameters: &[], tables: &[] };
             let formula = Formula::compile((text, 0), known, (Dimension::NONE, "it")).unwrap();
-            let ([least, most], value) = (formula.bounds(), formula.value(&[x, y]));
+            let ([least, most], value) = (formula.bounds, formula.value(&[x, y]));
             prop_assert!(least - 1e-9 <= value && value <= most + 1e-9, "{text}: {value} in {least} to {most}");
         }
     }

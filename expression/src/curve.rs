@@ -17,7 +17,8 @@ pub struct Table {
     pub from: Unit,
     /// Unit in which its values are written.
     pub to: Unit,
-    written: [Vec<f64>; 2],
+    /// Its points as they are written: x, y.
+    pub written: [Vec<f64>; 2],
 }
 
 impl Table {
@@ -42,12 +43,6 @@ impl Table {
             return Err(("y", format!("y: {} values for {} points of x", y.len(), x.len())));
         }
         Ok(Self { name, curve: Curve { x: x_si, y: y_si }, from, to, written: [x, y] })
-    }
-
-    /// Its points as they are written: x, y.
-    #[must_use]
-    pub fn written(&self) -> &[Vec<f64>; 2] {
-        &self.written
     }
 }
 

@@ -48,7 +48,8 @@ pub struct Formula {
     /// Registers before an evaluation: parameters and constants.
     registers: [f64; MOST_REGISTERS],
     parameters: usize,
-    bounds: Range,
+    /// Smallest and largest value that it can have over all ranges.
+    pub bounds: Range,
     /// Names of the tables that it reads.
     tables: Vec<String>,
 }
@@ -125,13 +126,6 @@ impl Formula {
         self.tape.compute(&mut registers)
     }
 
-    /// Smallest and largest value that it can have over all ranges.
-    #[must_use]
-    pub fn bounds(&self) -> Range {
-        self.bounds
-    }
-
-    /// Whether it reads the table of this name.
     #[must_use]
     pub fn reads_table(&self, name: &str) -> bool {
         self.tables.iter().any(|table| table == name)
@@ -222,7 +216,7 @@ impl Compile for Names<'_> {
     }
 
     fn named(&mut self, name: &str, _at: usize, (): ()) -> Result<Register> {
-        let leaves = self.builder.leaves();
+        let leaves = self.builder.leaves;
         Ok(match self.place(name) {
             Some(place) if place < self.known.variables.len() => leaves.input(place),
             Some(place) => leaves.parameter(place - self.known.variables.len()),
@@ -269,7 +263,7 @@ mod tests {
         assert_eq!(brake.value(&[0.25, 2.0]), -10.0 * 1.5 * 2.0);
         brake.set(&[20.0]);
         assert_eq!(brake.value(&[0.25, 2.0]), -20.0 * 1.5 * 2.0);
-        assert_eq!(brake.bounds(), [-6e5, 6e5]);
+        assert_eq!(brake.bounds, [-6e5, 6e5]);
         assert_eq!([0, 1].map(|place| brake.reads(place)), [true, true]);
         assert!(!compiled("c*v").unwrap().reads(0));
     }
@@ -292,7 +286,7 @@ mod tests {
             [1500.0, 3000.0, 1667.0, 1667.0]
         );
         // x is 0 to 1 m, and the table goes on to 2 m.
-        assert_eq!(lift.bounds(), [0.0, 3000.0]);
+        assert_eq!(lift.bounds, [0.0, 3000.0]);
         assert!(compiled("1[N^2]/lift(x)").unwrap_err().why.contains("may be 0 (0 to 3000)"));
         assert!(compiled("1[N^2]/lift(max(x, 0.1[m]))").is_ok());
         assert!(compiled("lift(c)").unwrap_err().why.contains("lift is over m, and this is in N s/m"));

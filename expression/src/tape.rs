@@ -63,7 +63,7 @@ impl Leaves {
 
 /// Collects operations, each once.
 pub struct Builder {
-    leaves: Leaves,
+    pub leaves: Leaves,
     constants: Vec<f64>,
     operations: Vec<Operation>,
     known: HashMap<Operation, Register>,
@@ -75,10 +75,6 @@ const CONSTANTS: usize = 2 * crate::grammar::MOST_NODES;
 impl Builder {
     pub fn new(leaves: Leaves) -> Self {
         Self { leaves, constants: Vec::new(), operations: Vec::new(), known: HashMap::new() }
-    }
-
-    pub fn leaves(&self) -> Leaves {
-        self.leaves
     }
 
     pub fn constant(&mut self, value: f64) -> Register {

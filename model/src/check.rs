@@ -73,11 +73,14 @@ fn delays_look_back(model: &Model, constants: &[Option<f64>]) -> Result<(), Wron
     Ok(())
 }
 
-/// The unit of a definition, in those of the file.
-pub(crate) fn definition_unit(model: &Model, index: usize) -> Unit {
-    let mut dimensions = Checker { model, known: HashMap::new(), open: Vec::new() };
-    let dimension = dimensions.definition(index, 0).ok().flatten().unwrap_or_default();
-    unit_of(model, dimension)
+impl Model {
+    /// The unit of a definition, as it follows from what it is made of, in those of the file.
+    #[must_use]
+    pub fn definition_unit(&self, index: usize) -> Unit {
+        let mut dimensions = Checker { model: self, known: HashMap::new(), open: Vec::new() };
+        let dimension = dimensions.definition(index, 0).ok().flatten().unwrap_or_default();
+        unit_of(self, dimension)
+    }
 }
 
 /// The unit of a suspect's expression, in those of the file.

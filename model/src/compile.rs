@@ -91,7 +91,7 @@ pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
 pub(crate) fn frictions_hold(model: &Model, suspects: &[usize]) -> Result<(), Wrong> {
     for (index, friction) in model.frictions.iter().enumerate() {
         let mut compiler = Compiler::new(model, suspects);
-        let force = direction_of(compiler.builder.leaves(), model, index);
+        let force = direction_of(compiler.builder.leaves, model, index);
         let rate = compiler.held((index, force))?;
         let (name, state) = (&friction.name, &model.states[friction.velocity].name);
         let why = match compiler.builder.degree(rate, force) {
@@ -106,26 +106,32 @@ pub(crate) fn frictions_hold(model: &Model, suspects: &[usize]) -> Result<(), Wr
     Ok(())
 }
 
-/// Values of an expression of inputs and fixed numbers at each sample.
-pub(crate) fn at_samples(model: &Model, expression: &Expression, inputs: &Inputs<'_>) -> Vec<f64> {
-    let scope = Scope { suspect: None, before: None };
-    let tape = tape(model, &[], |compiler| Ok(vec![compiler.node(expression.root, scope)?]))
-        .expect("it was checked when the file was read");
-    let leaves = tape.leaves;
-    let mut registers = Registers::new(&tape, 0, |_| false);
-    for (index, parameter) in model.parameters.iter().enumerate() {
-        registers.set(leaves.parameter(index), parameter.values_si[0]);
-    }
-    tape.prepare(&mut registers);
-    let value = |(row, time_s): (usize, &f64)| {
-        registers.set(0, *time_s);
-        for (index, samples) in inputs.samples_si.iter().enumerate() {
-            registers.set(leaves.input(index), samples[row]);
+impl Model {
+    /// Values of an expression of inputs and fixed numbers, at each sample.
+    ///
+    /// # Panics
+    /// For an expression that was not checked with this model.
+    #[must_use]
+    pub fn at_samples(&self, expression: &Expression, inputs: &Inputs<'_>) -> Vec<f64> {
+        let scope = Scope { suspect: None, before: None };
+        let tape = tape(self, &[], |compiler| Ok(vec![compiler.node(expression.root, scope)?]))
+            .expect("it was checked when the file was read");
+        let leaves = tape.leaves;
+        let mut registers = Registers::new(&tape, 0, |_| false);
+        for (index, parameter) in self.parameters.iter().enumerate() {
+            registers.set(leaves.parameter(index), parameter.values_si[0]);
         }
-        tape.evaluate(&mut registers, inputs, &NONE);
-        registers.value(tape.result(0))
-    };
-    inputs.time_s.iter().enumerate().map(value).collect()
+        tape.prepare(&mut registers);
+        let value = |(row, time_s): (usize, &f64)| {
+            registers.set(0, *time_s);
+            for (index, samples) in inputs.samples_si.iter().enumerate() {
+                registers.set(leaves.input(index), samples[row]);
+            }
+            tape.evaluate(&mut registers, inputs, &NONE);
+            registers.value(tape.result(0))
+        };
+        inputs.time_s.iter().enumerate().map(value).collect()
+    }
 }
 
 /// Whether a suspect at an input is one that delays it.
@@ -206,7 +212,7 @@ impl<'a> Compiler<'a> {
         match (0..model.frictions.len()).find(holds) {
             // Exactly at rest, where the sum of forces would leave a rounding error.
             Some(friction) if self.held.is_none() => {
-                let direction = direction_of(self.builder.leaves(), model, friction);
+                let direction = direction_of(self.builder.leaves, model, friction);
                 let direction = self.kept(direction, &model.frictions[friction].name)?;
                 let zero = self.builder.constant(0.0);
                 Ok(self.builder.push(Code::Select, &[direction, rate, zero]))
@@ -267,7 +273,7 @@ impl<'a> Compiler<'a> {
             }
             None => {}
         }
-        let direction = direction_of(self.builder.leaves(), model, friction);
+        let direction = direction_of(self.builder.leaves, model, friction);
         let direction = self.kept(direction, &element.name)?;
         let [holding, _] = self.holding(friction)?;
         let sliding = self.node(element.sliding.root, Scope { suspect: element.suspect, before: None })?;
@@ -281,12 +287,12 @@ impl<'a> Compiler<'a> {
         let (root, suspect) = match target {
             Target::Input(index) => {
                 return Ok(match self.earlier.by {
-                    None => self.builder.leaves().input(index),
+                    None => self.builder.leaves.input(index),
                     Some((by, _)) => self.builder.push(Code::Delayed(index as u16), &[by]),
                 });
             }
             Target::State(index) => {
-                let leaf = self.builder.leaves().state(index);
+                let leaf = self.builder.leaves.state(index);
                 return self.kept(leaf, &model.states[index].name);
             }
             Target::Definition(index) => {
@@ -326,7 +332,7 @@ impl<'a> Compiler<'a> {
     }
 
     fn symbol(&mut self, symbol: Symbol, at: usize) -> Result<Register, Wrong> {
-        let leaves = self.builder.leaves();
+        let leaves = self.builder.leaves;
         let known = match &self.earlier.by {
             None => self.known.get(&symbol),
             Some((by, _)) => self.earlier.known.get(&(*by, symbol)),

@@ -2,7 +2,7 @@
 
 use crate::check;
 use crate::compile;
-use crate::inputs::{Hold, Inputs};
+use crate::inputs::Hold;
 use crate::read;
 use crate::rows::Rows;
 use crate::units::Unit;
@@ -46,7 +46,8 @@ pub struct Model {
     /// Curves that expressions read by name.
     pub tables: Vec<Table>,
     pub(crate) nodes: Nodes,
-    pub(crate) text: String,
+    /// The text of the file.
+    pub text: String,
     pub(crate) file: PathBuf,
 }
 
@@ -356,12 +357,6 @@ impl Model {
             .map_or_else(|error| error, |source| source.with_columns().wrong_from(at, why))
     }
 
-    /// The text of the file.
-    #[must_use]
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-
     /// File, line and column of an expression.
     #[must_use]
     pub fn place_of(&self, expression: &Expression) -> String {
@@ -404,12 +399,6 @@ impl Model {
         expression::mathml::expression(&self.nodes, of.root, operand)
     }
 
-    /// The unit of a definition, as it follows from what it is made of, in those of the file.
-    #[must_use]
-    pub fn definition_unit(&self, index: usize) -> Unit {
-        check::definition_unit(self, index)
-    }
-
     /// What a target is called.
     #[must_use]
     pub fn target_name(&self, target: Target) -> &str {
@@ -435,15 +424,6 @@ impl Model {
         let mut all: Vec<usize> = all.filter(|index| self.suspects[*index].target == target).collect();
         all.sort_by_key(|index| !compile::delays_its_place(self, *index));
         all
-    }
-
-    /// Values of an expression that reads inputs alone, at each sample.
-    ///
-    /// # Panics
-    /// For an expression that was not checked with this model.
-    #[must_use]
-    pub fn at_samples(&self, expression: &Expression, inputs: &Inputs<'_>) -> Vec<f64> {
-        compile::at_samples(self, expression, inputs)
     }
 
     /// Parameters that are read with these suspects, by their index.

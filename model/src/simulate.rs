@@ -166,7 +166,7 @@ pub struct Simulator<'a> {
     longest_delay_s: f64,
     step_s: f64,
     /// Steps of the record, refused ones too, and how many it may take.
-    steps: usize,
+    pub steps: usize,
     most_steps: usize,
 }
 
@@ -234,12 +234,6 @@ impl<'a> Simulator<'a> {
     #[must_use]
     pub fn within(self, most_steps: usize) -> Self {
         Self { most_steps, ..self }
-    }
-
-    /// Steps that the last record took.
-    #[must_use]
-    pub fn steps(&self) -> usize {
-        self.steps
     }
 
     fn width(&self) -> usize {

@@ -82,7 +82,7 @@ pub(super) fn grown(baseline: &Fitted<'_>) -> Result<Grown, String> {
         return Err("nothing varies that a term could be made of".into());
     }
     let text: String = terms.iter().map(|term| term.text.as_str()).collect();
-    let text = format!("{}\n{text}", model.text());
+    let text = format!("{}\n{text}", model.text);
     let mut grown = Model::parse(&text, Path::new("model with the terms of the search"))
         .map_err(|error| error.to_string())?;
     grown.starts = 0;

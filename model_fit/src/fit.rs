@@ -292,7 +292,7 @@ impl<'a> Fitting<'a> {
                     sink(place, output, value, slopes);
                 }
             })?;
-            return Ok(simulator.steps());
+            return Ok(simulator.steps);
         };
         // Values and derivatives of all samples go through the filter of what was measured.
         let width = 1 + directions.len();
@@ -311,7 +311,7 @@ impl<'a> Fitting<'a> {
                 sink(place, output, columns[0][*sample], &slopes);
             }
         }
-        Ok(simulator.steps())
+        Ok(simulator.steps)
     }
 
     pub(crate) fn at(&self, values_si: Vec<f64>) -> Result<Point, Failure> {

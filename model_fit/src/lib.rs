@@ -254,7 +254,7 @@ pub fn close_with(
     let page = page::page(models, &report, (&traces, &curves), not_judged.as_deref());
     let folder = file.parent().unwrap_or(Path::new(""));
     let is_named = (!report.named.is_empty() || !report.discovered.is_empty()) && !report.taken_back;
-    let extended = is_named.then(|| extended(model.text(), folder, &report).ok()).flatten();
+    let extended = is_named.then(|| extended(&model.text, folder, &report).ok()).flatten();
     Ok(ClosedModel { report, not_judged, page, extended })
 }
 

@@ -165,9 +165,9 @@ impl Group {
         self.stale = false;
         self.in_lanes = [false; WIDTH];
         let Some(first) = plants.iter().find(|plant| plant.is_baseline()) else { return };
-        let substeps = first.integrator().substeps();
+        let substeps = first.integrator.substeps;
         for (in_lane, plant) in self.in_lanes.iter_mut().zip(plants) {
-            *in_lane = plant.is_baseline() && plant.integrator().substeps() == substeps;
+            *in_lane = plant.is_baseline() && plant.integrator.substeps == substeps;
         }
         if self.in_lanes.iter().filter(|in_lane| **in_lane).count() < registers.worthwhile() {
             self.in_lanes = [false; WIDTH];
@@ -175,7 +175,7 @@ impl Group {
         }
         for (lane, in_lane) in self.in_lanes.iter().enumerate() {
             let plant = if *in_lane { &plants[lane] } else { first };
-            self.fixed.seat(lane, plant.integrator());
+            self.fixed.seat(lane, &plant.integrator);
         }
     }
 
@@ -197,8 +197,8 @@ impl Group {
 
     /// Moves the columns by one period.
     fn advance(&mut self, registers: Registers, first: usize, plants: &[Plant]) {
-        let like = plants[first].integrator();
-        for number in 0..like.substeps() {
+        let like = &plants[first].integrator;
+        for number in 0..like.substeps {
             let [from, to] = &mut self.moving;
             substep::substep(registers, like, &self.fixed, from, to);
             if to.has_corners() {
@@ -215,8 +215,7 @@ impl Group {
         for (lane, plant) in plants.iter().enumerate() {
             if self.in_lanes[lane] && to.corner(lane) {
                 let (lanes, held): ((Lanes<Pair>, f64), _) = (from.get(lane), self.fixed.held(lane));
-                let (lanes, supply_pa) =
-                    plant.integrator().in_parts(&Baseline, lanes, held, substep, &mut ());
+                let (lanes, supply_pa) = plant.integrator.in_parts(&Baseline, lanes, held, substep, &mut ());
                 to.set(lane, &lanes, supply_pa);
             }
         }

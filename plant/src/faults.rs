@@ -81,7 +81,7 @@ impl Default for AxisFaults {
 
 impl AxisFaults {
     /// Whether it changes a law of air or friction, which the baseline's step does not know.
-    fn changes_laws(&self) -> bool {
+    pub(crate) fn changes_laws(&self) -> bool {
         self.friction_factor != 1.0 || self.outlets().iter().any(Outlet::is_open)
     }
 
@@ -91,23 +91,12 @@ impl AxisFaults {
     }
 }
 
-impl Faults {
-    /// Whether it changes a law of air or friction.
-    pub(crate) fn change_laws(&self) -> bool {
-        self.axes.iter().any(AxisFaults::changes_laws)
-    }
-
-    /// Mass on top, kg, of drive and load.
-    pub(crate) fn added_masses_kg(&self) -> [f64; 2] {
-        [0, 1].map(|axis: usize| self.axes[axis].added_mass_kg)
-    }
-}
-
 /// Valve faults at work: what they are, and what a slow valve has reached.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct ValvesAtWork {
     faults: [ValveFault; 2],
-    any: bool,
+    /// Whether any valve is faulty.
+    pub(crate) any: bool,
     arrived: [f64; 2],
 }
 
@@ -120,12 +109,6 @@ impl ValvesAtWork {
         for axis in (0..2).filter(|axis| !was_slow[*axis]) {
             self.arrived[axis] = spools[axis];
         }
-    }
-
-    /// Whether any valve is faulty.
-    #[inline(always)]
-    pub(crate) fn any(&self) -> bool {
-        self.any
     }
 
     /// Commands that reach the spools over a period, and which spools do not move.

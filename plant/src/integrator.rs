@@ -50,10 +50,11 @@ pub(crate) struct Integrator<P = Pair> {
     pub(crate) motion: Motion,
     pub(crate) linkage: Linkage,
     pub(crate) supply: Supply,
-    atmospheric_pa: f64,
+    /// Pressure around the rods, Pa.
+    pub(crate) atmospheric_pa: f64,
     /// Dead volume of the rig file, which an effect may have replaced in the chambers, m^3.
     pub(crate) file_dead_volume_m3: f64,
-    substeps: u32,
+    pub(crate) substeps: u32,
     coarse: Span<P>,
     fine: Span<P>,
 }
@@ -145,7 +146,7 @@ impl Integrator {
         substeps: u32,
         faults: &Faults,
     ) -> Self {
-        let [on_drive_kg, on_load_kg] = faults.added_masses_kg();
+        let [on_drive_kg, on_load_kg] = faults.axes.map(|axis| axis.added_mass_kg);
         let motion = Motion::new(rig, [added_mass_kg + on_drive_kg, on_load_kg]);
         let supply = Supply::new(rig.supply(), faults.supply);
         let span = |span_s: f64| Span {
@@ -211,10 +212,6 @@ impl Integrator {
         (lanes, supply_pa)
     }
 
-    pub(crate) fn substeps(&self) -> u32 {
-        self.substeps
-    }
-
     pub(crate) fn substep_s(&self) -> f64 {
         self.coarse.span_s
     }
@@ -222,11 +219,6 @@ impl Integrator {
     /// The two lengths of step: a substep, and a part of one.
     pub(crate) fn spans(&self) -> [&Span; 2] {
         [&self.coarse, &self.fine]
-    }
-
-    /// Pressure around the rods, Pa.
-    pub(crate) fn atmospheric_pa(&self) -> f64 {
-        self.atmospheric_pa
     }
 
     /// A short step that may meet any corner.

@@ -27,10 +27,12 @@ use crate::parameters::{FrictionParameters, RigParameters};
 /// What moves each axis and what holds it.
 #[derive(Debug, Clone)]
 pub(crate) struct Motion {
-    masses_kg: [f64; 2],
-    behind_sensor_kg: [f64; 2],
-    stroke_m: f64,
-    levels: Levels,
+    pub(crate) masses_kg: [f64; 2],
+    /// What each axis' force sensor pushes along: the carriage with its weights.
+    pub(crate) behind_sensor_kg: [f64; 2],
+    pub(crate) stroke_m: f64,
+    /// Friction of the baseline, the same for both axes and both directions.
+    pub(crate) levels: Levels,
 }
 
 /// How much friction an axis has in each direction: extending, retracting.
@@ -91,11 +93,6 @@ impl Motion {
         }
     }
 
-    /// Friction of the baseline, the same for both axes and both directions.
-    pub(crate) fn levels(&self) -> &Levels {
-        &self.levels
-    }
-
     /// The factors of a span with the baseline's viscous friction.
     pub(crate) fn span(&self, span_s: f64) -> MotionSpan {
         self.span_with([self.levels.viscous_n_s_per_m[0]; 2], span_s)
@@ -112,19 +109,6 @@ impl Motion {
             drift: pair(|f| f.drift),
             push: pair(|f| f.push),
         }
-    }
-
-    pub(crate) fn mass_kg(&self, axis: usize) -> f64 {
-        self.masses_kg[axis]
-    }
-
-    /// What an axis' force sensor pushes along, kg: the carriage with its weights.
-    pub(crate) fn behind_sensor_kg(&self, axis: usize) -> f64 {
-        self.behind_sensor_kg[axis]
-    }
-
-    pub(crate) fn stroke_m(&self) -> f64 {
-        self.stroke_m
     }
 
     /// Whether a resting axis under this force stays, force in N without any friction; the break-away level is that of its
@@ -292,7 +276,7 @@ mod tests {
 
     fn advance(viscous_n_per_mm_per_s: f64, axis: usize, from: Place, force: f64, span_s: f64) -> Place {
         let motion = motion(viscous_n_per_mm_per_s);
-        motion.advance(axis, from, force, motion.levels(), span_s)
+        motion.advance(axis, from, force, &motion.levels, span_s)
     }
 
     fn at(velocity: f64) -> Place {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::effects::tabulated::Seen;
 use crate::effects::{Effects, Term, Terms};
-use crate::faults::{Faults, ValvesAtWork};
+use crate::faults::{AxisFaults, Faults, ValvesAtWork};
 use crate::integrator::laws::Baseline;
 use crate::integrator::{Held, Integrator, Lanes, SUBSTEPS};
 use crate::lanes::{Axes, Pair};
@@ -20,7 +20,7 @@ use crate::truth::{Truth, hand_forces, supply_pressure_pa};
 #[derive(Debug, Clone)]
 pub struct Plant {
     rig: Arc<RigParameters>,
-    integrator: Integrator,
+    pub(crate) integrator: Integrator,
     /// `None` for a rig that has none switched on.
     effects: Option<Box<Effects>>,
     state: State,
@@ -107,7 +107,7 @@ impl Plant {
 
     /// Sets the time that declared terms read as `t`, in periods; nothing else changes. A plant begins at 0.
     pub fn set_time(&mut self, periods: u64) {
-        let substeps = u64::from(self.integrator.substeps());
+        let substeps = u64::from(self.integrator.substeps);
         if let Some(effects) = &mut self.effects {
             effects.memory.substeps = periods * substeps;
         }
@@ -123,7 +123,7 @@ impl Plant {
     pub fn step(&mut self, inputs: &Inputs) {
         let held = self.hold(inputs);
         match &mut self.effects {
-            Some(effects) if !effects.leave_laws_alone() => {
+            Some(effects) if !effects.baseline_laws => {
                 effects.begin_period(held.command.to_array());
                 self.integrator.advance(effects.as_mut(), &mut self.state, held);
             }
@@ -145,7 +145,7 @@ impl Plant {
             Pair::new(inputs.valve[0], inputs.valve[1])
         };
         let mut stuck = [false; 2];
-        if self.valves.any() {
+        if self.valves.any {
             let spools = self.state.axes.map(|axis| axis.spool);
             let passed;
             (passed, stuck) = self.valves.pass(command.to_array(), spools);
@@ -162,7 +162,7 @@ impl Plant {
 
     /// Whether the baseline's laws move it, which many rigs can be moved by at once.
     pub(crate) fn is_baseline(&self) -> bool {
-        self.effects.as_ref().is_none_or(|effects| effects.leave_laws_alone())
+        self.effects.as_ref().is_none_or(|effects| effects.baseline_laws)
     }
 
     /// Goes to where a batch has moved it.
@@ -217,10 +217,6 @@ impl Plant {
     #[cfg(test)]
     pub(crate) fn effects(&self) -> Option<&Effects> {
         self.effects.as_deref()
-    }
-
-    pub(crate) fn integrator(&self) -> &Integrator {
-        &self.integrator
     }
 
     fn each_term(&self, inputs: &Inputs, tell: &mut dyn FnMut(Term)) {
@@ -304,7 +300,7 @@ impl Plant {
         self.valves.set(faults, self.state.axes.map(|axis| axis.spool));
         self.integrator = self.integrator.rebuilt(&self.rig, self.state.added_mass_kg, faults);
         if !self.rig.has_effects() {
-            if !faults.change_laws() {
+            if !faults.axes.iter().any(AxisFaults::changes_laws) {
                 // The baseline's own step goes on.
                 self.spare = self.effects.take().or(self.spare.take());
             } else if let Some(mut effects) = self.spare.take() {

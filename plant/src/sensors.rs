@@ -78,7 +78,7 @@ impl Sensors {
             let mut force_n = force_n + parameters.force_noise_n * force;
             let mut a_pa = a_pa + parameters.pressure_noise_pa * pressure_a;
             let mut b_pa = b_pa + parameters.pressure_noise_pa * pressure_b;
-            if self.faults.any() {
+            if self.faults.any {
                 let values = [&mut position_m, &mut force_n, &mut a_pa, &mut b_pa];
                 values.into_iter().enumerate().for_each(|(channel, value)| {
                     *value = self.faults.disturb(i, channel, *value);
@@ -98,7 +98,7 @@ impl Sensors {
                 pressure_a: pressure(a_pa),
                 pressure_b: pressure(b_pa),
             };
-            if self.faults.any() {
+            if self.faults.any {
                 let least_n = -most_force * parameters.force_step_n();
                 let AxisReadings { position, force, pressure_a, pressure_b } = &mut readings;
                 let shown = [(position, 0.0), (force, least_n), (pressure_a, 0.0), (pressure_b, 0.0)];

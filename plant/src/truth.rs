@@ -132,11 +132,11 @@ impl Truth {
 
         let axis = |i: usize| {
             let (axis_state, axis) = (&state.axes[i], &forces.axes[i]);
-            let rest_m = [0.0, integrator.motion.stroke_m()][i];
+            let rest_m = [0.0, integrator.motion.stroke_m][i];
             AxisTruth {
                 position_m: rest_m + [1.0, -1.0][i] * axis_state.extension_m,
                 rod_velocity_m_per_s: axis_state.rod_velocity_m_per_s,
-                rod_acceleration_m_per_s2: axis.sum() / integrator.motion.mass_kg(i),
+                rod_acceleration_m_per_s2: axis.sum() / integrator.motion.masses_kg[i],
                 spool: axis_state.spool,
                 pressure_a_pa: air.pressure[0].to_array()[i],
                 pressure_b_pa: air.pressure[1].to_array()[i],
@@ -270,7 +270,7 @@ impl TrueForces {
                 effects.map_or(0.0, |effects| effects.force(i, &Seen::at(lanes, &air, i)).sum(0.0));
             let force = pneumatic[i] + hand_n + contact_n + effect_n;
             let friction = effects.map(|effects| Friction::at(effects, integrator, i, place, &air));
-            let levels = friction.map_or(*motion.levels(), |friction| friction.levels(place.velocity.abs()));
+            let levels = friction.map_or(motion.levels, |friction| friction.levels(place.velocity.abs()));
             let viscous_n = -(levels.viscous_n_s_per_m[side(place.velocity)] * place.velocity);
             let mut sliding_n = 0.0;
             let mut holding_n = 0.0;
@@ -312,8 +312,8 @@ impl TrueForces {
     /// to be moved, too.
     pub(crate) fn sensor_n(&self, integrator: &Integrator, axis: usize) -> f64 {
         let axis_forces = &self.axes[axis];
-        let acceleration = axis_forces.sum() / integrator.motion.mass_kg(axis);
-        integrator.motion.behind_sensor_kg(axis) * acceleration - self.contact_n - axis_forces.hand_n
+        let acceleration = axis_forces.sum() / integrator.motion.masses_kg[axis];
+        integrator.motion.behind_sensor_kg[axis] * acceleration - self.contact_n - axis_forces.hand_n
     }
 }
 

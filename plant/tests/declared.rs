@@ -55,8 +55,8 @@ fn a_file_with_terms_is_read_as_it_was_written_numbers_to_the_bit() {
         ("load.pressure-b-reading", "c*sin(t/1[s])", "parameters.c = { unit = \"mbar\", value = 3 }"),
     ]);
     let [eddy, drift] = rig.terms() else { panic!("two terms") };
-    assert_eq!((eddy.name(), eddy.axis(), eddy.target()), ("term-0", Axis::Drive, Target::Force));
-    assert_eq!((drift.axis(), drift.target()), (Axis::Load, Target::PressureB));
+    assert_eq!((eddy.name.as_str(), eddy.axis, eddy.target), ("term-0", Axis::Drive, Target::Force));
+    assert_eq!((drift.axis, drift.target), (Axis::Load, Target::PressureB));
     assert_eq!(
         eddy.numbers().iter().map(|number| number.range).collect::<Vec<_>>(),
         [[0.0, 200.0], [0.12; 2]]
@@ -288,7 +288,7 @@ fn a_play_moves_only_when_the_axis_has_taken_it_up() {
     // Taken up to both sides, and never beyond, but for what the axis goes within a substep.
     assert!(off[0] < -199.0 && off[0] > -206.0 && off[1] > 199.0 && off[1] < 206.0, "{off:?}");
     let [_, with_play, _] = rig.terms() else { panic!("three terms") };
-    assert_eq!((with_play.memory()[0].name.as_str(), with_play.memory()[0].range), ("w", [-1.0, 1.0]));
+    assert_eq!((with_play.memory[0].name.as_str(), with_play.memory[0].range), ("w", [-1.0, 1.0]));
     assert_eq!(written_again(rig.terms()), rig);
 }
 
@@ -393,7 +393,7 @@ fn a_suspect_adds_nothing_while_it_is_off() {
     let good =
         suspects(&file("-c*v", &format!("{c}\ntwins = [\"friction-asymmetry\"]")), "s.toml").expect("good");
     assert_eq!((good[0].numbers()[0].prior, good[0].numbers()[0].value), (Some(50.0), 0.0));
-    assert_eq!(good[0].twins(), ["friction-asymmetry"]);
+    assert_eq!(good[0].twins, ["friction-asymmetry"]);
     assert_eq!(suspects(&good[0].toml("suspects"), "s.toml").expect("written as it is read"), good);
     for (text, message) in [
         (file("3[N] - c*v", c), "s.toml:4:8: where c is 0 a suspect adds nothing, and this adds 3 N"),

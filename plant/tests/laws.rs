@@ -44,8 +44,8 @@ const USED: &str = "[[suspects]]\nuse = \"friction/ripple\"\nplace = \"drive.for
 fn a_law_is_bound_to_the_variables_of_the_rig() {
     let read = suspects_using(USED, "s.toml", &ripple).unwrap_or_else(|error| panic!("{error}"));
     let ripple = &read[0];
-    assert_eq!(ripple.name(), "ripple");
-    assert_eq!(ripple.expression(), "(-1)*(ripple_s*(sign(v))*(p_a - p_b)/(1.0[bar])*sin(x/pitch))");
+    assert_eq!(ripple.name, "ripple");
+    assert_eq!(ripple.add, "(-1)*(ripple_s*(sign(v))*(p_a - p_b)/(1.0[bar])*sin(x/pitch))");
     let numbers: Vec<_> =
         ripple.numbers().iter().map(|one| (one.name.as_str(), one.value, one.range, one.prior)).collect();
     assert_eq!(numbers, [("ripple_s", 0.0, [0.0, 100.0], Some(5.0)), ("pitch", 2.0, [0.1, 10.0], None)]);
@@ -64,8 +64,8 @@ fn numbers_of_the_file_stand_in_place_of_those_of_the_library() {
          parameters.scale.value = 2\nparameters.pitch = {{ value = 3, range = [1, 4] }}\n"
     );
     let read = suspects_using(&text, "s.toml", &ripple).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!((read[0].name(), read[0].numbers()[0].unit.text.as_str()), ("mine", "kN"));
-    assert!(read[0].expression().contains("mine_s*") && read[0].expression().contains("(2.0[bar])"));
+    assert_eq!((read[0].name.as_str(), read[0].numbers()[0].unit.text.as_str()), ("mine", "kN"));
+    assert!(read[0].add.contains("mine_s*") && read[0].add.contains("(2.0[bar])"));
     let numbers: Vec<_> = read[0].numbers().iter().map(|one| (one.value, one.range, one.prior)).collect();
     assert_eq!(numbers, [(0.0, [0.0, 0.2], Some(0.01)), (3.0, [1.0, 4.0], None)]);
 }

@@ -62,7 +62,7 @@ pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> 
 /// Whether a row only adds channels that the row before lacks, within half the nominal period: recorders that stamp each channel
 /// write such rows.
 fn goes_on(record: &Record, time_s: f64, present: &[(Channel, f64)]) -> bool {
-    let (Some(period_s), Some(before_s)) = (record.nominal_period_s(), record.time_s().last()) else {
+    let (Some(period_s), Some(before_s)) = (record.nominal_period_s, record.time_s().last()) else {
         return false;
     };
     let row = record.len() - 1;
@@ -110,7 +110,7 @@ mod tests {
         assert_eq!(record.channel(X).unwrap(), [Some(0.0125), None, Some(0.0135)]);
         assert_eq!(record.channel(P).unwrap(), [Some(201_325.0), Some(251_325.0), None]);
         assert_eq!((record.line(0), record.line(1), record.line(2)), (3, 5, 7));
-        assert_eq!(record.warnings(), []);
+        assert_eq!(record.warnings, []);
     }
 
     #[test]
@@ -125,9 +125,9 @@ mod tests {
             unit = "m"
         "#;
         let record = mapped("  9  0.1\n  8  0.2\n", toml).unwrap();
-        assert_eq!((record.time_s(), record.nominal_period_s()), (&[0.0, 0.002][..], Some(0.002)));
+        assert_eq!((record.time_s(), record.nominal_period_s), (&[0.0, 0.002][..], Some(0.002)));
         assert_eq!(record.channel(X).unwrap(), [Some(0.1), Some(0.2)]);
-        assert!(record.warnings()[0].text.contains("column 1 is not in the mapping"));
+        assert!(record.warnings[0].text.contains("column 1 is not in the mapping"));
     }
 
     #[test]
@@ -153,7 +153,7 @@ mod tests {
             )
         };
         let record = mapped("t,y\n0,1\n", &toml(true)).unwrap();
-        assert_eq!((record.channel(X), record.warnings().len()), (None, 2));
+        assert_eq!((record.channel(X), record.warnings.len()), (None, 2));
         let message = mapped("t,y\n0,1\n", &toml(false)).unwrap_err().to_string();
         assert!(message.contains("foreign.csv:1: column x is missing; the file has t, y"), "{message}");
         let message = mapped("t,x\n0,1\n0.1,1e\n", &toml(false)).unwrap_err().to_string();

@@ -93,14 +93,15 @@ pub struct Warning {
 /// A record: rows of samples in SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    file: PathBuf,
-    form: Form,
-    setup: RigSetup,
-    nominal_period_s: Option<f64>,
+    pub file: PathBuf,
+    pub form: Form,
+    pub setup: RigSetup,
+    /// The period in which samples were meant to be taken, s; `None` for a record that has none.
+    pub nominal_period_s: Option<f64>,
     time_s: Vec<f64>,
     lines: Vec<u64>,
     columns: Vec<Option<Vec<Option<f64>>>>,
-    warnings: Vec<Warning>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Reads a record: a foreign one with `options.mapping`, a log when the file's name ends with `.log`, else a `measurement.csv`.
@@ -166,23 +167,6 @@ impl Record {
         self.warnings.push(Warning { line: line.into(), text: text.into() });
     }
 
-    pub fn file(&self) -> &Path {
-        &self.file
-    }
-
-    pub fn form(&self) -> Form {
-        self.form
-    }
-
-    pub fn setup(&self) -> RigSetup {
-        self.setup
-    }
-
-    /// The period in which samples were meant to be taken, s; `None` for a record that has none.
-    pub fn nominal_period_s(&self) -> Option<f64> {
-        self.nominal_period_s
-    }
-
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
@@ -217,9 +201,5 @@ impl Record {
     /// Whether the record has any channel of the axis.
     pub fn has_axis(&self, axis: Axis) -> bool {
         self.channels().any(|channel| matches!(channel, Channel::Of(channel_axis, _) if channel_axis == axis))
-    }
-
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
     }
 }

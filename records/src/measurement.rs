@@ -142,19 +142,19 @@ mod tests {
         let (_folder, path) =
             written(&format!("# linked=true added_mass_kg=7.5\n{DRIVE}0.001,1e5,0.5,0.1,-3,2e5\n"));
         let record = read(&path, UnlistedColumns::Refused).unwrap();
-        assert_eq!(record.setup(), RigSetup { linked: true, added_mass_kg: 7.5 });
+        assert_eq!(record.setup, RigSetup { linked: true, added_mass_kg: 7.5 });
         assert_eq!(record.time_s(), [0.001]);
         assert_eq!(record.value(Channel::Of(Axis::Drive, Signal::PressureA), 0), Some(1e5));
         assert_eq!(record.value(Channel::Of(Axis::Drive, Signal::Valve), 0), Some(0.5));
         assert!(!record.has_axis(Axis::Load));
-        assert_eq!((record.line(0), record.warnings()), (3, &[][..]));
+        assert_eq!((record.line(0), &record.warnings[..]), (3, &[][..]));
     }
 
     #[test]
     fn an_empty_cell_is_no_value_and_a_missing_line_no_row() {
         let (_folder, path) = written(&format!("{DRIVE}0,1e5,0,0.1,,2e5\n0.003,1e5,0,,1,2e5\n"));
         let record = read(&path, UnlistedColumns::Ignored).unwrap();
-        assert_eq!((record.setup(), record.len()), (RigSetup::default(), 2));
+        assert_eq!((record.setup, record.len()), (RigSetup::default(), 2));
         let force = record.channel(Channel::Of(Axis::Drive, Signal::Force)).unwrap();
         assert_eq!(force, [None, Some(1.0)]);
     }
@@ -164,7 +164,7 @@ mod tests {
         let text = "time_s,drive_position_m,truth\n0,0.1,5\n";
         let (_folder, path) = written(text);
         let record = read(&path, UnlistedColumns::Ignored).unwrap();
-        assert!(record.warnings()[0].text.contains("column truth is ignored"), "{:?}", record.warnings());
+        assert!(record.warnings[0].text.contains("column truth is ignored"), "{:?}", record.warnings);
         assert!(
             refused(text, UnlistedColumns::Refused)
                 .contains("'truth' is refused in a blind record; allowed are time_s, drive_valve")

@@ -64,7 +64,7 @@ fn a_suspect_in_a_file_is_named_over_the_bus_and_runs_in_real_time_in_the_extend
     // The extended rig file holds the term, and the emulator runs it with time, without an allocation.
     let extended = out.join("rig.toml");
     let term = &RigParameters::from_toml(&std::fs::read_to_string(&extended).unwrap(), "rig.toml").unwrap();
-    assert_eq!(term.terms()[0].expression(), "-(c0 + c1*x)*v");
+    assert_eq!(term.terms()[0].add, "-(c0 + c1*x)*v");
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).rig(&extended).build(Build::CountingAllocations);
     run_both(&emulator, &scene.controller(Pace::Real));

@@ -67,7 +67,7 @@ pub struct Finer {
 
 /// Fits entries and parameters jointly; `None` where no rig can have the result.
 pub fn finer(engine: &Engine<'_>, calibrated: &Refit) -> Option<Finer> {
-    let rig = engine.rig();
+    let rig = &engine.rig;
     let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
     let entries = entries(rig, &calibrated.factors);
     let mut precisions = parameter_precisions();
@@ -198,7 +198,7 @@ fn columns(engine: &Engine<'_>, entries: &[TableEntry], factors: &[f64]) -> Opti
         (0..factors.len()).map(move |at| {
             let mut factors = factors.to_vec();
             factors[at] += change;
-            with(engine.rig(), entries, &factors)
+            with(&engine.rig, entries, &factors)
         })
     };
     let rigs = perturbed(FACTOR_CHANGE).chain(perturbed(-FACTOR_CHANGE)).collect::<Option<Vec<_>>>()?;

@@ -27,7 +27,7 @@ impl<'a> Notes<'a> {
 
     fn push(&mut self, kind: &str, column: String, row: Option<usize>, fatal: bool, text: &str) {
         let line = row.map(|row| self.record.line(row));
-        let file = self.record.file().display();
+        let file = self.record.file.display();
         let place = line.map_or_else(|| format!("{file}"), |line| format!("{file}:{line}"));
         let (kind, column, text) = (kind.into(), Some(column), format!("{place}: {text}"));
         self.findings.push(Finding { kind, column, line, fatal, text });
@@ -39,11 +39,6 @@ impl<'a> Notes<'a> {
             mask.resize(self.record.len(), false);
         }
         mask[row] = true;
-    }
-
-    pub(super) fn leave_row_out(&mut self, row: usize) {
-        let record = self.record;
-        record.channels().for_each(|channel| self.leave_out(channel, row));
     }
 
     /// A sample, if it is there and not left out.

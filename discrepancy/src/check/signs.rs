@@ -272,13 +272,13 @@ fn forces(motion: &Motion, rig: &RigParameters, axis: Axis, period_s: f64) -> Op
 
 /// Sign and unit of the force sensor.
 fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, motion: &Motion) {
-    let linked = notes.record.setup().linked;
+    let linked = notes.record.setup.linked;
     let mass = rig.mass();
     // The unlinked load passes nothing to anybody: its sensor shows its noise.
     if axis == Axis::Load && !linked {
         return;
     }
-    let moved_kg = mass.carriage_kg + notes.record.setup().added_mass_kg;
+    let moved_kg = mass.carriage_kg + notes.record.setup.added_mass_kg;
     // What lies before the sensor: piston and rod, with all of the axis' friction.
     let moving_kg = if axis == Axis::Drive { mass.drive_kg - mass.carriage_kg } else { mass.load_kg };
     let speeds = slopes(&motion.extension_m, REACH);

@@ -40,7 +40,7 @@ pub(super) fn check(notes: &mut Notes) {
         return notes.add_time("too-short", Some(0), true, "time never grows: record again");
     };
     order(notes, period);
-    let nominal = record.nominal_period_s().or(of_rig.then_some(PERIOD_S)).unwrap_or(period);
+    let nominal = record.nominal_period_s.or(of_rig.then_some(PERIOD_S)).unwrap_or(period);
     let ratio = period / nominal;
     if !(0.9..=1.1).contains(&ratio) && unit_of_time(notes, ratio) {
         return;
@@ -88,7 +88,8 @@ fn unit_of_time(notes: &mut Notes, ratio: f64) -> bool {
 /// Rows whose time repeats or goes back.
 fn order(notes: &mut Notes, period_s: f64) {
     let same_s = SAME * period_s;
-    let times = notes.record.time_s();
+    let record = notes.record;
+    let times = record.time_s();
     let mut kept = growing(times, same_s);
     leave_far_ends_out(times, &mut kept, FARTHEST * times.len() as f64 * period_s);
     let mut repeated = Vec::new();
@@ -105,7 +106,7 @@ fn order(notes: &mut Notes, period_s: f64) {
             } else {
                 jumping.push(row)
             }
-            notes.leave_row_out(row);
+            record.channels().for_each(|channel| notes.leave_out(channel, row));
         }
     }
     if let Some(first) = repeated.first() {

@@ -44,7 +44,7 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
     if let Some(extended) = &closed.extended {
         out.write(&model, extended)?;
     }
-    progress(&format!("report.json and report.html are in {}", out.path().display()));
+    progress(&format!("report.json and report.html are in {}", out.path.display()));
     Ok(match closed {
         ClosedModel { not_judged: Some(_), .. } => Exit::BadInput,
         _ if !records.read.strict => Exit::Good,

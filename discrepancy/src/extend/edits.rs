@@ -146,7 +146,7 @@ impl<'t> Edits<'t> {
         let place = term.place();
         let is_it = |table: &&Table| {
             let text = |key: &str| table.get(key).and_then(Item::as_str);
-            text("name") == Some(term.name()) && text("place") == Some(place.as_str())
+            text("name") == Some(term.name.as_str()) && text("place") == Some(place.as_str())
         };
         let Some(table) = terms.and_then(|terms| terms.iter().find(is_it)) else { return false };
         for number in term.numbers() {

@@ -181,7 +181,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     linkage::gather(
         rig,
         gridded,
-        pass.contact_n(),
+        &pass.contact_n,
         [ar1_coefficients[0][0], ar1_coefficients[1][0]],
         &mut unknowns.linkage,
     );

@@ -33,7 +33,8 @@ pub(super) struct Nudge {
 /// A plant that follows a record.
 pub(super) struct Pass<'a> {
     record: &'a GriddedRecord,
-    contact_n: Vec<f64>,
+    /// F_c over the record, N, in +x on the carriage; all 0 when not linked.
+    pub(super) contact_n: Vec<f64>,
     plant: Plant,
 }
 
@@ -48,11 +49,6 @@ impl<'a> Pass<'a> {
         }
         plant.go_on_in(&state).ok()?;
         Some(Pass { record, contact_n: contact_forces(rig, record), plant })
-    }
-
-    /// F_c over the record, N, in +x on the carriage; all 0 when not linked.
-    pub(super) fn contact_n(&self) -> &[f64] {
-        &self.contact_n
     }
 
     /// Readings of the window at a period with a nudge; `None` for a state that the rig cannot have.

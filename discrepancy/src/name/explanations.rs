@@ -58,12 +58,12 @@ pub(super) fn explanations(
     fits: &Fits<'_>,
 ) -> Vec<Explanation> {
     let at_model = linearise(engine, fits.model);
-    let dof: f64 = engine.scaled_dof().iter().sum();
+    let dof: f64 = engine.scaled_dof.iter().sum();
     // Of linked rods each model has start states of its own.
-    let restarted = engine.is_linked().then(|| engine.with_starts_under(engine.rig()));
+    let restarted = engine.is_linked().then(|| engine.with_starts_under(&engine.rig));
     let of_rig_file = restarted.as_ref().unwrap_or(engine);
-    let baseline = of_rig_file.squares(&of_rig_file.residual(&of_rig_file.simulate(engine.rig())));
-    let null_loss = fit::loss(&baseline, of_rig_file.scaled_dof());
+    let baseline = of_rig_file.squares(&of_rig_file.residual(&of_rig_file.simulate(&engine.rig)));
+    let null_loss = fit::loss(&baseline, &of_rig_file.scaled_dof);
     let alike = Alike::new(engine, linearisation, columns, fits.model);
     let classes = classes(fits, |left, right| alike.are(left, right));
     let losses = classes.iter().map(|class| class[0].loss).chain([null_loss, fits.parameters.loss]);

@@ -98,12 +98,12 @@ fn fit_within(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT], option
 }
 
 fn iterate(engine: &Engine<'_>, effects: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Simulated> {
-    let simulated = engine.simulate(&rig_of(engine.rig(), &effects, &factors)?);
+    let simulated = engine.simulate(&rig_of(&engine.rig, &effects, &factors)?);
     let residual = engine.residual(&simulated);
     let squares = engine.squares(&residual);
     let (precisions, off) = (prior_precisions(&effects), prior_deviations(&factors, &effects));
     let prior: Vec<f64> = precisions.iter().zip(&off).map(|(precision, off)| precision * off * off).collect();
-    let loss = loss(&squares, engine.scaled_dof())
+    let loss = loss(&squares, &engine.scaled_dof)
         + prior[..COUNT].iter().sum::<f64>()
         + prior[COUNT..].iter().sum::<f64>();
     Some(Simulated { effects, factors, simulated, residual, squares, loss })
@@ -128,7 +128,7 @@ impl JointLinearisation {
         let mut columns = Cow::from(&self.columns);
         if !excluded.is_empty() {
             for column in columns.to_mut() {
-                excluded.iter().for_each(|at| column[at * engine.rows()..][..engine.rows()].fill(0.0));
+                excluded.iter().for_each(|at| column[at * engine.rows..][..engine.rows].fill(0.0));
             }
         }
         engine.products(&iterate.residual, &columns)
@@ -136,7 +136,7 @@ impl JointLinearisation {
 }
 
 fn linearised(engine: &Engine<'_>, iterate: &Simulated) -> Option<JointLinearisation> {
-    let rig = rig_of(engine.rig(), &iterate.effects, &[1.0; COUNT])?;
+    let rig = rig_of(&engine.rig, &iterate.effects, &[1.0; COUNT])?;
     let mut columns = engine.parameter_columns(&rig, &iterate.factors);
     columns.extend(coordinate_columns(engine, &iterate.factors, &iterate.effects, &iterate.simulated)?);
     let (precisions, from) =
@@ -152,7 +152,7 @@ fn stepped(
     linearisation: &JointLinearisation,
     chosen: &[usize],
 ) -> Step<Simulated> {
-    let outliers: Vec<usize> = above_outlier_limit(&iterate.squares, engine.scaled_dof()).collect();
+    let outliers: Vec<usize> = above_outlier_limit(&iterate.squares, &engine.scaled_dof).collect();
     let with_all = line_search(engine, estimator, iterate, linearisation, chosen, &[]);
     if outliers.is_empty() {
         return with_all;
@@ -196,10 +196,10 @@ fn line_search(
         }
         let nonlinear = |window: &usize| {
             tried.squares[*window] - fit.squares[*window]
-                > NONLINEAR_EXCESS * engine.scaled_dof()[*window].sqrt()
+                > NONLINEAR_EXCESS * engine.scaled_dof[*window].sqrt()
         };
         let before = excluded.len();
-        excluded.extend((0..engine.scaled_dof().len()).filter(nonlinear));
+        excluded.extend((0..engine.scaled_dof.len()).filter(nonlinear));
         excluded.sort_unstable();
         excluded.dedup();
         if excluded.len() == before {
@@ -239,7 +239,7 @@ fn step_by(
 /// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.
 fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, iterate: &Simulated) -> Vec<f64> {
     let products = linearisation.products(engine, iterate, &[]);
-    let all: Vec<usize> = (0..products.columns()).collect();
+    let all: Vec<usize> = (0..products.columns).collect();
     let weights = products.weights(&iterate.squares);
     let stays = Fit {
         coefficients: vec![0.0; all.len()],

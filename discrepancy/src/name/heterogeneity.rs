@@ -172,7 +172,7 @@ struct Windows {
 
 impl Windows {
     fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
-        let simulated = engine.simulate(&rig_of(engine.rig(), &model.effects, &model.factors)?);
+        let simulated = engine.simulate(&rig_of(&engine.rig, &model.effects, &model.factors)?);
         let residual = engine.residual(&simulated);
         let mut columns = linearisation.columns.clone();
         columns.extend(coordinate_columns(engine, &model.factors, &model.effects, &simulated)?);
@@ -193,7 +193,7 @@ impl Windows {
     ) -> Option<Vec<(f64, f64)>> {
         let mut without = model.effects.clone();
         without.remove(effect);
-        let other = engine.simulate(&rig_of(engine.rig(), &without, &model.factors)?);
+        let other = engine.simulate(&rig_of(&engine.rig, &without, &model.factors)?);
         let mut columns: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
         let response = engine.difference(&self.simulated, &other);
         columns[column] = &response;

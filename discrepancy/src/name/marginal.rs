@@ -135,7 +135,7 @@ struct Estimates<'a> {
 
 impl Estimates<'_> {
     fn residual(&self, effects: &[EffectEstimate]) -> Option<Vec<f64>> {
-        let rig = rig_of(self.engine.rig(), effects, &self.factors)?;
+        let rig = rig_of(&self.engine.rig, effects, &self.factors)?;
         Some(self.engine.residual(&self.engine.simulate(&rig)))
     }
 
@@ -180,7 +180,7 @@ impl<'a> Model<'a> {
     /// `None` where no rig can have the model or its neighbours.
     fn of(at: Estimates<'_>, sensitivities: &'a [Vec<f64>], are_exact: bool) -> Option<Self> {
         let Estimates { engine, effects, factors } = at;
-        let simulated = engine.simulate(&rig_of(engine.rig(), effects, &factors)?);
+        let simulated = engine.simulate(&rig_of(&engine.rig, effects, &factors)?);
         let residual = engine.residual(&simulated);
         let columns = coordinate_columns(engine, &factors, effects, &simulated)?;
         let all: Vec<&Vec<f64>> = sensitivities.iter().chain(&columns).collect();
@@ -249,7 +249,7 @@ impl<'a> Model<'a> {
 
     /// Standard deviation of a coordinate under the tempered likelihood, the other numbers free.
     fn posterior_deviation(&self, engine: &Engine<'_>, coordinate: usize) -> Option<f64> {
-        let all: Vec<usize> = (0..self.products.columns()).collect();
+        let all: Vec<usize> = (0..self.products.columns).collect();
         let of_coordinates = self.coordinates.iter().map(|(prior, z)| prior.precision(*z));
         let precisions: Vec<f64> = parameter_precisions()
             .into_iter()
@@ -359,11 +359,11 @@ fn inputs(
         .collect();
     let mut grams = InputGrams { blocks: BLOCKS, gram: Vec::new(), cross: Vec::new() };
     let mut from = 0;
-    for part in engine.windows() {
+    for part in &engine.windows {
         let to = from + part.count() * part.rows();
         let columns: Vec<&[f64]> = all.iter().map(|column| &column[from..to]).collect();
-        let measured = part.record().measured;
-        for products in part.input_products(engine.rig(), &columns, engine.axis_by_axis())? {
+        let measured = part.record.measured;
+        for products in part.input_products(&engine.rig, &columns, engine.axis_by_axis)? {
             for axis in (0..2).filter(|axis| measured[*axis]) {
                 grams.gram.push(products.gram[axis].clone());
                 grams.cross.push(DMatrix::transpose(&products.cross[axis]));

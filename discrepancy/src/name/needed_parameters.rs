@@ -44,7 +44,7 @@ fn is_significant(by: f64, error: f64) -> bool {
 /// Size of the change of each parameter when the model is fitted to itself simulated with half the step. `None` where it cannot
 /// be linearised.
 fn integration_shifts(engine: &Engine<'_>, model: &Refit) -> Option<[f64; COUNT]> {
-    let rig = rig_of(engine.rig(), &model.effects, &model.factors)?;
+    let rig = rig_of(&engine.rig, &model.effects, &model.factors)?;
     let simulated = engine.simulate(&rig);
     let mut columns = linearise(engine, model).columns;
     columns.extend(coordinate_columns(engine, &model.factors, &model.effects, &simulated)?);
@@ -72,7 +72,7 @@ pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
 /// Needed parameters by the linearised model; `None` where all are needed, or where no derivative exists.
 fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
     let linearisation = linearise(engine, model);
-    let simulated = engine.simulate(&rig_of(engine.rig(), &model.effects, &model.factors)?);
+    let simulated = engine.simulate(&rig_of(&engine.rig, &model.effects, &model.factors)?);
     let coordinates = coordinate_columns(engine, &model.factors, &model.effects, &simulated)?;
     let mut residual = engine.residual(&simulated);
     // Shifts the residual to the rig file's values, so that the coefficients are deviations from them.

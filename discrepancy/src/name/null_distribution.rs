@@ -41,7 +41,7 @@ impl NullDistribution {
         model: &Refit,
     ) -> Self {
         let rig =
-            rig_of(engine.rig(), &model.effects, &model.factors).expect("a model that was fitted is a rig");
+            rig_of(&engine.rig, &model.effects, &model.factors).expect("a model that was fitted is a rig");
         let residual = engine.residual(&engine.simulate(&rig));
         let of: Vec<(usize, f64, usize)> = columns
             .probes
@@ -57,7 +57,7 @@ impl NullDistribution {
         let parameters: Vec<usize> = (0..COUNT).collect();
         let weights = &products.fit_from(&parameters, &precisions, &linearisation.deviations()).weights;
         let scores = products.efficient_scores(&parameters, weights, &precisions);
-        let outliers = outliers(&engine.squares(&residual), engine.scaled_dof());
+        let outliers = outliers(&engine.squares(&residual), &engine.scaled_dof);
         let probes = of
             .into_iter()
             .zip(scores)
@@ -73,7 +73,7 @@ impl NullDistribution {
     pub(super) fn loss_rise(&self, engine: &Engine<'_>, without: &Refit, model: &Refit) -> f64 {
         let of = |window: &usize| {
             let [without, with] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
-            engine.scaled_dof()[*window] * (without / with).ln()
+            engine.scaled_dof[*window] * (without / with).ln()
         };
         without.loss - model.loss - self.outliers.iter().map(of).sum::<f64>()
     }

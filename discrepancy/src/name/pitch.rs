@@ -32,7 +32,7 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
     let mut plain = model.effects.clone();
     let last = plain.len() - 1;
     plain[last].coordinates[ripple] = 0.0;
-    let rig = rig_of(engine.rig(), &plain, &model.factors)?;
+    let rig = rig_of(&engine.rig, &plain, &model.factors)?;
     let [simulated, coarse] = [engine.simulate(&rig), engine.simulate_coarsely(&rig)];
     let [least, most] = candidate.sheet.keys[pitch].drawn;
     let step = (1.0 / least - 1.0 / most) / f64::from(PITCHES - 1);
@@ -46,7 +46,7 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
     let ripples: Vec<Vec<f64>> = pitches
         .par_iter()
         .map(|at| {
-            let rig = rig_of(engine.rig(), &with(PROBE, *at), &model.factors)?;
+            let rig = rig_of(&engine.rig, &with(PROBE, *at), &model.factors)?;
             Some(engine.difference(&engine.simulate_coarsely(&rig), &coarse))
         })
         .collect::<Option<_>>()?;

@@ -181,7 +181,7 @@ impl<'a> Round<'a> {
         let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
         if let Some(backlash) = backlash
             && model.effects.len() < BACKLASH_BESIDE
-            && least > LACK_OF_FIT_PER_DOF * engine.scaled_dof().iter().sum::<f64>()
+            && least > LACK_OF_FIT_PER_DOF * engine.scaled_dof.iter().sum::<f64>()
         {
             progress("trying other gaps");
             round.with_backlash(engine, linearisation, model, backlash);

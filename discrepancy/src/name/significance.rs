@@ -62,7 +62,7 @@ pub(super) struct Fitted<'a> {
 impl Fitted<'_> {
     /// Tests a model whose effects are to be named.
     pub(super) fn significance(&self, model: &Refit) -> Option<Significance> {
-        let gains = window_gains(self.engine.scaled_dof(), &self.calibrated.squares, &model.squares);
+        let gains = window_gains(&self.engine.scaled_dof, &self.calibrated.squares, &model.squares);
         let charged = COLUMN_PENALTY * numbers(&model.effects) as f64;
         let gain = gains.iter().sum::<f64>() - charged;
         // Draws say how much chance gives without the best windows, which is far less than with them. Where there are none, what
@@ -102,9 +102,9 @@ impl Fitted<'_> {
         let count = model.effects.len();
         let draw = |number: usize| {
             let (drawn, residual) = truth.drawn(SEED, number);
-            let products = products.of_residual(&residual, &all, drawn.rows());
+            let products = products.of_residual(&residual, &all, drawn.rows);
             self.columns.largest_gain(&products, &linearisation, count, |without, with| {
-                without_best(&window_gains(drawn.scaled_dof(), without, with))
+                without_best(&window_gains(&drawn.scaled_dof, without, with))
             })
         };
         // A record too short to leave windows out keeps the gains of single windows, whose tail is heavy.
@@ -128,7 +128,7 @@ impl Fitted<'_> {
 
     /// Records drawn with another set of effects; `None` where no derivative exists.
     fn against(&self, model: &Refit, other: &Refit, draws: usize) -> Option<DrawnRecords> {
-        let dof = self.engine.scaled_dof();
+        let dof = &self.engine.scaled_dof;
         let truth = Truth::new(self.engine, other)?;
         let [model_step, other_step] =
             [model, other].map(|fit| OneStep::new(self.engine, self.linearisation, fit));
@@ -136,7 +136,7 @@ impl Fitted<'_> {
         let draw = |number: usize| {
             let (drawn, residual) = truth.drawn(SEED_OTHER, number);
             let of_model = drawn.residual(&drawn.simulate(&model_step.rig));
-            other_step.loss(&residual, drawn.rows()) - model_step.loss(&of_model, drawn.rows())
+            other_step.loss(&residual, drawn.rows) - model_step.loss(&of_model, drawn.rows)
         };
         let ahead = loss(&other.squares, dof) - loss(&model.squares, dof);
         Some(drawn_records(places(&other.effects), ahead, draws, true, draw))
@@ -152,7 +152,7 @@ struct Truth<'a> {
 
 impl<'a> Truth<'a> {
     fn new(engine: &'a Engine<'a>, model: &Refit) -> Option<Self> {
-        let rig = rig_of(engine.rig(), &model.effects, &model.factors)?;
+        let rig = rig_of(&engine.rig, &model.effects, &model.factors)?;
         let simulated = engine.simulate(&rig);
         Some(Truth { engine, rig, simulated })
     }
@@ -177,7 +177,7 @@ struct OneStep {
 
 impl OneStep {
     fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
-        let rig = rig_of(engine.rig(), &model.effects, &model.factors)?;
+        let rig = rig_of(&engine.rig, &model.effects, &model.factors)?;
         let simulated = engine.simulate(&rig);
         let mut columns = linearisation.columns.clone();
         columns.extend(coordinate_columns(engine, &model.factors, &model.effects, &simulated)?);

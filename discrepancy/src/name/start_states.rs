@@ -20,7 +20,7 @@ pub(super) struct RefitWithInitialStates<'a> {
 pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit) -> RefitWithInitialStates<'a> {
     let mut best = RefitWithInitialStates { engine: None, fit: model.clone() };
     for _ in 0..if engine.is_linked() { MAX_ALTERNATIONS } else { 0 } {
-        let Some(rig) = rig_of(engine.rig(), &best.fit.effects, &best.fit.factors) else { break };
+        let Some(rig) = rig_of(&engine.rig, &best.fit.effects, &best.fit.factors) else { break };
         let restarted = engine.with_starts_under(&rig);
         let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.effects) else {
             break;
@@ -61,7 +61,7 @@ pub(super) fn backlash_start(
     let losses: Vec<f64> = tried
         .par_iter()
         .map(|effects| {
-            rig_of(engine.rig(), effects, &linearisation.factors)
+            rig_of(&engine.rig, effects, &linearisation.factors)
                 .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), linearisation, effects))
         })
         .collect();

@@ -223,7 +223,8 @@ fn more_trials(
     progress: &mut dyn FnMut(&str),
 ) {
     progress(&format!("rehearsing {} again", entry.name));
-    let mut left = records_of_each(setting.explanations.len()).saturating_sub(FIRST_RECORDS);
+    // Records in which each explanation is the truth.
+    let mut left = TRIALS.div_ceil(setting.explanations.len() as u64).saturating_sub(FIRST_RECORDS);
     let mut run = 2;
     while left > 0 {
         let records = left.min(RECORDS_PER_RUN);
@@ -232,11 +233,6 @@ fn more_trials(
         }
         (left, run) = (left - records, run + 1);
     }
-}
-
-/// Records of a finalist in which each explanation is the truth.
-fn records_of_each(explanations: usize) -> u64 {
-    TRIALS.div_ceil(explanations as u64)
 }
 
 /// The order of the first round.

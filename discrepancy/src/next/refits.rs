@@ -24,6 +24,7 @@ use crate::gridded_record::GriddedRecord;
 use crate::name::INDISTINGUISHABLE_LOSS_DIFFERENCE;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::refit::{EffectEstimate, coordinate_precision, difference_step, parameter_precisions};
+use crate::windows::Windows;
 use plant::RigParameters;
 use plant::effects::sheet::Part;
 
@@ -81,8 +82,8 @@ impl Setting<'_> {
         let first = record(0);
         let engines = record_engines(self, &first, &run);
         // Of linked rods the search for start states takes most of the time: that of the first record serves all.
-        let of_starts: Vec<_> =
-            engines.iter().filter(|_| run.linked).map(Engine::start_sensitivities).collect();
+        let of_starts = |engine: &Engine<'_>| engine.windows.iter().map(Windows::sensitivities).collect();
+        let of_starts: Vec<Vec<_>> = engines.iter().filter(|_| run.linked).map(of_starts).collect();
         let mut fits: Vec<Refits> = Vec::new();
         let mut trials = vec![self.trial(&engines, truth, &mut fits)?];
         for number in 1..seeds.records {

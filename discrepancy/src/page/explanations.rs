@@ -17,7 +17,8 @@ pub(super) fn explanations(report: &Report) -> String {
         let mut cells = vec![
             text_cell(name(explanation)),
             number(words::percent(explanation.probability)),
-            of_evidence(noise_ratio),
+            // Mean power of what is left, over that of noise: the geometric mean of the windows.
+            of_evidence(|evidence| evidence.loss_per_dof.exp()),
             of_evidence(|evidence| evidence.loss_difference),
             of_evidence(|evidence| evidence.parameters_moved),
             optional(explanation.evidence.and_then(|evidence| evidence.amplitude_variation)),
@@ -109,11 +110,6 @@ fn shortened(name: &str) -> String {
         Some((start, _)) if start > 0 => format!("…{}", name[start..].trim_start()),
         _ => name.to_owned(),
     }
-}
-
-/// Mean power of what is left, over that of noise: the geometric mean of the windows.
-fn noise_ratio(evidence: &Features) -> f64 {
-    evidence.loss_per_dof.exp()
 }
 
 fn name(explanation: &Explanation) -> String {

@@ -81,7 +81,7 @@ impl Model {
     }
 
     fn rig(&self, engine: &Engine<'_>) -> Option<RigParameters> {
-        with_tables(&with_factors(engine.rig(), &self.factors), &self.tables)
+        with_tables(&with_factors(&engine.rig, &self.factors), &self.tables)
     }
 
     fn coordinates(&self) -> Vec<Coordinate> {
@@ -198,7 +198,7 @@ impl Iterate {
     /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
-        let loss = loss(&engine.squares(&residual), engine.scaled_dof()) + model.penalty();
+        let loss = loss(&engine.squares(&residual), &engine.scaled_dof) + model.penalty();
         loss.is_finite().then_some(Iterate { model, residual, loss })
     }
 
@@ -236,7 +236,7 @@ fn columns(
     coordinates: &[Coordinate],
     reference_runs: &[ReferenceRun],
 ) -> Option<Vec<Vec<f64>>> {
-    let from: Vec<f64> = reference_runs.iter().flat_map(ReferenceRun::simulated).copied().collect();
+    let from: Vec<f64> = reference_runs.iter().flat_map(|run| &run.simulated).copied().collect();
     coordinates
         .par_iter()
         .map(|coordinate| {
@@ -392,7 +392,7 @@ fn steps_within(engine: &Engine<'_>, start: Iterate, linearisation: &[&[f64]]) -
     let all: Vec<usize> = (0..coordinates.len()).collect();
     let mut products = engine.products(&start.residual, linearisation);
     Estimator::new(TABLES_WITHIN).descend(start, |estimator, point| {
-        products.set_residual(&point.residual, linearisation, engine.rows());
+        products.set_residual(&point.residual, linearisation, engine.rows);
         let joint = products.fit_from(&all, &precisions, &point.model.deviations());
         let predicted_reduction = point.loss - point.model.penalty_for_points() - joint.loss;
         if predicted_reduction < estimator.tolerance(point.loss) {

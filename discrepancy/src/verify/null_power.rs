@@ -49,7 +49,7 @@ impl NullPower {
 
     /// All but the range, and the standard deviation of the joint power of noise.
     fn of_noise(windows: &Windows<'_>) -> (Self, f64) {
-        let outputs = windows.outputs().len();
+        let outputs = windows.outputs.len();
         let draws: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
             .map(|draw| sums(&windows.noise(&mut Pcg64::seed_from_u64(SEED ^ draw)), outputs))
@@ -81,14 +81,14 @@ impl NullPower {
     /// Mean and standard deviation of the joint power of synthetic records. Around a stop or a break-away even the true model
     /// leaves more than noise, since start states are known to micrometres only.
     fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
-        let outputs = model.windows.outputs().len();
+        let outputs = model.windows.outputs.len();
         let sensitivities = model.windows.sensitivities();
         let left: Vec<f64> = (0..RECORDS)
             .into_par_iter()
             .map(|draw| {
                 let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw));
                 let windows = model.windows.redrawn(&model.simulated, &sensitivities, &mut random);
-                let residual = windows.residual(&windows.simulate(windows.rig()));
+                let residual = windows.residual(&windows.simulate(&windows.rig));
                 let power = Power::new(&sums(&residual, outputs), &self.expected, outputs);
                 joint(&power.divided_by_levels(&levels(&power, self)))
             })

@@ -159,13 +159,12 @@ fn a_law_over_time_goes_on_in_the_time_of_the_whole_record_where_a_part_is_searc
         let windows = Windows::new(record, &truth);
         let simulated = windows.simulate(&truth);
         let of_window = |(at, start): (usize, &usize)| {
-            let place =
-                whole.starts().iter().position(|other| *other == since_start(start)).expect("in both");
+            let place = whole.starts.iter().position(|other| *other == since_start(start)).expect("in both");
             let rows = windows.rows();
             let [one, other] = [&of_whole[place * rows..][..rows], &simulated[at * rows..][..rows]];
             one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
         };
-        let all: Vec<f64> = windows.starts().iter().enumerate().map(of_window).collect();
+        let all: Vec<f64> = windows.starts.iter().enumerate().map(of_window).collect();
         assert_eq!(all.len(), 10);
         all.into_iter().fold(0.0, f64::max)
     };

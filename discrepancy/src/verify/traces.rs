@@ -8,9 +8,9 @@ use plant::{Axis, PERIOD_S};
 /// One trace for each output, over the whole record; what no window has is NaN.
 pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {
     let windows = &after.windows;
-    let record = windows.record();
-    let outputs = windows.outputs();
-    let load_offset_m = windows.rig().sensors().load_position_offset_m;
+    let record = windows.record;
+    let outputs = &windows.outputs;
+    let load_offset_m = windows.rig.sensors().load_position_offset_m;
     outputs
         .iter()
         .enumerate()
@@ -20,8 +20,7 @@ pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {
             let offset = if *at == 0 && Axis::ALL[*axis] == Axis::Load { load_offset_m } else { 0.0 };
             let joined = |values: &[f64], offset: f64| {
                 let mut series = vec![f64::NAN; record.len()];
-                for (start, window) in
-                    windows.starts().iter().zip(values.chunks_exact(WINDOW * outputs.len()))
+                for (start, window) in windows.starts.iter().zip(values.chunks_exact(WINDOW * outputs.len()))
                 {
                     let output = window.iter().skip(output).step_by(outputs.len());
                     series[*start..]

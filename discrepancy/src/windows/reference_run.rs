@@ -16,18 +16,14 @@ use plant::{Axis, Plant, RigParameters, State};
 /// Readings of a rig in the windows of a record, with start states and ranges of the variables.
 #[derive(Clone, Debug, Default)]
 pub struct ReferenceRun {
-    simulated: Vec<f64>,
+    /// Readings over their noise, as [`Windows::simulate_coarsely`] gives them.
+    pub simulated: Vec<f64>,
     /// Start state of each judged window; empty for rigs with effects, whose internal states are no part of it.
     states: Vec<State>,
     ranges_of_windows: Vec<VariableRanges>,
 }
 
-impl ReferenceRun {
-    /// Readings over their noise, as [`Windows::simulate_coarsely`] gives them.
-    pub fn simulated(&self) -> &[f64] {
-        &self.simulated
-    }
-}
+impl ReferenceRun {}
 
 /// Smallest and largest value of each table variable in a window.
 #[derive(Clone, Copy, Debug)]

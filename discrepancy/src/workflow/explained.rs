@@ -36,7 +36,7 @@ pub(super) fn searched_for(
     progress: &mut dyn FnMut(&str),
 ) -> SelectionResult {
     let linked = records.iter().any(|record| record.linked);
-    let (rig, measured) = (engine.rig(), records[0].measured);
+    let (rig, measured) = (&engine.rig, records[0].measured);
     let mut candidates = Candidate::all(rig, measured, linked, &task.without);
     candidates.extend(Candidate::of_suspects(rig, measured, &task.suspects));
     let mut found = name(engine, candidates, progress);

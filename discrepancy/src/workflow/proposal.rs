@@ -57,8 +57,8 @@ pub(super) fn proposal_for(
         return Some(Proposal { next, experiment_toml: None, rehearsed: Vec::new() });
     }
     let baseline = &rig_file.rig;
-    let noise = match training.and_then(|engine| engine.windows().first()) {
-        Some(windows) => ReadingNoise::of(windows.record(), baseline),
+    let noise = match training.and_then(|engine| engine.windows.first()) {
+        Some(windows) => ReadingNoise::of(windows.record, baseline),
         None => ReadingNoise::specified(baseline),
     };
     let question = Question {

@@ -122,7 +122,9 @@ pub(super) fn columns(
     let named = growing.iter().find(|index| is_time(index)).copied();
     let is_growing = read.time_s.len() > 1 && read.time_s.windows(2).all(|pair| pair[0] < pair[1]);
     let time = match (named, calendar.filter(|_| is_growing)) {
-        (None, Some(column)) => of_calendar(column, &read.time_s),
+        (None, Some(column)) => {
+            Time { column: column.into(), unit: "iso8601".into(), ..time(("", None), &read.time_s) }
+        }
         _ => {
             let Some(place) = named.or(growing.first().copied()) else {
                 return Err(NewError::Time { file: file() });
@@ -164,11 +166,6 @@ fn filled(values: Vec<Option<f64>>) -> Vec<f64> {
         last
     };
     values.into_iter().map(fill).collect()
-}
-
-/// A column with times of a calendar.
-fn of_calendar(column: &str, time_s: &[f64]) -> Time {
-    Time { column: column.into(), unit: "iso8601".into(), ..time(("", None), time_s) }
 }
 
 fn time((column, unit): (&str, Option<&str>), values: &[f64]) -> Time {

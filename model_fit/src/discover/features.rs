@@ -158,7 +158,7 @@ pub(super) fn group_terms(model: &Model, variables: &[Variable], period_s: f64) 
             if matches!(target, Target::Input(_)) && name == one.name {
                 memories(one, period_s, 30.0 * period_s)
                     .iter()
-                    .filter(|low| low.is_change())
+                    .filter(|low| low.name.starts_with(CHANGE))
                     .for_each(|low| add(std::slice::from_ref(low)));
             }
             for other in variables[place + 1..].iter().filter(|_| !is_output) {
@@ -171,12 +171,6 @@ pub(super) fn group_terms(model: &Model, variables: &[Variable], period_s: f64) 
     }
     all.truncate(MOST_OF_GROUPS);
     all
-}
-
-impl Factor {
-    fn is_change(&self) -> bool {
-        self.name.starts_with(CHANGE)
-    }
 }
 
 /// Inputs and definitions with their units.

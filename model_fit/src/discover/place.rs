@@ -74,7 +74,7 @@ pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
     let model = baseline.fitting.model;
     let terms = group_terms(model, &variables(baseline), period_s(&baseline.fitting));
     let text: String = terms.iter().map(|term| term.text.as_str()).collect();
-    let text = format!("{}\n{text}", model.text());
+    let text = format!("{}\n{text}", model.text);
     let grown = Model::parse(&text, Path::new("model with the terms of places")).ok()?;
     let first = model.suspects.len();
     let screen = Screen::of(&grown, baseline, first, terms.len())?;

@@ -11,8 +11,7 @@ use super::flows::PortsAt;
 use super::friction::direction_of;
 use super::memory::{Memory, Moving, seen_at};
 use super::presliding::Bristle;
-use super::replaced::linkage_terms;
-use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
+use super::sums::{ExhaustSide, Force, SupplySide};
 use super::tabulated::Seen;
 use super::{AxisEffects, ChangedLaws, OpenBalance, act_in_no_step};
 use crate::faults::{Faults, Outlet};
@@ -36,14 +35,14 @@ pub(crate) struct Effects {
     pub(super) stroke_m: f64,
     pub(super) temperature_k: f64,
     pub(super) spool_time_constant_s: f64,
-    file_linkage: LinkageParameters,
+    pub(super) file_linkage: LinkageParameters,
     /// What is broken: friction levels times these, and ways out of the chambers a and b.
     pub(super) friction_factors: [f64; 2],
     outlets: [[Outlet; 2]; 2],
     /// Whether friction is the baseline's on both axes; most effects leave it so, and its own laws cost three times as much.
     baseline_friction: bool,
     /// Whether the baseline's laws move the rig: no effect, table, term or fault acts in a step.
-    baseline_laws: bool,
+    pub(crate) baseline_laws: bool,
 }
 
 /// Below this speed an axis on bristles counts as resting: far below what moves it a sensor's step in a second. A guess.
@@ -109,11 +108,6 @@ impl Effects {
         self.baseline_laws = self.has_baseline_laws();
     }
 
-    /// Whether the baseline's laws move the rig; nothing is remembered then.
-    pub(crate) fn leave_laws_alone(&self) -> bool {
-        self.baseline_laws
-    }
-
     fn has_baseline_laws(&self) -> bool {
         let leaks = (0..2).any(|axis| self.leaks(axis));
         act_in_no_step(&self.on, &self.changed_laws) && self.baseline_friction && !leaks
@@ -125,10 +119,6 @@ impl Effects {
 
     fn leaks(&self, axis: usize) -> bool {
         self.outlets[axis].iter().any(Outlet::is_open)
-    }
-
-    pub(crate) fn linkage_terms(&self) -> (Gap, Stiffness, Damping) {
-        linkage_terms(&self.on[0], &self.file_linkage)
     }
 
     /// Takes over the masses of an integrator; to be called when they change.
@@ -160,7 +150,7 @@ impl Effects {
         let extension_m = seen.extension_m;
         let position_m = if axis == 0 { extension_m } else { self.stroke_m - extension_m };
         Force {
-            inclination: on.inclination.map_or(0.0, |effect| ALONG_X[axis] * effect.term()),
+            inclination: on.inclination.map_or(0.0, |effect| ALONG_X[axis] * effect.force_n),
             position_dependent_force: on
                 .position_dependent_force
                 .map_or(0.0, |effect| ALONG_X[axis] * effect.term(position_m)),
@@ -411,10 +401,10 @@ impl Laws for Effects {
             let pressure_pa = middle.pressure.map(lane);
             let mut leakage = self.leakage(of, axis, &seen(at, middle, axis)).map(|terms| terms.sum(0.0));
             for (chamber, leakage) in leakage.iter_mut().enumerate().filter(|_| self.leaks(axis)) {
-                let lacks_pa = (of.atmospheric_pa() - pressure_pa[chamber]).abs();
+                let lacks_pa = (of.atmospheric_pa - pressure_pa[chamber]).abs();
                 let most = lacks_pa / lane(middle.per_volume[chamber]) / (normal_pa * span_s);
                 let outlet = &self.outlets[axis][chamber];
-                *leakage += outlet.inflow(pressure_pa[chamber], of.atmospheric_pa(), most);
+                *leakage += outlet.inflow(pressure_pa[chamber], of.atmospheric_pa, most);
             }
             let axis_states = &mut carried.axes[axis];
             for chamber in 0..2 {

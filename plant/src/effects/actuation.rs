@@ -15,7 +15,7 @@ impl Effects {
             command_dead_time: on.command_dead_time.map_or(0.0, |effect| {
                 effect.term(self.memory.commands[axis].before(effect.delay_s - local_s), now)
             }),
-            valve_offset: on.valve_offset.map_or(0.0, |effect| effect.term()),
+            valve_offset: on.valve_offset.map_or(0.0, |effect| effect.offset),
         }
     }
 

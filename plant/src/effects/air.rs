@@ -48,7 +48,7 @@ impl Effects {
         let across = on.piston_leakage.map_or(0.0, |effect| effect.flow(pressure_pa[0], pressure_pa[1]));
         let out = |chamber: usize| {
             on.rod_leakage[chamber]
-                .map_or(0.0, |effect| -effect.flow(pressure_pa[chamber], of.atmospheric_pa()))
+                .map_or(0.0, |effect| -effect.flow(pressure_pa[chamber], of.atmospheric_pa))
         };
         [0, 1].map(|chamber| Leakage {
             piston_leakage: if chamber == 0 { -across } else { across },

@@ -174,65 +174,35 @@ pub struct Number {
 /// A term as a file declares it, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Declared {
-    pub(crate) name: String,
-    pub(crate) axis: Axis,
-    pub(crate) target: Target,
-    pub(crate) add: String,
+    /// What reports call it.
+    pub name: String,
+    /// Axis that it acts on.
+    pub axis: Axis,
+    /// What it adds to.
+    pub target: Target,
+    /// As the rig file writes it.
+    pub add: String,
     pub(crate) numbers: Vec<Number>,
-    pub(crate) memory: Vec<Remembered>,
+    /// What it keeps from step to step, in the order of the file.
+    pub memory: Vec<Remembered>,
     /// Curves that its expressions read.
     pub(crate) tables: Vec<Table>,
-    pub(crate) twins: Vec<String>,
+    /// Effects or suspects that are known to do the same.
+    pub twins: Vec<String>,
     pub(crate) formula: Formula,
 }
 
 impl Declared {
-    /// What reports call it.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Axis that it acts on.
-    #[must_use]
-    pub fn axis(&self) -> Axis {
-        self.axis
-    }
-
-    /// What it adds to.
-    #[must_use]
-    pub fn target(&self) -> Target {
-        self.target
-    }
-
     /// Axis and target, as in the file.
     #[must_use]
     pub fn place(&self) -> String {
         format!("{}.{}", self.axis.name(), self.target.name())
     }
 
-    /// As the rig file writes it.
-    #[must_use]
-    pub fn expression(&self) -> &str {
-        &self.add
-    }
-
     /// Its numbers, in the order of the file.
     #[must_use]
     pub fn numbers(&self) -> &[Number] {
         &self.numbers
-    }
-
-    /// What it keeps from step to step, in the order of the file.
-    #[must_use]
-    pub fn memory(&self) -> &[Remembered] {
-        &self.memory
-    }
-
-    /// Effects or suspects that are known to do the same.
-    #[must_use]
-    pub fn twins(&self) -> &[String] {
-        &self.twins
     }
 
     /// Its place, as of an effect: the axis of a force, the chamber of a flow, the sensor of a reading.

@@ -118,7 +118,7 @@ mod tests {
             (plant, on)
         };
         let ((plant, with), (_, without)) = (of(1.0), of(0.0));
-        let integrator = plant.integrator();
+        let integrator = &plant.integrator;
         let seen = Seen { extension_m: 0.2, velocity_m_per_s: 0.1, spool: 0.3, pressure_pa: [4e5, 3e5] };
         let rubbing = Rubbing { extension_m: 0.2, gauge_pa: [3e5, 2e5], rest_s: 0.0 };
         let sums = |effects: &Effects| {

@@ -97,7 +97,7 @@ impl Effects {
                 let shut = if at.shut { 0.0 } else { 1.0 };
                 pipes.conductance[edge] = ports.edges[chamber][edge].sum(kv_open) * FLOW_PER_KV * shut;
             }
-            let to_end_m = if chamber == 0 { at.extension_m } else { of.motion.stroke_m() - at.extension_m };
+            let to_end_m = if chamber == 0 { at.extension_m } else { of.motion.stroke_m - at.extension_m };
             let unresisted = [0, 1].map(|edge| self.edge(axis, &pipes, edge, at.pressure_pa[chamber]));
             let (flow, port) = self.through(axis, &pipes, unresisted, at.pressure_pa[chamber], to_end_m);
             let [supplied, vented] = if flow == 0.0 {

@@ -18,6 +18,7 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceSensorOffset {
+    /// What the reading has above the truth, N.
     pub(crate) offset_n: f64,
 }
 
@@ -47,20 +48,13 @@ impl Effect for ForceSensorOffset {
     }
 }
 
-impl ForceSensorOffset {
-    /// What the reading has above the truth, N.
-    pub(crate) fn term(&self) -> f64 {
-        self.offset_n
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     #[test]
     fn it_is_a_constant_of_either_sign() {
         for offset in [12.0, 0.0, -(12.0)] {
-            assert_eq!(ForceSensorOffset::new(&[offset], &RigParameters::baseline()).term(), offset);
+            assert_eq!(ForceSensorOffset::new(&[offset], &RigParameters::baseline()).offset_n, offset);
         }
     }
 }

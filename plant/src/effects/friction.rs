@@ -38,7 +38,7 @@ pub(super) fn direction_of(value: f64) -> f64 {
 
 impl Effects {
     pub(crate) fn viscous_term(&self, of: &Integrator, axis: usize, direction: f64) -> Viscous {
-        let file = of.motion.levels().viscous_n_s_per_m[0];
+        let file = of.motion.levels.viscous_n_s_per_m[0];
         Viscous {
             friction_asymmetry: self.on[axis]
                 .friction_asymmetry
@@ -48,7 +48,7 @@ impl Effects {
 
     /// Viscous friction in a direction, N s/m.
     pub(crate) fn viscous(&self, of: &Integrator, axis: usize, direction: f64) -> f64 {
-        let sound = self.viscous_term(of, axis, direction).sum(of.motion.levels().viscous_n_s_per_m[0]);
+        let sound = self.viscous_term(of, axis, direction).sum(of.motion.levels.viscous_n_s_per_m[0]);
         sound.max(0.0) * self.friction_factors[axis]
     }
 
@@ -63,7 +63,7 @@ impl Effects {
         let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
         let rubbing = Rubbing {
             extension_m: middle.extension.to_array()[axis],
-            gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa()),
+            gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa),
             rest_s: axis_states.rest_s,
         };
         Friction { effects: self, of, axis, rubbing }
@@ -80,7 +80,7 @@ impl<'a> Friction<'a> {
     ) -> Self {
         let rubbing = Rubbing {
             extension_m: place.extension,
-            gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa()),
+            gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa),
             rest_s: effects.memory.moving.axes[axis].rest_s,
         };
         Self { effects, of, axis, rubbing }
@@ -89,7 +89,7 @@ impl<'a> Friction<'a> {
     /// Terms of the sliding level in a direction (1 extending, -1 retracting) at a speed.
     pub(crate) fn sliding_level(&self, speed: f64, direction: f64) -> SlidingLevel {
         let (on, at) = (&self.effects.on[self.axis], &self.rubbing);
-        let file = self.of.motion.levels().sliding_n[0];
+        let file = self.of.motion.levels.sliding_n[0];
         SlidingLevel {
             stribeck_friction: on.stribeck_friction.map_or(0.0, |effect| effect.term(speed)),
             friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
@@ -106,7 +106,7 @@ impl<'a> Friction<'a> {
     /// Terms of the break-away level in a direction, beside those of its sliding level.
     pub(crate) fn break_away_level(&self, direction: f64, sliding: &SlidingLevel) -> BreakAwayLevel {
         let (on, at) = (&self.effects.on[self.axis], &self.rubbing);
-        let file = self.of.motion.levels().break_away_n[0];
+        let file = self.of.motion.levels.break_away_n[0];
         BreakAwayLevel {
             friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
             pressure_dependent_friction: sliding.pressure_dependent_friction,
@@ -124,7 +124,7 @@ impl<'a> Friction<'a> {
 
     /// Level of sliding friction in a direction (1 extending, -1 retracting) at a speed, N, not below 0.
     pub(super) fn sliding_n(&self, speed: f64, direction: f64) -> f64 {
-        let file = self.of.motion.levels().sliding_n[0];
+        let file = self.of.motion.levels.sliding_n[0];
         let level = if self.effects.changed_laws[self.axis].friction {
             self.sliding_level(speed, direction).sum(file).max(0.0)
         } else {
@@ -135,7 +135,7 @@ impl<'a> Friction<'a> {
 
     /// Break-away level in a direction, N: not easier than to slide.
     pub(super) fn break_away_n(&self, direction: f64) -> f64 {
-        let (file, factor) = (self.of.motion.levels(), self.effects.friction_factors[self.axis]);
+        let (file, factor) = (&self.of.motion.levels, self.effects.friction_factors[self.axis]);
         if !self.effects.changed_laws[self.axis].friction {
             return file.break_away_n[0] * factor;
         }
@@ -167,7 +167,7 @@ impl<'a> Friction<'a> {
         let direction = direction_of(if velocity == 0.0 { force_n } else { velocity });
         Under {
             force_n,
-            mass_kg: self.of.motion.mass_kg(self.axis),
+            mass_kg: self.of.motion.masses_kg[self.axis],
             viscous_n_s_per_m: self.viscous(direction),
             sliding_n: self.sliding_n(speed, direction),
             break_away_n: self.break_away_n(direction),
@@ -182,7 +182,7 @@ impl<'a> Friction<'a> {
         let direction = if velocity == 0.0 { push.signum() } else { velocity.signum() };
         let friction = self.sliding_n(velocity.abs(), direction_of(direction))
             + self.viscous(direction_of(direction)) * velocity.abs();
-        let acceleration = (push * direction - friction) / self.of.motion.mass_kg(self.axis);
+        let acceleration = (push * direction - friction) / self.of.motion.masses_kg[self.axis];
         (velocity.abs() + acceleration * span_s / 2.0).max(0.0)
     }
 }

@@ -20,6 +20,7 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Inclination {
+    /// Force in +x of the rig, N.
     pub(crate) force_n: f64,
 }
 
@@ -49,20 +50,13 @@ impl Effect for Inclination {
     }
 }
 
-impl Inclination {
-    /// Force in +x of the rig, N.
-    pub(crate) fn term(&self) -> f64 {
-        self.force_n
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     #[test]
     fn it_is_a_constant_of_either_sign() {
         for force in [-50.0, 0.0, 12.5] {
-            assert_eq!(Inclination::new(&[force], &RigParameters::baseline()).term(), force);
+            assert_eq!(Inclination::new(&[force], &RigParameters::baseline()).force_n, force);
         }
     }
 }

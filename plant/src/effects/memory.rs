@@ -158,7 +158,7 @@ impl Memory {
             let lane = |pair: Pair| pair.to_array()[i];
             let pressure_pa = [0, 1].map(|chamber| lane(stored_j[chamber]) / lane(volume_m3[chamber]));
             let position_m =
-                if i == 0 { lane(lanes.extension) } else { of.motion.stroke_m() - lane(lanes.extension) };
+                if i == 0 { lane(lanes.extension) } else { of.motion.stroke_m - lane(lanes.extension) };
             let truths = [position_m, pressure_pa[0], pressure_pa[1]];
             AxisMoving {
                 spool: lane(lanes.spool),

@@ -18,6 +18,7 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorOffset {
+    /// What the reading has above the truth, m.
     pub(crate) offset_m: f64,
 }
 
@@ -47,20 +48,13 @@ impl Effect for PositionSensorOffset {
     }
 }
 
-impl PositionSensorOffset {
-    /// What the reading has above the truth, m.
-    pub(crate) fn term(&self) -> f64 {
-        self.offset_m
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     #[test]
     fn it_is_a_constant_of_either_sign() {
         for offset in [-0.8e-3, 0.0, -(-0.8e-3)] {
-            assert_eq!(PositionSensorOffset::new(&[offset], &RigParameters::baseline()).term(), offset);
+            assert_eq!(PositionSensorOffset::new(&[offset], &RigParameters::baseline()).offset_m, offset);
         }
     }
 }

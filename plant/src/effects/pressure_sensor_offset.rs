@@ -18,6 +18,7 @@ use crate::parameters::table::Unit;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressureSensorOffset {
+    /// What the reading has above the truth, Pa.
     pub(crate) offset_pa: f64,
 }
 
@@ -48,20 +49,13 @@ impl Effect for PressureSensorOffset {
     }
 }
 
-impl PressureSensorOffset {
-    /// What the reading has above the truth, Pa.
-    pub(crate) fn term(&self) -> f64 {
-        self.offset_pa
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     #[test]
     fn it_is_a_constant_of_either_sign() {
         for offset in [-3e3, 0.0, -(-3e3)] {
-            assert_eq!(PressureSensorOffset::new(&[offset], &RigParameters::baseline()).term(), offset);
+            assert_eq!(PressureSensorOffset::new(&[offset], &RigParameters::baseline()).offset_pa, offset);
         }
     }
 }

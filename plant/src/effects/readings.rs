@@ -26,7 +26,7 @@ impl Effects {
                 .position_sensor_lag
                 .map_or(0.0, |_| self.memory.moving.axes[axis].shown[0] - truth),
             position_sensor_gain: on.position_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
-            position_sensor_offset: on.position_sensor_offset.map_or(0.0, |effect| effect.term()),
+            position_sensor_offset: on.position_sensor_offset.map_or(0.0, |effect| effect.offset_m),
             declared_reading: on.declared.reading(Target::Position, at),
             added: on.added(OpenBalance::PositionReading { truth_m: truth }),
         }
@@ -38,7 +38,7 @@ impl Effects {
         ForceReading {
             time_skew: self.skew(axis, 1, truth),
             force_sensor_gain: on.force_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
-            force_sensor_offset: on.force_sensor_offset.map_or(0.0, |effect| effect.term()),
+            force_sensor_offset: on.force_sensor_offset.map_or(0.0, |effect| effect.offset_n),
             declared_reading: on.declared.reading(Target::ForceReading, at),
             added: on.added(OpenBalance::ForceReading { truth_n: truth }),
         }
@@ -58,7 +58,7 @@ impl Effects {
             pressure_sensor_lag: on.pressure_sensor_lag[chamber]
                 .map_or(0.0, |_| self.memory.moving.axes[axis].shown[1 + chamber] - truth),
             pressure_sensor_gain: on.pressure_sensor_gain[chamber].map_or(0.0, |effect| effect.term(truth)),
-            pressure_sensor_offset: on.pressure_sensor_offset[chamber].map_or(0.0, |effect| effect.term()),
+            pressure_sensor_offset: on.pressure_sensor_offset[chamber].map_or(0.0, |effect| effect.offset_pa),
             declared_reading: on.declared.reading([Target::PressureA, Target::PressureB][chamber], at),
             added: on.added(OpenBalance::PressureReading { chamber, truth_pa: truth }),
         }

@@ -7,6 +7,7 @@ use super::OpenBalance;
 use super::acting::Effects;
 use super::air::HeatAt;
 use super::friction::{Friction, direction_of};
+use super::replaced::linkage_terms;
 use super::sheet::{Element, Part};
 use super::sums::Balance;
 use super::sums::{Damping, DeadSpace, ExhaustSide, Gap, Stiffness};
@@ -184,7 +185,7 @@ impl Effects {
             teller.open(&self.force(axis, &seen), None, &OpenBalance::Force(&seen));
 
             // What the sensors make of it.
-            let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m() - place.extension };
+            let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m - place.extension };
             let force_n = forces.sensor_n(of, axis);
             let declared = self.declared_at(axis, &seen, force_n);
             let open = OpenBalance::PositionReading { truth_m: position_m };
@@ -198,7 +199,7 @@ impl Effects {
                 teller.open(&reading, Some(name), &open);
             }
         }
-        let (gap, stiffness, damping) = self.linkage_terms();
+        let (gap, stiffness, damping) = linkage_terms(&self.on[0], &self.file_linkage);
         let mut teller = Teller { effects: self, part: Part::Linkage, tell };
         teller.balance::<Gap>(&gap, None, None);
         teller.balance::<Stiffness>(&stiffness, None, None);

@@ -24,7 +24,7 @@ fn moving() -> (RigParameters, Plant, Inputs) {
 
 fn terms(effects: &Effects, plant: &Plant, inputs: &Inputs) -> Vec<Term> {
     let mut terms = Vec::new();
-    effects.each_term(plant.integrator(), plant.state(), inputs, &mut |term| terms.push(term));
+    effects.each_term(&plant.integrator, plant.state(), inputs, &mut |term| terms.push(term));
     terms
 }
 

@@ -48,13 +48,6 @@ impl Effect for ValveOffset {
     }
 }
 
-impl ValveOffset {
-    /// What is added to the command for the spool's target, share of full command.
-    pub(crate) fn term(&self) -> f64 {
-        self.offset
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,7 +56,7 @@ mod tests {
     fn it_is_a_constant_in_shares_of_full_command_and_nothing_at_zero() {
         let rig = RigParameters::baseline();
         let percent = ValveOffset::SHEET.keys[0].unit;
-        assert_eq!(ValveOffset::new(&[percent.to_si(-2.5)], &rig).term(), -0.025);
-        assert_eq!(ValveOffset::new(&[percent.to_si(0.0)], &rig).term(), 0.0);
+        assert_eq!(ValveOffset::new(&[percent.to_si(-2.5)], &rig).offset, -0.025);
+        assert_eq!(ValveOffset::new(&[percent.to_si(0.0)], &rig).offset, 0.0);
     }
 }

@@ -73,7 +73,8 @@ struct SensorFaultState {
 /// Faults of all sensors: drive and load; position, force, pressure a, pressure b.
 #[derive(Debug, Clone)]
 pub(crate) struct SensorFaults {
-    any: bool,
+    /// Whether any sensor is faulty.
+    pub(crate) any: bool,
     fault_states: [[SensorFaultState; 4]; 2],
     noise: Pcg64,
 }
@@ -101,12 +102,6 @@ impl SensorFaults {
                 }
             }
         }
-    }
-
-    /// Whether any sensor is faulty.
-    #[inline(always)]
-    pub(crate) fn any(&self) -> bool {
-        self.any
     }
 
     /// The value that a sensor rounds.
@@ -152,14 +147,14 @@ mod tests {
         let mut all = <[[SensorFault; 4]; 2]>::default();
         all[1][2] = fault;
         faults.set(&all);
-        assert!(faults.any());
+        assert!(faults.any);
         faults
     }
 
     #[test]
     fn the_default_changes_nothing() {
         let mut faults = SensorFaults::new(3);
-        assert!(!faults.any());
+        assert!(!faults.any);
         assert_eq!(faults.disturb(1, 2, 0.1).to_bits(), 0.1_f64.to_bits());
         let reading = Reading { value: 0.1, saturated: false };
         assert_eq!(faults.show(1, 2, reading, 0.0), reading);

@@ -162,17 +162,17 @@ impl<P: Axes> Laws<P> for Baseline {
 
     #[inline(always)]
     fn sliding(&self, at: At<'_, P>, _: &Middle<P>, (): &(), _: P, moving: P::Mask) -> P {
-        against(at.from.velocity, P::both(at.of.motion.levels().sliding_n[0]), moving)
+        against(at.from.velocity, P::both(at.of.motion.levels.sliding_n[0]), moving)
     }
 
     #[inline(always)]
     fn starting(&self, at: At<'_, P>, _: &Middle<P>, force: P, starts: P::Mask) -> P {
-        against(force, P::both(at.of.motion.levels().sliding_n[0]), starts)
+        against(force, P::both(at.of.motion.levels.sliding_n[0]), starts)
     }
 
     #[inline(always)]
     fn break_away(&self, at: At<'_, P>, _: &Middle<P>, _: P) -> P {
-        P::both(at.of.motion.levels().break_away_n[0])
+        P::both(at.of.motion.levels.break_away_n[0])
     }
 
     #[inline(always)]
@@ -182,13 +182,13 @@ impl<P: Axes> Laws<P> for Baseline {
 
     #[inline(always)]
     fn holds(&self, at: At<'_, P>, _: &Middle<P>, axis: usize, force: f64) -> bool {
-        at.of.motion.holds(at.from.place(axis).extension, force, at.of.motion.levels().break_away_n[0])
+        at.of.motion.holds(at.from.place(axis).extension, force, at.of.motion.levels.break_away_n[0])
     }
 
     #[inline(always)]
     fn advance(&self, at: At<'_, P>, _: &Middle<P>, (): &mut (), axis: usize, force: f64) -> Place {
         let motion = &at.of.motion;
-        motion.advance(axis, at.from.place(axis), force, motion.levels(), at.span.span_s)
+        motion.advance(axis, at.from.place(axis), force, &motion.levels, at.span.span_s)
     }
 
     #[inline(always)]

@@ -17,7 +17,7 @@ impl<P: Axes> Integrator<P> {
     /// d of the linkage, m, from both extensions.
     #[inline(always)]
     pub(crate) fn distance(&self, extension: P) -> f64 {
-        self.motion.stroke_m() - extension.sum()
+        self.motion.stroke_m - extension.sum()
     }
 
     #[inline(always)]
@@ -99,7 +99,7 @@ impl<P: Axes> Integrator<P> {
         let leaves = !moving & self.motion.might_leave(from.extension, force, margin, break_away);
         let turns = moving & (velocity * from.velocity).at_most(zero);
         let turns = sticks.map_or(turns, |sticks| turns & sticks);
-        let overruns = extension.less(zero) | P::both(self.motion.stroke_m()).less(extension);
+        let overruns = extension.less(zero) | P::both(self.motion.stroke_m).less(extension);
         let touches =
             held.linked && self.linkage.made_contact(self.distance(from.extension), self.distance(extension));
         let limits = self.chambers.limits(node.end_pa);
@@ -117,7 +117,7 @@ impl<P: Axes> Integrator<P> {
     #[inline(always)]
     pub(crate) fn ahead(&self, span: &Span<P>, from: &Lanes<P>) -> P {
         let ahead = from.extension + from.velocity * P::both(span.span_s / 2.0);
-        ahead.max(P::both(0.0)).min(P::both(self.motion.stroke_m()))
+        ahead.max(P::both(0.0)).min(P::both(self.motion.stroke_m))
     }
 
     #[inline(always)]

@@ -434,7 +434,7 @@ impl Declared {
             );
         }
         for table in &self.tables {
-            let (name, [x, y]) = (&table.name, table.written());
+            let (name, [x, y]) = (&table.name, &table.written);
             let (x_unit, y_unit) = (text(&table.from.text), text(&table.to.text));
             let _ = writeln!(
                 out,

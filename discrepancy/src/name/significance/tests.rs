@@ -38,7 +38,7 @@ impl<'a> Case<'a> {
 
     /// The best candidate of the screening, or the one of a name, refitted.
     fn fitted(&self, name: Option<&str>) -> Refit {
-        let residual = self.engine.residual(&self.engine.simulate(self.engine.rig()));
+        let residual = self.engine.residual(&self.engine.simulate(&self.engine.rig));
         let (_, mut screened) = self.columns.screen(&self.engine, &self.linearisation, &residual, &[]);
         screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let is_it = |name: &str, start: &EffectEstimate| start.candidate.sheet.name == name;
@@ -118,10 +118,6 @@ fn a_strong_effect_is_significant_after_five_draws_with_any_number_of_threads() 
     }
     assert_eq!(other.effects[0].effect, "dead-volume");
     // The other way round the records look as if drawn with what was tested.
-    let turned = case.significance(&other_first(&explanations), &explanations);
+    let turned = case.significance(explanations[1].fit.as_ref().unwrap(), &explanations);
     assert!(!turned.other.is_some_and(|drawn| drawn.significant));
-}
-
-fn other_first(explanations: &[Explanation; 2]) -> Refit {
-    explanations[1].fit.clone().unwrap()
 }

@@ -122,11 +122,11 @@ impl<'a> RigProblem<'a> {
 
     /// The rig file's rig with effects, without changed numbers.
     fn with_effects(&self, terms: &[Term]) -> Option<RigParameters> {
-        add(self.engine.rig().clone(), terms)
+        add(self.engine.rig.clone(), terms)
     }
 
     fn rig(&self, terms: &[Term]) -> Option<RigParameters> {
-        add(with_factors(self.engine.rig(), &Self::factors(terms)), terms)
+        add(with_factors(&self.engine.rig, &Self::factors(terms)), terms)
     }
 
     fn evaluate(&self, terms: Vec<Term>) -> Option<Fit> {
@@ -231,7 +231,7 @@ impl Problem for RigProblem<'_> {
     type Fit = Fit;
 
     fn count(&self) -> f64 {
-        self.engine.scaled_dof().iter().sum()
+        self.engine.scaled_dof.iter().sum()
     }
 
     fn fit(&self, terms: &[Term]) -> Option<Fit> {
