@@ -212,12 +212,7 @@ impl<'a> Engine<'a> {
     pub(crate) fn differences(&self, rigs: &[RigParameters], change: f64) -> Vec<Vec<f64>> {
         let simulated = self.simulate_side_by_side(rigs);
         let (up, down) = simulated.split_at(rigs.len() / 2);
-        let difference = |(up, down): (&Vec<f64>, &Vec<f64>)| {
-            let mut column = self.difference(up, down);
-            column.iter_mut().for_each(|value| *value /= change);
-            column
-        };
-        up.par_iter().zip(down).map(difference).collect()
+        up.par_iter().zip(down).map(|(up, down)| self.slope(up, down, change)).collect()
     }
 
     /// Whitened residual of a simulation.
@@ -228,6 +223,13 @@ impl<'a> Engine<'a> {
     /// Difference of two simulations, processed like a residual.
     pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
         self.each(simulated, Windows::difference, from)
+    }
+
+    /// The same over the change of a number that makes the difference.
+    pub(crate) fn slope(&self, simulated: &[f64], from: &[f64], change: f64) -> Vec<f64> {
+        let mut column = self.difference(simulated, from);
+        column.iter_mut().for_each(|value| *value /= change);
+        column
     }
 
     fn each(

@@ -377,9 +377,7 @@ pub(crate) fn derivative(
     let mut effects = effects.to_vec();
     effects[at].coordinates[key] += change;
     let readings = engine.simulate(&rig_of(&engine.rig, &effects, factors)?);
-    let mut column = engine.difference(&readings, simulated);
-    column.iter_mut().for_each(|value| *value /= change);
-    Some(column)
+    Some(engine.slope(&readings, simulated, change))
 }
 
 #[cfg(test)]

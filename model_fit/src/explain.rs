@@ -59,15 +59,10 @@ pub(crate) fn in_words(model: &Model) -> String {
     };
     section("record", record(&model.record));
     section("inputs", model.inputs.iter().map(|one| input(model, one)).collect());
-    let is_of_model = |suspect: Option<usize>| suspect.is_none();
-    section(
-        "equations",
-        model.states.iter().filter(|one| is_of_model(one.suspect)).map(|one| equation(model, one)).collect(),
-    );
+    section("equations", equations(model, None).collect());
     section("with", definitions(model, None).collect());
-    section("memory", model.memories.iter().filter(|one| is_of_model(one.suspect)).map(memory).collect());
-    let frictions = model.frictions.iter().filter(|one| is_of_model(one.suspect));
-    section("friction", frictions.map(|one| friction(model, one)).collect());
+    section("memory", memories(model, None).collect());
+    section("friction", frictions(model, None).collect());
     let output = |output: &model::Output| {
         let noise = output.noise_si.map_or("noise estimated".into(), |noise| {
             format!("noise {} {}", significant(noise / output.unit.factor), output.unit.text)
@@ -87,10 +82,7 @@ pub(crate) fn in_words(model: &Model) -> String {
     };
     section("tables", model.tables.iter().map(table).collect());
     section("outputs", model.outputs.iter().map(output).collect());
-    section(
-        "parameters",
-        model.parameters.iter().filter(|one| is_of_model(one.suspect)).map(parameter).collect(),
-    );
+    section("parameters", parameters(model, None).collect());
     section("rows", rows(&model.rows));
     section("held out", vec![held_out(model.start_samples)]);
     section("fit", vec![fit(model.starts)]);
@@ -98,18 +90,14 @@ pub(crate) fn in_words(model: &Model) -> String {
         let suspect = &model.suspects[index];
         let decoy = if suspect.is_decoy { ", a decoy" } else { "" };
         let head = format!("{}{decoy}, {}: {}", suspect.name, place(model, index), term(model, index));
-        let is_own = move |owner: Option<usize>| owner == Some(index);
-        let states = model.states.iter().filter(move |one| is_own(one.suspect));
-        let memories = model.memories.iter().filter(move |one| is_own(one.suspect));
-        let frictions = model.frictions.iter().filter(move |one| is_own(one.suspect));
-        let parameters = model.parameters.iter().filter(move |one| is_own(one.suspect));
+        let owner = Some(index);
         let brought = kind(suspect)
             .into_iter()
-            .chain(states.map(|one| equation(model, one)))
-            .chain(definitions(model, Some(index)))
-            .chain(memories.map(memory))
-            .chain(frictions.map(|one| friction(model, one)))
-            .chain(parameters.map(parameter));
+            .chain(equations(model, owner))
+            .chain(definitions(model, owner))
+            .chain(memories(model, owner))
+            .chain(frictions(model, owner))
+            .chain(parameters(model, owner));
         std::iter::once(head).chain(brought.map(|line| format!("  {line}")))
     };
     for (name, is_term) in [("terms", true), ("suspects", false)] {
@@ -226,6 +214,12 @@ pub(super) fn column(name: &str, scale: f64) -> String {
     if scale == 1.0 { format!("column {name}") } else { format!("column {name} times {scale}") }
 }
 
+// What follows is of a suspect, or of the model itself.
+
+fn equations(model: &Model, of: Option<usize>) -> impl Iterator<Item = String> {
+    model.states.iter().filter(move |one| one.suspect == of).map(|one| equation(model, one))
+}
+
 fn equation(model: &Model, state: &model::State) -> String {
     let unit = &state.unit;
     let start = match state.start {
@@ -242,6 +236,14 @@ fn definitions(model: &Model, suspect: Option<usize>) -> impl Iterator<Item = St
     of_suspect.map(|(index, one)| {
         format!("{} = {}    in {}", one.name, one.value.text, model.definition_unit(index).text)
     })
+}
+
+fn frictions(model: &Model, of: Option<usize>) -> impl Iterator<Item = String> {
+    model.frictions.iter().filter(move |one| one.suspect == of).map(|one| friction(model, one))
+}
+
+fn memories(model: &Model, of: Option<usize>) -> impl Iterator<Item = String> {
+    model.memories.iter().filter(move |one| one.suspect == of).map(memory)
 }
 
 fn memory(memory: &model::Memory) -> String {
@@ -282,8 +284,9 @@ pub(super) fn rows(rows: &Rows) -> Vec<String> {
     lines
 }
 
-fn parameter(parameter: &Parameter) -> String {
-    format!("{} = {}", parameter.name, value_of(parameter))
+fn parameters(model: &Model, of: Option<usize>) -> impl Iterator<Item = String> {
+    let own = model.parameters.iter().filter(move |one| one.suspect == of);
+    own.map(|one| format!("{} = {}", one.name, value_of(one)))
 }
 
 /// What is known of a number: value and unit, and whether it is fitted.

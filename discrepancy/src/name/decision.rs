@@ -16,11 +16,11 @@
 //! probable than nothing or than [`LEAST_PROBABLE`]: so it is wherever nothing has one half; parameters that are not adequate
 //! (leave more than noise) are outside the catalogue. A set whose variation cannot be computed is beyond the bar.
 
-use super::elimination::Selection;
+use super::elimination::{Selection, has_effect, is_same_set};
 use super::explanations::Explanation;
 use super::heterogeneity::parameter_spread;
 use super::needed_parameters::{significantly_off, with_needed};
-use super::{axes_of, is_large, is_same_effect, loss_on};
+use super::{axes_of, is_large, loss_on};
 use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit, linearise};
@@ -187,9 +187,8 @@ fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Op
     let singles = all_rounds.first()?;
     let effects = explanations.iter().filter(|one| one.kind == ExplanationKind::Effects);
     let probable = effects.max_by(|left, right| left.probability.total_cmp(&right.probability));
-    let is_in = |single: &&Refit, set: &[EffectEstimate]| {
-        single.effects.iter().all(|effect| set.iter().any(|other| is_same_effect(effect, other)))
-    };
+    let is_in =
+        |single: &&Refit, set: &[EffectEstimate]| single.effects.iter().all(|effect| has_effect(set, effect));
     let of_set = probable.and_then(|one| one.sets.first());
     of_set.and_then(|set| singles.iter().find(|single| is_in(single, set))).or_else(|| singles.first())
 }
@@ -203,13 +202,11 @@ fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
 /// Whether the effects of the search's model are less probable than nothing, or hardly probable at all.
 fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
     let large: Vec<_> = model.effects.iter().filter(|effect| is_large(effect)).collect();
-    let is_it = |set: &Vec<EffectEstimate>| {
-        set.len() == large.len()
-            && large.iter().all(|effect| set.iter().any(|other| is_same_effect(effect, other)))
-    };
     let null = explanations.iter().find(|one| one.kind == ExplanationKind::Null);
     let least = null.map_or(LEAST_PROBABLE, |null| null.probability.max(LEAST_PROBABLE));
-    let set = explanations.iter().find(|one| !large.is_empty() && one.sets.iter().any(is_it));
+    let set = explanations
+        .iter()
+        .find(|one| !large.is_empty() && one.sets.iter().any(|set| is_same_set(set, &large)));
     set.is_some_and(|set| set.probability < least)
 }
 

@@ -179,3 +179,12 @@ impl Selection {
 pub(crate) fn is_same_effect(left: &EffectEstimate, right: &EffectEstimate) -> bool {
     left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
 }
+
+pub(super) fn has_effect(set: &[EffectEstimate], effect: &EffectEstimate) -> bool {
+    set.iter().any(|other| is_same_effect(effect, other))
+}
+
+/// Whether a set has these effects and no other one.
+pub(super) fn is_same_set(set: &[EffectEstimate], effects: &[&EffectEstimate]) -> bool {
+    set.len() == effects.len() && effects.iter().all(|effect| has_effect(set, effect))
+}

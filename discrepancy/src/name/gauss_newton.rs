@@ -110,7 +110,7 @@ fn iterate(engine: &Engine<'_>, effects: Vec<EffectEstimate>, factors: [f64; COU
 }
 
 /// Number of coordinates of the effects.
-fn coordinates(effects: &[EffectEstimate]) -> usize {
+pub(super) fn coordinates(effects: &[EffectEstimate]) -> usize {
     effects.iter().map(|effect| effect.coordinates.len()).sum()
 }
 

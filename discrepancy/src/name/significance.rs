@@ -19,8 +19,10 @@
 
 mod sequential;
 
+use super::elimination::is_same_set;
 use super::explanations::Explanation;
-use super::{MIN_LOSS_REDUCTION, is_large, is_same_effect, lacks_fit};
+use super::gauss_newton::coordinates;
+use super::{MIN_LOSS_REDUCTION, is_large, lacks_fit};
 use crate::engine::Engine;
 use crate::fit::{LEAST, Products, loss};
 use crate::refit::{
@@ -63,7 +65,7 @@ impl Fitted<'_> {
     /// Tests a model whose effects are to be named.
     pub(super) fn significance(&self, model: &Refit) -> Option<Significance> {
         let gains = window_gains(&self.engine.scaled_dof, &self.calibrated.squares, &model.squares);
-        let charged = COLUMN_PENALTY * numbers(&model.effects) as f64;
+        let charged = COLUMN_PENALTY * coordinates(&model.effects) as f64;
         let gain = gains.iter().sum::<f64>() - charged;
         // Draws say how much chance gives without the best windows, which is far less than with them. Where there are none, what
         // any gain has to exceed counts; a threshold from a residual that is signal is no measure of chance.
@@ -117,12 +119,9 @@ impl Fitted<'_> {
         let mut ranked: Vec<&Explanation> = self.explanations.iter().collect();
         ranked.sort_by(|left, right| right.probability.total_cmp(&left.probability));
         let large: Vec<&EffectEstimate> = model.effects.iter().filter(|effect| is_large(effect)).collect();
-        let is_model = |set: &Vec<EffectEstimate>| {
-            set.len() == large.len()
-                && large.iter().all(|effect| set.iter().any(|other| is_same_effect(effect, other)))
+        let is_other = |one: &&Explanation| {
+            one.kind == ExplanationKind::Effects && !one.sets.iter().any(|set| is_same_set(set, &large))
         };
-        let is_other =
-            |one: &&Explanation| one.kind == ExplanationKind::Effects && !one.sets.iter().any(is_model);
         ranked.into_iter().take(2).find(is_other)?.fit.as_ref()
     }
 
@@ -240,11 +239,6 @@ fn without_best(gains: &[f64]) -> f64 {
     let mut ascending = gains.to_vec();
     ascending.sort_by(f64::total_cmp);
     ascending.iter().take(gains.len() - best_windows(gains.len())).sum()
-}
-
-/// Count of fitted effect parameters.
-fn numbers(effects: &[EffectEstimate]) -> usize {
-    effects.iter().map(|effect| effect.coordinates.len()).sum()
 }
 
 fn places(effects: &[EffectEstimate]) -> Vec<EffectPlace> {

@@ -240,9 +240,7 @@ fn column(
     let mut coordinates = effect.coordinates.clone();
     coordinates[key] += change;
     let changed = engine.simulate(&effect.candidate.rig(rig, &coordinates).ok()?);
-    let mut column = engine.difference(&changed, simulated);
-    column.iter_mut().for_each(|value| *value /= change);
-    Some(column)
+    Some(engine.slope(&changed, simulated, change))
 }
 
 /// The effects of an explanation that the baseline does not have with these numbers, each with the standard errors of its

@@ -249,9 +249,7 @@ fn columns(
                     engine.simulate_where(&rig, reference_runs, |ranges| fitted.acts(*point, ranges))
                 }
             };
-            let mut column = engine.difference(&simulated, &from);
-            column.iter_mut().for_each(|value| *value /= change);
-            Some(column)
+            Some(engine.slope(&simulated, &from, change))
         })
         .collect()
 }
