@@ -276,27 +276,21 @@ extern "C" fn fmi2SetupExperiment(
     on(component, |instance| instance.simulation.set_start(start_s).map(|()| Status::Ok))
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2EnterInitializationMode(component: *mut c_void) -> Status {
-    on(component, |instance| instance.simulation.enter_initialisation().map(|()| Status::Ok))
+/// Functions that lead from one mode to another.
+macro_rules! changes_of_mode {
+    ($($name:ident $work:ident;)*) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(component: *mut c_void) -> Status {
+            on(component, |instance| instance.simulation.$work().map(|()| Status::Ok))
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2ExitInitializationMode(component: *mut c_void) -> Status {
-    on(component, |instance| instance.simulation.exit_initialisation().map(|()| Status::Ok))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2Terminate(component: *mut c_void) -> Status {
-    on(component, |instance| instance.simulation.terminate().map(|()| Status::Ok))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
-    on(component, |instance| {
-        instance.simulation.reset()?;
-        Ok(Status::Ok)
-    })
+changes_of_mode! {
+    fmi2EnterInitializationMode enter_initialisation;
+    fmi2ExitInitializationMode exit_initialisation;
+    fmi2Terminate terminate;
+    fmi2Reset reset;
 }
 
 /// Functions that get or set values by their references, from `name(values) hands, work`.

@@ -85,7 +85,7 @@ impl Simulation {
     }
 
     /// Resets to the state after instantiation, with all values at their start.
-    pub(crate) fn reset(&mut self) -> Result<(), SetupError> {
+    pub(crate) fn reset(&mut self) -> Result<(), Refusal> {
         *self = Self::new(self.rig.as_ref().clone())?;
         Ok(())
     }
