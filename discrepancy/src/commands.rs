@@ -453,18 +453,21 @@ pub fn end_when_asked() {
 mod tests {
     use super::*;
 
+    fn report(verdict: Verdict, verification: Verification) -> Report {
+        Report { verdict, verification: Some(verification), ..Report::default() }
+    }
+
+    /// Without and with `--strict`.
+    fn exits(report: &Report) -> [Exit; 2] {
+        [false, true].map(|strict| exit_of(report, strict))
+    }
+
     #[test]
     fn only_who_is_strict_is_refused_a_finding_that_the_held_out_record_does_not_confirm() {
-        let report = |verdict, confirmed| Report {
-            verdict,
-            verification: Some(Verification { confirmed, ..Verification::default() }),
-            ..Report::default()
-        };
+        let report =
+            |verdict, confirmed| report(verdict, Verification { confirmed, ..Verification::default() });
         let unconfirmed = report(Verdict::Named, false);
-        assert_eq!(
-            [false, true].map(|strict| exit_of(&unconfirmed, strict)),
-            [Exit::Good, Exit::BoundBroken]
-        );
+        assert_eq!(exits(&unconfirmed), [Exit::Good, Exit::BoundBroken]);
         assert_eq!(exit_of(&report(Verdict::Named, true), true), Exit::Good);
         // Nothing was found, so that there is nothing to confirm.
         assert_eq!(exit_of(&report(Verdict::NothingMissing, false), true), Exit::Good);
@@ -473,21 +476,12 @@ mod tests {
 
     #[test]
     fn nothing_missing_that_the_held_out_record_contradicts_is_refused_to_who_is_strict() {
-        let report = |verdict, confirmed, worse| Report {
-            verdict,
-            verification: Some(Verification {
-                confirmed,
-                worse,
-                more_missing: true,
-                ..Verification::default()
-            }),
-            ..Report::default()
+        let report = |verdict, confirmed, worse| {
+            let more_missing = true;
+            report(verdict, Verification { confirmed, worse, more_missing, ..Verification::default() })
         };
         let contradicted = report(Verdict::NothingMissing, false, false);
-        assert_eq!(
-            [false, true].map(|strict| exit_of(&contradicted, strict)),
-            [Exit::Good, Exit::BoundBroken]
-        );
+        assert_eq!(exits(&contradicted), [Exit::Good, Exit::BoundBroken]);
         assert_eq!(exit_of(&report(Verdict::NothingMissing, false, true), true), Exit::BoundBroken);
         // The finding is right, and not the whole.
         assert_eq!(exit_of(&report(Verdict::Named, true, false), true), Exit::Good);

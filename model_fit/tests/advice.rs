@@ -60,6 +60,19 @@ fn files(folder: &Path, model: &str) -> [PathBuf; 2] {
     [file(folder, "tanks.toml", model), file(folder, "record.csv", &text)]
 }
 
+fn explained(model: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, record] = files(folder.path(), model);
+    explain(&file, &[record]).unwrap()
+}
+
+/// The model with a gain of its sensor that is fitted.
+fn with_gain(model: &str) -> String {
+    model
+        .replace("value = \"lower\"", "value = \"gain*lower\"")
+        .replace("[states.upper]", "[parameters]\ngain = { value = 1, range = [0.1, 10] }\n[states.upper]")
+}
+
 #[test]
 fn a_sensor_is_advised_that_two_suspects_do_not_move_alike() {
     let folder = tempfile::tempdir().unwrap();
@@ -76,12 +89,7 @@ fn a_sensor_is_advised_that_two_suspects_do_not_move_alike() {
 
 #[test]
 fn a_sensor_is_advised_that_shows_a_suspect_which_hides() {
-    let folder = tempfile::tempdir().unwrap();
-    let gain = TANKS
-        .replace("value = \"lower\"", "value = \"gain*lower\"")
-        .replace("[states.upper]", "[parameters]\ngain = { value = 1, range = [0.1, 10] }\n[states.upper]");
-    let [file, record] = files(folder.path(), &gain);
-    let text = explain(&file, &[record]).unwrap();
+    let text = explained(&with_gain(TANKS));
     for line in [
         "suspect input-gain: looks like a change of the model's own numbers",
         "to see input-gain you would need a sensor of upper or lower",
@@ -93,7 +101,6 @@ fn a_sensor_is_advised_that_shows_a_suspect_which_hides() {
 
 #[test]
 fn a_sensor_is_advised_of_a_state_that_changes_no_output() {
-    let folder = tempfile::tempdir().unwrap();
     // Its rate is fitted from several starts, of which the record prefers none.
     let third = "[parameters]\nrate = { unit = \"1/s\", value = 0.5 }\n[states.third]\nunit = \"m\"\nstart = 0\n\
                  derivative = \"rate*(lower - third)\"\n[define]";
@@ -101,8 +108,7 @@ fn a_sensor_is_advised_of_a_state_that_changes_no_output() {
                 parameters.k = { unit = \"1/s\", value = 0.1, range = [0, 5] }\n";
     let model = TANKS.replace("starts = 0\n", "starts = 8\n").replace("[define]", third);
     let (plant, _) = model.split_once("[[suspects]]").unwrap();
-    let [file, record] = files(folder.path(), &format!("{plant}{leak}"));
-    let text = explain(&file, &[record]).unwrap();
+    let text = explained(&format!("{plant}{leak}"));
     for line in
         ["rate: changes no output", "leak: changes no output", "to see leak you would need a sensor of third"]
     {
@@ -113,16 +119,13 @@ fn a_sensor_is_advised_of_a_state_that_changes_no_output() {
 
 #[test]
 fn no_sensor_is_advised_where_two_suspects_do_the_same_to_every_state() {
-    let folder = tempfile::tempdir().unwrap();
     let twin = TANKS.replace("\"flow-gain\"\nplace = \"flow\"", "\"flow-gain\"\nplace = \"u\"");
-    let [file, record] = files(folder.path(), &twin);
-    let text = explain(&file, std::slice::from_ref(&record)).unwrap();
+    let text = explained(&twin);
     let line = "no sensor of a state would tell input-gain and flow-gain apart";
     assert!(text.contains(line), "{text}");
     // Where each state is measured there is nothing to advise.
     let measured = "[outputs.above]\ncolumn = \"level\"\nunit = \"m\"\nvalue = \"upper\"\n[[suspects]]\n";
-    let [file, record] = files(folder.path(), &twin.replacen("[[suspects]]\n", measured, 1));
-    let text = explain(&file, &[record]).unwrap();
+    let text = explained(&twin.replacen("[[suspects]]\n", measured, 1));
     assert!(text.contains("input-gain and flow-gain: the same") && !text.contains("sensor"), "{text}");
 }
 
@@ -133,7 +136,7 @@ fn a_suspect_whose_number_starts_at_0_is_seen_by_what_it_does_beside_it() {
                 parameters.k = { value = 0, range = [-1, 1] }\n";
     let zero = TANKS.replace("value = 0.1", "value = 0") + idle;
     let [file, record] = files(folder.path(), &zero);
-    let report = close(&file, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
+    let report = close(&file, &[record], &[], &mut |_| {}).unwrap().report;
     let structure = &report.structure;
     assert_eq!(structure.without_effect, ["squared"], "{structure:?}");
     assert_eq!(structure.hidden, ["squared"], "{structure:?}");
@@ -142,11 +145,7 @@ fn a_suspect_whose_number_starts_at_0_is_seen_by_what_it_does_beside_it() {
     assert_eq!(structure.advice[0].suspects, ["squared"], "{structure:?}");
     assert_eq!(structure.advice[1].measure, ["upper"], "{structure:?}");
     // A gain of the sensor does what both gains do.
-    let gain = zero
-        .replace("value = \"lower\"", "value = \"gain*lower\"")
-        .replace("[states.upper]", "[parameters]\ngain = { value = 1, range = [0.1, 10] }\n[states.upper]");
-    let [file, record] = files(folder.path(), &gain);
-    let text = explain(&file, &[record]).unwrap();
+    let text = explained(&with_gain(&zero));
     for line in
         ["squared: changes no output", "suspect input-gain: looks like a change of the model's own numbers"]
     {

@@ -7,8 +7,7 @@
 use crate::closing::{self, close_with, file, number, random};
 use crate::model_files::OSCILLATOR;
 use model_fit::Verdict;
-use model_fit::{ClosedModel, Search, read};
-use std::path::Path;
+use model_fit::{ClosedModel, DiscoveredTerm, Search, read};
 
 /// The plant of the tests of model files, with one suspect that does not describe what is hidden here.
 fn oscillator() -> String {
@@ -39,16 +38,21 @@ fn record(mut seed: u64, hidden: fn(f64, f64, f64) -> f64) -> String {
     text
 }
 
-fn closed(folder: &Path, search: Search, hidden: fn(f64, f64, f64) -> f64) -> ClosedModel {
+fn closed(search: Search, hidden: fn(f64, f64, f64) -> f64) -> ClosedModel {
+    let folder = tempfile::tempdir().unwrap();
     let records = [1, 3].map(|seed| record(seed, hidden));
-    closing::closed(folder, ("oscillator.toml", &oscillator()), records, search)
+    closing::closed(folder.path(), ("oscillator.toml", &oscillator()), records, search)
+}
+
+fn is_in_the_equation_of_v(term: &DiscoveredTerm, variables: &str) {
+    let found = (term.place.as_str(), term.variables.join(","));
+    assert_eq!(found, ("equation of v", variables.to_owned()), "{term:?}");
 }
 
 /// What is left without it hangs together over the whole record; straight lines alone call it a constant.
 #[test]
 fn a_strong_spring_on_one_side_is_placed_with_its_variable() {
-    let folder = tempfile::tempdir().unwrap();
-    let report = closed(folder.path(), Search::Never, |x, _, _| 60.0 * x.max(0.0)).report;
+    let report = closed(Search::Never, |x, _, _| 60.0 * x.max(0.0)).report;
     let located = report.located.expect("most of what is left");
     assert_eq!((located.place.as_str(), located.variables.join(",")), ("equation of v", "x".to_owned()));
     assert!(located.share > 0.9, "{located:?}");
@@ -58,15 +62,11 @@ fn a_strong_spring_on_one_side_is_placed_with_its_variable() {
 fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written() {
     let folder = tempfile::tempdir().unwrap();
     // A damper that grips away from the middle; nobody asks for a search.
-    let closed = closed(folder.path(), Search::MoreThanNoise, |x, v, _| 60.0 * x * x * v);
+    let closed = closed(Search::MoreThanNoise, |x, v, _| 60.0 * x * x * v);
     let report = &closed.report;
     assert_eq!((report.verdict, report.confirmed), (Verdict::OutsideCatalogue, Some(true)), "{report:#?}");
     let term = &report.discovered[0];
-    assert_eq!(
-        (term.place.as_str(), term.variables.join(",")),
-        ("equation of v", "x,v".to_owned()),
-        "{term:?}"
-    );
+    is_in_the_equation_of_v(term, "x,v");
     assert!(term.stability >= 0.6 && closed.page.contains("What a search found"), "{term:?}");
     assert!(closed.page.contains("± 2 standard errors of its numbers"), "what it looks like");
     // The formula says it, and nothing but noise is left.
@@ -81,16 +81,11 @@ fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written()
 
 #[test]
 fn a_term_with_memory_is_found_as_such() {
-    let folder = tempfile::tempdir().unwrap();
     // The spring is the harder, the further it was out on one side of late.
-    let report = closed(folder.path(), Search::NothingNamed, |x, _, low| 60.0 * low * x).report;
+    let report = closed(Search::NothingNamed, |x, _, low| 60.0 * low * x).report;
     assert_eq!((report.verdict, report.confirmed), (Verdict::OutsideCatalogue, Some(true)), "{report:#?}");
     let term = &report.discovered[0];
-    assert_eq!(
-        (term.place.as_str(), term.variables.join(",")),
-        ("equation of v", "x".to_owned()),
-        "{term:?}"
-    );
+    is_in_the_equation_of_v(term, "x");
     let [lag, k] = ["lag_found", "k_found"].map(|name| number(&report, name));
     let error = lag.standard_error.unwrap();
     assert!((lag.value - 0.8).abs() < 4.0 * error + 0.01, "{lag:?}");
@@ -99,21 +94,19 @@ fn a_term_with_memory_is_found_as_such() {
 
 #[test]
 fn nothing_is_found_where_nothing_is_missing() {
-    let folder = tempfile::tempdir().unwrap();
-    let report = closed(folder.path(), Search::NothingNamed, |_, _, _| 0.0).report;
+    let report = closed(Search::NothingNamed, |_, _, _| 0.0).report;
     assert_eq!((report.verdict, report.discovered.len()), (Verdict::NothingMissing, 0), "{report:#?}");
     assert!(report.notes.iter().any(|note| note.contains("0 taken")), "{:?}", report.notes);
 }
 
 #[test]
 fn nothing_is_searched_where_it_is_switched_off_or_noise_is_left() {
-    let folder = tempfile::tempdir().unwrap();
-    let missed = closed(folder.path(), Search::Never, |x, v, _| 60.0 * x * x * v);
+    let missed = closed(Search::Never, |x, v, _| 60.0 * x * x * v);
     assert!(missed.page.contains("Where it comes from"), "{:?}", missed.report.located);
     let report = missed.report;
     assert!(report.discovered.is_empty() && report.notes.is_empty(), "{report:#?}");
     assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{report:#?}");
-    let report = closed(folder.path(), Search::MoreThanNoise, |_, _, _| 0.0).report;
+    let report = closed(Search::MoreThanNoise, |_, _, _| 0.0).report;
     assert_eq!(report.verdict, Verdict::NothingMissing, "{report:#?}");
     assert!(report.discovered.is_empty() && report.notes.is_empty(), "{report:#?}");
 }

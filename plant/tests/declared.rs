@@ -1,6 +1,6 @@
 //! Declared terms in the rig file and in the plant: read as written, refused with reasons, the same as an effect of that law.
 
-use crate::tabulated::{inputs, run};
+use crate::tabulated::{alike, inputs, run, same_but_for_rounding};
 use plant::effects::declared::{Declared, Target};
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::parameters::suspects;
@@ -31,14 +31,6 @@ fn refused(text: &str) -> String {
 fn written_again(terms: &[Declared]) -> RigParameters {
     let terms: String = terms.iter().map(|term| term.toml("terms")).collect();
     read(&format!("{}{terms}", RigParameters::BASELINE_TOML))
-}
-
-/// Both come to the same state but for rounding.
-fn alike(one: &RigParameters, two: &RigParameters) {
-    let [one, two] = [one, two].map(run);
-    for (one, two) in one.truth(&inputs(0)).values().into_iter().zip(two.truth(&inputs(0)).values()) {
-        assert!((one - two).abs() <= 1e-9 * one.abs().max(1.0), "{one} {two}");
-    }
 }
 
 const EDDY: (&str, &str, &str) = (
@@ -224,9 +216,7 @@ fn a_reading_is_the_truth_and_its_term_and_leaves_the_motion_alone() {
         bare.step(&inputs(period));
     });
     let (truth, expected) = (plant.truth(&inputs(2000)), bare.truth(&inputs(2000)));
-    for (one, two) in truth.values().into_iter().zip(expected.values()) {
-        assert!((one - two).abs() <= 1e-9 * one.abs().max(1.0), "{one} {two}");
-    }
+    same_but_for_rounding(&truth, &expected);
     let (shown, [drive, load]) = (plant.shown(&truth), truth.axes);
     assert!((shown[0][0] - (1.001 * drive.position_m + 1e-3)).abs() < 1e-12);
     assert!((shown[0][1] - 1.02 * drive.sensor_force_n).abs() < 1e-9);

@@ -3,16 +3,22 @@
 use plant::RigParameters;
 use plant::parameters::table::{KEYS, Key};
 
+/// Places of the table of a key, and of the key itself.
+fn lines_of(key: &Key, lines: &[&str]) -> [usize; 2] {
+    let header = format!("[{}]", key.table);
+    let starts = |line: &&str| line.starts_with(&format!("{} = ", key.name));
+    let table =
+        lines.iter().position(|line| *line == header).unwrap_or_else(|| panic!("{header} is missing"));
+    let at = lines[table..].iter().position(starts).unwrap_or_else(|| panic!("{key} is missing"));
+    [table, table + at]
+}
+
 #[test]
 fn the_shipped_file_says_what_the_table_says() {
     let lines: Vec<&str> = RigParameters::BASELINE_TOML.lines().collect();
     let mut place = 0;
     for key in KEYS {
-        let header = format!("[{}]", key.table);
-        let starts = |line: &&str| line.starts_with(&format!("{} = ", key.name));
-        let table =
-            lines.iter().position(|line| *line == header).unwrap_or_else(|| panic!("{header} is missing"));
-        let at = table + lines[table..].iter().position(starts).unwrap_or_else(|| panic!("{key} is missing"));
+        let [_, at] = lines_of(key, &lines);
         assert!(at > place, "{key} does not stand in the table's order");
         assert_eq!(lines[at - 1], key.comment(), "the comment above {key}, rig.toml:{at}");
         place = at;
@@ -151,9 +157,7 @@ fn every_mistake_is_named_with_file_line_key_value_and_range() {
 fn every_key_is_required_and_its_absence_is_named() {
     for key in KEYS {
         let mut lines: Vec<&str> = RigParameters::BASELINE_TOML.lines().collect();
-        let table = lines.iter().position(|line| *line == format!("[{}]", key.table)).expect("its table");
-        let starts = |line: &&str| line.starts_with(&format!("{} = ", key.name));
-        let at = table + lines[table..].iter().position(starts).expect("its line");
+        let [table, at] = lines_of(key, &lines);
         lines.remove(at);
         let error =
             RigParameters::from_toml(&lines.join("\n"), "f.toml").expect_err("incomplete").to_string();

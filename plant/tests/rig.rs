@@ -2,7 +2,7 @@
 
 use plant::{Axis, Inputs, LinkRefused, Plant, RigParameters, Setup, SetupError, State};
 
-fn plant(setup: Setup) -> Plant {
+pub(crate) fn plant(setup: Setup) -> Plant {
     Plant::new(&RigParameters::baseline(), &setup).expect("a good setup")
 }
 

@@ -1,10 +1,7 @@
 //! The sensors on the plant: steps, ranges, noise, what each one shows.
 
+use crate::rig::plant;
 use plant::{AxisReadings, Inputs, Plant, Reading, RigParameters, Sensors, Setup};
-
-fn plant(setup: Setup) -> Plant {
-    Plant::new(&RigParameters::baseline(), &setup).expect("a good setup")
-}
 
 fn noiseless() -> RigParameters {
     let mut rig = RigParameters::baseline();

@@ -2,7 +2,7 @@
 
 use plant::effects::SHEETS;
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
-use plant::{Axis, Inputs, Plant, RigParameters, Setup};
+use plant::{Axis, Inputs, Plant, RigParameters, Setup, Truth};
 
 fn table(axis: Axis, balance: Balance, variable: Variable, at: &[f64], value: &[f64]) -> Tabulated {
     Tabulated { axis, balance, variable, at: at.to_vec(), value: value.to_vec() }
@@ -22,6 +22,18 @@ pub(crate) fn run(rig: &RigParameters) -> Plant {
     let mut plant = Plant::new(rig, &Setup::default()).expect("good");
     (0..2000).for_each(|period| plant.step(&inputs(period)));
     plant
+}
+
+/// Both come to the same state but for rounding.
+pub(crate) fn alike(one: &RigParameters, two: &RigParameters) {
+    let [one, two] = [one, two].map(|rig| run(rig).truth(&inputs(0)));
+    same_but_for_rounding(&one, &two);
+}
+
+pub(crate) fn same_but_for_rounding(one: &Truth, two: &Truth) {
+    for (one, two) in one.values().into_iter().zip(two.values()) {
+        assert!((one - two).abs() <= 1e-9 * one.abs().max(1.0), "{one} {two}");
+    }
 }
 
 #[test]
@@ -107,10 +119,7 @@ fn a_constant_force_is_an_inclination() {
         // An inclination is along the rig's x, which the load's extension is against.
         let constant = table(axis, Balance::Force, Variable::Extension, &[0.0, 0.5], &[sign * 17.0; 2]);
         let tabulated = RigParameters::baseline().with_tabulated(&[constant]);
-        let [one, two] = [inclined, tabulated].map(|rig| run(&rig.expect("good")));
-        for (one, two) in one.truth(&inputs(0)).values().into_iter().zip(two.truth(&inputs(0)).values()) {
-            assert!((one - two).abs() <= 1e-9 * one.abs().max(1.0), "{one} {two}");
-        }
+        alike(&inclined.expect("good"), &tabulated.expect("good"));
     }
 }
 

@@ -120,28 +120,26 @@ fn allowed_columns() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::PathBuf;
 
     const DRIVE: &str =
         "time_s,drive_pressure_a_Pa,drive_valve,drive_position_m,drive_force_N,drive_pressure_b_Pa\n";
 
-    fn written(text: &str) -> (tempfile::TempDir, PathBuf) {
+    fn written(text: &str, unknown: UnlistedColumns) -> Result<Record, ReadError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("measurement.csv");
         std::fs::write(&path, text).unwrap();
-        (folder, path)
+        read(&path, unknown)
     }
 
-    fn refused(text: &str, unknown: UnlistedColumns) -> String {
-        let (_folder, path) = written(text);
-        read(&path, unknown).expect_err(text).to_string()
+    fn is_refused(text: &str, unknown: UnlistedColumns, hint: &str) {
+        let message = written(text, unknown).expect_err(text).to_string();
+        assert!(message.contains(hint), "{message}");
     }
 
     #[test]
     fn columns_come_in_any_order_and_the_load_may_be_missing() {
-        let (_folder, path) =
-            written(&format!("# linked=true added_mass_kg=7.5\n{DRIVE}0.001,1e5,0.5,0.1,-3,2e5\n"));
-        let record = read(&path, UnlistedColumns::Refused).unwrap();
+        let text = format!("# linked=true added_mass_kg=7.5\n{DRIVE}0.001,1e5,0.5,0.1,-3,2e5\n");
+        let record = written(&text, UnlistedColumns::Refused).unwrap();
         assert_eq!(record.setup, RigSetup { linked: true, added_mass_kg: 7.5 });
         assert_eq!(record.time_s(), [0.001]);
         assert_eq!(record.value(Channel::Of(Axis::Drive, Signal::PressureA), 0), Some(1e5));
@@ -152,8 +150,8 @@ mod tests {
 
     #[test]
     fn an_empty_cell_is_no_value_and_a_missing_line_no_row() {
-        let (_folder, path) = written(&format!("{DRIVE}0,1e5,0,0.1,,2e5\n0.003,1e5,0,,1,2e5\n"));
-        let record = read(&path, UnlistedColumns::Ignored).unwrap();
+        let text = format!("{DRIVE}0,1e5,0,0.1,,2e5\n0.003,1e5,0,,1,2e5\n");
+        let record = written(&text, UnlistedColumns::Ignored).unwrap();
         assert_eq!((record.setup, record.len()), (RigSetup::default(), 2));
         let force = record.channel(Channel::Of(Axis::Drive, Signal::Force)).unwrap();
         assert_eq!(force, [None, Some(1.0)]);
@@ -162,19 +160,12 @@ mod tests {
     #[test]
     fn unknown_columns_are_ignored_with_a_warning_and_refused_when_blind() {
         let text = "time_s,drive_position_m,truth\n0,0.1,5\n";
-        let (_folder, path) = written(text);
-        let record = read(&path, UnlistedColumns::Ignored).unwrap();
+        let record = written(text, UnlistedColumns::Ignored).unwrap();
         assert!(record.warnings[0].text.contains("column truth is ignored"), "{:?}", record.warnings);
-        assert!(
-            refused(text, UnlistedColumns::Refused)
-                .contains("'truth' is refused in a blind record; allowed are time_s, drive_valve")
-        );
-        assert!(
-            refused("# seed=7\ntime_s,drive_valve\n0,0\n", UnlistedColumns::Refused).contains("'seed=7'")
-        );
-        assert!(
-            refused("time_s,drive_valve\n# hint\n0,0\n", UnlistedColumns::Refused).contains(":2: '# hint'")
-        );
+        let blind = UnlistedColumns::Refused;
+        is_refused(text, blind, "'truth' is refused in a blind record; allowed are time_s, drive_valve");
+        is_refused("# seed=7\ntime_s,drive_valve\n0,0\n", blind, "'seed=7'");
+        is_refused("time_s,drive_valve\n# hint\n0,0\n", blind, ":2: '# hint'");
     }
 
     #[test]
@@ -188,11 +179,7 @@ mod tests {
             ("# linked=maybe\ntime_s,drive_valve\n0,1\n", "linked = 'maybe'; allowed is true or false"),
             ("# added_mass_kg=-1\ntime_s,drive_valve\n0,1\n", "added_mass_kg = '-1'"),
         ] {
-            assert!(
-                refused(text, UnlistedColumns::Ignored).contains(hint),
-                "{}",
-                refused(text, UnlistedColumns::Ignored)
-            );
+            is_refused(text, UnlistedColumns::Ignored, hint);
         }
     }
 }
