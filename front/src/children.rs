@@ -7,6 +7,7 @@
 #![allow(unsafe_code)] // what a new process does before exec, nothing else
 
 use crate::FrontError;
+use protocol::exit::Exit;
 use rustix::io::Errno;
 use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, getpid, getppid, kill_process, kill_process_group,
@@ -66,7 +67,12 @@ impl Children {
         let mut signals =
             signals.map_err(|error| FrontError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
         let signalled = sender.clone();
-        std::thread::spawn(move || signals.forever().try_for_each(|_| signalled.send(Message::Signal)));
+        std::thread::spawn(move || {
+            // When nobody waits for children any longer, as while a run is summed up, a signal ends this process.
+            if signals.forever().any(|_| signalled.send(Message::Signal).is_err()) {
+                std::process::exit(i32::from(Exit::Interrupted as u8));
+            }
+        });
         Ok(Self { running: Vec::new(), interrupted, messages, sender })
     }
 

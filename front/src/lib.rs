@@ -17,8 +17,8 @@
 //! | `pair` | emulator and controller for one run, with their output in one file |
 //! | `become_program` | the commands that are another program |
 //!
-//! It knows the programs by their command lines, files and exit codes alone. Started as `scripts/NAME`, as by the scripts of a
-//! checkout, it uses that name in its messages.
+//! It knows the programs by their command lines, files and exit codes alone; `figures` checks and sums up a run. Started as
+//! `scripts/NAME`, as by the scripts of a checkout, it uses that name in its messages.
 
 #![warn(missing_docs)] // an interface of other crates
 

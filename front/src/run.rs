@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     // The emulator clears the folder of an earlier run; if it fails before, old results must not be taken for this run's.
     let _ = fs::remove_file(out.join(SUMMARY_JSON));
 
-    let RunBus { url: bus, mut private, reservation: _reservation } =
+    let RunBus { url: bus, mut private, reservation } =
         RunBus::for_others(arguments.bus.as_deref(), arguments.lockstep || arguments.rehearse)?;
     let mut control = Command::new(&controller);
     control.arg(if arguments.rehearse { "rehearse" } else { "run" });
@@ -99,14 +99,15 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
     }
     let first_code = run.wait(front);
     let interrupted = run.children.interrupted();
-    // Ends gateway and page.
+    // Ends gateway and page, and removes the bus: a signal from now on ends this process at once.
     drop(run);
+    drop((private, reservation));
 
     // A run that did not start has no results.
     if first_code == Exit::BadInput as u8 {
         return Ok(first_code);
     }
-    let summary_code = sum_up(&out)?;
+    let summary_code = sum_up(&out, front);
     Ok(match (first_code, interrupted) {
         (0, false) => summary_code,
         (0, true) => Exit::Interrupted as u8,
@@ -128,13 +129,20 @@ fn start_page(
 }
 
 /// Judges and draws the run in `out`; the exit code is good where the run left no results.
-fn sum_up(out: &Path) -> Result<u8, FrontError> {
+fn sum_up(out: &Path, front: &Front) -> u8 {
     if !out.join(SUMMARY_JSON).is_file() {
-        return Ok(Exit::Good as u8);
+        return Exit::Good as u8;
     }
-    let summed_up = sum_up::sum_up(out).map_err(|error| FrontError::Input(error.to_string()))?;
-    say(summed_up.text.trim_end());
-    Ok(if summed_up.passed { Exit::Good } else { Exit::BoundBroken } as u8)
+    match sum_up::sum_up(out) {
+        Ok(summed_up) => {
+            say(summed_up.text.trim_end());
+            if summed_up.passed { Exit::Good as u8 } else { Exit::BoundBroken as u8 }
+        }
+        Err(error) => {
+            front.warn(&error.to_string());
+            Exit::BadInput as u8
+        }
+    }
 }
 
 /// Prints name and subject of each shipped experiment.

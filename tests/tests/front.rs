@@ -79,7 +79,9 @@ fn a_program_or_file_that_is_missing_is_named_with_every_path_looked_at() {
     let prefix = Prefix::made();
     fs::remove_file(prefix.path("lib/airbench/bench")).expect("a link of our own");
     let paths = ["bin/bench", "lib/airbench/bench"].map(|path| prefix.path(path).display().to_string());
-    for arguments in [&["bench", "figures"][..], &["can", "--", "true"], &["run", "--watch"]] {
+    for arguments in
+        [&["bench", "figures"][..], &["can", "--", "true"], &["run", "--watch"], &["run", "--gateway"]]
+    {
         let ended = prefix.run(arguments).expect_code(2);
         ended.expect_said(&["the program 'bench' is not there", &paths[0], &paths[1], "AIRBENCH_BIN=DIR"]);
     }
@@ -118,6 +120,24 @@ fn an_installed_run_needs_its_prefix_alone_and_leaves_its_folder_where_it_was_st
     assert!(prefix.path("work/runs/latest/measurement.csv").is_file());
     prefix.run(&["run", "--list"]).expect_code(0).expect_printed(&["\nload-step "]);
     prefix.run(&["run", "loadstep"]).expect_code(2).expect_said(&["airbench run --list names them"]);
+    let typo = prefix.path("typo.toml");
+    fs::write(&typo, "[passed]\nposition_eror_m = 1\n").expect("a folder of our own");
+    let refused = prefix.run(&["run", "--lockstep", &typo.to_string_lossy()]).expect_code(2);
+    refused.expect_said(&["airbench run: [passed] position_eror_m = 1: no such figure"]);
+}
+
+#[test]
+fn a_failed_run_that_cannot_be_summed_up_keeps_its_exit_code() {
+    let prefix = Prefix::made();
+    let leaves_half_a_summary =
+        "#!/bin/sh\nwhile [ \"$1\" != --out ]; do shift; done\necho '{' >\"$2/summary.json\"\nexit 3\n";
+    for (name, script) in [("emulator", leaves_half_a_summary), ("controller", "#!/bin/sh\nexec sleep 60\n")]
+    {
+        let path = prefix.path("lib/airbench").join(name);
+        fs::remove_file(&path).expect("a link of our own");
+        install(script.as_bytes(), &path);
+    }
+    prefix.run(&["run", "--lockstep"]).expect_code(3).expect_said(&["airbench run: ", "summary.json"]);
 }
 
 /// In two terminals, without a word on a bus in either.
