@@ -70,8 +70,7 @@ pub struct AxisController {
     /// What the rig said of itself last, however long ago.
     rig: Option<RigStatus>,
     fault: Option<Fault>,
-    /// Why the algorithm is no longer asked.
-    pub algorithm_fault: Option<AlgorithmFault>,
+    algorithm_fault: Option<AlgorithmFault>,
     asked: Option<Asked>,
     slow: Slow,
     alive: u8,
@@ -173,7 +172,7 @@ impl AxisController {
 
     fn measurement(&self, sensors: &Sensors) -> AxisMeasurement {
         let error = match &self.asked {
-            Some(Asked { demand, hand: Hand::User }) => self.work.error(demand, &self.program.ready),
+            Some(Asked { demand, hand: Hand::User }) => self.work.error(demand, self.program.ready()),
             _ => ControlError::None,
         };
         AxisMeasurement { position_m: sensors.position_m - self.program.geometry().offset_m, error }
@@ -247,6 +246,11 @@ impl AxisController {
         self.range = Range::default();
         self.slow = Slow::new(self.axis);
         (self.rig, self.fault, self.algorithm_fault, self.asked, self.alive) = (None, None, None, None, 0);
+    }
+
+    /// Why the algorithm is no longer asked.
+    pub fn algorithm_fault(&self) -> Option<AlgorithmFault> {
+        self.algorithm_fault
     }
 
     pub fn state(&self) -> MainChainState {

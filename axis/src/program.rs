@@ -92,8 +92,7 @@ pub struct Program {
     variables: Vec<Variable>,
     values: Vec<f64>,
     tasks: [Range<usize>; 5],
-    /// What was measured, in the axis's own extension.
-    pub ready: Ready,
+    ready: Ready,
     observed: Option<u64>,
     post_stepped: Option<u64>,
     output: Output,
@@ -209,6 +208,11 @@ impl Program {
             velocity_m_per_s: direction * self.ready.velocity_m_per_s,
             acceleration_m_per_s2: direction * self.ready.acceleration_m_per_s2,
         }
+    }
+
+    /// What was measured, in the axis's own extension.
+    pub fn ready(&self) -> &Ready {
+        &self.ready
     }
 
     pub fn geometry(&self) -> &Geometry {

@@ -122,7 +122,7 @@ fn check(answer: &Answer, controller: &AxisController) -> Result<(), TestCaseErr
     prop_assert!(command.opening.is_finite() && command.opening.abs() <= 1.0, "{command:?}");
     let without_control = matches!(controller.state(), WaitingForRig | Aborted | Fault)
         || controller.emergency_stop() != EmergencyStopChainState::Ready
-        || controller.algorithm_fault.is_some();
+        || controller.algorithm_fault().is_some();
     prop_assert!(!without_control || !command.enable, "{:?} and {command:?}", controller.state());
     prop_assert!(command.enable || command.opening == 0.0, "{command:?}");
     // What goes out fits the wire.

@@ -27,7 +27,7 @@ fn of_axis<P: CalibrationPort>(
         chain_cause: controller.cause().to_string(),
         emergency_stop_state: controller.emergency_stop().name().into(),
         repetitions_done: Some(controller.repetitions_done()),
-        algorithm_fault: controller.algorithm_fault.map(|fault| fault.to_string()),
+        algorithm_fault: controller.algorithm_fault().map(|fault| fault.to_string()),
         position_error_dynamic_m: controller.figures.dynamic_m(),
         position_error_static_m: controller.figures.static_m(),
         cycles_answered: node.answered_by(controller.axis),

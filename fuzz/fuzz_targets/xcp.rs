@@ -60,7 +60,7 @@ fuzz_target!(|input: (bool, Vec<(u8, [u8; 8])>)| {
         // It stays open no longer than the session that was opened.
         let mut actions = Strict { open: open && slave.is_unlocked() };
         let _ = slave.command(&packet[..usize::from(length).min(packet.len())], cycle, &mut actions);
-        let parameters = slave.image.parameters.clone();
+        let parameters = slave.image.parameters().to_vec();
         slave.cycle(cycle, &[1.0; COUNT], &parameters);
         let mut packets = 0;
         while slave.next_daq().is_some() {

@@ -57,8 +57,7 @@ pub struct CommandIntake {
     last: Option<ValveCommand>,
     /// An accepted command was there, and grew stale.
     expired: bool,
-    /// Whether the valve is shut because two senders dispute it.
-    pub disputed: bool,
+    disputed: bool,
     refused_since_accepted: u64,
     /// Counters since the start.
     pub counters: CommandCounters,
@@ -134,6 +133,12 @@ impl CommandIntake {
     #[must_use]
     pub fn obeyed_age_cycles(&self, live: &LiveCycles) -> Option<u64> {
         if self.disputed { None } else { self.age_cycles(live) }
+    }
+
+    /// Whether the valve is shut because two senders dispute it.
+    #[must_use]
+    pub fn disputed(&self) -> bool {
+        self.disputed
     }
 
     /// Whether the valve is shut because no fresh command is there.

@@ -79,8 +79,8 @@ pub(crate) fn status(
         load_pressure_b_saturated: load.pressure_b,
         drive_stale: commands[0].stale(),
         load_stale: commands[1].stale(),
-        drive_two_sources: commands[0].disputed,
-        load_two_sources: commands[1].disputed,
+        drive_two_sources: commands[0].disputed(),
+        load_two_sources: commands[1].disputed(),
     })
 }
 

@@ -22,7 +22,7 @@ pub const FOLDER: &str = "flight";
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Event {
-    /// See [`crate::run_folder::SCHEMA_VERSION`].
+    /// See [`crate::run_folder::SCHEMA_VERSION`]; 0 in a file that does not say it.
     pub schema_version: u32,
     /// Whose recorder: `emulator`, `controller`, `controller-drive`, `controller-load`.
     pub process: String,

@@ -71,8 +71,7 @@ struct PartialValue {
 pub struct Image {
     pub(crate) description: Vec<u8>,
     variables: Vec<Variable>,
-    /// Values of the parameters, in the order of the variables.
-    pub parameters: Vec<f64>,
+    parameters: Vec<f64>,
     controls: [f64; CONTROLS.len()],
     signals: [f64; COUNT],
     pub(crate) trace: Trace,
@@ -98,6 +97,11 @@ impl Image {
         self.signals = *signals;
         self.parameters.copy_from_slice(parameters);
         self.trace.take(cycle, signals);
+    }
+
+    /// Values of the parameters, in the order of the variables.
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
     }
 
     /// Discards the first bytes of a value that is not complete.
@@ -438,7 +442,7 @@ pub(super) mod tests {
             let (mut image, mut notes) = (image(), Notes::default());
             assert_eq!(image.write(PARAMETERS, &bytes(values), &mut notes), Err(refusal), "{values:?}");
             assert!(notes.set.is_empty(), "{values:?}");
-            assert_eq!(image.parameters, [25.0, 1.0, 15.0]);
+            assert_eq!(image.parameters(), [25.0, 1.0, 15.0]);
         }
         let (mut image, mut notes) = (image(), Notes::default());
         image.write(PARAMETERS, &bytes([30.0, 2.0, 15.0]), &mut notes).unwrap();

@@ -27,7 +27,7 @@ pub(crate) struct Lock {
     secret: Option<Vec<u8>>,
     start: [u8; 16],
     seeds: u64,
-    pub(crate) open: bool,
+    open: bool,
     seed: [u8; BYTES],
     /// Bytes of the seed that were issued; `None` without a seed.
     given: Option<usize>,
@@ -48,6 +48,10 @@ pub(crate) enum KeyCheck {
 }
 
 impl Lock {
+    pub(crate) fn is_open(&self) -> bool {
+        self.open
+    }
+
     /// A closed lock. `start` is random in real time; in simulated time it is constant, so that runs repeat.
     pub(crate) fn new(secret: Option<Vec<u8>>, start: [u8; 16]) -> Self {
         Self { secret, start, ..Self::default() }
@@ -171,10 +175,10 @@ mod tests {
         let mut lock = lock();
         let seed = seed(&mut lock);
         assert_eq!(check_key(&mut lock, key(seed)), KeyCheck::Open);
-        assert!(lock.open);
+        assert!(lock.is_open());
         assert_eq!(lock.seed(false).unwrap().0, 0, "no key is needed any more");
         lock.shut();
-        assert!(!lock.open);
+        assert!(!lock.is_open());
     }
 
     #[test]
@@ -184,7 +188,7 @@ mod tests {
             let mut wrong = key(seed(&mut lock));
             wrong[bit / 8] ^= 1 << (bit % 8);
             assert_eq!(check_key(&mut lock, wrong), KeyCheck::Wrong, "bit {bit}");
-            assert!(!lock.open);
+            assert!(!lock.is_open());
             (1..PAUSE).for_each(|_| lock.cycle());
             assert_eq!(lock.seed(false), Err(Refusal::AccessDenied));
             lock.cycle();

@@ -203,7 +203,7 @@ impl CalibrationPort for Port {
         command: &ValveCommand,
     ) {
         let record = controller.record(cycle, sensors, command);
-        let signals = signals::sample(&View { ready: &controller.program.ready, sensors, record });
+        let signals = signals::sample(&View { ready: controller.program.ready(), sensors, record });
         self.slave.cycle(cycle, &signals, controller.program.values());
         self.cycle = cycle;
         self.daq_budget = self.slave.daq.per_cycle;

@@ -116,7 +116,7 @@ impl Slave {
 
     /// Whether the session may write.
     pub fn is_unlocked(&self) -> bool {
-        self.lock.open
+        self.lock.is_open()
     }
 
     /// Ends a cycle of the rig: takes its signals, in the order of their table, and the current parameters, in the order of the
@@ -250,7 +250,7 @@ impl Slave {
 
     /// Resources that need a key.
     fn protected(&self) -> u8 {
-        if self.lock.open { 0 } else { CALIBRATION }
+        if self.lock.is_open() { 0 } else { CALIBRATION }
     }
 
     fn identify(&mut self, kind: u8) -> Packet {
@@ -270,7 +270,7 @@ impl Slave {
             return Err(Refusal::OutOfRange);
         }
         self.check_unlocked()?;
-        if self.storing || !actions.store(&self.image.parameters) {
+        if self.storing || !actions.store(self.image.parameters()) {
             return Err(Refusal::Busy);
         }
         self.storing = true;
@@ -278,7 +278,7 @@ impl Slave {
     }
 
     fn check_unlocked(&self) -> Result<(), Refusal> {
-        if self.lock.open { Ok(()) } else { Err(Refusal::AccessLocked) }
+        if self.lock.is_open() { Ok(()) } else { Err(Refusal::AccessLocked) }
     }
 
     fn seed(&mut self, fields: Fields<'_>) -> Result<Packet, Refusal> {

@@ -123,7 +123,7 @@ impl AxisController {
             set_position: asked.filter(|_| self.work.is_position()).map(|asked| asked.demand.position),
             set_force: asked.filter(|_| !self.work.is_position()).map(|asked| asked.demand.force),
             position_m: sensors.position_m - geometry.offset_m,
-            velocity_m_per_s: geometry.direction() * self.program.ready.velocity_m_per_s,
+            velocity_m_per_s: geometry.direction() * self.program.ready().velocity_m_per_s,
             force_n: sensors.force_n,
             wanted_velocity_m_per_s: asked.map_or(0.0, |asked| self.program.wanted_m_per_s(asked.hand)),
             opening: command.opening,

@@ -207,7 +207,7 @@ impl Pressing {
         self.fault = self.fault.or(self.not_linked(output.state, linked));
         let matching = asked != ForceAsked::Idle && self.preparing(output.phase) == Some(Prepare::Match);
         self.advance_matching(matching, linked, seen, program);
-        let ready = program.ready;
+        let ready = *program.ready();
         let chain = self.force.advance(
             &ForceInputs {
                 cycle: seen.cycle,

@@ -23,8 +23,6 @@ pub struct ReferenceRun {
     ranges_of_windows: Vec<VariableRanges>,
 }
 
-impl ReferenceRun {}
-
 /// Smallest and largest value of each table variable in a window.
 #[derive(Clone, Copy, Debug)]
 pub struct VariableRanges([[[f64; 2]; Variable::ALL.len()]; 2]);

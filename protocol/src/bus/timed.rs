@@ -106,7 +106,7 @@ impl TimedWire {
 
     /// Time up to which the model has gone, by the machine's clock, ns.
     pub(super) fn read_up_to_ns(&self) -> u64 {
-        self.zero_ns + self.model.now_ns
+        self.zero_ns + self.model.now_ns()
     }
 
     /// What happens next, up to `limit_ns`: one instant's events. False when nothing does.
@@ -124,7 +124,7 @@ impl TimedWire {
     /// Sets the timer to what the model does next. Setting it clears what it has reported, so that it need not be read.
     pub(super) fn arm(&mut self) -> rustix::io::Result<()> {
         let next_ns = self.model.next_ns();
-        let told = self.armed_ns.is_some_and(|armed_ns| armed_ns <= self.model.now_ns);
+        let told = self.armed_ns.is_some_and(|armed_ns| armed_ns <= self.model.now_ns());
         if next_ns == self.armed_ns && !told {
             return Ok(());
         }

@@ -30,8 +30,7 @@ const CRC: Crc<u16> = Crc::<u16>::new(&CRC_15_CAN);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BitSequence {
     bits: u128,
-    /// Bits put in so far.
-    pub count: u32,
+    count: u32,
 }
 
 impl BitSequence {

@@ -57,8 +57,7 @@ pub struct WireModel {
     /// Frames to come, by time and order of entering.
     coming: BTreeMap<(u64, u64), (NodeId, CanFrame)>,
     sending: Option<Sending>,
-    /// Time up to which everything has happened, ns.
-    pub now_ns: u64,
+    now_ns: u64,
     /// Since when the wire has been idle, when nothing is sent.
     idle_since_ns: u64,
     entered: u64,
@@ -112,6 +111,12 @@ impl WireModel {
         }
         self.entered += 1;
         self.coming.insert((at_ns.max(self.now_ns), self.entered), (node, frame));
+    }
+
+    /// Time up to which everything has happened, ns.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
     }
 
     /// When something happens next, if nothing enters before; `None` when nothing will.

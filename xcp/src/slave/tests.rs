@@ -300,12 +300,12 @@ proptest! {
             if let Some(answer) = talk.say(packet) {
                 prop_assert!(answer[0] >= ERROR);
             }
-            let parameters: [f64; 3] = talk.slave.image.parameters.as_slice().try_into().unwrap();
+            let parameters: [f64; 3] = talk.slave.image.parameters().try_into().unwrap();
             talk.slave.cycle(cycle, &[cycle as f64; COUNT], &parameters);
             let _ = talk.slave.next_daq();
         }
         prop_assert!(unlocked || talk.notes.set.is_empty());
-        let [gain, every, timeout]: [f64; 3] = talk.slave.image.parameters.as_slice().try_into().unwrap();
+        let [gain, every, timeout]: [f64; 3] = talk.slave.image.parameters().try_into().unwrap();
         prop_assert!((0.0..=200.0).contains(&gain) && (1.0..=1000.0).contains(&every) && every.fract() == 0.0);
         prop_assert_eq!(timeout, 15.0, "it is read at the start only");
     }

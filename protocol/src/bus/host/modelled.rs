@@ -39,7 +39,7 @@ impl Host {
         let Some(timed) = &mut self.timed else { return };
         let begins_ns = u64::from(release.cycle) * CYCLE_NS;
         // The rig speaks as its cycle begins; the others when they have heard it.
-        let enters_ns = if members_turn { begins_ns } else { timed.model.now_ns };
+        let enters_ns = if members_turn { begins_ns } else { timed.model.now_ns() };
         let mut beside = Vec::new();
         for (frame, from) in &release.frames {
             if frame.raw_id() & ERROR_FLAG == 0 {
