@@ -1,12 +1,13 @@
 //! `airbench`, the one command: as it is installed, with its programs and files below a prefix and no checkout around it.
 
+use rustix::fs::OFlags;
 use rustix::process::Signal;
-use std::fs;
-use std::os::unix::fs::symlink;
+use std::fs::{self, File};
+use std::os::unix::fs::{OpenOptionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use system_tests::foreign_python::{of, tools_path};
-use system_tests::{Build, Ended, Program, Running, executable, install, turn, workspace};
+use system_tests::{Build, Ended, Program, Running, executable, install, turn, wait_until, workspace};
 
 /// PREFIX/bin/airbench, PREFIX/lib/airbench with the programs, PREFIX/share/airbench with the files, and a working directory.
 struct Prefix(tempfile::TempDir);
@@ -126,18 +127,37 @@ fn an_installed_run_needs_its_prefix_alone_and_leaves_its_folder_where_it_was_st
     refused.expect_said(&["airbench run: [passed] position_eror_m = 1: no such figure"]);
 }
 
-#[test]
-fn a_failed_run_that_cannot_be_summed_up_keeps_its_exit_code() {
+/// With shell scripts in place of both programs; that of the emulator begins with the folder of the run in `$2`.
+fn in_place_of_both(emulator: &str, controller: &str) -> Prefix {
     let prefix = Prefix::made();
-    let leaves_half_a_summary =
-        "#!/bin/sh\nwhile [ \"$1\" != --out ]; do shift; done\necho '{' >\"$2/summary.json\"\nexit 3\n";
-    for (name, script) in [("emulator", leaves_half_a_summary), ("controller", "#!/bin/sh\nexec sleep 60\n")]
-    {
+    let emulator = format!("while [ \"$1\" != --out ]; do shift; done\n{emulator}");
+    for (name, script) in [("emulator", emulator.as_str()), ("controller", controller)] {
         let path = prefix.path("lib/airbench").join(name);
         fs::remove_file(&path).expect("a link of our own");
-        install(script.as_bytes(), &path);
+        install(format!("#!/bin/sh\n{script}\n").as_bytes(), &path);
     }
+    prefix
+}
+
+#[test]
+fn a_failed_run_that_cannot_be_summed_up_keeps_its_exit_code() {
+    let prefix = in_place_of_both("echo '{' >\"$2/summary.json\"\nexit 3", "exec sleep 60");
     prefix.run(&["run", "--lockstep"]).expect_code(3).expect_said(&["airbench run: ", "summary.json"]);
+}
+
+#[test]
+fn ctrl_c_ends_a_summary_that_takes_long() {
+    let prefix = in_place_of_both("echo '{}' >\"$2/summary.json\"\nmkfifo \"$2/run.json\"", "exit 0");
+    let run = Running::start("airbench", &mut prefix.command(&["run", "--lockstep", "--out", "run"]));
+    let mut fifo = File::options();
+    fifo.write(true).custom_flags(OFlags::NONBLOCK.bits() as i32);
+    let mut opened = None;
+    // Whoever opens it for writing is refused until the summary reads it; held open, it never ends.
+    wait_until("the summary reads run.json", || {
+        opened = fifo.open(prefix.path("work/run/run.json")).ok();
+        opened.is_some()
+    });
+    let _ = run.interrupt();
 }
 
 /// In two terminals, without a word on a bus in either.
