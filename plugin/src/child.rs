@@ -37,6 +37,7 @@ const MOST_TEXT: usize = 1 << 16;
 /// Who tries libraries.
 #[derive(Clone, Debug)]
 pub struct TrialRunner {
+    /// The controller program, which is started as `controller probe-library FILE`.
     pub program: PathBuf,
     /// How long it may take.
     pub limit: Duration,

@@ -10,6 +10,9 @@ use std::io::{self, Write};
 use std::path::Path;
 
 /// Prints what the library offers.
+///
+/// # Errors
+/// [`PluginError`] for a library that is refused, or without a program to try it with.
 pub fn check_library(library: &Path) -> Result<Exit, PluginError> {
     let description = TrialRunner::find()
         .map_err(|wrong| PluginError { library: library.to_owned(), wrong })

@@ -22,6 +22,8 @@
 //! | `command.rs` | `controller check-library FILE` |
 //! | `wrong.rs` | the refusals |
 
+#![warn(missing_docs)] // an interface of other crates
+
 mod check;
 mod child;
 pub mod command;
@@ -47,7 +49,9 @@ type Tell<'a> = &'a mut dyn FnMut(&str);
 pub struct Description {
     /// Its name for people and records; a program file names the library by its path.
     pub name: String,
+    /// What it does, for people.
     pub about: String,
+    /// What it controls: a position or a force.
     pub controls: Quantity,
     /// Its parameters, in the order of the slices.
     pub parameters: Vec<Parameter>,
@@ -55,6 +59,7 @@ pub struct Description {
 
 /// An algorithm of a shared library.
 pub struct Plugin {
+    /// What its library says of it.
     pub description: Description,
     instance: foreign::Instance,
 }
@@ -70,12 +75,18 @@ impl Algorithm for Plugin {
 }
 
 /// Loads the library of `path` for a rig of these nominal numbers, after a trial in a child process.
+///
+/// # Errors
+/// [`PluginError`] when there is no program to try it with, when it fails the trial or when it cannot be loaded.
 pub fn load(path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
     let trier = TrialRunner::find().map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
     load_tried_by(&trier, path, rig)
 }
 
 /// [`load`] with a trier that is named.
+///
+/// # Errors
+/// Those of [`load`], but for the missing program.
 pub fn load_tried_by(trier: &TrialRunner, path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
     let made = || {
         let offer = tried_out(trier, path)?;
@@ -86,6 +97,9 @@ pub fn load_tried_by(trier: &TrialRunner, path: &Path, rig: &RigParameters) -> R
 }
 
 /// What the library of `path` offers, after a trial in a child process.
+///
+/// # Errors
+/// [`PluginError`] when it fails the trial or cannot be opened.
 pub fn describe(trier: &TrialRunner, path: &Path) -> Result<Description, PluginError> {
     let offer = tried_out(trier, path).map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
     Ok(offer.description)
@@ -99,6 +113,9 @@ fn tried_out(trier: &TrialRunner, path: &Path) -> Result<foreign::Offer, Wrong> 
 
 /// The trial itself, in this process: opens, asks and runs the library with the shipped rig's numbers, every parameter
 /// at its default. A bad library may end the process.
+///
+/// # Errors
+/// [`PluginError`] for a library that is refused.
 pub fn probe(path: &Path) -> Result<Description, PluginError> {
     probe_telling(path, &mut |_| ())
 }

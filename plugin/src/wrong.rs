@@ -11,13 +11,17 @@ use std::time::Duration;
 #[derive(Debug, thiserror::Error)]
 #[error("library '{}': {wrong}", library.display())]
 pub struct PluginError {
+    /// Its file.
     pub library: PathBuf,
+    /// What is wrong with it.
     pub wrong: Wrong,
 }
 
 const REBUILD: &str = "build it again with this airbench's airbench_algorithm.h";
 
+/// What is wrong with a library, or with its trial.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum Wrong {
     #[error("cannot be opened: {0}; give the path of a shared library")]
     File(#[source] io::Error),

@@ -6,6 +6,7 @@ use toml::value::Datetime;
 
 const NANOSECONDS: i128 = 1_000_000_000;
 
+/// A time of a calendar, to the nanosecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CalendarTime {
     /// Since 1970 in its own zone, or in that of its record where it names none.

@@ -3,6 +3,7 @@
 use plant::Axis;
 use std::fmt;
 
+/// A sensor of an axis, or the valve command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Signal {
     /// Valve command that acts over the row's period, -1 to 1.
@@ -19,8 +20,10 @@ pub enum Signal {
     AppliedForce,
 }
 
+/// A column of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Channel {
+    /// A signal of an axis.
     Of(Axis, Signal),
     /// Absolute pressure of the supply node, Pa.
     SupplyPressure,
@@ -63,6 +66,7 @@ pub enum Quantity {
 }
 
 impl Channel {
+    /// Number of channels.
     pub const COUNT: usize = 2 * Signal::ALL.len() + 1;
 
     /// All channels: the drive's, the load's, the supply.
@@ -108,6 +112,7 @@ impl Channel {
         matches!(self, Channel::Of(_, Signal::AppliedForce))
     }
 
+    /// The quantity that it is in.
     #[must_use]
     pub fn quantity(self) -> Quantity {
         match self {

@@ -37,13 +37,17 @@ pub struct ColumnOptions<'a> {
 /// Columns over time.
 #[derive(Clone, Debug)]
 pub struct Columns {
+    /// The file that was read.
     pub file: PathBuf,
+    /// Time of each row, s: from the first row on where it is that of a calendar.
     pub time_s: Vec<f64>,
     /// Line of each row, from 1.
     pub lines: Vec<u64>,
     /// Those that were wanted, in their order, as they are written.
     pub values: Vec<Vec<Option<f64>>>,
+    /// The row of units, where the table has one.
     pub units: Option<UnitRow>,
+    /// What the reader noticed.
     pub warnings: Vec<Warning>,
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a record cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum ReadError {
     #[error("cannot read {}: {reason}", file.display())]
     Open { file: PathBuf, reason: String },

@@ -11,6 +11,8 @@
 //!
 //! Forms and keys: `discrepancy/docs/records.md`. Sources: rig-model.md, Measurement file; bus.md, Time and Frames.
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod channel;
 pub mod error;
 pub mod mapping;
@@ -65,15 +67,18 @@ pub enum LoggedBy {
     Listener,
 }
 
+/// Which kind of file a record comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// `measurement.csv`.
     Measurement,
     /// `bus.log`.
     BusLog,
+    /// A table that a mapping explains.
     Foreign,
 }
 
+/// How the rig was set up, from the record's comments or its mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigSetup {
     /// Whether the load's eye sat in the carriage.
@@ -82,6 +87,7 @@ pub struct RigSetup {
     pub added_mass_kg: f64,
 }
 
+/// What a reader noticed and did not refuse.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
     /// Line in the file, from 1; `None` when it is about the file as a whole.
@@ -93,14 +99,18 @@ pub struct Warning {
 /// A record: rows of samples in SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
+    /// The file that was read.
     pub file: PathBuf,
+    /// Which kind of file it is.
     pub form: Form,
+    /// How the rig was set up.
     pub setup: RigSetup,
     /// The period in which samples were meant to be taken, s; `None` for a record that has none.
     pub nominal_period_s: Option<f64>,
     time_s: Vec<f64>,
     lines: Vec<u64>,
     columns: Vec<Option<Vec<Option<f64>>>>,
+    /// What the reader noticed, in the order of the file.
     pub warnings: Vec<Warning>,
 }
 
@@ -167,10 +177,12 @@ impl Record {
         self.warnings.push(Warning { line: line.into(), text: text.into() });
     }
 
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
 
+    /// Whether it has no rows.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
@@ -190,10 +202,12 @@ impl Record {
         self.columns[channel.index()].as_deref()
     }
 
+    /// The value of a channel in a row, in SI; `None` where either has none.
     pub fn value(&self, channel: Channel, row: usize) -> Option<f64> {
         self.channel(channel)?.get(row).copied().flatten()
     }
 
+    /// The channels that it has, in the order of [`Channel::ALL`].
     pub fn channels(&self) -> impl Iterator<Item = Channel> {
         Channel::ALL.into_iter().filter(|channel| self.channel(*channel).is_some())
     }

@@ -11,6 +11,7 @@ use super::{Channel, Quantity, RigSetup};
 use settings::{Section, SettingsError, Source};
 use std::path::Path;
 
+/// How the columns of a foreign table map to channels.
 #[derive(Clone, Debug)]
 pub struct Mapping {
     pub(super) layout: Layout,

@@ -10,6 +10,7 @@ use std::path::Path;
 
 /// Files of which no rehearsal can be made.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum RehearsalError {
     #[error("{0}")]
     Scene(String),
@@ -36,6 +37,9 @@ pub fn scene(inputs: &Inputs, file: &str) -> Result<Scene, RehearsalError> {
 }
 
 /// A rehearsal of what was read.
+///
+/// # Errors
+/// [`RehearsalError::Input`] for controllers that cannot be set up, [`RehearsalError::Setup`] for a plant that cannot.
 pub fn of_inputs(
     inputs: &Inputs,
     scene: &Scene,
@@ -55,6 +59,10 @@ pub struct PlantTables {
 }
 
 impl PlantTables {
+    /// Creates both files in the folder and writes their heads.
+    ///
+    /// # Errors
+    /// The system's, with a file that cannot be created or written.
     pub fn create(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<Self> {
         let mut measurement = LineFile::create(&folder.join(MEASUREMENT_CSV))?;
         let mut truth = LineFile::create(&folder.join(TRUTH_CSV))?;
@@ -63,6 +71,10 @@ impl PlantTables {
         Ok(Self { measurement, truth })
     }
 
+    /// Adds the row of a cycle to each.
+    ///
+    /// # Errors
+    /// The system's: the disk is full.
     pub fn write(&mut self, cycle: &CycleRecord) -> io::Result<()> {
         tables::write_measurement(self.measurement.lines(), cycle)?;
         tables::write_truth(self.truth.lines(), cycle)?;

@@ -11,6 +11,8 @@
 //!
 //! The rig is the emulator's node ([`rig_node`]), over the plant or over another simulation ([`SimulatedRig`]).
 
+#![warn(missing_docs)] // an interface of other crates
+
 mod files;
 
 pub use files::{PlantTables, RehearsalError, of_inputs, scene};
@@ -29,11 +31,15 @@ use rig_node::{PeopledPlant, RigNode, SimulatedRig};
 /// Rows and news of a cycle: two and some.
 const OUTLET_ROOM: usize = 64;
 
+/// What a rehearsal is made of.
 pub struct RehearsalParts<'a> {
+    /// The rig's numbers.
     pub rig: &'a RigParameters,
     /// How it is set up, and what people do to it.
     pub scene: &'a Scene,
+    /// Of the sensors' noise.
     pub seed: u64,
+    /// Those of the axes that are controlled.
     pub controllers: Vec<AxisController>,
 }
 
@@ -82,6 +88,7 @@ impl Rehearsal {
         self.rig.rig_mut().act(action, |_| {});
     }
 
+    /// The plant as it is between two cycles.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         self.rig.rig().plant()
@@ -109,6 +116,7 @@ impl<R: SimulatedRig> Rehearsal<R> {
         }
     }
 
+    /// Runs one cycle of 1 ms; `tell` gets what happens at the rig, each with its cycle.
     pub fn step(&mut self, mut tell: impl FnMut(u64, R::Event)) -> Rehearsed<R::Cycle> {
         let cycle = self.cycle;
         self.cycle += 1;
@@ -146,22 +154,25 @@ impl<R: SimulatedRig> Rehearsal<R> {
         self.listener = Some(listener);
     }
 
+    /// The simulated rig.
     #[must_use]
     pub fn rig(&self) -> &R {
         self.rig.rig()
     }
 
+    /// The node of the controllers.
     #[must_use]
     pub fn node(&self) -> &ControllerNode {
         &self.node
     }
 
+    /// Cycles so far.
     #[must_use]
     pub fn cycles(&self) -> u64 {
         self.cycle
     }
 
-    /// NodeEvent since they were taken last.
+    /// Events of the node since they were taken last.
     pub fn take_news(&mut self) -> impl Iterator<Item = NodeEvent> {
         self.news.try_iter()
     }
