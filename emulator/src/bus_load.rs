@@ -37,15 +37,15 @@ fn markdown(analysis: &RigAnalysis, run: &WireTimeReport) -> String {
          critical instant, us | bound of these frames, us |\n|---|---|---:|---|---:|---:|---:|---:|---:|---:|\n",
     );
     let as_it_came = analysis.clone().with(|frame| {
-        let arrivals = seen_of(run, frame.message.id).map(|seen| seen.arrivals).unwrap_or_default();
+        let arrivals = identifier_report(run, frame.message.id).map(|seen| seen.arrivals).unwrap_or_default();
         frame.allow_for(arrivals.least_distance_ns, arrivals.release_jitter_ns);
         true
     });
     let bounds = analysis.responses().into_iter().zip(as_it_came.responses());
     for (place, (frame, (bound, as_it_came))) in analysis.frames.iter().zip(bounds).enumerate() {
         let message = frame.message;
-        let seen = seen_of(run, message.id);
-        let critical = critical::play(analysis, place, 1);
+        let seen = identifier_report(run, message.id);
+        let critical = critical::simulate(analysis, place, 1);
         let bits = seen.map_or_else(String::new, |seen| format!("{} to {}", seen.bits[0], seen.bits[1]));
         let in_ns = |bound: Option<Response>| in_us(bound.map(|found| found.response_ns));
         let measured = seen.map_or_else(|| "not sent".into(), |seen| in_us(Some(seen.response_ns.max)));
@@ -73,6 +73,6 @@ fn markdown(analysis: &RigAnalysis, run: &WireTimeReport) -> String {
     text
 }
 
-fn seen_of(run: &WireTimeReport, id: u16) -> Option<&IdentifierReport> {
+fn identifier_report(run: &WireTimeReport, id: u16) -> Option<&IdentifierReport> {
     run.identifiers.get(&format!("{id:03X}"))
 }

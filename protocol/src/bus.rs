@@ -43,7 +43,7 @@ pub use wire::{Frames, WireFault, WireNode, WireOrder, WireOrders};
 /// arrival and reading, ignores it.
 pub type StampClock = Box<dyn Fn(u64) -> u64 + Send>;
 
-/// What [`Bus::receive`] found.
+/// Result of [`Bus::receive`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A frame, and when it arrived at this peer's queue, in ns of the bus's [`StampClock`].
@@ -73,9 +73,9 @@ pub enum BusError {
     Open {
         /// The bus as it was asked for.
         url: String,
-        /// What the system said.
+        /// Error of the system.
         reason: String,
-        /// What a person can do.
+        /// Remedy for a person.
         remedy: &'static str,
     },
     /// Another host serves this embedded bus already.
@@ -102,7 +102,7 @@ pub enum BusError {
     },
 }
 
-/// What a peer counted since it was opened.
+/// Counters of a peer since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct BusCounters {
@@ -130,7 +130,7 @@ pub struct BusCounters {
     pub received_by_id: FrameTally,
 }
 
-/// What frames are sent to.
+/// A destination of frames.
 pub trait FrameSink {
     /// Puts a frame on the bus and tells when it was handed over, in ns of the bus's clock.
     ///
@@ -175,7 +175,7 @@ pub trait Bus: FrameSink + Send {
         None
     }
 
-    /// What the bus's host counted, when this peer is the host as well.
+    /// Report of the bus's host, when this peer is the host as well.
     fn host_report(&self) -> Option<host::HostReport> {
         None
     }

@@ -34,7 +34,7 @@ pub const FULLEST_MILLISECOND_BITS: u32 = sum_of_cyclic_bits(u32::MAX) + RESERVE
 /// Milliseconds, the fullest one included, until everything of it was sent.
 pub const BACKLOG_MS: u32 = backlog_ms();
 
-/// What one millisecond carries.
+/// Capacity of the bus in one millisecond, bits.
 const BITS_PER_MS: u32 = BIT_RATE_PER_S / 1000;
 
 // A load below 70 % leaves room for frames on change, events and repeated frames after an error.

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Age in cycles beyond which a command is stale (bus.md, Time).
 pub const STALE_AFTER_CYCLES: u64 = 20;
 
-/// What was counted of one axis's commands.
+/// Counters of one axis's commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CommandCounters {

@@ -39,7 +39,7 @@ pub const ALIVE_RANGE: u64 = 16;
 /// Values of the `echo` in a command: the cycle number that it answers, modulo this.
 pub const ECHO_RANGE: u64 = 4096;
 
-/// What `rig.dbc` says about one message.
+/// Specification of a message in `rig.dbc`.
 #[derive(Debug, PartialEq)]
 pub struct MessageSpec {
     /// Name, unique.
@@ -54,7 +54,7 @@ pub struct MessageSpec {
     pub send_type: &'static str,
     /// The one node that sends it.
     pub sender: &'static str,
-    /// What it is for.
+    /// Purpose of the message.
     pub comment: &'static str,
     /// First bit of the checksum's byte, the last of the frame; `None` without a checksum.
     pub checksum_start: Option<u8>,
@@ -81,7 +81,7 @@ impl MessageSpec {
     }
 }
 
-/// What `rig.dbc` says about one signal of a message.
+/// Specification of a signal of a message in `rig.dbc`.
 #[derive(Debug, PartialEq)]
 pub struct SignalSpec {
     /// Name in the DBC, unique in its message.
@@ -90,7 +90,7 @@ pub struct SignalSpec {
     pub field: &'static str,
     /// Unit of the physical value: `m`, `N`, `Pa`, `kg` or empty.
     pub unit: &'static str,
-    /// What it means.
+    /// Meaning of the signal.
     pub comment: &'static str,
     /// First bit, bit 0 of byte 0 being 0; Intel byte order.
     pub start: u8,

@@ -26,7 +26,7 @@ pub enum SocketFileError {
     /// The folder is not this user's alone.
     #[error("{0}")]
     NotPrivate(io::Error),
-    /// What the system said.
+    /// Error of the system.
     #[error(transparent)]
     System(#[from] io::Error),
 }

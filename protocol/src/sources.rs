@@ -1,4 +1,4 @@
-//! Tells whether one or two senders use a command identifier, from the 4-bit counters that interleave.
+//! Detects from the 4-bit counters whether one or two senders use a command identifier.
 //!
 //! One sender's counter goes up by one a frame; lost frames make it jump by at most the cycles that passed. Two senders
 //! on one identifier break that rule with at least every second frame, whatever their counters are:
@@ -22,7 +22,7 @@ pub const SILENCE_CYCLES: u64 = 20;
 /// Breaks within [`SILENCE_CYCLES`] that raise the fault: a restart makes one, two in quick succession two.
 const BREAKS_TO_LATCH: usize = 4;
 
-/// What a frame's counter said.
+/// Step of the counter from the frame before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// The sender's next frame, after `lost` that never came.
@@ -34,8 +34,8 @@ pub enum Step {
     Breaks,
 }
 
-/// The last frame.
-struct Seen {
+/// Counter of the last frame, the cycle in which it came and the cycle that it answered.
+struct LastFrame {
     alive: u8,
     cycle: u64,
     answered: u64,
@@ -44,7 +44,7 @@ struct Seen {
 /// Watches the counter of one command identifier.
 #[derive(Default)]
 pub struct SourceWatch {
-    last: Option<Seen>,
+    last: Option<LastFrame>,
     breaks: [Option<u64>; BREAKS_TO_LATCH],
     two_sources: bool,
 }
@@ -56,10 +56,10 @@ impl SourceWatch {
             None => Step::Continues { lost: 0 },
             // After a silence the command was stale, which is reported; what comes now may be a restart, so that its
             // counter says nothing about loss.
-            Some(seen) if cycle - seen.cycle > SILENCE_CYCLES => Step::Continues { lost: 0 },
-            Some(seen) => {
-                let ahead = (ALIVE_RANGE + u64::from(alive) - u64::from(seen.alive)) % ALIVE_RANGE;
-                let passed = (cycle - seen.cycle).max(answered.saturating_sub(seen.answered));
+            Some(last) if cycle - last.cycle > SILENCE_CYCLES => Step::Continues { lost: 0 },
+            Some(last) => {
+                let ahead = (ALIVE_RANGE + u64::from(alive) - u64::from(last.alive)) % ALIVE_RANGE;
+                let passed = (cycle - last.cycle).max(answered.saturating_sub(last.answered));
                 // A frame may come late into the next cycle, so one more than the cycles that passed.
                 let allowed = passed + 1;
                 match ahead {
@@ -70,7 +70,7 @@ impl SourceWatch {
                 }
             }
         };
-        self.last = Some(Seen { alive, cycle, answered });
+        self.last = Some(LastFrame { alive, cycle, answered });
         if step == Step::Breaks {
             self.breaks.rotate_left(1);
             self.breaks[BREAKS_TO_LATCH - 1] = Some(cycle);

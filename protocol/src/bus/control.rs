@@ -22,7 +22,7 @@ pub enum Role {
     Member,
 }
 
-/// What a control packet says.
+/// Kind of a control packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A peer joins the barrier.
@@ -41,7 +41,7 @@ pub enum Kind {
 /// One packet of the barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Control {
-    /// What it says.
+    /// Kind of the packet.
     pub kind: Kind,
     /// Cycle that it speaks of.
     pub cycle: u32,

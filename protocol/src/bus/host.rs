@@ -15,16 +15,16 @@ use super::BusError;
 use super::control::{Control, Kind, Role};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
 use super::packets::{self, Inbox, Wait};
-use super::timed::{Reported, TimedWire};
+use super::timed::{ReportTarget, TimedWire};
 use super::unix_link;
 use super::url::{BusUrl, WireOptions};
-use super::wire::{Fate, Wire};
+use super::wire::{FrameOutcome, Wire};
 use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
 use crate::periods::CYCLE_NS;
 use crate::response_time;
 use crate::socket_file::SocketFile;
 use crate::wire_time::WireEvent;
-use peer::{Peer, Sent};
+use peer::{Peer, SendOutcome};
 use rustix::event::{Timespec, epoll};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
@@ -82,12 +82,12 @@ pub struct Host {
     peers: BTreeMap<PeerId, Peer>,
     next_peer: PeerId,
     wire: Wire,
-    /// What the wire decided, and what its babbling nodes say; kept so that it need not be allocated anew.
-    fates: Vec<Fate>,
+    /// Buffers for the outcomes of the wire and the frames of babbling nodes; kept to avoid allocations.
+    outcomes: Vec<FrameOutcome>,
     babble: Vec<CanFrame>,
     began: Instant,
     timed: Option<TimedWire>,
-    /// What the timed wire tells; kept so that it need not be allocated anew.
+    /// Buffer for the events of the timed wire; kept to avoid allocations.
     wire_events: Vec<WireEvent>,
     barrier: Option<Barrier>,
     waiting_since: Instant,
@@ -126,7 +126,7 @@ impl Host {
             peers: BTreeMap::new(),
             next_peer: 0,
             wire: Wire::new(&wire),
-            fates: Vec::new(),
+            outcomes: Vec::new(),
             babble: Vec::new(),
             began: Instant::now(),
             timed,
@@ -150,10 +150,10 @@ impl Host {
         self
     }
 
-    /// Serves the bus until `stop` is set, and tells what it counted.
+    /// Serves the bus until `stop` is set, and returns its report.
     ///
     /// # Errors
-    /// What epoll says when the system is out of memory or descriptors.
+    /// The error of epoll when the system is out of memory or descriptors.
     pub fn serve(mut self, stop: &AtomicBool) -> io::Result<HostReport> {
         while !stop.load(Ordering::Relaxed) {
             self.turn(IDLE_WAIT)?;
@@ -202,7 +202,7 @@ impl Host {
         let joined = barrier.join(RIG_HERE, Role::Rig, "rig".into());
         self.for_rig = joined.then(VecDeque::new);
         if let Some(timed) = self.timed.as_mut().filter(|_| joined) {
-            timed.join(RIG_HERE, Reported::Rig);
+            timed.join(RIG_HERE, ReportTarget::Rig);
         }
         joined
     }
@@ -224,10 +224,10 @@ impl Host {
         self.for_rig.as_mut()?.pop_front()
     }
 
-    /// What was counted so far.
+    /// Counts so far.
     pub(super) fn report(&self) -> HostReport {
         let wire_time = self.timed.as_ref().map(|timed| timed.report(&self.report.peers));
-        let met = self.wire.met.iter();
+        let met = self.wire.frames_by_fault.iter();
         let faults = met.map(|(name, frames)| (Cow::Borrowed(*name), frames.clone())).collect();
         HostReport { wire_time, faults, ..self.report.clone() }
     }
@@ -252,7 +252,7 @@ impl Host {
         if let Some(timed) = &mut self.timed {
             // Without stamps its frames enter when they are read: later, and never wrongly.
             let _ = packets::enable_stamps(socket.as_fd(), false);
-            timed.join(id, Reported::Peer(self.report.peers.len()));
+            timed.join(id, ReportTarget::Peer(self.report.peers.len()));
         }
         self.peers.insert(id, Peer::new(socket, self.report.peers.len()));
         let before_it_came = self.report.on_wire.clone();
@@ -371,9 +371,9 @@ impl Host {
                 continue;
             }
             match peer.send(&bytes) {
-                Sent::Delivered => report.delivered.count(frame),
-                Sent::Gone => report.after_it_left.count(frame),
-                Sent::Dropped => {
+                SendOutcome::Delivered => report.delivered.count(frame),
+                SendOutcome::Gone => report.after_it_left.count(frame),
+                SendOutcome::Dropped => {
                     report.dropped_at_queue.count(frame);
                     if let Some(barrier) = &mut self.barrier {
                         barrier.lost(frame, Some(*id));
@@ -397,7 +397,7 @@ impl Host {
             return;
         };
         for peer in barrier.everyone() {
-            self.tell(peer, Control::named(Kind::TimedOut, 0, &name));
+            self.send_control(peer, Control::named(Kind::TimedOut, 0, &name));
         }
         self.waiting_since = Instant::now();
     }
@@ -427,13 +427,13 @@ impl Host {
         }
         let members = self.barrier.as_ref().map_or(0, |barrier| barrier.member_count()) as u8;
         for id in release.go {
-            self.tell(id, Control::new(Kind::Go { members }, release.cycle));
+            self.send_control(id, Control::new(Kind::Go { members }, release.cycle));
         }
         // Members that may not act yet get their frames too, so that nothing waits in the host.
         self.peers.values_mut().for_each(Peer::flush);
     }
 
-    fn tell(&mut self, id: PeerId, control: Control) {
+    fn send_control(&mut self, id: PeerId, control: Control) {
         if let (RIG_HERE, Some(for_rig)) = (id, &mut self.for_rig) {
             for_rig.push_back(ForRig::Barrier(control));
         } else if let Some(peer) = self.peers.get_mut(&id) {

@@ -1,4 +1,4 @@
-//! What the host of the embedded bus counts: frames, and every loss by identifier.
+//! Counts of the host of the embedded bus: frames, and every loss by identifier.
 //!
 //! Counting is on the way of a frame, so it keeps identifiers as numbers; they become names when a report is written.
 
@@ -73,7 +73,7 @@ impl<'de> Deserialize<'de> for FramesById {
     }
 }
 
-/// What the host saw of one peer. To the frame, for each identifier of others:
+/// Counts of the host for one peer. To the frame, for each identifier of others:
 ///
 /// ```text
 ///   on_wire = before_it_came + delivered + dropped_at_queue + missed_in_bus_off + after_it_left
@@ -99,7 +99,7 @@ pub struct PeerReport {
     pub after_it_left: FramesById,
 }
 
-/// What the host counted.
+/// Counts of the host.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct HostReport {
@@ -116,7 +116,7 @@ pub struct HostReport {
     pub faults: BTreeMap<Cow<'static, str>, FramesById>,
     /// The peers in the order in which they came.
     pub peers: Vec<PeerReport>,
-    /// What a wire that keeps time counted; left out where it takes none.
+    /// Counts of a wire that keeps time; left out where it takes none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wire_time: Option<WireTimeReport>,
 }

@@ -42,7 +42,7 @@ pub struct BarrierConfig {
     pub echo_ids: Vec<u16>,
 }
 
-/// What the host has to do when a phase is complete.
+/// Deliveries and turns of the host when a phase is complete.
 pub(super) struct Release {
     /// Frames with their senders, in the order of delivery.
     pub(super) frames: Vec<(CanFrame, PeerId)>,
@@ -80,7 +80,8 @@ impl ForeignMember {
     }
 }
 
-struct Posted {
+/// A frame that waits for the end of its phase, with its sender's name for a fixed order.
+struct PendingFrame {
     frame: CanFrame,
     from: PeerId,
     sender: String,
@@ -94,8 +95,8 @@ pub(super) struct Barrier {
     rig: Option<PeerId>,
     members: BTreeMap<PeerId, Member>,
     foreign_members: Vec<ForeignMember>,
-    from_rig: Vec<Posted>,
-    from_others: Vec<Posted>,
+    from_rig: Vec<PendingFrame>,
+    from_others: Vec<PendingFrame>,
 }
 
 impl Barrier {
@@ -157,7 +158,7 @@ impl Barrier {
 
     pub(super) fn post(&mut self, from: PeerId, frame: CanFrame) {
         if self.rig == Some(from) {
-            self.from_rig.push(Posted { frame, from, sender: String::new() });
+            self.from_rig.push(PendingFrame { frame, from, sender: String::new() });
             return;
         }
         let sender = match self.members.get(&from) {
@@ -169,7 +170,7 @@ impl Barrier {
                 String::new()
             }
         };
-        self.from_others.push(Posted { frame, from, sender });
+        self.from_others.push(PendingFrame { frame, from, sender });
     }
 
     fn note_echo(&mut self, frame: &CanFrame, from: PeerId) {
@@ -231,7 +232,7 @@ impl Barrier {
         self.foreign_members.iter().filter(move |foreign| over && foreign.lost).map(|foreign| foreign.peer)
     }
 
-    /// What to do now, if a phase is complete. `connected` is the number of peers, joined or not.
+    /// The release that is due, if a phase is complete. `connected` is the number of peers, joined or not.
     pub(super) fn release(&mut self, connected: usize) -> Option<Release> {
         match self.phase {
             Phase::Gathering => {
@@ -266,7 +267,7 @@ impl Barrier {
     }
 }
 
-fn sorted(posted: &mut Vec<Posted>) -> Vec<(CanFrame, PeerId)> {
+fn sorted(posted: &mut Vec<PendingFrame>) -> Vec<(CanFrame, PeerId)> {
     // Stable: frames of one sender on one identifier keep their order.
     posted.sort_by(|a, b| (a.frame.raw_id(), &a.sender).cmp(&(b.frame.raw_id(), &b.sender)));
     posted.drain(..).map(|entry| (entry.frame, entry.from)).collect()

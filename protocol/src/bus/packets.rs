@@ -93,7 +93,7 @@ impl Inbox {
     /// ns ago.
     ///
     /// # Errors
-    /// What `recvmmsg` says; `WouldBlock` when nothing waits.
+    /// The error of `recvmmsg`; `WouldBlock` when nothing waits.
     pub(super) fn fill(
         &mut self,
         socket: BorrowedFd<'_>,
@@ -189,7 +189,7 @@ const LONGEST_READING_NS: u64 = 20_000;
 /// Times that it is tried at most.
 const READINGS: usize = 4;
 
-/// What is known of the wall clock against the monotonic one.
+/// Readings of the wall clock and the monotonic clock, from which stamps are converted.
 struct Clocks {
     /// Wall clock less monotonic clock: now, and when the last batch was taken, ns.
     offsets_ns: [i64; 2],
@@ -297,7 +297,7 @@ impl Outbox {
     /// Sends all packets; the outbox is empty afterwards.
     ///
     /// # Errors
-    /// What `sendmmsg` says, `WouldBlock` for a full queue; what it did not take waits for the next call.
+    /// The error of `sendmmsg`, `WouldBlock` for a full queue; frames that it did not take wait for the next call.
     pub(super) fn flush(&mut self, socket: BorrowedFd<'_>) -> io::Result<()> {
         let count = self.count;
         // SAFETY: iovec and mmsghdr are plain C structs for which all zeros is a valid value.

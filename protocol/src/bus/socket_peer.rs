@@ -21,7 +21,7 @@ pub(super) trait Link: Send {
     const HAS_BARRIER: bool;
     /// Whether the kernel counts what it drops at the receive queue.
     const COUNTS_OVERFLOW: bool;
-    /// What a person can do when opening fails.
+    /// Remedy for a person when opening fails.
     const REMEDY: &'static str;
 
     /// Opens a non-blocking socket to the bus.

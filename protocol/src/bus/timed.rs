@@ -31,7 +31,7 @@ const NS_PER_S: u64 = 1_000_000_000;
 
 /// Receiver of the wire's reports on a node.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Reported {
+pub(super) enum ReportTarget {
     /// The rig that lives in the host's process.
     Rig,
     /// A node that is a fault.
@@ -45,9 +45,9 @@ pub(super) struct TimedWire {
     pub(super) model: WireModel,
     nodes: BTreeMap<PeerId, NodeId>,
     /// For each node, the receiver of its reports.
-    reported: Vec<Reported>,
+    report_targets: Vec<ReportTarget>,
     pub(super) timer: OwnedFd,
-    /// What the timer was set to, ns of the model's time.
+    /// Expiry that the timer was set to, ns of the model's time.
     armed_ns: Option<u64>,
     /// Time 0 of the model by the machine's clock, ns.
     zero_ns: u64,
@@ -62,7 +62,7 @@ impl TimedWire {
         Ok(Some(Self {
             model: WireModel::new(timing, options.seed),
             nodes: BTreeMap::new(),
-            reported: Vec::new(),
+            report_targets: Vec::new(),
             timer: timerfd_create(TimerfdClockId::Monotonic, flags)?,
             armed_ns: None,
             zero_ns: ns_of(ClockId::Monotonic),
@@ -71,10 +71,10 @@ impl TimedWire {
     }
 
     /// A peer comes onto the wire.
-    pub(super) fn join(&mut self, peer: PeerId, reported: Reported) {
+    pub(super) fn join(&mut self, peer: PeerId, target: ReportTarget) {
         let node = self.model.join();
         self.nodes.insert(peer, node);
-        self.reported.push(reported);
+        self.report_targets.push(target);
     }
 
     pub(super) fn leave(&mut self, peer: PeerId) {
@@ -109,7 +109,7 @@ impl TimedWire {
         self.zero_ns + self.model.now_ns()
     }
 
-    /// What happens next, up to `limit_ns`: one instant's events. False when nothing does.
+    /// Advances to the next instant with events, up to `limit_ns`, and adds these. False when there is none.
     pub(super) fn advance_once(&mut self, limit_ns: u64, events: &mut Vec<WireEvent>) -> bool {
         let Some(at_ns) = self.model.next_ns().filter(|at_ns| *at_ns <= limit_ns) else { return false };
         self.model.advance(at_ns, events);
@@ -121,14 +121,14 @@ impl TimedWire {
         self.late.note(self.time_ns(0).saturating_sub(ended_ns));
     }
 
-    /// Sets the timer to what the model does next. Setting it clears what it has reported, so that it need not be read.
+    /// Sets the timer to the model's next event. Setting it clears what it has reported, so that it need not be read.
     pub(super) fn arm(&mut self) -> rustix::io::Result<()> {
         let next_ns = self.model.next_ns();
-        let told = self.armed_ns.is_some_and(|armed_ns| armed_ns <= self.model.now_ns());
-        if next_ns == self.armed_ns && !told {
+        let expired = self.armed_ns.is_some_and(|armed_ns| armed_ns <= self.model.now_ns());
+        if next_ns == self.armed_ns && !expired {
             return Ok(());
         }
-        // All zeros would switch it off; a time long past makes it tell at once.
+        // All zeros would switch it off; a time long past makes it expire at once.
         let at_ns = next_ns.map_or(0, |next_ns| self.zero_ns + next_ns);
         let at = Timespec { tv_sec: (at_ns / NS_PER_S) as i64, tv_nsec: (at_ns % NS_PER_S) as i64 };
         let once = Itimerspec { it_interval: Timespec { tv_sec: 0, tv_nsec: 0 }, it_value: at };
@@ -137,14 +137,14 @@ impl TimedWire {
         Ok(())
     }
 
-    /// What was counted, with the nodes' names.
+    /// The model's report, with the nodes' names.
     pub(super) fn report(&self, peers: &[PeerReport]) -> WireTimeReport {
         let mut report = WireTimeReport { delivered_late: self.late, ..self.model.report() };
-        for (node, reported) in report.nodes.iter_mut().zip(&self.reported) {
-            node.name = match reported {
-                Reported::Rig => "rig".into(),
-                Reported::Babbler => "babbling node".into(),
-                Reported::Peer(place) => peers[*place].name.clone(),
+        for (node, target) in report.nodes.iter_mut().zip(&self.report_targets) {
+            node.name = match target {
+                ReportTarget::Rig => "rig".into(),
+                ReportTarget::Babbler => "babbling node".into(),
+                ReportTarget::Peer(place) => peers[*place].name.clone(),
             };
         }
         report

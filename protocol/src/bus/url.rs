@@ -23,12 +23,12 @@ pub enum BusUrl {
     Unix {
         /// Path of the socket.
         path: PathBuf,
-        /// What the host's wire does to frames.
+        /// Options of the host's wire.
         wire: WireOptions,
     },
 }
 
-/// What the wire of the embedded bus does to frames.
+/// Options of the wire of the embedded bus: loss, seed, timing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireOptions {
     /// Probability that a frame is lost for everyone, 0 to 1.
@@ -39,7 +39,7 @@ pub struct WireOptions {
     pub timing: Option<WireTiming>,
 }
 
-/// What is wrong with a bus URL.
+/// Error in a bus URL.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UrlError {
     /// Neither `can://` nor `unix://`.
@@ -187,7 +187,7 @@ fn identifier(value: &str) -> Option<u32> {
 }
 
 impl fmt::Display for WireOptions {
-    /// What differs from the default, as a URL has it after the path.
+    /// Options that differ from the default, as a URL has them after the path.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut options = Vec::new();
         if let Some(timing) = &self.timing {

@@ -24,7 +24,7 @@ use super::url::WireOptions;
 use crate::can::CanFrame;
 use crate::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_VALVE_COMMAND};
 use crossbeam_channel::{Receiver, Sender, bounded};
-use kinds::Draw;
+use kinds::FaultRng;
 use std::collections::BTreeMap;
 
 use super::host_report::FramesById;
@@ -36,14 +36,14 @@ const MS_NS: u64 = 1_000_000;
 /// Frames that a babbling node is given at once after a pause of the host.
 const BURST: f64 = 200.0;
 
-/// What the host is asked to do to frames from now on.
+/// Order to a host to begin or end a fault of its wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WireOrder {
     /// A fault begins.
     Begin {
         /// Number by which it is ended.
         number: u16,
-        /// What it is.
+        /// Kind of the fault, with its parameters.
         fault: WireFault,
         /// Which frames it concerns.
         frames: Frames,
@@ -57,7 +57,7 @@ pub enum WireOrder {
     },
 }
 
-/// The way in which orders reach a host; giving one takes no lock and waits for nobody.
+/// Queue of orders to a host; giving one takes no lock and does not wait.
 #[derive(Clone)]
 pub struct WireOrders(Sender<WireOrder>);
 
@@ -69,10 +69,10 @@ impl WireOrders {
     }
 }
 
-/// What becomes of a frame.
+/// Outcome of a frame on the wire.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Fate {
-    /// It goes to everyone but its sender and the deaf.
+pub(super) enum FrameOutcome {
+    /// It is delivered to all peers but its sender and the deaf ones.
     Carried {
         frame: CanFrame,
         from: PeerId,
@@ -82,37 +82,37 @@ pub(super) enum Fate {
     Held(CanFrame),
 }
 
-struct Active {
+struct ActiveFault {
     number: u16,
     fault: WireFault,
     frames: Frames,
-    draw: Draw,
-    /// Up to when a babbling node has spoken, and what it owes beyond whole frames.
-    spoken_ns: u64,
-    owes: f64,
+    rng: FaultRng,
+    /// Time up to which a babbling node has sent, and its fraction of a frame still to be sent.
+    babbled_until_ns: u64,
+    owed_frames: f64,
 }
 
-/// A frame that comes later, by the number of the fault that holds it.
-struct Held {
+/// A frame that is delivered later, with the number of the fault that holds it.
+struct HeldFrame {
     number: u16,
-    /// When; `None`: behind the next frame of its identifier.
+    /// Time of delivery; `None`: after the next frame of its identifier.
     due_ns: Option<u64>,
     frame: CanFrame,
     from: PeerId,
-    /// How often it comes beyond once.
+    /// Number of duplicates.
     copies: u32,
 }
 
-/// What the wire does now.
+/// The wire with its active faults and held frames.
 pub(super) struct Wire {
-    active: Vec<Active>,
-    held: Vec<Held>,
-    /// Who sent the sensors and the commands of drive and load last.
-    speakers: [Option<PeerId>; 3],
+    active: Vec<ActiveFault>,
+    held: Vec<HeldFrame>,
+    /// Peers that sent the sensors and the commands of drive and load last.
+    node_peers: [Option<PeerId>; 3],
     orders: Receiver<WireOrder>,
     give: Sender<WireOrder>,
-    /// Frames that met a fault, by its name and their identifier.
-    pub(super) met: BTreeMap<&'static str, FramesById>,
+    /// Frames that a fault acted on, by its name and their identifier.
+    pub(super) frames_by_fault: BTreeMap<&'static str, FramesById>,
 }
 
 impl Wire {
@@ -121,10 +121,10 @@ impl Wire {
         let mut wire = Self {
             active: Vec::new(),
             held: Vec::new(),
-            speakers: [None; 3],
+            node_peers: [None; 3],
             orders,
             give,
-            met: BTreeMap::new(),
+            frames_by_fault: BTreeMap::new(),
         };
         if options.loss > 0.0 {
             let fault = WireFault::Loss { probability: options.loss };
@@ -143,8 +143,8 @@ impl Wire {
         self.active.is_empty() && self.held.is_empty()
     }
 
-    /// Takes what was ordered; frames that an ended fault held go on.
-    pub(super) fn take_orders(&mut self, now_ns: u64, fates: &mut Vec<Fate>) {
+    /// Carries out the orders; frames that an ended fault held are released.
+    pub(super) fn take_orders(&mut self, now_ns: u64, outcomes: &mut Vec<FrameOutcome>) {
         while let Ok(order) = self.orders.try_recv() {
             match order {
                 WireOrder::Begin { number, fault, frames, seed } => {
@@ -152,68 +152,72 @@ impl Wire {
                 }
                 WireOrder::End { number } => {
                     self.active.retain(|active| active.number != number);
-                    self.let_go(fates, |held| held.number == number);
+                    self.release(outcomes, |held| held.number == number);
                 }
             }
         }
     }
 
     fn begin(&mut self, number: u16, fault: WireFault, frames: Frames, seed: u64, now_ns: u64) {
-        self.active.push(Active {
+        self.active.push(ActiveFault {
             number,
             fault,
             frames,
-            draw: Draw::new(seed),
-            spoken_ns: now_ns,
-            owes: 0.0,
+            rng: FaultRng::new(seed),
+            babbled_until_ns: now_ns,
+            owed_frames: 0.0,
         });
     }
 
-    /// What is due by `now_ns` of what was held.
-    pub(super) fn pass_time(&mut self, now_ns: u64, fates: &mut Vec<Fate>) {
-        self.let_go(fates, |held| held.due_ns.is_some_and(|due_ns| due_ns <= now_ns));
+    /// Releases the held frames that are due by `now_ns`.
+    pub(super) fn release_due(&mut self, now_ns: u64, outcomes: &mut Vec<FrameOutcome>) {
+        self.release(outcomes, |held| held.due_ns.is_some_and(|due_ns| due_ns <= now_ns));
     }
 
-    /// Everything that is held, when the host goes.
-    pub(super) fn let_all_go(&mut self, fates: &mut Vec<Fate>) {
-        self.let_go(fates, |_| true);
+    /// Releases all held frames, when the host ends.
+    pub(super) fn release_all(&mut self, outcomes: &mut Vec<FrameOutcome>) {
+        self.release(outcomes, |_| true);
     }
 
-    fn let_go(&mut self, fates: &mut Vec<Fate>, which: impl Fn(&Held) -> bool) {
+    fn release(&mut self, outcomes: &mut Vec<FrameOutcome>, which: impl Fn(&HeldFrame) -> bool) {
         let deaf = self.deaf(&[]);
         for held in self.held.extract_if(.., |held| which(held)) {
             for _ in 0..=held.copies {
-                fates.push(Fate::Carried { frame: held.frame, from: held.from, deaf: deaf.clone() });
+                outcomes.push(FrameOutcome::Carried {
+                    frame: held.frame,
+                    from: held.from,
+                    deaf: deaf.clone(),
+                });
             }
         }
     }
 
-    /// What babbling nodes say up to `now_ns`.
+    /// Frames of babbling nodes up to `now_ns`.
     pub(super) fn babble(&mut self, now_ns: u64, babbled: &mut Vec<CanFrame>) {
         for active in &mut self.active {
             let WireFault::Babbling { id, frames_per_ms, bytes } = active.fault else { continue };
-            let since_ms = now_ns.saturating_sub(active.spoken_ns) as f64 / MS_NS as f64;
-            active.spoken_ns = now_ns.max(active.spoken_ns);
-            active.owes = (active.owes + since_ms * frames_per_ms).min(BURST);
-            let whole = active.owes.floor();
-            active.owes -= whole;
+            let since_ms = now_ns.saturating_sub(active.babbled_until_ns) as f64 / MS_NS as f64;
+            active.babbled_until_ns = now_ns.max(active.babbled_until_ns);
+            active.owed_frames = (active.owed_frames + since_ms * frames_per_ms).min(BURST);
+            let whole = active.owed_frames.floor();
+            active.owed_frames -= whole;
             let frame = CanFrame::new(id, &[0; 8][..usize::from(bytes.min(8))]);
             for _ in 0..whole as usize {
-                self.met.entry(active.fault.name()).or_default().count(&frame);
+                self.frames_by_fault.entry(active.fault.name()).or_default().count(&frame);
                 babbled.push(frame);
             }
         }
     }
 
-    /// How long the host may sleep, ns; `None` for as long as it likes.
-    pub(super) fn patience_ns(&self, now_ns: u64) -> Option<u64> {
+    /// Longest time that the host may sleep, ns; `None`: no limit.
+    pub(super) fn longest_sleep_ns(&self, now_ns: u64) -> Option<u64> {
         let babbles = self.active.iter().any(|active| matches!(active.fault, WireFault::Babbling { .. }));
         let due_ns = self.held.iter().filter_map(|held| held.due_ns).min();
         let due_ns = due_ns.map(|due_ns| due_ns.saturating_sub(now_ns));
         if babbles { Some(due_ns.unwrap_or(MS_NS).min(MS_NS)) } else { due_ns }
     }
 
-    /// Those who hear nothing, with the nodes that are off the bus.
+    /// Peers that receive nothing: `deaf` and the nodes that are off the bus.
     fn deaf(&self, deaf: &[PeerId]) -> Vec<PeerId> {
         let mut deaf = deaf.to_vec();
         deaf.extend(self.active.iter().filter_map(|active| self.off(&active.fault)));
@@ -222,34 +226,34 @@ impl Wire {
 
     /// The peer that a fault takes off the bus.
     fn off(&self, fault: &WireFault) -> Option<PeerId> {
-        if let WireFault::BusOff { node } = fault { self.speakers[*node as usize] } else { None }
+        if let WireFault::BusOff { node } = fault { self.node_peers[*node as usize] } else { None }
     }
 
-    /// Notes who is who by what they send.
-    pub(super) fn note_speaker(&mut self, frame: &CanFrame, from: PeerId) {
+    /// Learns which peer is which node from the identifiers that it sends.
+    pub(super) fn learn_node(&mut self, frame: &CanFrame, from: PeerId) {
         let ids = [DRIVE_SENSORS.id, DRIVE_VALVE_COMMAND.id, LOAD_VALVE_COMMAND.id];
         if let Some(node) = ids.iter().position(|id| frame.standard_id() == Some(*id)) {
-            self.speakers[node] = Some(from);
+            self.node_peers[node] = Some(from);
         }
     }
 
-    /// What becomes of a frame that comes to the wire at `now_ns`, and of those that waited for it.
+    /// Adds the outcome of a frame that enters the wire at `now_ns`, and of the frames that waited for it.
     pub(super) fn pass(
         &mut self,
         frame: &CanFrame,
         from: PeerId,
         deaf: &[PeerId],
         now_ns: u64,
-        fates: &mut Vec<Fate>,
+        outcomes: &mut Vec<FrameOutcome>,
     ) {
-        let met = &mut self.met;
-        let mut note = |fault: &WireFault| met.entry(fault.name()).or_default().count(frame);
-        let (mut passing, mut hold, mut copies) = (*frame, None, 0);
+        let frames_by_fault = &mut self.frames_by_fault;
+        let mut note = |fault: &WireFault| frames_by_fault.entry(fault.name()).or_default().count(frame);
+        let (mut changed, mut hold, mut copies) = (*frame, None, 0);
         for active in self.active.iter_mut().filter(|active| active.frames.hold(frame)) {
             match active.fault {
-                WireFault::BusOff { node } if self.speakers[node as usize] == Some(from) => {
+                WireFault::BusOff { node } if self.node_peers[node as usize] == Some(from) => {
                     note(&active.fault);
-                    fates.push(Fate::Lost(*frame));
+                    outcomes.push(FrameOutcome::Lost(*frame));
                     return;
                 }
                 WireFault::BusOff { .. } | WireFault::Babbling { .. } => continue,
@@ -257,14 +261,15 @@ impl Wire {
                     let due_ns = now_ns + u64::from(delay_ms) * MS_NS;
                     hold = Some((active.number, Some(due_ns)));
                 }
-                fault if !active.draw.hits(fault.probability()) => continue,
+                fault if !active.rng.hits(fault.probability()) => continue,
                 WireFault::Loss { .. } => {
                     note(&active.fault);
-                    fates.push(Fate::Lost(*frame));
+                    outcomes.push(FrameOutcome::Lost(*frame));
                     return;
                 }
                 WireFault::Reordering { .. } => {
-                    let waits = |held: &Held| held.due_ns.is_none() && held.frame.raw_id() == frame.raw_id();
+                    let waits =
+                        |held: &HeldFrame| held.due_ns.is_none() && held.frame.raw_id() == frame.raw_id();
                     // One at a time: the next one is what it waits for.
                     if hold.is_some() || self.held.iter().any(waits) {
                         continue;
@@ -272,20 +277,20 @@ impl Wire {
                     hold = Some((active.number, None));
                 }
                 WireFault::Duplication { copies: more, .. } => copies += more,
-                fault => passing = fault.change(&passing, &mut active.draw),
+                fault => changed = fault.change(&changed, &mut active.rng),
             }
             note(&active.fault);
         }
         if let Some((number, due_ns)) = hold {
-            fates.push(Fate::Held(*frame));
-            self.held.push(Held { number, due_ns, frame: passing, from, copies });
+            outcomes.push(FrameOutcome::Held(*frame));
+            self.held.push(HeldFrame { number, due_ns, frame: changed, from, copies });
             return;
         }
         let deaf = self.deaf(deaf);
         for _ in 0..=copies {
-            fates.push(Fate::Carried { frame: passing, from, deaf: deaf.clone() });
+            outcomes.push(FrameOutcome::Carried { frame: changed, from, deaf: deaf.clone() });
         }
         let id = frame.raw_id();
-        self.let_go(fates, |held| held.due_ns.is_none() && held.frame.raw_id() == id);
+        self.release(outcomes, |held| held.due_ns.is_none() && held.frame.raw_id() == id);
     }
 }

@@ -12,7 +12,7 @@ use crate::wire_time::{IdentifierReport, WireModel, WireTimeReport, WireTiming};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// What the model showed, and what the analysis says of the frames that it sent.
+/// Response times of the model, and the bounds of the analysis for the frames that it sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CriticalInstant {
     /// Longest response on the model's clock, ns.
@@ -21,15 +21,16 @@ pub struct CriticalInstant {
     pub bound_ns: u64,
 }
 
-/// What a report holds of a frame.
+/// Entry of a report for a frame.
 #[must_use]
-pub fn seen_of<'a>(frame: &RigFrame, report: &'a WireTimeReport) -> Option<&'a IdentifierReport> {
+pub fn identifier_report<'a>(frame: &RigFrame, report: &'a WireTimeReport) -> Option<&'a IdentifierReport> {
     report.identifiers.get(&FramesById::name_of(u32::from(frame.message.id)))
 }
 
-/// Plays the critical instant of the frame at `place` of the analysis, with contents drawn from `seed`. `None` without a bound.
+/// Simulates the critical instant of the frame at `place` of the analysis, with contents drawn from `seed`. `None` without a
+/// bound.
 #[must_use]
-pub fn play(analysis: &RigAnalysis, place: usize, seed: u64) -> Option<CriticalInstant> {
+pub fn simulate(analysis: &RigAnalysis, place: usize, seed: u64) -> Option<CriticalInstant> {
     let busy_ns = analysis.responses()[place]?.busy_period_ns;
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut any_content = |frame: &RigFrame| {
@@ -50,13 +51,13 @@ pub fn play(analysis: &RigAnalysis, place: usize, seed: u64) -> Option<CriticalI
     model.advance(10 * busy_ns, &mut Vec::new());
     let report = model.report();
     let sent = analysis.clone().with(|frame| {
-        let seen = seen_of(frame, &report);
+        let seen = identifier_report(frame, &report);
         frame.bits = seen.map_or(0, |seen| seen.bits[1]);
         seen.is_some()
     });
     let frame = &analysis.frames[place];
     Some(CriticalInstant {
-        measured_ns: seen_of(frame, &report)?.response_ns.max,
+        measured_ns: identifier_report(frame, &report)?.response_ns.max,
         bound_ns: sent.response_of(frame.message.id)?.response_ns,
     })
 }
@@ -70,7 +71,7 @@ mod tests {
         let analysis = RigAnalysis::worst_case(1_000_000);
         for (place, frame) in analysis.frames.iter().enumerate() {
             for seed in 0..50 {
-                let CriticalInstant { measured_ns, bound_ns } = play(&analysis, place, seed).unwrap();
+                let CriticalInstant { measured_ns, bound_ns } = simulate(&analysis, place, seed).unwrap();
                 let share = measured_ns as f64 / bound_ns as f64;
                 let name = frame.message.name;
                 assert!((0.9..=1.0).contains(&share), "{name}, seed {seed}: {measured_ns} of {bound_ns} ns");

@@ -65,7 +65,7 @@ const ARRIVALS: &[(&str, Arrivals, &str)] = &[
 /// A frame of `rig.dbc` as the analysis sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigFrame {
-    /// What `rig.dbc` says.
+    /// Its specification in `rig.dbc`.
     pub message: &'static MessageSpec,
     /// Bits of one frame, intermission included.
     pub bits: u32,

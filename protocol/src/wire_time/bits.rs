@@ -65,7 +65,7 @@ impl BitSequence {
     }
 }
 
-/// What a frame sends from start of frame to CRC, not yet stuffed.
+/// Bits of a frame from start of frame to CRC, before stuffing.
 #[must_use]
 pub fn sequence(frame: &CanFrame) -> BitSequence {
     let mut bits = BitSequence::default();

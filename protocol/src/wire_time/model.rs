@@ -5,7 +5,7 @@
 
 use super::WireTiming;
 use super::errors::{ERROR_BITS, Errors, SUSPEND_BITS};
-use super::node::{Change, Node, Queued, RECOVERY_BITS};
+use super::node::{ErrorStateChange, Node, Queued, RECOVERY_BITS};
 use super::report::{Identifier, Lateness, NodeReport, WireTimeReport};
 use crate::bus::host::FramesById;
 use crate::can::CanFrame;
@@ -31,8 +31,8 @@ pub enum WireEvent {
         deaf: Vec<NodeId>,
     },
     /// A node gets an error frame with its own state.
-    Told {
-        /// Node whose state it tells.
+    ErrorFrame {
+        /// Node whose state it reports.
         node: NodeId,
         /// The error frame.
         frame: CanFrame,
@@ -41,7 +41,7 @@ pub enum WireEvent {
     },
 }
 
-struct Sending {
+struct Transmission {
     queued: Queued,
     from: NodeId,
     began_ns: u64,
@@ -56,7 +56,7 @@ pub struct WireModel {
     nodes: Vec<Node>,
     /// Frames to come, by time and order of entering.
     coming: BTreeMap<(u64, u64), (NodeId, CanFrame)>,
-    sending: Option<Sending>,
+    sending: Option<Transmission>,
     now_ns: u64,
     /// Since when the wire has been idle, when nothing is sent.
     idle_since_ns: u64,
@@ -135,7 +135,7 @@ impl WireModel {
 
     /// When a node in bus-off will be back if the wire stays idle.
     fn recovery_ns(&self, node: &Node) -> Option<u64> {
-        let off = node.off.filter(|_| !node.gone)?;
+        let off = node.bus_off.filter(|_| !node.gone)?;
         let from_ns = off.counts_from_ns.max(self.idle_since_ns);
         Some(from_ns + off.missing * self.timing.duration_ns(RECOVERY_BITS))
     }
@@ -175,7 +175,7 @@ impl WireModel {
         for id in 0..self.nodes.len() {
             if self.recovery_ns(&self.nodes[id]).is_some_and(|at_ns| at_ns <= self.now_ns) {
                 self.nodes[id].come_back();
-                self.tell(id, Change::Restarted, events);
+                self.report_change(id, ErrorStateChange::Restarted, events);
             }
         }
     }
@@ -191,25 +191,26 @@ impl WireModel {
         let hit = self.errors.hit(&queued.frame, queued.bits, self.now_ns);
         let length = hit.map_or(queued.bits, |place| place + ERROR_BITS);
         let ends_ns = self.now_ns + self.timing.duration_ns(length);
-        self.sending = Some(Sending { queued, from, began_ns: self.now_ns, ends_ns, hit: hit.is_some() });
+        self.sending =
+            Some(Transmission { queued, from, began_ns: self.now_ns, ends_ns, hit: hit.is_some() });
     }
 
     /// A node in bus-off has seen the recessive bits of an idle wire.
     fn count_idle_sequences(&mut self) {
         let length_ns = self.timing.duration_ns(RECOVERY_BITS);
-        for off in self.nodes.iter_mut().filter_map(|node| node.off.as_mut()) {
+        for off in self.nodes.iter_mut().filter_map(|node| node.bus_off.as_mut()) {
             let from_ns = off.counts_from_ns.max(self.idle_since_ns);
             off.missing = off.missing.saturating_sub(self.now_ns.saturating_sub(from_ns) / length_ns);
         }
     }
 
     /// The end of a transmission: 11 recessive bits, delimiter and intermission among them, after a frame and an error alike.
-    fn end(&mut self, sending: Sending, events: &mut Vec<WireEvent>) {
+    fn end(&mut self, sending: Transmission, events: &mut Vec<WireEvent>) {
         let now_ns = self.now_ns;
         (self.idle_since_ns, self.last_ns) = (now_ns, now_ns);
         self.busy_ns += now_ns - sending.began_ns;
         let tail_ns = self.timing.duration_ns(RECOVERY_BITS);
-        for off in self.nodes.iter_mut().filter_map(|node| node.off.as_mut()) {
+        for off in self.nodes.iter_mut().filter_map(|node| node.bus_off.as_mut()) {
             off.missing -= u64::from(off.missing > 0 && off.counts_from_ns + tail_ns <= now_ns);
         }
         if sending.hit {
@@ -219,16 +220,16 @@ impl WireModel {
         }
     }
 
-    fn end_well(&mut self, sending: Sending, events: &mut Vec<WireEvent>) {
-        let Sending { queued, from, began_ns, .. } = sending;
+    fn end_well(&mut self, sending: Transmission, events: &mut Vec<WireEvent>) {
+        let Transmission { queued, from, began_ns, .. } = sending;
         let ended_ns = self.now_ns;
         self.frames += 1;
         let identifier = self.identifiers.entry(queued.frame.raw_id()).or_default();
         identifier.sent(queued.bits, [queued.entered_ns, began_ns, ended_ns]);
         let mut deaf = Vec::new();
         for (id, node) in self.nodes.iter_mut().enumerate() {
-            if node.off.is_some() && !node.gone {
-                node.counted.missed += 1;
+            if node.bus_off.is_some() && !node.gone {
+                node.counters.missed += 1;
                 deaf.push(id);
             }
         }
@@ -243,11 +244,13 @@ impl WireModel {
         self.suspend(from);
     }
 
-    fn end_in_error(&mut self, sending: Sending, events: &mut Vec<WireEvent>) {
-        let Sending { queued, from, .. } = sending;
+    fn end_in_error(&mut self, sending: Transmission, events: &mut Vec<WireEvent>) {
+        let Transmission { queued, from, .. } = sending;
         self.failed += 1;
         self.identifiers.entry(queued.frame.raw_id()).or_default().failed();
-        if self.confine(from, Node::has_failed, Node::has_seen_failure, events) == Some(Change::BusOff) {
+        if self.confine(from, Node::has_failed, Node::has_seen_failure, events)
+            == Some(ErrorStateChange::BusOff)
+        {
             let counts_from_ns = self.now_ns + u64::from(self.timing.restart_ms) * 1_000_000;
             self.nodes[from].go_off(&queued.frame, counts_from_ns);
         } else {
@@ -260,10 +263,10 @@ impl WireModel {
     fn confine(
         &mut self,
         from: NodeId,
-        sender: fn(&mut Node) -> Option<Change>,
-        others: fn(&mut Node) -> Option<Change>,
+        sender: fn(&mut Node) -> Option<ErrorStateChange>,
+        others: fn(&mut Node) -> Option<ErrorStateChange>,
         events: &mut Vec<WireEvent>,
-    ) -> Option<Change> {
+    ) -> Option<ErrorStateChange> {
         let mut of_sender = None;
         for id in 0..self.nodes.len() {
             let node = &mut self.nodes[id];
@@ -276,7 +279,7 @@ impl WireModel {
                 None
             };
             if let Some(change) = change {
-                self.tell(id, change, events);
+                self.report_change(id, change, events);
             }
         }
         of_sender
@@ -289,14 +292,14 @@ impl WireModel {
         }
     }
 
-    fn tell(&self, node: NodeId, change: Change, events: &mut Vec<WireEvent>) {
+    fn report_change(&self, node: NodeId, change: ErrorStateChange, events: &mut Vec<WireEvent>) {
         if !self.nodes[node].gone {
-            let frame = self.nodes[node].tell(change);
-            events.push(WireEvent::Told { node, frame, at_ns: self.now_ns });
+            let frame = self.nodes[node].error_frame(change);
+            events.push(WireEvent::ErrorFrame { node, frame, at_ns: self.now_ns });
         }
     }
 
-    /// What was counted so far. Nodes have no names here, and nothing is delivered by the model.
+    /// Report of the counts so far. Nodes have no names here, and nothing is delivered by the model.
     #[must_use]
     pub fn report(&self) -> WireTimeReport {
         let observed_ns = self.first_ns.map_or(0, |first_ns| self.last_ns.saturating_sub(first_ns));
@@ -308,7 +311,7 @@ impl WireModel {
             load_ppm,
             frames: self.frames,
             errors: self.failed,
-            bus_offs: self.nodes.iter().map(|node| node.counted.bus_offs).sum(),
+            bus_offs: self.nodes.iter().map(|node| node.counters.bus_offs).sum(),
             entered_late: self.entered_late,
             delivered_late: Lateness::default(),
             identifiers: self
@@ -322,19 +325,19 @@ impl WireModel {
 }
 
 fn node_report(node: &Node) -> NodeReport {
-    let counted = node.counted.clone();
+    let counters = node.counters.clone();
     NodeReport {
         name: String::new(),
-        sent: counted.sent,
-        errors: counted.errors,
-        tec: [node.tec, counted.tec_max],
-        rec: [node.rec, counted.rec_max],
-        error_passive: counted.passives,
-        bus_offs: counted.bus_offs,
-        bus_off: node.off.is_some(),
-        missed_in_bus_off: counted.missed,
-        dropped_at_full_queue: counted.dropped_at_full_queue,
-        dropped_in_bus_off: counted.dropped_in_bus_off,
+        sent: counters.sent,
+        errors: counters.errors,
+        tec: [node.tec, counters.tec_max],
+        rec: [node.rec, counters.rec_max],
+        error_passive: counters.passives,
+        bus_offs: counters.bus_offs,
+        bus_off: node.bus_off.is_some(),
+        missed_in_bus_off: counters.missed,
+        dropped_at_full_queue: counters.dropped_at_full_queue,
+        dropped_in_bus_off: counters.dropped_in_bus_off,
     }
 }
 

@@ -60,18 +60,18 @@ impl Queued {
     }
 }
 
-/// A node in bus-off.
+/// Progress of the recovery of a node from bus-off.
 #[derive(Clone, Copy)]
-pub(super) struct Off {
-    /// From when on recessive bits count.
+pub(super) struct BusOffRecovery {
+    /// Time from which recessive bits count, ns.
     pub(super) counts_from_ns: u64,
     /// Sequences of them still missing.
     pub(super) missing: u64,
 }
 
-/// What happened to a node that has to be reported to it.
+/// Change of a node's error state, which is reported to the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Change {
+pub(super) enum ErrorStateChange {
     Passive,
     Active,
     BusOff,
@@ -85,16 +85,16 @@ pub(super) struct Node {
     pub(super) tec: u32,
     pub(super) rec: u32,
     pub(super) passive: bool,
-    pub(super) off: Option<Off>,
+    pub(super) bus_off: Option<BusOffRecovery>,
     /// Gone from the bus; what it had queued is still sent.
     pub(super) gone: bool,
     /// An error-passive sender does not begin before this.
     pub(super) suspended_until_ns: u64,
-    pub(super) counted: Counted,
+    pub(super) counters: NodeCounters,
 }
 
 #[derive(Clone, Default)]
-pub(super) struct Counted {
+pub(super) struct NodeCounters {
     pub(super) sent: u64,
     pub(super) errors: u64,
     pub(super) tec_max: u32,
@@ -109,10 +109,10 @@ pub(super) struct Counted {
 impl Node {
     /// Takes a frame into the queue; false when it was dropped.
     pub(super) fn enqueue(&mut self, queued: Queued) -> bool {
-        if self.off.is_some() {
-            self.counted.dropped_in_bus_off.count(&queued.frame);
+        if self.bus_off.is_some() {
+            self.counters.dropped_in_bus_off.count(&queued.frame);
         } else if self.waiting.len() >= QUEUE_FRAMES {
-            self.counted.dropped_at_full_queue.count(&queued.frame);
+            self.counters.dropped_at_full_queue.count(&queued.frame);
         } else {
             self.put(queued);
             return true;
@@ -137,74 +137,74 @@ impl Node {
 
     /// Whether it takes part in what happens on the wire.
     pub(super) fn on_the_bus(&self) -> bool {
-        self.off.is_none() && !self.gone
+        self.bus_off.is_none() && !self.gone
     }
 
-    pub(super) fn has_sent(&mut self) -> Option<Change> {
-        self.counted.sent += 1;
+    pub(super) fn has_sent(&mut self) -> Option<ErrorStateChange> {
+        self.counters.sent += 1;
         self.tec = self.tec.saturating_sub(1);
         self.confine()
     }
 
-    pub(super) fn has_received(&mut self) -> Option<Change> {
+    pub(super) fn has_received(&mut self) -> Option<ErrorStateChange> {
         self.rec = if self.rec >= PASSIVE_FROM { REC_AFTER_PASSIVE } else { self.rec.saturating_sub(1) };
         self.confine()
     }
 
     /// Its frame was hit by an error.
-    pub(super) fn has_failed(&mut self) -> Option<Change> {
-        self.counted.errors += 1;
+    pub(super) fn has_failed(&mut self) -> Option<ErrorStateChange> {
+        self.counters.errors += 1;
         self.tec += 8;
-        self.counted.tec_max = self.counted.tec_max.max(self.tec);
+        self.counters.tec_max = self.counters.tec_max.max(self.tec);
         self.confine()
     }
 
     /// Another one's frame was hit.
-    pub(super) fn has_seen_failure(&mut self) -> Option<Change> {
+    pub(super) fn has_seen_failure(&mut self) -> Option<ErrorStateChange> {
         // The counter has 8 bits in controllers; beyond passive it says nothing.
         self.rec = (self.rec + 1).min(255);
-        self.counted.rec_max = self.counted.rec_max.max(self.rec);
+        self.counters.rec_max = self.counters.rec_max.max(self.rec);
         self.confine()
     }
 
-    fn confine(&mut self) -> Option<Change> {
+    fn confine(&mut self) -> Option<ErrorStateChange> {
         if self.tec >= BUS_OFF_FROM {
-            return Some(Change::BusOff);
+            return Some(ErrorStateChange::BusOff);
         }
         let was = std::mem::replace(&mut self.passive, self.tec >= PASSIVE_FROM || self.rec >= PASSIVE_FROM);
         match (was, self.passive) {
             (false, true) => {
-                self.counted.passives += 1;
-                Some(Change::Passive)
+                self.counters.passives += 1;
+                Some(ErrorStateChange::Passive)
             }
-            (true, false) => Some(Change::Active),
+            (true, false) => Some(ErrorStateChange::Active),
             _ => None,
         }
     }
 
     /// Goes off the bus; what waits, and `sending`, is dropped.
     pub(super) fn go_off(&mut self, sending: &CanFrame, counts_from_ns: u64) {
-        self.off = Some(Off { counts_from_ns, missing: RECOVERY_SEQUENCES });
-        self.counted.bus_offs += 1;
-        self.counted.dropped_in_bus_off.count(sending);
+        self.bus_off = Some(BusOffRecovery { counts_from_ns, missing: RECOVERY_SEQUENCES });
+        self.counters.bus_offs += 1;
+        self.counters.dropped_in_bus_off.count(sending);
         for queued in self.waiting.drain(..) {
-            self.counted.dropped_in_bus_off.count(&queued.frame);
+            self.counters.dropped_in_bus_off.count(&queued.frame);
         }
     }
 
-    /// Comes back as a new one.
+    /// Recovers, with counters at 0.
     pub(super) fn come_back(&mut self) {
-        (self.off, self.tec, self.rec, self.passive, self.suspended_until_ns) = (None, 0, 0, false, 0);
+        (self.bus_off, self.tec, self.rec, self.passive, self.suspended_until_ns) = (None, 0, 0, false, 0);
     }
 
-    /// The error frame that tells the node's programs.
-    pub(super) fn tell(&self, change: Change) -> CanFrame {
+    /// The error frame that reports a change to the node's programs.
+    pub(super) fn error_frame(&self, change: ErrorStateChange) -> CanFrame {
         let (class, detail) = match change {
-            Change::Passive if self.tec >= PASSIVE_FROM => (CLASS_CONTROLLER, SENDER_PASSIVE),
-            Change::Passive => (CLASS_CONTROLLER, RECEIVER_PASSIVE),
-            Change::Active => (CLASS_CONTROLLER, ACTIVE_AGAIN),
-            Change::BusOff => (CLASS_BUS_OFF, 0),
-            Change::Restarted => (CLASS_RESTARTED, 0),
+            ErrorStateChange::Passive if self.tec >= PASSIVE_FROM => (CLASS_CONTROLLER, SENDER_PASSIVE),
+            ErrorStateChange::Passive => (CLASS_CONTROLLER, RECEIVER_PASSIVE),
+            ErrorStateChange::Active => (CLASS_CONTROLLER, ACTIVE_AGAIN),
+            ErrorStateChange::BusOff => (CLASS_BUS_OFF, 0),
+            ErrorStateChange::Restarted => (CLASS_RESTARTED, 0),
         };
         let count = |counter: u32| u8::try_from(counter).unwrap_or(u8::MAX);
         let data = [0, detail, 0, 0, 0, 0, count(self.tec), count(self.rec)];
@@ -220,19 +220,19 @@ mod tests {
     fn sixteen_errors_make_a_sender_passive_and_thirty_two_put_it_off() {
         let mut node = Node::default();
         let changes: Vec<_> = (1..=32).filter_map(|n| node.has_failed().map(|change| (n, change))).collect();
-        assert_eq!(changes, [(16, Change::Passive), (32, Change::BusOff)]);
-        assert_eq!(node.counted.tec_max, 256);
+        assert_eq!(changes, [(16, ErrorStateChange::Passive), (32, ErrorStateChange::BusOff)]);
+        assert_eq!(node.counters.tec_max, 256);
     }
 
     #[test]
     fn good_frames_bring_a_passive_node_back() {
         let mut sender = Node::default();
         (0..16).for_each(|_| _ = sender.has_failed());
-        assert_eq!(sender.has_sent(), Some(Change::Active));
+        assert_eq!(sender.has_sent(), Some(ErrorStateChange::Active));
         let mut receiver = Node::default();
         let passive = (0..200).filter_map(|_| receiver.has_seen_failure()).count();
         assert_eq!((passive, receiver.passive, receiver.rec), (1, true, 200));
-        assert_eq!(receiver.has_received(), Some(Change::Active));
+        assert_eq!(receiver.has_received(), Some(ErrorStateChange::Active));
         assert_eq!(receiver.rec, REC_AFTER_PASSIVE);
     }
 
@@ -240,11 +240,11 @@ mod tests {
     fn error_frames_are_those_of_socketcan() {
         let mut node = Node::default();
         (0..16).for_each(|_| _ = node.has_failed());
-        assert_eq!(node.tell(Change::Passive).to_string(), "20000204#0020000000008000");
+        assert_eq!(node.error_frame(ErrorStateChange::Passive).to_string(), "20000204#0020000000008000");
         (0..16).for_each(|_| _ = node.has_failed());
-        assert_eq!(node.tell(Change::BusOff).to_string(), "20000240#000000000000FF00");
+        assert_eq!(node.error_frame(ErrorStateChange::BusOff).to_string(), "20000240#000000000000FF00");
         node.come_back();
-        assert_eq!(node.tell(Change::Restarted).to_string(), "20000300#0000000000000000");
+        assert_eq!(node.error_frame(ErrorStateChange::Restarted).to_string(), "20000300#0000000000000000");
     }
 
     #[test]
@@ -257,6 +257,6 @@ mod tests {
         assert_eq!(order, [2, 4, 1, 3]);
         let taken = (0..100).filter(|n| node.enqueue(Queued::new(CanFrame::new(1, &[]), *n, 0))).count();
         assert_eq!(taken, QUEUE_FRAMES);
-        assert_eq!(node.counted.dropped_at_full_queue.by_name()["001"], 36);
+        assert_eq!(node.counters.dropped_at_full_queue.by_name()["001"], 36);
     }
 }

@@ -29,7 +29,7 @@ pub struct ArrivalReport {
     pub release_jitter_ns: Option<u64>,
 }
 
-/// What was seen of one identifier.
+/// Figures of one identifier.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct IdentifierReport {
@@ -47,7 +47,7 @@ pub struct IdentifierReport {
     pub arrivals: ArrivalReport,
 }
 
-/// What became of one node.
+/// Figures of one node.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct NodeReport {

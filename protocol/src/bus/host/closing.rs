@@ -24,7 +24,7 @@ impl Host {
         if let Some(to_ns) = wire_to_ns {
             self.advance_wire(to_ns + LAST_FRAMES_NS)?;
         }
-        self.let_all_go();
+        self.release_all();
         peers.into_iter().for_each(|id| self.remove(id));
         for (place, on_wire_by_then) in self.gone.drain(..) {
             self.report.peers[place].after_it_left.add_difference(&self.report.on_wire, &on_wire_by_then);

@@ -1,6 +1,6 @@
 //! The host over a wire that keeps time: what the model says happened is carried out, in real time and in lockstep.
 
-use super::{ForRig, GONE, Host, RIG_HERE, Sent};
+use super::{ForRig, GONE, Host, RIG_HERE, SendOutcome};
 use crate::bus::lockstep::{PeerId, Release};
 use crate::bus::timed::TimedWire;
 use crate::can::{CanFrame, ERROR_FLAG};
@@ -22,7 +22,7 @@ impl Host {
         for event in events.drain(..) {
             let ended_ns = match &event {
                 WireEvent::Delivered { ended_ns, .. } => Some(*ended_ns),
-                WireEvent::Told { .. } => None,
+                WireEvent::ErrorFrame { .. } => None,
             };
             self.happen(event);
             if let (Some(ended_ns), Some(timed)) = (ended_ns, &mut self.timed) {
@@ -40,15 +40,15 @@ impl Host {
         let begins_ns = u64::from(release.cycle) * CYCLE_NS;
         // The rig speaks as its cycle begins; the others when they have heard it.
         let enters_ns = if members_turn { begins_ns } else { timed.model.now_ns() };
-        let mut beside = Vec::new();
+        let mut error_frames = Vec::new();
         for (frame, from) in &release.frames {
             if frame.raw_id() & ERROR_FLAG == 0 {
                 timed.enter(*from, frame, enters_ns);
             } else {
-                beside.push((*frame, *from));
+                error_frames.push((*frame, *from));
             }
         }
-        beside.iter().for_each(|(frame, from)| self.deliver(frame, *from, &[]));
+        error_frames.iter().for_each(|(frame, from)| self.deliver(frame, *from, &[]));
         if members_turn {
             self.carry_rigs_frames(release, begins_ns);
         } else {
@@ -102,7 +102,7 @@ impl Host {
                 let deaf: Vec<PeerId> = deaf.into_iter().filter_map(|node| timed.peer_of(node)).collect();
                 self.deliver(&frame, from, &deaf);
             }
-            WireEvent::Told { node, frame, .. } => {
+            WireEvent::ErrorFrame { node, frame, .. } => {
                 let Some(peer) = timed.peer_of(node) else { return };
                 self.tell_of_error(peer, &frame);
             }
@@ -119,7 +119,7 @@ impl Host {
         let Some(peer) = self.peers.get_mut(&id) else { return };
         if in_barrier {
             peer.post(&frame.to_bytes());
-        } else if matches!(peer.send(&frame.to_bytes()), Sent::Dropped) {
+        } else if matches!(peer.send(&frame.to_bytes()), SendOutcome::Dropped) {
             self.report.peers[peer.report].dropped_at_queue.count(frame);
         }
     }

@@ -16,8 +16,8 @@ pub(super) struct Peer {
     stopped_reading: bool,
 }
 
-/// What became of a packet for a peer.
-pub(super) enum Sent {
+/// Outcome of sending a packet to a peer.
+pub(super) enum SendOutcome {
     /// Its queue took it.
     Delivered,
     /// Its queue was full.
@@ -32,11 +32,11 @@ impl Peer {
     }
 
     /// Sends without blocking.
-    pub(super) fn send(&self, bytes: &[u8]) -> Sent {
+    pub(super) fn send(&self, bytes: &[u8]) -> SendOutcome {
         match rustix::net::send(&self.socket, bytes, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
-            Ok(_) => Sent::Delivered,
-            Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => Sent::Gone,
-            Err(_) => Sent::Dropped,
+            Ok(_) => SendOutcome::Delivered,
+            Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => SendOutcome::Gone,
+            Err(_) => SendOutcome::Dropped,
         }
     }
 

@@ -1,4 +1,4 @@
-//! What can be done to a frame: the kinds of wire faults with their numbers, and their draws.
+//! Kinds of wire faults with their parameters, and their random draws.
 
 use crate::can::CanFrame;
 use crate::frames::{ALIVE_RANGE, Frame};
@@ -126,15 +126,15 @@ impl WireFault {
         }
     }
 
-    /// What it makes of a frame; the same for faults that change none.
-    pub(super) fn change(&self, frame: &CanFrame, draw: &mut Draw) -> CanFrame {
+    /// The frame as the fault changes it; faults that change none return it as it is.
+    pub(super) fn change(&self, frame: &CanFrame, rng: &mut FaultRng) -> CanFrame {
         let mut data = [0; 8];
         let length = frame.data().len();
         data[..length].copy_from_slice(frame.data());
         match *self {
             Self::Corruption { bits, .. } if length > 0 => {
                 for _ in 0..bits {
-                    let bit = draw.below(8 * length as u64) as usize;
+                    let bit = rng.below(8 * length as u64) as usize;
                     data[bit / 8] ^= 1 << (bit % 8);
                 }
                 CanFrame::from_raw(frame.raw_id(), &data[..length])
@@ -160,9 +160,9 @@ fn with_counter_off(frame: &CanFrame, step: u8) -> Option<CanFrame> {
     decoded.encode().ok()
 }
 
-pub(super) struct Draw(Pcg64Mcg);
+pub(super) struct FaultRng(Pcg64Mcg);
 
-impl Draw {
+impl FaultRng {
     pub(super) fn new(seed: u64) -> Self {
         Self(Pcg64Mcg::seed_from_u64(seed))
     }

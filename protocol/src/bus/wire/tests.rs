@@ -22,32 +22,32 @@ fn sensors(alive: u8) -> CanFrame {
 }
 
 /// Counters of the sensors that come out when so many go in, one each millisecond.
-fn out(wire: &mut Wire, count: u8) -> Vec<Fate> {
-    let mut fates = Vec::new();
+fn out(wire: &mut Wire, count: u8) -> Vec<FrameOutcome> {
+    let mut outcomes = Vec::new();
     for alive in 0..count {
         let now_ns = u64::from(alive) * MS_NS;
-        wire.pass_time(now_ns, &mut fates);
-        wire.pass(&sensors(alive % 16), FROM, &[], now_ns, &mut fates);
+        wire.release_due(now_ns, &mut outcomes);
+        wire.pass(&sensors(alive % 16), FROM, &[], now_ns, &mut outcomes);
     }
-    fates
+    outcomes
 }
 
-fn counters(fates: &[Fate]) -> Vec<u8> {
-    let alive = |fate: &Fate| match fate {
-        Fate::Carried { frame, .. } => match Frame::decode(frame) {
+fn counters(outcomes: &[FrameOutcome]) -> Vec<u8> {
+    let alive = |outcome: &FrameOutcome| match outcome {
+        FrameOutcome::Carried { frame, .. } => match Frame::decode(frame) {
             Ok(Frame::DriveSensors(sensors)) => Some(sensors.alive),
             _ => None,
         },
         _ => None,
     };
-    fates.iter().filter_map(alive).collect()
+    outcomes.iter().filter_map(alive).collect()
 }
 
 fn lost_of_ten_thousand(loss: f64, seed: u64) -> Vec<bool> {
     let mut wire = Wire::new(&WireOptions { loss, seed, timing: None });
-    let mut fates = Vec::new();
-    (0..10_000).for_each(|_| wire.pass(&sensors(0), FROM, &[], 0, &mut fates));
-    fates.iter().map(|fate| matches!(fate, Fate::Lost(_))).collect()
+    let mut outcomes = Vec::new();
+    (0..10_000).for_each(|_| wire.pass(&sensors(0), FROM, &[], 0, &mut outcomes));
+    outcomes.iter().map(|outcome| matches!(outcome, FrameOutcome::Lost(_))).collect()
 }
 
 #[test]
@@ -66,8 +66,8 @@ fn a_fault_concerns_its_own_frames_and_ends_when_told() {
     let mut wire = with(WireFault::Loss { probability: 1.0 }, Frames::Id(0x121));
     assert_eq!(counters(&out(&mut wire, 3)), [0, 1, 2]);
     let mut wire = with(WireFault::Loss { probability: 1.0 }, Frames::Id(0x120));
-    assert_eq!(out(&mut wire, 2), [Fate::Lost(sensors(0)), Fate::Lost(sensors(1))]);
-    assert_eq!(wire.met["bus-loss"].by_name()["120"], 2);
+    assert_eq!(out(&mut wire, 2), [FrameOutcome::Lost(sensors(0)), FrameOutcome::Lost(sensors(1))]);
+    assert_eq!(wire.frames_by_fault["bus-loss"].by_name()["120"], 2);
     assert!(wire.orders().give(WireOrder::End { number: 9 }));
     wire.take_orders(0, &mut Vec::new());
     assert!(wire.is_plain());
@@ -76,12 +76,12 @@ fn a_fault_concerns_its_own_frames_and_ends_when_told() {
 #[test]
 fn what_is_delayed_comes_in_its_order_and_what_is_held_at_the_end_goes_on() {
     let mut wire = with(WireFault::Delay { delay_ms: 3 }, Frames::All);
-    let mut fates = out(&mut wire, 5);
-    assert_eq!(counters(&fates), [0, 1], "those of 0 and 1 ms are due by 4 ms");
-    assert_eq!(wire.patience_ns(4 * MS_NS), Some(MS_NS));
+    let mut outcomes = out(&mut wire, 5);
+    assert_eq!(counters(&outcomes), [0, 1], "those of 0 and 1 ms are due by 4 ms");
+    assert_eq!(wire.longest_sleep_ns(4 * MS_NS), Some(MS_NS));
     assert!(wire.orders().give(WireOrder::End { number: 9 }));
-    wire.take_orders(0, &mut fates);
-    assert_eq!(counters(&fates), [0, 1, 2, 3, 4]);
+    wire.take_orders(0, &mut outcomes);
+    assert_eq!(counters(&outcomes), [0, 1, 2, 3, 4]);
     assert!(wire.is_plain());
 }
 
@@ -107,7 +107,7 @@ fn a_frame_that_is_held_comes_with_its_copies() {
             assert!(wire.orders().give(begin));
             wire.take_orders(0, &mut Vec::new());
             assert_eq!(counters(&out(&mut wire, 4)), expected, "{first:?}, then {second:?}");
-            assert_eq!(wire.met["bus-duplication"].by_name()["120"], 4);
+            assert_eq!(wire.frames_by_fault["bus-duplication"].by_name()["120"], 4);
         }
     }
 }
@@ -117,10 +117,10 @@ fn a_corrupted_frame_is_one_that_the_checksum_finds_and_a_wrong_counter_is_not()
     let command = ValveCommand { opening: 1.0, alive: 15, echo: 7, enable: true };
     let frame = Frame::DriveValveCommand(command).encode().unwrap();
     let changed = |fault: WireFault| {
-        let (mut wire, mut fates) = (with(fault, Frames::All), Vec::new());
-        wire.pass(&frame, FROM, &[], 0, &mut fates);
-        match &fates[..] {
-            [Fate::Carried { frame, .. }] => *frame,
+        let (mut wire, mut outcomes) = (with(fault, Frames::All), Vec::new());
+        wire.pass(&frame, FROM, &[], 0, &mut outcomes);
+        match &outcomes[..] {
+            [FrameOutcome::Carried { frame, .. }] => *frame,
             other => panic!("{other:?}"),
         }
     };
@@ -140,7 +140,7 @@ fn a_babbling_node_says_so_many_frames_in_a_millisecond() {
     let mut babbled = Vec::new();
     (1..=10).for_each(|ms| wire.babble(ms * MS_NS, &mut babbled));
     assert_eq!(babbled, vec![CanFrame::new(0x10, &[0; 4]); 25]);
-    assert_eq!(wire.patience_ns(0), Some(MS_NS));
+    assert_eq!(wire.longest_sleep_ns(0), Some(MS_NS));
     babbled.clear();
     wire.babble(u64::MAX / 2, &mut babbled);
     assert_eq!(babbled.len(), 200, "a pause is not caught up without bounds");
@@ -149,12 +149,12 @@ fn a_babbling_node_says_so_many_frames_in_a_millisecond() {
 #[test]
 fn a_node_off_the_bus_is_not_heard_and_hears_nothing() {
     let mut wire = with(WireFault::BusOff { node: WireNode::Rig }, Frames::All);
-    let mut fates = Vec::new();
+    let mut outcomes = Vec::new();
     let other = CanFrame::new(0x110, &[0; 5]);
-    wire.pass(&other, 7, &[1], 0, &mut fates);
-    wire.note_speaker(&sensors(0), FROM);
-    wire.pass(&other, 7, &[1], 0, &mut fates);
-    wire.pass(&sensors(0), FROM, &[], 0, &mut fates);
-    let carried = |deaf: &[PeerId]| Fate::Carried { frame: other, from: 7, deaf: deaf.to_vec() };
-    assert_eq!(fates, [carried(&[1]), carried(&[1, FROM]), Fate::Lost(sensors(0))]);
+    wire.pass(&other, 7, &[1], 0, &mut outcomes);
+    wire.learn_node(&sensors(0), FROM);
+    wire.pass(&other, 7, &[1], 0, &mut outcomes);
+    wire.pass(&sensors(0), FROM, &[], 0, &mut outcomes);
+    let carried = |deaf: &[PeerId]| FrameOutcome::Carried { frame: other, from: 7, deaf: deaf.to_vec() };
+    assert_eq!(outcomes, [carried(&[1]), carried(&[1, FROM]), FrameOutcome::Lost(sensors(0))]);
 }

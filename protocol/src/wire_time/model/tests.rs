@@ -30,14 +30,16 @@ fn run(model: &mut WireModel, to_ns: u64) -> Vec<WireEvent> {
 fn delivered(events: &[WireEvent]) -> Vec<(u32, NodeId, u64)> {
     let of = |event: &WireEvent| match event {
         WireEvent::Delivered { frame, from, ended_ns, .. } => Some((frame.raw_id(), *from, *ended_ns)),
-        WireEvent::Told { .. } => None,
+        WireEvent::ErrorFrame { .. } => None,
     };
     events.iter().filter_map(of).collect()
 }
 
 fn reported(events: &[WireEvent], whom: NodeId) -> Vec<(u32, u64)> {
     let of = |event: &WireEvent| match event {
-        WireEvent::Told { node, frame, at_ns } if *node == whom => Some((frame.raw_id() & 0x1FF, *at_ns)),
+        WireEvent::ErrorFrame { node, frame, at_ns } if *node == whom => {
+            Some((frame.raw_id() & 0x1FF, *at_ns))
+        }
         _ => None,
     };
     events.iter().filter_map(of).collect()
@@ -91,7 +93,7 @@ fn frames_of_one_identifier_keep_their_order() {
         .iter()
         .filter_map(|event| match event {
             WireEvent::Delivered { frame, .. } => Some(frame.data()[0]),
-            WireEvent::Told { .. } => None,
+            WireEvent::ErrorFrame { .. } => None,
         })
         .collect();
     assert_eq!(data, [0, 1, 2, 3, 4]);
