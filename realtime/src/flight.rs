@@ -63,7 +63,7 @@ pub trait Stamped {
     fn at_ns(&self) -> u64;
 }
 
-/// What happened.
+/// Kind of an event, and its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// A cycle woke late.
@@ -111,10 +111,10 @@ impl fmt::Display for Severity {
     }
 }
 
-/// What freezes the ring.
+/// An event that freezes the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trigger {
-    /// What happened.
+    /// Its kind and size.
     pub severity: Severity,
     /// Cycle in which it was noticed.
     pub cycle: u64,
@@ -134,7 +134,7 @@ impl Trigger {
     }
 }
 
-/// From when on a cycle is worth a dump.
+/// Limits beyond which a cycle triggers a dump.
 #[derive(Clone, Copy, Debug)]
 pub struct Lateness {
     /// Longest wake-up latency and longest execution that are not.
@@ -163,10 +163,10 @@ impl Lateness {
     }
 }
 
-/// What is handed out.
+/// The window around an event.
 #[derive(Debug)]
 pub struct Dump<'a, R, F> {
-    /// What names it.
+    /// Its most severe trigger, which names it.
     pub trigger: Trigger,
     /// Start of the window.
     pub from: Instant,
@@ -180,7 +180,7 @@ pub struct Dump<'a, R, F> {
     pub replaces: Option<Trigger>,
 }
 
-/// What is being waited for.
+/// A window that is not over yet.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
     trigger: Trigger,
@@ -188,11 +188,12 @@ struct Pending {
     to: Instant,
 }
 
-/// Where a dump goes.
-enum Room {
+/// Whether there is a place for a dump.
+enum DumpSlot {
     Free,
-    InPlaceOf(Trigger),
-    None,
+    /// The dump of this less severe trigger is removed for it.
+    Replaces(Trigger),
+    Full,
 }
 
 /// Rows of the last seconds, from which the window around an event is taken.
@@ -259,10 +260,10 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
 
     fn hand_out(&mut self, pending: Pending, write: &mut impl FnMut(Dump<'_, R, F>)) {
         let Pending { trigger, from, to } = pending;
-        let replaces = match self.make_room(&trigger) {
-            Room::Free => None,
-            Room::InPlaceOf(less_severe) => Some(less_severe),
-            Room::None => return,
+        let replaces = match self.find_slot(&trigger) {
+            DumpSlot::Free => None,
+            DumpSlot::Replaces(less_severe) => Some(less_severe),
+            DumpSlot::Full => return,
         };
         self.kept.push(trigger);
         let within = |at_ns: u64| (from.as_nanos()..=to.as_nanos()).contains(&at_ns);
@@ -273,18 +274,18 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
         write(Dump { trigger, from, to, rows, frames, replaces });
     }
 
-    fn make_room(&mut self, trigger: &Trigger) -> Room {
+    fn find_slot(&mut self, trigger: &Trigger) -> DumpSlot {
         if self.kept.len() < MOST_DUMPS {
-            return Room::Free;
+            return DumpSlot::Free;
         }
         self.dropped += 1;
         // Of equals the newest goes: what began a trouble tells more than its hundredth repetition.
         let least = self.kept.iter().enumerate().rev().min_by_key(|(_, kept)| kept.severity.rank());
         match least.map(|(place, kept)| (place, kept.severity)) {
             Some((place, severity)) if severity.rank() < trigger.severity.rank() => {
-                Room::InPlaceOf(self.kept.remove(place))
+                DumpSlot::Replaces(self.kept.remove(place))
             }
-            _ => Room::None,
+            _ => DumpSlot::Full,
         }
     }
 

@@ -106,7 +106,7 @@ impl Serialize for Recorder {
     }
 }
 
-/// What a report says of a distribution; in the unit of the samples. Nothing was measured: `None`, in JSON `null`.
+/// Percentiles of a distribution, in the unit of the samples; `None`, in JSON `null`, without samples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Percentiles {
     /// Half of the samples were at most this.

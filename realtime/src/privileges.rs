@@ -36,7 +36,7 @@ pub const FIFO_PRIORITIES: RangeInclusive<u8> = 1..=99;
 const DMA_LATENCY_FILE: &str = "/dev/cpu_dma_latency";
 const ONLINE_CPUS_FILE: &str = "/sys/devices/system/cpu/online";
 
-/// What a thread would like to have.
+/// Real-time settings that a thread requests.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Request {
     /// SCHED_FIFO with this priority, 1 to 99, for the calling thread.
@@ -127,14 +127,14 @@ impl From<&str> for Grant {
 
 stored_as_text!(Grant);
 
-/// What the system gave, and what it refused. Dropping it gives the DMA latency back; the rest stays.
+/// Granted and refused requests. Dropping it gives the DMA latency back; the rest stays.
 #[derive(Debug, Default)]
 pub struct Grants {
     /// Keeps the CPUs out of deep sleep while it is open.
     dma_latency: Option<File>,
-    /// What was given, for the run's record.
+    /// Granted requests, for the run's record.
     pub granted: Vec<Grant>,
-    /// What was refused, to be shown to a person.
+    /// Refused requests, to be shown to a person.
     pub refusals: Vec<Refusal>,
 }
 
@@ -150,11 +150,11 @@ impl Grants {
 /// Something that the system did not give. Displays as one line that a person can act on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// What was asked for.
+    /// Refused request.
     pub what: &'static str,
     /// Why it was not given.
     pub reason: String,
-    /// What a person can do about it.
+    /// Remedy for a person.
     pub remedy: &'static str,
 }
 

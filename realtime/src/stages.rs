@@ -26,7 +26,7 @@
 //! account.log_to(IntervalLog::create("controller-drive.hlog".as_ref(), unix_s, MonotonicClock.now())?);
 //! while let Some(row) = next_row() {
 //!     account.record(&row)?;
-//!     account.record_further(answered, 12_000);
+//!     account.record_extra(answered, 12_000);
 //! }
 //! account.advance(MonotonicClock.now())?; // at each poll: writes a second that is over though nothing newer came
 //! let figures = account.finish(MonotonicClock.now())?;
@@ -104,9 +104,9 @@ pub struct StageFigures {
     pub period_error_ns: Percentiles,
 }
 
-/// A histogram that a process added to the usual ones.
+/// Handle of a histogram that a process added by [`StageAccount::add`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Further(usize);
+pub struct ExtraHistogram(usize);
 
 /// Places in the account.
 #[derive(Clone, Copy)]
@@ -140,9 +140,9 @@ impl StageAccount {
     }
 
     /// Adds a histogram under a tag of its own.
-    pub fn add(&mut self, tag: &str) -> Further {
+    pub fn add(&mut self, tag: &str) -> ExtraHistogram {
         self.recorders.push(TaggedRecorder::new(tag.into()));
-        Further(self.recorders.len() - 1)
+        ExtraHistogram(self.recorders.len() - 1)
     }
 
     /// Writes everything recorded from now on to `log`, a second at a time.
@@ -203,14 +203,14 @@ impl StageAccount {
     }
 
     /// Records a sample of a histogram that was added.
-    pub fn record_further(&mut self, further: Further, ns: u64) {
-        self.recorders[further.0].record(ns);
+    pub fn record_extra(&mut self, extra: ExtraHistogram, ns: u64) {
+        self.recorders[extra.0].record(ns);
     }
 
     /// Percentiles of a histogram that was added.
     #[must_use]
-    pub fn further(&self, further: Further) -> Percentiles {
-        self.recorders[further.0].percentiles()
+    pub fn extra_percentiles(&self, extra: ExtraHistogram) -> Percentiles {
+        self.recorders[extra.0].percentiles()
     }
 
     /// Writes a second that has been over for a while: asked at each poll, for when no newer cycle comes.

@@ -4,7 +4,7 @@
 //! tested exactly. It does the three things that real clocks and real schedulers do to a loop:
 //!
 //! - *drift*: it runs fast or slow by a fixed rate against true time;
-//! - *wobble*: wake-ups come late, as a script or a seed says;
+//! - *jitter*: wake-ups come late, as a script or a seed says;
 //! - *step*: its reading jumps.
 //!
 //! ```text
@@ -35,12 +35,12 @@ pub struct VirtualClock {
     drift_ppb: i64,
     true_ns: Cell<u64>,
     stepped_ns: Cell<i64>,
-    wobble: Wobble,
+    jitter: WakeupJitter,
 }
 
 /// How late each wake-up comes.
 #[derive(Debug)]
-enum Wobble {
+enum WakeupJitter {
     None,
     Scripted { late: Vec<Duration>, next: Cell<usize> },
     Seeded { state: Cell<u64>, most_ns: u64 },
@@ -59,7 +59,7 @@ impl VirtualClock {
             drift_ppb: 0,
             true_ns: Cell::new(0),
             stepped_ns: Cell::new(0),
-            wobble: Wobble::None,
+            jitter: WakeupJitter::None,
         }
     }
 
@@ -82,14 +82,14 @@ impl VirtualClock {
     ///
     /// Lateness counts from the deadline or, when that has passed, from the time of the call.
     pub fn with_late_wakeups(mut self, late: impl Into<Vec<Duration>>) -> Self {
-        self.wobble = Wobble::Scripted { late: late.into(), next: Cell::new(0) };
+        self.jitter = WakeupJitter::Scripted { late: late.into(), next: Cell::new(0) };
         self
     }
 
     /// Lets each wait wake late by something between zero and `most`, the same for the same seed.
-    pub fn with_seeded_wobble(mut self, seed: u64, most: Duration) -> Self {
-        let most_ns = u64::try_from(most.as_nanos()).expect("a wobble stays below 584 years");
-        self.wobble = Wobble::Seeded { state: Cell::new(seed), most_ns };
+    pub fn with_seeded_jitter(mut self, seed: u64, most: Duration) -> Self {
+        let most_ns = u64::try_from(most.as_nanos()).expect("the jitter stays below 584 years");
+        self.jitter = WakeupJitter::Seeded { state: Cell::new(seed), most_ns };
         self
     }
 
@@ -148,7 +148,7 @@ impl Clock for VirtualClock {
     }
 
     fn wait_until(&self, deadline: Instant) {
-        let late = self.wobble.next_lateness();
+        let late = self.jitter.next_lateness();
         self.run_to(deadline.max(self.now()) + late);
     }
 
@@ -159,7 +159,7 @@ impl Clock for VirtualClock {
     }
 }
 
-impl Wobble {
+impl WakeupJitter {
     fn next_lateness(&self) -> Duration {
         match self {
             Self::None => Duration::ZERO,
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn a_seed_gives_the_same_wobble_again_and_stays_within_its_bound() {
         let readings = |seed| {
-            let clock = VirtualClock::new().with_seeded_wobble(seed, MS);
+            let clock = VirtualClock::new().with_seeded_jitter(seed, MS);
             (1..100_u32)
                 .map(|n| {
                     let deadline = Instant::from_nanos(0) + n * 10 * MS;

@@ -92,7 +92,7 @@ impl VitalsReader {
         reader
     }
 
-    /// What was counted since the last reading, or since [`VitalsReader::new`].
+    /// Counts since the last reading, or since [`VitalsReader::new`].
     pub fn read(&mut self) -> VitalCounts {
         let now = self.absolute();
         let before = std::mem::replace(&mut self.last, now);

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::clock::{Clock, Instant, MonotonicClock};
 
-/// What counts as a step.
+/// Smallest change that counts as a step.
 const LEAST_STEP_NS: u64 = 1_000_000;
 /// A bracket as tight as this is good at once.
 const TIGHT_NS: u64 = 20_000;

@@ -94,7 +94,7 @@ fn a_watch_in_a_watch_ends_with_the_outer_one() {
 #[test]
 fn a_loop_of_thousands_of_cycles_allocates_nothing_for_any_wobble() {
     let _turn = counter_for_this_test_alone();
-    let clock = VirtualClock::new().with_seeded_wobble(1, Duration::from_micros(2500));
+    let clock = VirtualClock::new().with_seeded_jitter(1, Duration::from_micros(2500));
     let period = Duration::from_millis(1);
     let config =
         PeriodicConfig { period, policy: OverrunPolicy::CatchUp, spin: Some(Duration::from_micros(100)) };

@@ -145,7 +145,7 @@ fn stopping_names_the_first_missed_cycle_and_stays_stopped() {
 #[test]
 fn each_cycle_that_was_due_is_recorded_once_for_any_wobble() {
     for seed in 0..100 {
-        let mut periodic = catching_up(VirtualClock::new().with_seeded_wobble(seed, 3 * MS));
+        let mut periodic = catching_up(VirtualClock::new().with_seeded_jitter(seed, 3 * MS));
         let mut expected_index = 0;
         let mut last = None;
         for _ in 0..500 {

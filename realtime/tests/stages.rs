@@ -161,10 +161,10 @@ fn a_second_is_written_though_nothing_newer_comes() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("controller.hlog");
     let mut account = StageAccount::new("controller", PERIOD);
-    let further = account.add("controller-answer");
+    let extra = account.add("controller-answer");
     account.log_to(IntervalLog::create(&path, 0.0, Instant::from_nanos(0)).expect("made"));
     account.record_waited(5_000_000, 5_010_000);
-    account.record_further(further, 7);
+    account.record_extra(extra, 7);
     account.advance(Instant::from_nanos(1_100_000_000)).expect("written");
     assert!(lines(&path).is_empty(), "rows may still be in the queue");
     account.advance(Instant::from_nanos(1_300_000_000)).expect("written");
@@ -172,5 +172,5 @@ fn a_second_is_written_though_nothing_newer_comes() {
         lines(&path).keys().collect::<Vec<_>>(),
         ["controller-answer", "controller-completion", "controller-wakeup"]
     );
-    assert_eq!(account.further(further).max, Some(7));
+    assert_eq!(account.extra_percentiles(extra).max, Some(7));
 }

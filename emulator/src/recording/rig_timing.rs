@@ -6,7 +6,7 @@ use crate::event::Event;
 use crate::exchange::{AxisCycle, RoundTrip, TimingRecord};
 use plant::Axis;
 use protocol::frames::{MessageSpec, RIG_STATUS};
-use realtime::stages::Further;
+use realtime::stages::ExtraHistogram;
 use realtime::{Percentiles, WallClockStep, WallClockWatch};
 use runlog::candump::FrameRecord;
 use runlog::process::Process;
@@ -36,10 +36,10 @@ pub(crate) struct RigTimingReport {
 
 pub(crate) struct RigTiming {
     pub(super) recorder: TimingRecorder,
-    round_trip: [Further; 2],
+    round_trip: [ExtraHistogram; 2],
     /// Round trips of cycles whose rows are still to come.
     trips: VecDeque<RoundTrip>,
-    command_age: [Further; 2],
+    command_age: [ExtraHistogram; 2],
     ages: CommandAges,
     wall_clock: WallClockWatch,
     steps: Vec<WallClockStep>,
@@ -78,7 +78,7 @@ impl RigTiming {
         self.record_trips(row.cycle);
         for (axis, cycle) in axes.iter().enumerate() {
             if let Some(ns) = cycle.age_ns(row.due_ns) {
-                self.recorder.account.record_further(self.command_age[axis], ns);
+                self.recorder.account.record_extra(self.command_age[axis], ns);
             }
             if cycle.age_cycles > 0 {
                 let ages = if axis == 0 { &mut self.ages.drive } else { &mut self.ages.load };
@@ -96,7 +96,7 @@ impl RigTiming {
     /// Records the round trips up to this cycle.
     fn record_trips(&mut self, cycle: u64) {
         while let Some(RoundTrip { axis, ns, .. }) = self.trips.pop_front_if(|trip| trip.cycle <= cycle) {
-            self.recorder.account.record_further(self.round_trip[axis], ns);
+            self.recorder.account.record_extra(self.round_trip[axis], ns);
         }
     }
 
@@ -127,7 +127,8 @@ impl RigTiming {
     pub(crate) fn finish(mut self, now: realtime::Instant) -> (RigTimingReport, io::Result<()>) {
         self.record_trips(u64::MAX);
         let written = self.recorder.finish(now);
-        let of = |further: [Further; 2]| further.map(|further| self.recorder.account.further(further));
+        let of =
+            |extras: [ExtraHistogram; 2]| extras.map(|extra| self.recorder.account.extra_percentiles(extra));
         let report = RigTimingReport {
             timing: self.recorder.figures(),
             round_trip_ns: of(self.round_trip),

@@ -5,15 +5,15 @@ use super::*;
 const MS: u64 = 1_000_000;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct At(u64);
+struct Stamp(u64);
 
-impl Stamped for At {
+impl Stamped for Stamp {
     fn at_ns(&self) -> u64 {
         self.0
     }
 }
 
-type Recorder = FlightRecorder<At, At>;
+type Recorder = FlightRecorder<Stamp, Stamp>;
 
 fn overrun(at_ms: u64, late_ms: u64) -> Trigger {
     let severity = Severity::Overrun { ns: late_ms * MS };
@@ -28,26 +28,26 @@ fn at(ms: u64) -> Instant {
 /// A recorder with a row each millisecond up to `ms`.
 fn fed(ms: u64) -> Recorder {
     let mut flight = Recorder::default();
-    (0..=ms).for_each(|ms| flight.row(At(ms * MS)));
+    (0..=ms).for_each(|ms| flight.row(Stamp(ms * MS)));
     flight
 }
 
 #[test]
 fn a_dump_is_handed_out_when_its_window_is_over_and_holds_nothing_else() {
     let mut flight = fed(5000);
-    flight.frame(At(4001 * MS + 1));
-    flight.frame(At(4001 * MS));
-    flight.frame(At(100 * MS));
+    flight.frame(Stamp(4001 * MS + 1));
+    flight.frame(Stamp(4001 * MS));
+    flight.frame(Stamp(100 * MS));
     flight.trigger(overrun(5000, 2));
     flight.advance(at(5299), |dump| panic!("too early: {dump:?}"));
-    (5001..5400).for_each(|ms| flight.row(At(ms * MS)));
-    let mut seen = None;
+    (5001..5400).for_each(|ms| flight.row(Stamp(ms * MS)));
+    let mut dump_seen = None;
     flight.advance(at(5300), |dump| {
         let (first, last) = (*dump.rows[0], *dump.rows[dump.rows.len() - 1]);
         let frames: Vec<_> = dump.frames.iter().map(|frame| frame.0 - 4001 * MS).collect();
-        seen = Some((first, last, dump.rows.len(), frames, dump.replaces));
+        dump_seen = Some((first, last, dump.rows.len(), frames, dump.replaces));
     });
-    assert_eq!(seen, Some((At(3998 * MS), At(5300 * MS), 1303, vec![0, 1], None)));
+    assert_eq!(dump_seen, Some((Stamp(3998 * MS), Stamp(5300 * MS), 1303, vec![0, 1], None)));
     assert_eq!((flight.dumps(), flight.dropped), (1, 0));
     flight.finish(|dump| panic!("handed out twice: {dump:?}"));
 }
@@ -73,7 +73,7 @@ fn an_event_after_a_window_that_nobody_handed_out_yet_begins_one_of_its_own() {
     let mut flight = fed(2000);
     flight.trigger(overrun(2000, 1));
     // Stopped within the window, continued long after it.
-    flight.row(At(7000 * MS));
+    flight.row(Stamp(7000 * MS));
     flight.trigger(overrun(7000, 4900));
     let mut named = Vec::new();
     flight.advance(at(7004), |dump| named.push((dump.trigger.cycle, dump.rows.len())));
@@ -85,7 +85,7 @@ fn an_event_after_a_window_that_nobody_handed_out_yet_begins_one_of_its_own() {
 #[test]
 fn after_a_stall_of_any_length_the_rows_before_it_are_there() {
     let mut flight = fed(3000);
-    flight.row(At(9000 * MS));
+    flight.row(Stamp(9000 * MS));
     flight.trigger(overrun(9000, 6000));
     flight.finish(|dump| {
         assert_eq!(dump.from, at(2000));
@@ -143,9 +143,9 @@ fn of_more_dumps_than_are_kept_the_least_severe_goes() {
 #[test]
 fn the_ring_holds_its_seconds_and_no_more() {
     let mut flight = fed(10_000);
-    (0..100_000).for_each(|ns| flight.frame(At(ns)));
+    (0..100_000).for_each(|ns| flight.frame(Stamp(ns)));
     assert_eq!((flight.rows.len(), flight.frames.len()), (ROWS, FRAMES));
-    assert_eq!(flight.frames.back(), Some(&At(99_999)));
+    assert_eq!(flight.frames.back(), Some(&Stamp(99_999)));
 }
 
 #[test]
