@@ -26,7 +26,7 @@ pub(crate) type FrameBytes = [u8; CAN_FRAME_BYTES];
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SendResult {
     /// The host accepted it.
-    Taken,
+    Accepted,
     /// The host's queue is full.
     Full,
     /// There is no host.
@@ -75,7 +75,7 @@ impl BusPeer {
     pub(crate) fn send(&mut self, frame: &FrameBytes) -> SendResult {
         let Some(socket) = &self.socket else { return SendResult::Down };
         match send(socket, frame, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
-            Ok(_) => SendResult::Taken,
+            Ok(_) => SendResult::Accepted,
             Err(Errno::AGAIN | Errno::NOBUFS | Errno::INTR) => SendResult::Full,
             // The end of the connection is detected where frames are received.
             Err(_) => SendResult::Down,

@@ -209,7 +209,7 @@ pub(crate) fn install() -> io::Result<OwnedFd> {
 mod tests {
     use super::*;
 
-    /// What the filter decides, computed as the kernel's interpreter does for the instructions that occur.
+    /// Decision of the filter, computed as the kernel's interpreter does for the instructions that occur.
     fn decision(number: libc::c_long, arguments: [u64; 6]) -> u32 {
         decision_on(ARCHITECTURE, number, arguments)
     }

@@ -27,7 +27,7 @@ impl Supervisor {
         if kind_and_flags & !(flags | 0xF) != 0 || !(0..CAN_PROTOCOLS).contains(&protocol) {
             return Err(Errno::INVAL);
         }
-        let (wanted, made) = match protocol {
+        let (expected, socket_kind) = match protocol {
             CAN_RAW => (libc::SOCK_RAW, Kind::Raw(RawOptions::default())),
             CAN_BCM => (libc::SOCK_DGRAM, Kind::Bcm(Box::<BroadcastManager>::default())),
             CAN_ISOTP => (libc::SOCK_DGRAM, Kind::Transport(Box::<Transport>::default())),
@@ -40,21 +40,22 @@ impl Supervisor {
                 return Err(Errno::PROTONOSUPPORT);
             }
         };
-        if kind != wanted {
+        if kind != expected {
             return Err(Errno::PROTOTYPE);
         }
-        let injected = self.inject_socket(notification, made, kind_and_flags);
+        let injected = self.inject_socket(notification, socket_kind, kind_and_flags);
         injected.map_err(|error| Errno::from_io_error(&error).unwrap_or(Errno::NOMEM))?;
         Ok(Answer::Deferred)
     }
 
     fn inject_socket(&mut self, notification: &Notification, kind: Kind, flags: i32) -> io::Result<()> {
         let non_blocking = flags & libc::SOCK_NONBLOCK != 0;
-        let (made, theirs) = socket::make(kind, non_blocking, &self.accounts)?;
-        let inode = inode_of(theirs.as_fd()).ok_or_else(|| io::Error::from(io::ErrorKind::OutOfMemory))?;
-        self.add_socket(inode, made)?;
+        let (socket, guest_end) = socket::make(kind, non_blocking, &self.accounting)?;
+        let inode = inode_of(guest_end.as_fd()).ok_or_else(|| io::Error::from(io::ErrorKind::OutOfMemory))?;
+        self.add_socket(inode, socket)?;
         // The guest may use it at once, so it is registered before.
-        let injected = self.listener.inject(notification.id, theirs.as_fd(), flags & libc::SOCK_CLOEXEC != 0);
+        let injected =
+            self.listener.inject(notification.id, guest_end.as_fd(), flags & libc::SOCK_CLOEXEC != 0);
         if injected.is_err() {
             self.remove_socket(inode);
         }

@@ -26,7 +26,7 @@ impl Supervisor {
                     return Ok(Answer::Continue);
                 }
                 (libc::SO_RXQ_OVFL, Some(wanted)) => {
-                    socket.tells_dropped = wanted != 0;
+                    socket.reports_dropped = wanted != 0;
                     return Ok(Answer::Value(0));
                 }
                 // Raw CAN sockets are bound by `bind`; the kernel accepts the option without effect.
@@ -70,7 +70,7 @@ impl Supervisor {
             (libc::SOL_SOCKET, libc::SO_DOMAIN) => number(crate::abi::AF_CAN),
             // The kernel does not store it for CAN.
             (libc::SOL_SOCKET, libc::SO_PROTOCOL) => number(0),
-            (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => number(socket.tells_dropped.into()),
+            (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => number(socket.reports_dropped.into()),
             (libc::SOL_SOCKET, libc::SO_ERROR) => {
                 number(socket.take_error(end.as_fd()).map_or(0, Errno::raw_os_error))
             }

@@ -11,7 +11,7 @@ use crate::abi::{self, u32_at, u64_at};
 use crate::caller::Caller;
 use crate::isotp::LONGEST_PDU;
 use crate::notification::{Answer, Notification};
-use crate::socket::{GuestSocket, Note};
+use crate::socket::{GuestSocket, MessageMetadata};
 use crate::supervisor::Supervisor;
 use crate::transport;
 use rustix::fs::{OFlags, fcntl_getfl};
@@ -43,7 +43,7 @@ pub(crate) struct Message {
     bytes: Vec<u8>,
     /// Control messages of the kernel: time stamps.
     control: Vec<u8>,
-    note: Note,
+    metadata: MessageMetadata,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -254,7 +254,7 @@ fn receive_from(
 
 /// The source address of a message: its interface, and for the transport protocol zeros.
 fn sender(socket: &GuestSocket, message: &Message) -> Vec<u8> {
-    let mut address = abi::address(message.note.interface).to_vec();
+    let mut address = abi::address(message.metadata.interface).to_vec();
     if socket.transport().is_some() {
         address.resize(transport::ADDRESS_BYTES, 0);
     }
@@ -281,14 +281,14 @@ fn receive_one(
     let message = take(socket, end, flags)?;
     let length = message.bytes.len().min(header.room());
     header.scatter(caller, &message.bytes[..length])?;
-    let mut out_flags = message.note.flags as i32 | flags & libc::MSG_CMSG_CLOEXEC;
+    let mut out_flags = message.metadata.flags as i32 | flags & libc::MSG_CMSG_CLOEXEC;
     if length < message.bytes.len() {
         out_flags |= libc::MSG_TRUNC;
     }
     header.write_name(caller, header_at, &sender(socket, &message))?;
     let mut control = message.control.clone();
-    if socket.tells_dropped && message.note.dropped != 0 {
-        control.extend(overflow_message(message.note.dropped));
+    if socket.reports_dropped && message.metadata.dropped != 0 {
+        control.extend(overflow_message(message.metadata.dropped));
     }
     if control.len() > header.control_bytes {
         control.truncate(header.control_bytes);
@@ -346,7 +346,7 @@ fn take(socket: &mut GuestSocket, end: BorrowedFd<'_>, flags: i32) -> Result<Mes
     if let Some(message) = returned {
         return Ok(message);
     }
-    let note = socket.next_note();
+    let metadata = socket.next_metadata();
     let room = if socket.transport().is_some() { LONGEST_MESSAGE } else { LONGEST_OTHER };
     let (bytes, control) = take_bytes(end, room, flags & libc::MSG_PEEK)?;
     if bytes.is_empty() {
@@ -354,10 +354,10 @@ fn take(socket: &mut GuestSocket, end: BorrowedFd<'_>, flags: i32) -> Result<Mes
             // An error is reported once.
             let _ = take_bytes(end, room, 0);
         }
-        return Err(note.and_then(|note| note.error).unwrap_or(Errno::NETDOWN));
+        return Err(metadata.and_then(|metadata| metadata.error).unwrap_or(Errno::NETDOWN));
     }
-    let unknown = Note::new(socket.interface.unwrap_or(0), 0);
-    Ok(Message { bytes, control, note: note.unwrap_or(unknown) })
+    let unknown = MessageMetadata::new(socket.interface.unwrap_or(0), 0);
+    Ok(Message { bytes, control, metadata: metadata.unwrap_or(unknown) })
 }
 
 /// A message with its control messages of the kernel.

@@ -9,7 +9,7 @@ use crate::bus_peer::{FrameBytes, SendResult};
 use crate::caller::Caller;
 use crate::notification::{Answer, Notification};
 use crate::receive::{Header, LONGEST_MESSAGE, LONGEST_OTHER, blocks};
-use crate::socket::{Kind, Note};
+use crate::socket::{Kind, MessageMetadata};
 use crate::supervisor::{Supervisor, wall_clock_ns};
 use crate::transport::SendingCall;
 use rustix::io::Errno;
@@ -190,7 +190,7 @@ impl Supervisor {
             return Err(Errno::INVAL);
         }
         match interface.bus.send(frame) {
-            SendResult::Taken => {}
+            SendResult::Accepted => {}
             SendResult::Full => return Err(Errno::NOBUFS),
             SendResult::Down => return Err(Errno::NETDOWN),
         }
@@ -218,7 +218,10 @@ impl Supervisor {
                     }
                     let local = if from == FrameOrigin::Bus { 0 } else { libc::MSG_DONTROUTE };
                     let flags = (local | if is_own { libc::MSG_CONFIRM } else { 0 }) as u32;
-                    socket.deliver(frame, Note { interface, flags, dropped: 0, stamp_ns, error: None });
+                    socket.deliver(
+                        frame,
+                        MessageMetadata { interface, flags, dropped: 0, stamp_ns, error: None },
+                    );
                 }
                 Kind::Bcm(manager) => manager.take_frame(interface, frame, now, &mut actions),
                 Kind::Transport(_) if is_own => {}
@@ -253,7 +256,7 @@ impl Supervisor {
                     let _ = self.send_frame(inode, interface, &frame);
                 }
                 Action::Notify(interface, message) => {
-                    self.deliver(inode, &message, Note::new(interface, wall_clock_ns()));
+                    self.deliver(inode, &message, MessageMetadata::new(interface, wall_clock_ns()));
                 }
             }
         }

@@ -5,9 +5,9 @@
 //!   guest: write, send      ──► its end ══► the queue ──► here: to the bus, and to the other guests
 //! ```
 //!
-//! Metadata of a queued frame (interface, sender, frames lost before it) do not fit its 16 bytes and are kept here, a [`Note`]
-//! for each frame, in the order of the queue. Native reads are not observed, so the number of valid notes is computed from the
-//! bytes that the kernel accounts as sent and unread.
+//! Metadata of a queued frame (interface, sender, frames lost before it) do not fit its 16 bytes and are kept here, a
+//! [`MessageMetadata`] for each frame, in the order of the queue. Native reads are not observed, so the number of valid entries
+//! is computed from the bytes that the kernel accounts as sent and unread.
 
 #![allow(unsafe_code)] // the ioctl SIOCOUTQ, nothing else
 
@@ -25,14 +25,14 @@ use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 use std::rc::Rc;
 
-/// Number of notes that are kept without checking their validity.
-const FEW_NOTES: usize = 64;
+/// Number of entries of metadata that are kept without checking their validity.
+const FEW_MESSAGES: usize = 64;
 /// Most dropped messages of a queue that are counted.
 const MOST_UNREAD: usize = 10_000;
 
 /// Metadata of a message in a guest's queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Note {
+pub(crate) struct MessageMetadata {
     /// Index of the interface on which it was received.
     pub(crate) interface: u32,
     /// `MSG_DONTROUTE` for a frame of a guest, `MSG_CONFIRM` too for the reader's own.
@@ -45,8 +45,8 @@ pub(crate) struct Note {
     pub(crate) error: Option<Errno>,
 }
 
-impl Note {
-    /// A note without flags and losses.
+impl MessageMetadata {
+    /// Metadata without flags and losses.
     pub(crate) fn new(interface: u32, stamp_ns: u64) -> Self {
         Self { interface, flags: 0, dropped: 0, stamp_ns, error: None }
     }
@@ -67,12 +67,12 @@ pub(crate) struct GuestSocket {
     /// Index of its interface, 0 for any; `None` before `bind`.
     pub(crate) interface: Option<u32>,
     /// Each with the bytes that the kernel accounts to its message.
-    notes: VecDeque<(Note, usize)>,
-    noted_bytes: usize,
-    accounts: Rc<Accounts>,
+    metadata: VecDeque<(MessageMetadata, usize)>,
+    accounted_bytes: usize,
+    accounting: Rc<QueueAccounting>,
     dropped: u32,
     /// Whether `SO_RXQ_OVFL` is on.
-    pub(crate) tells_dropped: bool,
+    pub(crate) reports_dropped: bool,
     /// Time of the last message read, ns, as far as it is known.
     last_stamp_ns: Option<u64>,
     pub(crate) waiting: VecDeque<WaitingCall>,
@@ -86,36 +86,36 @@ pub(crate) struct GuestSocket {
 pub(crate) fn make(
     kind: Kind,
     non_blocking: bool,
-    accounts: &Rc<Accounts>,
+    accounting: &Rc<QueueAccounting>,
 ) -> io::Result<(GuestSocket, OwnedFd)> {
     let flags = if non_blocking { SocketFlags::NONBLOCK } else { SocketFlags::empty() };
-    let (end, theirs) =
+    let (end, guest_end) =
         socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, flags | SocketFlags::CLOEXEC, None)?;
     let socket = GuestSocket {
         end,
         kind,
         interface: None,
-        notes: VecDeque::new(),
-        noted_bytes: 0,
-        accounts: Rc::clone(accounts),
+        metadata: VecDeque::new(),
+        accounted_bytes: 0,
+        accounting: Rc::clone(accounting),
         dropped: 0,
-        tells_dropped: false,
+        reports_dropped: false,
         last_stamp_ns: None,
         waiting: VecDeque::new(),
         returned: VecDeque::new(),
         held: None,
     };
-    Ok((socket, theirs))
+    Ok((socket, guest_end))
 }
 
 /// Bytes that this kernel accounts to a message in a queue of Unix sockets: data, head, rounding. Measured once for each
 /// length.
-pub(crate) struct Accounts {
+pub(crate) struct QueueAccounting {
     pair: (OwnedFd, OwnedFd),
     known: RefCell<BTreeMap<usize, usize>>,
 }
 
-impl Accounts {
+impl QueueAccounting {
     pub(crate) fn new() -> io::Result<Self> {
         let pair = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)?;
         Ok(Self { pair, known: RefCell::default() })
@@ -150,16 +150,16 @@ impl AsFd for GuestSocket {
 
 impl GuestSocket {
     /// Puts a message into the guest's queue. Without room it is dropped and counted, as in the kernel.
-    pub(crate) fn deliver(&mut self, message: &[u8], note: Note) {
-        let note = Note { dropped: self.dropped, ..note };
+    pub(crate) fn deliver(&mut self, message: &[u8], metadata: MessageMetadata) {
+        let metadata = MessageMetadata { dropped: self.dropped, ..metadata };
         match send(&self.end, message, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
             Ok(_) => {
-                if self.notes.len() >= FEW_NOTES && self.notes.len().is_power_of_two() {
+                if self.metadata.len() >= FEW_MESSAGES && self.metadata.len().is_power_of_two() {
                     self.forget_read_notes();
                 }
-                let bytes = self.accounts.of(message);
-                self.notes.push_back((note, bytes));
-                self.noted_bytes += bytes;
+                let bytes = self.accounting.of(message);
+                self.metadata.push_back((metadata, bytes));
+                self.accounted_bytes += bytes;
             }
             // The guest has closed it: its end is read next.
             Err(Errno::PIPE | Errno::CONNRESET) => {}
@@ -167,25 +167,25 @@ impl GuestSocket {
         }
     }
 
-    /// Drops the notes of messages that the guest has read.
+    /// Drops the metadata of messages that the guest has read.
     pub(crate) fn forget_read_notes(&mut self) {
         let unread = unread_bytes(self.end.as_fd());
-        while self.noted_bytes > unread {
-            let Some((note, bytes)) = self.notes.pop_front() else { break };
-            self.noted_bytes -= bytes;
-            self.last_stamp_ns = Some(note.stamp_ns);
+        while self.accounted_bytes > unread {
+            let Some((metadata, bytes)) = self.metadata.pop_front() else { break };
+            self.accounted_bytes -= bytes;
+            self.last_stamp_ns = Some(metadata.stamp_ns);
         }
     }
 
-    /// The note of the message that is read next.
-    pub(crate) fn next_note(&mut self) -> Option<Note> {
+    /// Metadata of the message that is read next.
+    pub(crate) fn next_metadata(&mut self) -> Option<MessageMetadata> {
         self.forget_read_notes();
-        self.notes.front().map(|(note, _)| *note)
+        self.metadata.front().map(|(metadata, _)| *metadata)
     }
 
     /// Takes an error out of the guest's queue, by a copy of the guest's end, if it is the next to be read.
     pub(crate) fn take_error(&mut self, end: BorrowedFd<'_>) -> Option<Errno> {
-        let error = self.next_note()?.error?;
+        let error = self.next_metadata()?.error?;
         let mut byte = [0_u8; 1];
         match recv(end, &mut byte, RecvFlags::DONTWAIT | RecvFlags::PEEK) {
             Ok((_, 0)) => recv(end, &mut byte, RecvFlags::DONTWAIT).is_ok().then_some(error),
@@ -249,59 +249,60 @@ impl GuestSocket {
 mod tests {
     use super::*;
 
-    const NOTE: Note = Note { interface: 7, flags: 0, dropped: 0, stamp_ns: 0, error: None };
+    const METADATA: MessageMetadata =
+        MessageMetadata { interface: 7, flags: 0, dropped: 0, stamp_ns: 0, error: None };
 
     fn new() -> (GuestSocket, OwnedFd) {
-        let accounts = Rc::new(Accounts::new().unwrap());
-        make(Kind::Raw(RawOptions::default()), false, &accounts).unwrap()
+        let accounting = Rc::new(QueueAccounting::new().unwrap());
+        make(Kind::Raw(RawOptions::default()), false, &accounting).unwrap()
     }
 
     #[test]
     fn notes_follow_what_the_guest_reads_without_asking() {
-        let (mut socket, theirs) = new();
+        let (mut socket, guest_end) = new();
         for number in 0..200_u64 {
-            socket.deliver(&[1; 16], Note { stamp_ns: number, ..NOTE });
+            socket.deliver(&[1; 16], MessageMetadata { stamp_ns: number, ..METADATA });
         }
         for number in 0..150 {
-            assert_eq!(socket.next_note().map(|note| note.stamp_ns), Some(number));
-            recv(&theirs, &mut [0_u8; 16], RecvFlags::DONTWAIT).unwrap();
+            assert_eq!(socket.next_metadata().map(|metadata| metadata.stamp_ns), Some(number));
+            recv(&guest_end, &mut [0_u8; 16], RecvFlags::DONTWAIT).unwrap();
         }
         assert_eq!(socket.last_stamp_ns(), Some(149));
-        assert!(socket.notes.len() <= 50);
+        assert!(socket.metadata.len() <= 50);
     }
 
     #[test]
     fn notes_follow_messages_of_any_length() {
-        let (mut socket, theirs) = new();
+        let (mut socket, guest_end) = new();
         let length = |number: usize| [16, 4152, 72, 0, 300, 9000][number % 6];
         for number in 0..12 {
-            socket.deliver(&vec![1; length(number)], Note { stamp_ns: number as u64, ..NOTE });
+            socket.deliver(&vec![1; length(number)], MessageMetadata { stamp_ns: number as u64, ..METADATA });
         }
         for number in 0..12 {
-            assert_eq!(socket.next_note().map(|note| note.stamp_ns), Some(number as u64));
-            assert_eq!(recv(&theirs, &mut [0_u8; 9000], RecvFlags::DONTWAIT).unwrap().1, length(number));
+            assert_eq!(socket.next_metadata().map(|metadata| metadata.stamp_ns), Some(number as u64));
+            assert_eq!(recv(&guest_end, &mut [0_u8; 9000], RecvFlags::DONTWAIT).unwrap().1, length(number));
         }
-        assert_eq!(socket.next_note(), None);
+        assert_eq!(socket.next_metadata(), None);
     }
 
     #[test]
     fn what_the_queue_does_not_take_is_counted_and_told_with_the_next_frame() {
-        let (mut socket, theirs) = new();
+        let (mut socket, guest_end) = new();
         while socket.dropped < 3 {
-            socket.deliver(&[1; 16], NOTE);
+            socket.deliver(&[1; 16], METADATA);
         }
-        while recv(&theirs, &mut [0_u8; 16], RecvFlags::DONTWAIT).is_ok() {}
-        socket.deliver(&[1; 16], NOTE);
-        assert_eq!(socket.next_note().map(|note| note.dropped), Some(3));
+        while recv(&guest_end, &mut [0_u8; 16], RecvFlags::DONTWAIT).is_ok() {}
+        socket.deliver(&[1; 16], METADATA);
+        assert_eq!(socket.next_metadata().map(|metadata| metadata.dropped), Some(3));
     }
 
     #[test]
     fn a_message_of_length_zero_is_accounted_as_one_too() {
-        let (mut socket, theirs) = new();
-        socket.deliver(&[], Note { error: Some(Errno::NETDOWN), ..NOTE });
-        socket.deliver(&[1; 16], NOTE);
-        assert_eq!(socket.next_note().and_then(|note| note.error), Some(Errno::NETDOWN));
-        recv(&theirs, &mut [0_u8; 16], RecvFlags::DONTWAIT).unwrap();
-        assert_eq!(socket.next_note().map(|note| note.error), Some(None));
+        let (mut socket, guest_end) = new();
+        socket.deliver(&[], MessageMetadata { error: Some(Errno::NETDOWN), ..METADATA });
+        socket.deliver(&[1; 16], METADATA);
+        assert_eq!(socket.next_metadata().and_then(|metadata| metadata.error), Some(Errno::NETDOWN));
+        recv(&guest_end, &mut [0_u8; 16], RecvFlags::DONTWAIT).unwrap();
+        assert_eq!(socket.next_metadata().map(|metadata| metadata.error), Some(None));
     }
 }

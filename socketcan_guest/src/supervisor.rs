@@ -10,7 +10,7 @@ use crate::netlink::LinkRequest;
 use crate::notification::{Answer, Listener, Notification};
 use crate::receive::WaitingCall;
 use crate::send::FrameOrigin;
-use crate::socket::{Accounts, GuestSocket, Kind, Note};
+use crate::socket::{GuestSocket, Kind, MessageMetadata, QueueAccounting};
 use crate::transport::Transport;
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 use rustix::io::Errno;
@@ -52,7 +52,7 @@ pub(crate) struct Supervisor {
     pub(crate) timed: BTreeSet<u64>,
     /// Number of calls that wait for a message, of all sockets.
     pub(crate) waiting_calls: usize,
-    pub(crate) accounts: Rc<Accounts>,
+    pub(crate) accounting: Rc<QueueAccounting>,
     /// Frames of guests that a bus accepted.
     pub(crate) sent: u64,
     /// Native writes that the kernel would have refused.
@@ -76,7 +76,7 @@ impl Supervisor {
             sockets: BTreeMap::new(),
             timed: BTreeSet::new(),
             waiting_calls: 0,
-            accounts: Rc::new(Accounts::new()?),
+            accounting: Rc::new(QueueAccounting::new()?),
             sent: 0,
             refused_late: 0,
             bus_lost: false,
@@ -315,13 +315,17 @@ impl Supervisor {
 
     /// Lets the next receiving call fail with this error; a native read returns length 0.
     pub(crate) fn deliver_error(&mut self, inode: u64, interface: u32, error: Errno) {
-        self.deliver(inode, &[], Note { error: Some(error), ..Note::new(interface, wall_clock_ns()) });
+        self.deliver(
+            inode,
+            &[],
+            MessageMetadata { error: Some(error), ..MessageMetadata::new(interface, wall_clock_ns()) },
+        );
     }
 
     /// Delivers a message to a guest's socket, and serves the calls that wait for one.
-    pub(crate) fn deliver(&mut self, inode: u64, message: &[u8], note: Note) {
+    pub(crate) fn deliver(&mut self, inode: u64, message: &[u8], metadata: MessageMetadata) {
         if let Some(socket) = self.sockets.get_mut(&inode) {
-            socket.deliver(message, note);
+            socket.deliver(message, metadata);
         }
         self.serve_waiting(inode);
     }

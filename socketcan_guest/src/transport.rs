@@ -11,7 +11,7 @@ use crate::abi::{self, u32_at};
 use crate::caller::Caller;
 use crate::isotp::{Event, Identifiers, IsoTp, LONGEST_PDU};
 use crate::notification::{Answer, Notification};
-use crate::socket::{GuestSocket, Kind, Note};
+use crate::socket::{GuestSocket, Kind, MessageMetadata};
 use crate::supervisor::{Supervisor, wall_clock_ns};
 use rustix::io::Errno;
 use std::collections::{BTreeSet, VecDeque};
@@ -248,7 +248,7 @@ impl Supervisor {
                     let _ = self.send_frame(inode, interface, &frame);
                 }
                 Event::Received(message) => {
-                    self.deliver(inode, &message, Note::new(interface, wall_clock_ns()));
+                    self.deliver(inode, &message, MessageMetadata::new(interface, wall_clock_ns()));
                 }
                 Event::ReceivingFailed(error) => self.deliver_error(inode, interface, error),
                 Event::SendingFailed(error) => {

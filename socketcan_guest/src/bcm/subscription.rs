@@ -15,7 +15,7 @@ const MOST_FRAMES: u32 = super::MOST_FRAMES + 1;
 
 /// The last frame received for an entry of the list.
 #[derive(Clone, Copy, Debug)]
-struct Last {
+struct LastReception {
     frame: FrameBytes,
     /// Whether its report waits for the end of `ival2`.
     is_held_back: bool,
@@ -27,7 +27,7 @@ pub(super) struct Subscription {
     interface: u32,
     head: Head,
     frames: Vec<FrameBytes>,
-    last: Vec<Option<Last>>,
+    last: Vec<Option<LastReception>>,
     silent_at: Option<Instant>,
     reported_at: Option<Instant>,
     held_back_until: Option<Instant>,
@@ -161,7 +161,7 @@ impl Subscription {
     }
 
     fn note_change(&mut self, entry: usize, frame: &FrameBytes, now: Instant, actions: &mut Vec<Action>) {
-        self.last[entry] = Some(Last { frame: *frame, is_held_back: true });
+        self.last[entry] = Some(LastReception { frame: *frame, is_held_back: true });
         if self.head.interval_2.is_zero() {
             self.report_held_back(actions);
             return;

@@ -53,7 +53,7 @@ impl Bench {
         actions
     }
 
-    /// What happens up to then, each with its time in ms from the beginning.
+    /// Actions up to then, each with its time in ms from the beginning.
     fn until(&mut self, ms: u32) -> Vec<(u128, Action)> {
         let end = self.began + MS * ms;
         let mut all = Vec::new();
@@ -72,8 +72,8 @@ fn sent(at: u128, data: &[u8]) -> (u128, Action) {
     (at, Action::Send(INTERFACE, frame(0x123, data)))
 }
 
-/// Opcode and frames of what was told.
-fn told(actions: &[Action]) -> Vec<(u32, Vec<FrameBytes>)> {
+/// Opcode and frames of each notification.
+fn notifications(actions: &[Action]) -> Vec<(u32, Vec<FrameBytes>)> {
     let read = |action: &Action| match action {
         Action::Notify(_, bytes) => Head::read(bytes).map(|(head, frames)| (head.opcode, frames)).ok(),
         Action::Send(..) | Action::SendOnce(..) => None,
@@ -113,7 +113,10 @@ fn a_count_at_the_first_interval_ends_with_an_event_and_the_second_goes_on() {
     let expired: Vec<_> =
         all.iter().filter(|(_, action)| matches!(action, Action::Notify(..))).cloned().collect();
     assert_eq!(expired.len(), 1);
-    assert_eq!((expired[0].0, told(&[expired[0].1.clone()])), (20, vec![(opcode::TX_EXPIRED, vec![])]));
+    assert_eq!(
+        (expired[0].0, notifications(&[expired[0].1.clone()])),
+        (20, vec![(opcode::TX_EXPIRED, vec![])])
+    );
 }
 
 #[test]
@@ -133,9 +136,9 @@ fn a_watch_tells_of_changes_under_its_mask_alone() {
     let watch = Command::new(opcode::RX_SETUP, 0, 0x123, &[frame(0x123, &[0xFF, 0])]);
     assert_eq!(bench.command(&watch), Ok(vec![]));
     let changed = |data: &[u8]| vec![(opcode::RX_CHANGED, vec![frame(0x123, data)])];
-    assert_eq!(told(&bench.frame(frame(0x123, &[1, 1]))), changed(&[1, 1]));
+    assert_eq!(notifications(&bench.frame(frame(0x123, &[1, 1]))), changed(&[1, 1]));
     assert_eq!(bench.frame(frame(0x123, &[1, 2])), []);
-    assert_eq!(told(&bench.frame(frame(0x123, &[2, 2]))), changed(&[2, 2]));
+    assert_eq!(notifications(&bench.frame(frame(0x123, &[2, 2]))), changed(&[2, 2]));
     assert_eq!(bench.frame(frame(0x124, &[3, 3])), []);
     assert_eq!(bench.frame(frame(0x8000_0123, &[3, 3])), []);
 }
@@ -147,8 +150,11 @@ fn silence_is_told_once_and_the_clock_starts_again_with_the_next_frame() {
     bench.command(&watch).unwrap();
     let all = bench.until(50);
     assert_eq!(all.len(), 1);
-    assert_eq!((all[0].0, told(&[all[0].1.clone()])), (10, vec![(opcode::RX_TIMEOUT, vec![])]));
-    assert_eq!(told(&bench.frame(frame(0x123, &[1]))), [(opcode::RX_CHANGED, vec![frame(0x123, &[1])])]);
+    assert_eq!((all[0].0, notifications(&[all[0].1.clone()])), (10, vec![(opcode::RX_TIMEOUT, vec![])]));
+    assert_eq!(
+        notifications(&bench.frame(frame(0x123, &[1]))),
+        [(opcode::RX_CHANGED, vec![frame(0x123, &[1])])]
+    );
     assert_eq!(bench.until(59).len(), 0);
     assert_eq!(bench.until(100).len(), 1);
 }
@@ -162,14 +168,14 @@ fn changes_are_told_no_faster_than_the_second_interval_and_the_last_one_is_not_l
         10 * MS,
     );
     bench.command(&watch).unwrap();
-    assert_eq!(told(&bench.frame(frame(0x123, &[1]))).len(), 1);
+    assert_eq!(notifications(&bench.frame(frame(0x123, &[1]))).len(), 1);
     assert_eq!(bench.until(3), []);
     assert_eq!(bench.frame(frame(0x123, &[2])), []);
     assert_eq!(bench.frame(frame(0x123, &[3])), []);
     let all = bench.until(40);
     assert_eq!(all.len(), 1);
     assert_eq!(
-        (all[0].0, told(&[all[0].1.clone()])),
+        (all[0].0, notifications(&[all[0].1.clone()])),
         (10, vec![(opcode::RX_CHANGED, vec![frame(0x123, &[3])])])
     );
 }
