@@ -208,7 +208,7 @@ mod tests {
     const LIMITS: Limits = Limits { added_limit_kg: 20.0, hosts_bus: true };
 
     /// Commands and answers of a whole input.
-    fn said(input: &str) -> (Vec<Command>, Vec<String>) {
+    fn run_console(input: &str) -> (Vec<Command>, Vec<String>) {
         let (console, receiver) = open(LIMITS);
         let mut answers = Vec::new();
         console.read(&mut input.as_bytes(), |text| answers.push(text.to_owned()));
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn each_line_is_a_command() {
-        let (commands, answers) = said(
+        let (commands, answers) = run_console(
             "stop\nrelease\n\nlink\n unlink \nweights 2.5\nhand carriage -40\nhand load 1e2\nquit\nstop",
         );
         let expected = [
@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn faults_are_broken_and_mended_by_name_and_place() {
-        let (commands, answers) = said(
+        let (commands, answers) = run_console(
             "fault valve-stuck drive\nfault hose-burst kv_m3_per_h=2 load.b\nfault bus-loss\nmend valve-stuck drive\n\
              mend hose-burst load.b\nmend all\n",
         );
@@ -279,7 +279,7 @@ mod tests {
             ("mend valve-stuck nowhere", "one of drive, load"),
         ];
         for (line, hint) in cases {
-            let (commands, answers) = said(&format!("{line}\nlink\n"));
+            let (commands, answers) = run_console(&format!("{line}\nlink\n"));
             assert_eq!(commands.len(), 1, "{line}");
             assert!(answers.len() == 1 && answers[0].contains(hint), "{line}: {answers:?}");
         }
@@ -287,13 +287,13 @@ mod tests {
 
     #[test]
     fn help_names_every_command_and_an_endless_line_is_none() {
-        let (_, answers) = said("help\n");
+        let (_, answers) = run_console("help\n");
         for word in
             ["stop", "release", "link", "unlink", "weights KG", "hand carriage N", "hand load N", "quit"]
         {
             assert!(answers[0].contains(word), "{word}");
         }
-        let (commands, answers) = said(&format!("{}\nunlink\n", "stop ".repeat(1000)));
+        let (commands, answers) = run_console(&format!("{}\nunlink\n", "stop ".repeat(1000)));
         assert_eq!(commands, [Command::Act(Action::Unlink)]);
         assert!(answers.len() == 1 && answers[0].contains("200 bytes"), "{answers:?}");
     }

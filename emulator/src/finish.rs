@@ -2,7 +2,7 @@
 
 use crate::cli::RunArguments;
 use crate::event::Event;
-use crate::pace::End;
+use crate::pace::RunEnd;
 use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
 use protocol::exit::Exit;
@@ -118,27 +118,27 @@ fn summarise(
 }
 
 /// The exit code of an end, and its message.
-fn verdict(end: &End) -> (Exit, String) {
+fn verdict(end: &RunEnd) -> (Exit, String) {
     match end {
-        End::ControllersDone => (Exit::Good, "the controllers are done".into()),
-        End::TimeUp => (Exit::Good, "the time asked for is up".into()),
-        End::Quit => (Exit::Good, "ended at the console".into()),
-        End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
-        End::OutputFailed => (Exit::BadInput, "the output could not be written".into()),
-        End::BusGone => (Exit::BusFailed, "the bus was gone for too long; see --bus-grace".into()),
-        End::SecondRig => {
+        RunEnd::ControllersDone => (Exit::Good, "the controllers are done".into()),
+        RunEnd::TimeUp => (Exit::Good, "the time asked for is up".into()),
+        RunEnd::Quit => (Exit::Good, "ended at the console".into()),
+        RunEnd::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
+        RunEnd::OutputFailed => (Exit::BadInput, "the output could not be written".into()),
+        RunEnd::BusGone => (Exit::BusFailed, "the bus was gone for too long; see --bus-grace".into()),
+        RunEnd::SecondRig => {
             (Exit::BusFailed, "another rig is on this bus already; stop it, or choose another --bus".into())
         }
-        End::NobodyJoined => (
+        RunEnd::NobodyJoined => (
             Exit::BusFailed,
             "not all members joined the barrier in time; start 'controller run --pace lockstep', or see --members".into(),
         ),
-        End::MembersLeft => (Exit::BusFailed, "all members left the barrier before they were done".into()),
-        End::LockstepTimeout(name) => {
+        RunEnd::MembersLeft => (Exit::BusFailed, "all members left the barrier before they were done".into()),
+        RunEnd::LockstepTimeout(name) => {
             (Exit::LockstepTimeout, format!("lockstep: '{name}' was not done within 5 s of wall time"))
         }
-        End::Overrun(overrun) => (Exit::BoundBroken, overrun.to_string()),
-        End::NotFinite => (
+        RunEnd::Overrun(overrun) => (Exit::BoundBroken, overrun.to_string()),
+        RunEnd::NotFinite => (
             Exit::BoundBroken,
             "fault not-finite: the plant's state is no longer finite; please report the rig file".into(),
         ),

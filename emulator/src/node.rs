@@ -25,7 +25,7 @@ use protocol::can::CanFrame;
 use protocol::commands::{Change, CommandCounters};
 use protocol::frames::{ChainStatus, DecodeError, FaultMark, Frame, LinkRequest, MainChainState};
 use realtime::Overrun;
-use rig_node::{Hand, Latched, RigNode, Taken, TickCause};
+use rig_node::{FrameOutcome, HandForceSource, Latched, RigNode, TickCause};
 use runlog::candump::FrameRecord;
 use runlog::summary::FrameCounters;
 use runlog::timing::CycleTiming;
@@ -176,15 +176,17 @@ impl EmulatorNode {
     fn take_known(&mut self, known: Frame, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
         let Self { node, recorder, .. } = self;
         let other = match node.take(known, &mut |kind| recorder.event(Event { cycle, kind })) {
-            Taken::Command { axis, echo } => return self.time_command(axis.index(), echo, stamp_ns, cycle),
-            Taken::Done => return,
-            Taken::Other(other) => other,
+            FrameOutcome::Command { axis, echo } => {
+                return self.time_command(axis.index(), echo, stamp_ns, cycle);
+            }
+            FrameOutcome::Handled => return,
+            FrameOutcome::Unhandled(other) => other,
         };
         match other {
             Frame::DriveChainStatus(status) => self.note_chain(0, status),
             Frame::LoadChainStatus(status) => self.note_chain(1, status),
             Frame::HandForce(hand) if self.bench_frames => {
-                *self.node.rig_mut().hand(Hand::Bus) =
+                *self.node.rig_mut().hand_forces(HandForceSource::Bus) =
                     HandForces { carriage_n: hand.carriage_n, load_eye_n: hand.load_eye_n };
             }
             Frame::Link(link) if self.bench_frames => match link.request {
@@ -277,16 +279,16 @@ impl EmulatorNode {
         match command {
             Command::Act(action) => self.act_by_hand(action, cycle),
             Command::Hand { on, force_n } => {
-                let hand = self.node.rig_mut().hand(Hand::Console);
+                let hand = self.node.rig_mut().hand_forces(HandForceSource::Console);
                 *hand.on(on) = force_n;
                 let kind = of_hand(*hand);
                 self.record_event(cycle, kind);
             }
-            Command::Break(fault) => self.break_or_mend(cycle, |faults, broken, tell| {
-                faults.break_by_hand(fault, broken, tell);
+            Command::Break(fault) => self.break_or_mend(cycle, |faults, broken, on_mark| {
+                faults.break_by_hand(fault, broken, on_mark);
             }),
-            Command::Mend(like) => self.break_or_mend(cycle, |faults, broken, tell| {
-                faults.mend(like.as_ref(), broken, tell);
+            Command::Mend(like) => self.break_or_mend(cycle, |faults, broken, on_mark| {
+                faults.mend(like.as_ref(), broken, on_mark);
             }),
             Command::Quit => self.quit_asked = true,
         }

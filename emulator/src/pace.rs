@@ -43,7 +43,7 @@ impl fmt::Display for Pace {
 
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum End {
+pub(crate) enum RunEnd {
     ControllersDone,
     /// The requested time has passed.
     TimeUp,
@@ -109,7 +109,7 @@ pub(crate) struct RunContext<'a> {
 
 /// Results of the loop.
 pub(crate) struct RunOutcome {
-    pub end: End,
+    pub end: RunEnd,
     /// Cycles begun, skipped ones included.
     pub cycles: u64,
     /// Due time of cycle 0, ns of the run's clock.
@@ -123,23 +123,23 @@ pub(crate) struct RunOutcome {
 
 impl RunContext<'_> {
     /// Publishes the progress after `cycles`; returns why the run should end, if it should.
-    fn after_cycle(&mut self, cycles: u64) -> Option<End> {
+    fn after_cycle(&mut self, cycles: u64) -> Option<RunEnd> {
         let Self { node, limits, shared, .. } = self;
         shared.cycle.store(cycles, Ordering::Relaxed);
         shared.skipped.store(node.skipped(), Ordering::Relaxed);
         shared.controller_received.store(node.controller_received(), Ordering::Relaxed);
         if !node.is_finite(cycles - 1) {
-            Some(End::NotFinite)
+            Some(RunEnd::NotFinite)
         } else if shared.interrupt.came() {
-            Some(End::Interrupted)
+            Some(RunEnd::Interrupted)
         } else if shared.output_failed.load(Ordering::Relaxed) {
-            Some(End::OutputFailed)
+            Some(RunEnd::OutputFailed)
         } else if node.quit_asked {
-            Some(End::Quit)
+            Some(RunEnd::Quit)
         } else if limits.cycles.is_some_and(|limit| cycles >= limit) {
-            Some(End::TimeUp)
+            Some(RunEnd::TimeUp)
         } else {
-            node.controllers_done().then_some(End::ControllersDone)
+            node.controllers_done().then_some(RunEnd::ControllersDone)
         }
     }
 }

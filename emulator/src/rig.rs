@@ -6,7 +6,7 @@ use crate::faults::schedule::{FaultSchedule, FaultTargets};
 use plant::scene::{Action, HandForces, Holder, RigCall};
 use plant::tables::CycleRecord;
 use plant::{AxisReadings, People, Plant, Sensors};
-use rig_node::{Hand, PeopledPlant, SimulatedRig, Standing};
+use rig_node::{HandForceSource, PeopledPlant, RigCondition, SimulatedRig};
 
 /// The plant with people and faults.
 pub(crate) struct BreakableRig {
@@ -28,23 +28,23 @@ impl BreakableRig {
     }
 
     /// Forces of a hand, from now on.
-    pub(crate) fn hand(&mut self, whose: Hand) -> &mut HandForces {
-        self.peopled.hand(whose)
+    pub(crate) fn hand_forces(&mut self, source: HandForceSource) -> &mut HandForces {
+        self.peopled.hand_forces(source)
     }
 
-    pub(crate) fn act(&mut self, action: Action, mut tell: impl FnMut(EventKind)) {
-        self.peopled.act(action, |outcome| tell(of_outcome(outcome)));
+    pub(crate) fn act(&mut self, action: Action, mut on_event: impl FnMut(EventKind)) {
+        self.peopled.act(action, |outcome| on_event(of_outcome(outcome)));
     }
 
     /// Starts or ends faults by hand.
     pub(crate) fn break_or_mend(
         &mut self,
         act: impl FnOnce(&mut FaultSchedule, FaultTargets<'_>, &mut dyn FnMut(Mark)),
-        mut tell: impl FnMut(EventKind),
+        mut on_event: impl FnMut(EventKind),
     ) {
         let (plant, sensors, inputs) = self.peopled.parts();
         let broken = FaultTargets { plant, sensors, inputs };
-        act(&mut self.faults, broken, &mut |mark| tell(EventKind::Fault(mark)));
+        act(&mut self.faults, broken, &mut |mark| on_event(EventKind::Fault(mark)));
     }
 
     /// The next mark for the bench's frame: number of the fault, and whether it begins.
@@ -57,12 +57,12 @@ impl SimulatedRig for BreakableRig {
     type Cycle = CycleRecord;
     type Event = EventKind;
 
-    fn sample(&mut self, cycle: u64, tell: &mut dyn FnMut(EventKind)) -> [AxisReadings; 2] {
-        self.peopled.let_people_act(cycle, |outcome| tell(of_outcome(outcome)));
+    fn sample(&mut self, cycle: u64, on_event: &mut dyn FnMut(EventKind)) -> [AxisReadings; 2] {
+        self.peopled.let_people_act(cycle, |outcome| on_event(of_outcome(outcome)));
         let (plant, sensors, inputs) = self.peopled.parts();
         let broken = FaultTargets { plant, sensors, inputs };
-        self.faults.begin_cycle(cycle, broken, |mark| tell(EventKind::Fault(mark)));
-        *self.peopled.hand(Hand::Faults) = self.faults.overlay.hands;
+        self.faults.begin_cycle(cycle, broken, |mark| on_event(EventKind::Fault(mark)));
+        *self.peopled.hand_forces(HandForceSource::Faults) = self.faults.overlay.hands;
         self.peopled.sample_sensors()
     }
 
@@ -74,8 +74,8 @@ impl SimulatedRig for BreakableRig {
         self.peopled.emergency_stop(holder, release).map(of_outcome)
     }
 
-    fn standing(&self) -> Standing {
-        self.peopled.standing()
+    fn condition(&self) -> RigCondition {
+        self.peopled.condition()
     }
 
     fn step(&mut self, cycle: u64, valve: [f64; 2]) -> CycleRecord {

@@ -16,7 +16,7 @@ pub(crate) struct WireMisfit {
     /// Table of the rig file.
     pub table: &'static str,
     pub key: &'static str,
-    /// What is wrong, and what the wire can carry.
+    /// The misfit, and the range that the wire can carry.
     pub problem: String,
 }
 

@@ -15,7 +15,7 @@
 mod rig;
 mod telegrams;
 
-pub use rig::{Hand, PeopledPlant, SimulatedRig, Standing};
+pub use rig::{HandForceSource, PeopledPlant, RigCondition, SimulatedRig};
 pub use telegrams::TickCause;
 
 use plant::scene::Holder;
@@ -39,9 +39,9 @@ pub struct RigNode<R> {
     lockstep: bool,
 }
 
-/// What became of a frame.
+/// Outcome of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Taken {
+pub enum FrameOutcome {
     /// A valve command was accepted.
     Command {
         /// Whose valve.
@@ -49,16 +49,16 @@ pub enum Taken {
         /// Low bits of the cycle that it answers.
         echo: u16,
     },
-    /// The node dealt with it.
-    Done,
-    /// Nothing that every rig obeys.
-    Other(Frame),
+    /// The node processed it.
+    Handled,
+    /// The node does not process it: a frame that not every rig obeys.
+    Unhandled(Frame),
 }
 
 /// State of the command of an axis over a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Latched {
-    /// What changed with it.
+    /// Change of the command's state.
     pub change: Option<Change>,
     /// Age of the command that is obeyed, in cycles that were sent; `None` without one.
     pub age_cycles: Option<u64>,
@@ -85,8 +85,8 @@ impl<R: SimulatedRig> RigNode<R> {
     }
 
     /// Begins `cycle`: people act, then the sensors are sampled.
-    pub fn begin(&mut self, cycle: u64, tell: &mut dyn FnMut(R::Event)) -> [AxisReadings; 2] {
-        let readings = self.rig.sample(cycle, tell);
+    pub fn begin(&mut self, cycle: u64, on_event: &mut dyn FnMut(R::Event)) -> [AxisReadings; 2] {
+        let readings = self.rig.sample(cycle, on_event);
         self.saturated.iter_mut().zip(&readings).for_each(|(saturated, readings)| saturated.note(readings));
         readings
     }
@@ -115,7 +115,7 @@ impl<R: SimulatedRig> RigNode<R> {
         }
         if periods::status_is_due(cycle) {
             let saturated = std::mem::take(&mut self.saturated);
-            send(&telegrams::status(&self.rig.standing(), &saturated, &self.commands));
+            send(&telegrams::status(&self.rig.condition(), &saturated, &self.commands));
         }
     }
 
@@ -126,27 +126,32 @@ impl<R: SimulatedRig> RigNode<R> {
     }
 
     /// Takes a frame that arrived before the cycle that was sent last.
-    pub fn take(&mut self, frame: Frame, tell: &mut dyn FnMut(R::Event)) -> Taken {
+    pub fn take(&mut self, frame: Frame, on_event: &mut dyn FnMut(R::Event)) -> FrameOutcome {
         match frame {
             Frame::DriveValveCommand(command) => self.take_command(Axis::Drive, command),
             Frame::LoadValveCommand(command) => self.take_command(Axis::Load, command),
-            Frame::ConsoleEmergencyStop(stop) => self.obey(Holder::Console, stop, tell),
-            Frame::DriveEmergencyStop(stop) => self.obey(Holder::Drive, stop, tell),
-            Frame::LoadEmergencyStop(stop) => self.obey(Holder::Load, stop, tell),
-            other => Taken::Other(other),
+            Frame::ConsoleEmergencyStop(stop) => self.obey(Holder::Console, stop, on_event),
+            Frame::DriveEmergencyStop(stop) => self.obey(Holder::Drive, stop, on_event),
+            Frame::LoadEmergencyStop(stop) => self.obey(Holder::Load, stop, on_event),
+            other => FrameOutcome::Unhandled(other),
         }
     }
 
-    fn take_command(&mut self, axis: Axis, command: ValveCommand) -> Taken {
+    fn take_command(&mut self, axis: Axis, command: ValveCommand) -> FrameOutcome {
         let accepted = self.commands[axis.index()].take(command, &self.live);
-        if accepted { Taken::Command { axis, echo: command.echo } } else { Taken::Done }
+        if accepted { FrameOutcome::Command { axis, echo: command.echo } } else { FrameOutcome::Handled }
     }
 
-    fn obey(&mut self, holder: Holder, stop: EmergencyStop, tell: &mut dyn FnMut(R::Event)) -> Taken {
+    fn obey(
+        &mut self,
+        holder: Holder,
+        stop: EmergencyStop,
+        on_event: &mut dyn FnMut(R::Event),
+    ) -> FrameOutcome {
         if let Some(event) = self.rig.emergency_stop(holder, stop.release) {
-            tell(event);
+            on_event(event);
         }
-        Taken::Done
+        FrameOutcome::Handled
     }
 
     /// Drops the command of an axis that is stale in the cycle that was sent last, notes a dispute of two senders, and reports
@@ -167,7 +172,7 @@ impl<R: SimulatedRig> RigNode<R> {
     /// the emergency stop is tripped.
     #[must_use]
     pub fn openings(&self, coming: [Option<ValveCommand>; 2]) -> [f64; 2] {
-        let stopped = self.rig.standing().emergency_stop;
+        let stopped = self.rig.condition().emergency_stop;
         Axis::ALL.map(|axis| {
             let opening = match coming[axis.index()] {
                 _ if stopped => 0.0,

@@ -1,4 +1,4 @@
-//! What a node moves: a simulated rig, and the plant with people around it.
+//! The simulated rig that a node moves, and the plant with people around it.
 
 use plant::scene::{Action, HandForces, Holder, Outcome, RigCall};
 use plant::tables::CycleRecord;
@@ -6,9 +6,9 @@ use plant::{AxisReadings, Inputs, People, Plant, Sensors};
 
 /// A rig that is simulated, with what people do to it: what a node moves by one period at a time.
 pub trait SimulatedRig {
-    /// What a cycle leaves: what the rig shows, and what only a simulation knows.
+    /// Record of a cycle: readings and truth.
     type Cycle;
-    /// What happened to the rig.
+    /// An event at the rig.
     type Event;
 
     /// The valve openings of drive and load over the coming cycle, unless an emergency stop comes in it: for a rig that has to
@@ -16,24 +16,24 @@ pub trait SimulatedRig {
     fn expect_valves(&mut self, _valve: [f64; 2]) {}
 
     /// Begins a cycle: people act, then the sensors are sampled.
-    fn sample(&mut self, cycle: u64, tell: &mut dyn FnMut(Self::Event)) -> [AxisReadings; 2];
+    fn sample(&mut self, cycle: u64, on_event: &mut dyn FnMut(Self::Event)) -> [AxisReadings; 2];
 
-    /// What the rig has to say about its own emergency stop in `cycle`; what is given counts as said.
+    /// Announcement of the rig's own emergency stop due in `cycle`; what is returned counts as sent.
     fn rig_call(&mut self, cycle: u64) -> Option<RigCall>;
 
     /// Takes note of a stop or a release by a controller or the console.
     fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Self::Event>;
 
-    /// What the rig reports of itself beside its sensors.
-    fn standing(&self) -> Standing;
+    /// State of the rig that its status reports.
+    fn condition(&self) -> RigCondition;
 
     /// Ends the cycle: moves by one period under these valve openings of drive and load.
     fn step(&mut self, cycle: u64, valve: [f64; 2]) -> Self::Cycle;
 }
 
-/// What a rig reports of itself beside its sensors.
+/// State of the rig that its status reports, apart from its sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Standing {
+pub struct RigCondition {
     /// Absolute pressure of the supply node, Pa.
     pub supply_pressure_pa: f64,
     /// Whether the load's eye sits in the carriage.
@@ -44,9 +44,9 @@ pub struct Standing {
     pub check_valves_shut: bool,
 }
 
-/// Whose hands push the rig; the sum of all acts.
+/// Source of the hand forces on the rig; the sum of all sources acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Hand {
+pub enum HandForceSource {
     /// Of the scene's script.
     Script,
     /// By frames of the bench.
@@ -89,18 +89,19 @@ impl PeopledPlant {
     }
 
     /// Hands that push from now on.
-    pub fn hand(&mut self, whose: Hand) -> &mut HandForces {
-        &mut self.hands[whose as usize]
+    pub fn hand_forces(&mut self, source: HandForceSource) -> &mut HandForces {
+        &mut self.hands[source as usize]
     }
 
     /// Does something that the scene does not hold.
-    pub fn act(&mut self, action: Action, tell: impl FnMut(Outcome)) {
-        self.people.act(action, &mut self.plant, tell);
+    pub fn act(&mut self, action: Action, on_event: impl FnMut(Outcome)) {
+        self.people.act(action, &mut self.plant, on_event);
     }
 
     /// Lets people do what is due in `cycle`.
-    pub fn let_people_act(&mut self, cycle: u64, tell: impl FnMut(Outcome)) {
-        *self.hand(Hand::Script) = self.people.begin_cycle(cycle, &mut self.plant, tell);
+    pub fn let_people_act(&mut self, cycle: u64, on_event: impl FnMut(Outcome)) {
+        *self.hand_forces(HandForceSource::Script) =
+            self.people.begin_cycle(cycle, &mut self.plant, on_event);
     }
 
     /// Samples the sensors under the hands that push now.
@@ -120,8 +121,8 @@ impl SimulatedRig for PeopledPlant {
     type Cycle = CycleRecord;
     type Event = Outcome;
 
-    fn sample(&mut self, cycle: u64, tell: &mut dyn FnMut(Outcome)) -> [AxisReadings; 2] {
-        self.let_people_act(cycle, tell);
+    fn sample(&mut self, cycle: u64, on_event: &mut dyn FnMut(Outcome)) -> [AxisReadings; 2] {
+        self.let_people_act(cycle, on_event);
         self.sample_sensors()
     }
 
@@ -133,8 +134,8 @@ impl SimulatedRig for PeopledPlant {
         self.people.emergency_stop(holder, release, &mut self.plant)
     }
 
-    fn standing(&self) -> Standing {
-        Standing {
+    fn condition(&self) -> RigCondition {
+        RigCondition {
             supply_pressure_pa: self.plant.supply_pressure_pa(),
             linked: self.plant.linked(),
             emergency_stop: self.plant.emergency_stop(),

@@ -1,6 +1,6 @@
-//! What the rig says on the bus: sensors every cycle, tick and status every ten ([`protocol::periods`]).
+//! Frames of the rig: sensors every cycle, tick and status every ten ([`protocol::periods`]).
 
-use crate::rig::Standing;
+use crate::rig::RigCondition;
 use plant::AxisReadings;
 use plant::scene::RigCall;
 use protocol::commands::CommandIntake;
@@ -16,7 +16,7 @@ pub(crate) fn sensors(readings: &AxisReadings, cycle: u64) -> Sensors {
     }
 }
 
-/// What a tick is sent for.
+/// Reason for sending a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TickCause {
     /// Its period is over.
@@ -59,16 +59,16 @@ impl SaturatedSensors {
 
 /// The rig's status, with the sensors that saturated since the last one.
 pub(crate) fn status(
-    standing: &Standing,
+    condition: &RigCondition,
     [drive, load]: &[SaturatedSensors; 2],
     commands: &[CommandIntake; 2],
 ) -> Frame {
     Frame::RigStatus(RigStatus {
         // A node that chambers feed back into may rise above the set pressure, and its sensor ends where the wire does.
-        supply_pressure_pa: standing.supply_pressure_pa.min(RIG_STATUS.signals[0].max),
-        linked: standing.linked,
-        emergency_stop: standing.emergency_stop,
-        check_valves_shut: standing.check_valves_shut,
+        supply_pressure_pa: condition.supply_pressure_pa.min(RIG_STATUS.signals[0].max),
+        linked: condition.linked,
+        emergency_stop: condition.emergency_stop,
+        check_valves_shut: condition.check_valves_shut,
         drive_position_saturated: drive.position,
         drive_force_saturated: drive.force,
         drive_pressure_a_saturated: drive.pressure_a,
@@ -111,7 +111,7 @@ mod tests {
         let rig = RigParameters::baseline().with("supply.pressure_bar", &[11.0]).unwrap();
         let plant = Plant::new(&rig, &Setup::default()).unwrap();
         let rig = PeopledPlant::new(plant, plant::Sensors::new(&rig, 1), People::new(&Scene::default()));
-        let frame = status(&rig.standing(), &Default::default(), &Default::default());
+        let frame = status(&rig.condition(), &Default::default(), &Default::default());
         let Frame::RigStatus(sent) = frame else { panic!("a status") };
         assert_eq!(sent.supply_pressure_pa, RIG_STATUS.signals[0].max);
         assert_eq!(Frame::RigStatus(sent).encode().unwrap().data().len(), 4);

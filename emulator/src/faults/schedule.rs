@@ -10,7 +10,7 @@
 use super::Fault;
 use super::mark::{Cause, Mark};
 use super::overlay::{Overlay, on_wire};
-use super::script::{Condition, FaultScript, Until};
+use super::script::{Condition, FaultEnd, FaultScript};
 use super::table::Kind;
 use plant::{Axis, Inputs, Plant, Sensors};
 use protocol::bus::{WireOrder, WireOrders};
@@ -24,7 +24,7 @@ const MARKS: usize = 2048;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
-    Waiting { from: u64, when: Option<Condition>, until: Option<Until> },
+    Waiting { from: u64, when: Option<Condition>, until: Option<FaultEnd> },
     Active { until: Option<u64> },
     Over,
 }
@@ -98,7 +98,12 @@ impl FaultSchedule {
     }
 
     /// Starts and ends the faults that are due in `cycle`, before the sensors are sampled.
-    pub(crate) fn begin_cycle(&mut self, cycle: u64, broken: FaultTargets<'_>, mut tell: impl FnMut(Mark)) {
+    pub(crate) fn begin_cycle(
+        &mut self,
+        cycle: u64,
+        broken: FaultTargets<'_>,
+        mut on_mark: impl FnMut(Mark),
+    ) {
         if !self.busy {
             return;
         }
@@ -109,9 +114,9 @@ impl FaultSchedule {
             match entry.state {
                 State::Over => {}
                 State::Waiting { from, .. } if cycle < from => {}
-                State::Waiting { until: Some(Until::Cycle(to)), .. } if cycle >= to => {
+                State::Waiting { until: Some(FaultEnd::Cycle(to)), .. } if cycle >= to => {
                     self.entries[place].state = State::Over;
-                    self.report(place, FaultChange::NeverBegan, &mut tell);
+                    self.report(place, FaultChange::NeverBegan, &mut on_mark);
                 }
                 State::Waiting { when, until, .. } => {
                     let met = when.is_none_or(|when| {
@@ -120,17 +125,17 @@ impl FaultSchedule {
                     });
                     if met {
                         let until = until.map(|until| match until {
-                            Until::Cycle(to) => to,
-                            Until::After(cycles) => cycle + cycles,
+                            FaultEnd::Cycle(to) => to,
+                            FaultEnd::After(cycles) => cycle + cycles,
                         });
-                        self.start(place, until, broken.plant, &mut tell);
+                        self.start(place, until, broken.plant, &mut on_mark);
                         changed = true;
                     }
                 }
                 State::Active { until } => {
                     let mended = until.is_some_and(|until| cycle >= until);
                     if mended || has_hit(&entry.fault, broken.plant) {
-                        self.stop(place, &mut tell);
+                        self.stop(place, &mut on_mark);
                         changed = true;
                     }
                 }
@@ -147,18 +152,18 @@ impl FaultSchedule {
         &mut self,
         fault: Fault,
         broken: FaultTargets<'_>,
-        mut tell: impl FnMut(Mark),
+        mut on_mark: impl FnMut(Mark),
     ) {
         let (number, cause) = (self.next_number, Cause::Console);
         self.entries.retain(|entry| entry.state != State::Over || entry.cause != Cause::Console);
         let wire = on_wire(&fault).is_none() || self.orders.is_some();
         if self.entries.len() >= self.room || number == u16::MAX || !wire {
-            tell(Mark { number, what: FaultChange::Refused, fault, cause });
+            on_mark(Mark { number, what: FaultChange::Refused, fault, cause });
             return;
         }
         self.next_number += 1;
         self.entries.push(Entry { number, fault, cause, state: State::Active { until: None } });
-        self.start(self.entries.len() - 1, None, broken.plant, &mut tell);
+        self.start(self.entries.len() - 1, None, broken.plant, &mut on_mark);
         self.apply(broken);
         self.busy = true;
     }
@@ -168,7 +173,7 @@ impl FaultSchedule {
         &mut self,
         like: Option<&Fault>,
         broken: FaultTargets<'_>,
-        mut tell: impl FnMut(Mark),
+        mut on_mark: impl FnMut(Mark),
     ) {
         for place in 0..self.entries.len() {
             let Entry { fault, state, .. } = self.entries[place];
@@ -176,13 +181,13 @@ impl FaultSchedule {
                 like.spec.name == fault.spec.name && like.place_index() == fault.place_index()
             });
             if meant && matches!(state, State::Active { .. }) {
-                self.stop(place, &mut tell);
+                self.stop(place, &mut on_mark);
             }
         }
         self.apply(broken);
     }
 
-    fn start(&mut self, place: usize, until: Option<u64>, plant: &mut Plant, tell: &mut impl FnMut(Mark)) {
+    fn start(&mut self, place: usize, until: Option<u64>, plant: &mut Plant, on_mark: &mut impl FnMut(Mark)) {
         let Entry { number, fault, .. } = self.entries[place];
         let mut state = State::Active { until };
         if fault.spec.kind == Kind::Unlink {
@@ -196,10 +201,10 @@ impl FaultSchedule {
             !self.orders.as_ref().is_some_and(|orders| orders.give(order))
         });
         self.entries[place].state = if refused { State::Over } else { state };
-        self.report(place, if refused { FaultChange::Refused } else { FaultChange::Begins }, tell);
+        self.report(place, if refused { FaultChange::Refused } else { FaultChange::Begins }, on_mark);
     }
 
-    fn stop(&mut self, place: usize, tell: &mut impl FnMut(Mark)) {
+    fn stop(&mut self, place: usize, on_mark: &mut impl FnMut(Mark)) {
         let Entry { number, fault, .. } = self.entries[place];
         if on_wire(&fault).is_some()
             && let Some(orders) = &self.orders
@@ -210,12 +215,12 @@ impl FaultSchedule {
             return;
         }
         self.entries[place].state = State::Over;
-        self.report(place, FaultChange::Ends, tell);
+        self.report(place, FaultChange::Ends, on_mark);
     }
 
-    fn report(&mut self, place: usize, what: FaultChange, tell: &mut impl FnMut(Mark)) {
+    fn report(&mut self, place: usize, what: FaultChange, on_mark: &mut impl FnMut(Mark)) {
         let Entry { number, fault, cause, .. } = self.entries[place];
-        tell(Mark { number, what, fault, cause });
+        on_mark(Mark { number, what, fault, cause });
         let happened = matches!(what, FaultChange::Begins | FaultChange::Ends);
         if happened && self.pending_marks.len() < self.pending_marks.capacity() {
             self.pending_marks.push_back((number, what == FaultChange::Begins));

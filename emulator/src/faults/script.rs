@@ -57,12 +57,12 @@ pub struct ScheduledFault {
     /// Condition that must hold too for it to begin.
     pub(crate) when: Option<Condition>,
     /// Its end; `None`: never.
-    pub(crate) until: Option<Until>,
+    pub(crate) until: Option<FaultEnd>,
 }
 
 /// End of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Until {
+pub(crate) enum FaultEnd {
     Cycle(u64),
     /// Number of cycles after its begin.
     After(u64),
@@ -158,8 +158,8 @@ fn planned(source: &Source<'_>, section: &mut Section<'_>) -> Result<ScheduledFa
         (Some(to), None) if to <= from => {
             return Err(section.refused("to_s", "to_s must be at least 0.001 s after from_s"));
         }
-        (Some(to), None) => Some(Until::Cycle(to)),
-        (None, after) => after.map(Until::After),
+        (Some(to), None) => Some(FaultEnd::Cycle(to)),
+        (None, after) => after.map(FaultEnd::After),
     };
     let when = condition(section)?;
     Ok(ScheduledFault { fault, line: section.line() as u32, from, when, until })
@@ -200,9 +200,9 @@ mod tests {
         assert_eq!((script.seed, script.faults.len()), (7, 3));
         let [stuck, burst, loss] = script.faults[..] else { panic!("three") };
         assert_eq!((stuck.fault.place(), stuck.line, stuck.from), ("load".into(), 2, 1500));
-        assert_eq!((stuck.when, stuck.until), (None, Some(Until::Cycle(2000))));
+        assert_eq!((stuck.when, stuck.until), (None, Some(FaultEnd::Cycle(2000))));
         assert_eq!(burst.fault.numbers().collect::<Vec<_>>(), [("kv_m3_per_h", 1.0)]);
-        assert_eq!(burst.until, Some(Until::After(500)));
+        assert_eq!(burst.until, Some(FaultEnd::After(500)));
         assert_eq!(burst.when, Some(Condition { signal: 0, above: true, threshold: 0.25 }));
         assert_eq!((loss.fault.place(), loss.until), ("bus".into(), None));
     }

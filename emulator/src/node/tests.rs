@@ -8,17 +8,17 @@ use protocol::bus::{BusCounters, BusError, FrameSink, Received, SendError};
 use protocol::frames::ValveCommand;
 use std::time::Instant;
 
-/// A bus without anybody on it.
+/// A bus without other nodes.
 #[derive(Default)]
-struct Nobody(BusCounters);
+struct EmptyBus(BusCounters);
 
-impl FrameSink for Nobody {
+impl FrameSink for EmptyBus {
     fn send(&mut self, _frame: &CanFrame) -> Result<u64, SendError> {
         Ok(1)
     }
 }
 
-impl Bus for Nobody {
+impl Bus for EmptyBus {
     fn receive(&mut self) -> Received {
         Received::Nothing
     }
@@ -59,7 +59,7 @@ fn node(scene: &str) -> (EmulatorNode, Records) {
 
 /// Sends the sensors of `cycle`, which are answered with this opening of the drive's valve from the second cycle on.
 fn live(node: &mut EmulatorNode, cycle: u64, opening: f64) {
-    node.publish(cycle, false, &mut Nobody::default());
+    node.publish(cycle, false, &mut EmptyBus::default());
     if let Some(echo) = cycle.checked_sub(1) {
         let alive = (cycle % 16) as u8;
         let command = ValveCommand { opening, alive, echo: echo as u16, enable: true };
@@ -104,7 +104,7 @@ fn a_writer_that_does_not_write_is_waited_for_once_in_a_stall_and_one_that_is_go
 #[test]
 fn a_bus_that_went_and_came_back_between_two_looks_is_told_of() {
     let (mut node, records) = node("");
-    let mut bus = Nobody::default();
+    let mut bus = EmptyBus::default();
     node.publish(0, false, &mut bus);
     (bus.0.disconnects, bus.0.reconnects) = (1, 1);
     node.publish(1, false, &mut bus);

@@ -1,6 +1,6 @@
 //! The rig as the master of the barrier: as fast as all members allow, in simulated time.
 
-use super::{End, RunContext, RunOutcome};
+use super::{RunContext, RunEnd, RunOutcome};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{BusError, Received};
 use protocol::can::CanFrame;
@@ -32,7 +32,7 @@ pub(crate) fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Resu
         take(&mut posted, |frame, stamp_ns| node.take(frame, stamp_ns, cycle));
         node.act(cycle);
         cycles += 1;
-        let left = (members_seen && members == 0).then_some(End::MembersLeft);
+        let left = (members_seen && members == 0).then_some(RunEnd::MembersLeft);
         if let Some(end) = context.after_cycle(cycles).or(left) {
             context.node.publish_end(cycles, context.bus);
             context.bus.done(cycle as u32);
@@ -58,7 +58,7 @@ fn wait_for_go(
     posted: &mut Vec<(CanFrame, u64)>,
     cycle: u64,
     patience: Duration,
-) -> Result<u8, End> {
+) -> Result<u8, RunEnd> {
     let mut since: Option<Instant> = None;
     loop {
         match context.bus.receive() {
@@ -66,17 +66,17 @@ fn wait_for_go(
             Received::Frame(frame, stamp_ns) => posted.push((frame, stamp_ns)),
             Received::Barrier(control) => match control.kind {
                 Kind::Go { members } if control.cycle == cycle as u32 => return Ok(members),
-                Kind::TimedOut => return Err(End::LockstepTimeout(control.name())),
+                Kind::TimedOut => return Err(RunEnd::LockstepTimeout(control.name())),
                 _ => {}
             },
             Received::Nothing => {
                 let waited = since.get_or_insert_with(Instant::now).elapsed();
                 // In the middle of a cycle the members finish their turn, so that they receive the last tick after it.
                 if context.shared.interrupt.came() && (cycle == 0 || waited >= LAST_TURN_TIMEOUT) {
-                    return Err(End::Interrupted);
+                    return Err(RunEnd::Interrupted);
                 }
                 if waited >= patience {
-                    return Err(if cycle == 0 { End::NobodyJoined } else { End::BusGone });
+                    return Err(if cycle == 0 { RunEnd::NobodyJoined } else { RunEnd::BusGone });
                 }
                 context.bus.wait_readable((patience - waited).min(Duration::from_millis(100)));
             }

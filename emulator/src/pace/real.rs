@@ -1,6 +1,6 @@
 //! The rig on the machine's clock: one cycle each millisecond.
 
-use super::{End, RunContext, RunOutcome};
+use super::{RunContext, RunEnd, RunOutcome};
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
 use protocol::commands::STALE_AFTER_CYCLES;
@@ -34,7 +34,7 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
             Ok(cycle) => cycle,
             Err(overrun) => {
                 context.node.record_overrun(&overrun, clock.now().as_nanos());
-                break End::Overrun(overrun);
+                break RunEnd::Overrun(overrun);
             }
         };
         let index = cycle.index;
@@ -55,9 +55,9 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
         cycles = index + 1;
         bus_lost_at = if bus.is_up() { None } else { bus_lost_at.or(Some(index)) };
         let end = if bus_lost_at.is_some_and(|lost| index - lost > grace_cycles) {
-            Some(End::BusGone)
+            Some(RunEnd::BusGone)
         } else if index < NEWCOMER_CYCLES && node.frames.second_rig > 0 {
-            Some(End::SecondRig)
+            Some(RunEnd::SecondRig)
         } else {
             context.after_cycle(cycles)
         };
@@ -85,7 +85,7 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
         realtime::allocations::counted()
     });
     // A faulty rig is silent; the second rig on a bus does not end the first one's controllers.
-    if !matches!(end, End::NotFinite | End::SecondRig) {
+    if !matches!(end, RunEnd::NotFinite | RunEnd::SecondRig) {
         send_last_ticks(&mut context, &mut inbox, cycles);
     }
     let cycle_zero_ns = start.as_nanos();

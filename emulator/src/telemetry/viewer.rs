@@ -92,12 +92,12 @@ impl Viewer {
             return;
         }
         let line = std::mem::take(&mut self.line);
-        let said = match console {
+        let answer = match console {
             None => Err("this run takes no commands: the emulator was started without --console".to_owned()),
             Some(_) if line.len() > LONGEST_LINE => Err(console::too_long()),
             Some(console) => console.execute(&String::from_utf8_lossy(&line)).map(str::to_owned),
         };
-        let (ok, text) = match said {
+        let (ok, text) = match answer {
             Ok(text) => (true, text),
             Err(text) => (false, text),
         };

@@ -12,7 +12,7 @@ use axis_control::setup::{Inputs, Mode};
 use plant::scene::{Holder, Outcome, RigCall};
 use plant::{Axis, AxisReadings, RigParameters, Scene};
 use rehearsal::Rehearsal;
-use rig_node::{SimulatedRig, Standing};
+use rig_node::{RigCondition, SimulatedRig};
 use std::path::{Path, PathBuf};
 
 /// Rms and largest error of a sampling instant, s.
@@ -367,8 +367,8 @@ impl SimulatedRig for RecordedRig {
         None
     }
 
-    fn standing(&self) -> Standing {
-        Standing {
+    fn condition(&self) -> RigCondition {
+        RigCondition {
             supply_pressure_pa: self.state.supply_pa,
             linked: self.linked,
             emergency_stop: false,

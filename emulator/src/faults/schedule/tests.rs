@@ -102,19 +102,22 @@ fn people_break_and_mend_and_are_told_when_they_cannot() {
     let mut bench = Bench::new("", true);
     let stuck = Fault::new("valve-stuck", Some("drive"), &[]).unwrap();
     let lost = Fault::new("bus-loss", None, &[]).unwrap();
-    let changes = bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(lost, broken, tell));
+    let changes = bench.by_hand(|schedule, broken, on_mark| schedule.break_by_hand(lost, broken, on_mark));
     assert_eq!(changes, [FaultChange::Refused]);
-    let changes = bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell));
+    let changes = bench.by_hand(|schedule, broken, on_mark| schedule.break_by_hand(stuck, broken, on_mark));
     assert_eq!(changes, [FaultChange::Begins]);
     assert_eq!(bench.schedule.active(), 1);
-    assert_eq!(bench.by_hand(|schedule, broken, tell| schedule.mend(Some(&lost), broken, tell)), []);
-    let changes = bench.by_hand(|schedule, broken, tell| schedule.mend(Some(&stuck), broken, tell));
+    assert_eq!(bench.by_hand(|schedule, broken, on_mark| schedule.mend(Some(&lost), broken, on_mark)), []);
+    let changes = bench.by_hand(|schedule, broken, on_mark| schedule.mend(Some(&stuck), broken, on_mark));
     assert_eq!(changes, [FaultChange::Ends]);
     for _ in 0..MOST_BY_HAND {
-        bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell));
+        bench.by_hand(|schedule, broken, on_mark| schedule.break_by_hand(stuck, broken, on_mark));
     }
-    let changes = bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell));
+    let changes = bench.by_hand(|schedule, broken, on_mark| schedule.break_by_hand(stuck, broken, on_mark));
     assert_eq!(changes, [FaultChange::Refused]);
-    assert_eq!(bench.by_hand(|schedule, broken, tell| schedule.mend(None, broken, tell)).len(), MOST_BY_HAND);
+    assert_eq!(
+        bench.by_hand(|schedule, broken, on_mark| schedule.mend(None, broken, on_mark)).len(),
+        MOST_BY_HAND
+    );
     assert_eq!(bench.schedule.overlay, Overlay::default());
 }
