@@ -11,7 +11,7 @@ use crate::image::{
     TRACE_STATUS, WIDE,
 };
 use crate::signals::{Format, SIGNALS};
-use crate::slave::{BLOCK_PACKETS, Texts};
+use crate::slave::{BLOCK_PACKETS, TextLocations};
 use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, STATUS};
 use crate::{EVENT_NAME, identifiers};
 use a2lfile::{
@@ -38,7 +38,7 @@ pub struct AxisDescription<'a> {
 /// Content of the description region of an XCP image.
 pub(crate) struct Description {
     pub bytes: Vec<u8>,
-    pub texts: Texts,
+    pub texts: TextLocations,
 }
 
 /// An A2L file that the library rejects. The tables are ours, so this is a bug; the message holds the library's reason.
@@ -77,7 +77,7 @@ pub(crate) fn description(described: &AxisDescription<'_>) -> Result<Description
         bytes.extend_from_slice(text.as_bytes());
         (at, text.len() as u32)
     };
-    let texts = Texts {
+    let texts = TextLocations {
         epk: place(&epk(described)),
         event: place(EVENT_NAME),
         file: place(&file_name(described.axis)),
@@ -95,13 +95,13 @@ pub fn text(described: &AxisDescription<'_>) -> Result<String, A2lError> {
     let (mut file, warnings) =
         a2lfile::load_from_string(&frame(described), None, true).map_err(|what| error(what.to_string()))?;
     let module = &mut file.project.module[0];
-    let mut maker = Maker { module, axis: described.axis.name(), parts: Vec::new() };
-    maker.record_layouts();
-    maker.parameters(described.variables);
-    maker.controls();
-    maker.signals();
-    maker.trace();
-    maker.groups();
+    let mut builder = A2lBuilder { module, axis: described.axis.name(), parts: Vec::new() };
+    builder.record_layouts();
+    builder.parameters(described.variables);
+    builder.controls();
+    builder.signals();
+    builder.trace();
+    builder.groups();
     checked(&file, warnings).map_err(error)?;
     Ok(file.write_to_string())
 }
@@ -148,14 +148,14 @@ fn layout(format: Format) -> &'static str {
 }
 
 /// Adds objects to a module, and keeps their names for its groups.
-struct Maker<'a> {
+struct A2lBuilder<'a> {
     module: &'a mut Module,
     axis: &'static str,
     /// Names of objects by group: what can be written or only read, and what is measured.
     parts: Vec<(String, Vec<String>, Vec<String>)>,
 }
 
-impl Maker<'_> {
+impl A2lBuilder<'_> {
     fn record_layouts(&mut self) {
         for format in [Format::Long, Format::Double] {
             let mut record = RecordLayout::new(layout(format).into());
@@ -202,27 +202,27 @@ impl Maker<'_> {
         let method = format!("names.{name}");
         let table = format!("{method}.table");
         if !self.module.compu_method.iter().any(|known| known.get_name() == method) {
-            let mut made = CompuMethod::new(
+            let mut conversion = CompuMethod::new(
                 method.clone(),
                 String::new(),
                 ConversionType::TabVerb,
                 "%.0".into(),
                 String::new(),
             );
-            made.compu_tab_ref = Some(CompuTabRef::new(table.clone()));
-            self.module.compu_method.push(made);
-            let mut made = CompuVtab::new(
+            conversion.compu_tab_ref = Some(CompuTabRef::new(table.clone()));
+            self.module.compu_method.push(conversion);
+            let mut value_table = CompuVtab::new(
                 table,
                 String::new(),
                 ConversionType::TabVerb,
                 values.len().try_into().unwrap_or(u16::MAX),
             );
-            made.value_pairs = values
+            value_table.value_pairs = values
                 .iter()
                 .zip(0_u32..)
                 .map(|(value, at)| ValuePairsStruct::new(f64::from(at), (*value).into()))
                 .collect();
-            self.module.compu_vtab.push(made);
+            self.module.compu_vtab.push(value_table);
         }
         method
     }
@@ -231,11 +231,12 @@ impl Maker<'_> {
         let mut names = Vec::new();
         for (variable, at) in variables.iter().zip(0_u32..) {
             let conversion = self.unit(&variable.parameter.unit);
-            let place = Place { address: PARAMETERS + at * WIDE, format: Format::Double, conversion };
+            let location =
+                ValueLocation { address: PARAMETERS + at * WIDE, format: Format::Double, conversion };
             names.push(self.characteristic(
                 &variable.name,
                 &variable.parameter,
-                place,
+                location,
                 variable.parameter.at_start_only,
             ));
         }
@@ -253,27 +254,33 @@ impl Maker<'_> {
                 _ => self.unit(&control.unit),
             };
             let address = CONTROL + place as u32 * WIDE;
-            let place = Place { address, format: trace::control_format(place), conversion };
-            names.push(self.characteristic(&control.name, control, place, false));
+            let location = ValueLocation { address, format: trace::control_format(place), conversion };
+            names.push(self.characteristic(&control.name, control, location, false));
         }
         self.parts.push(("controls".into(), names, Vec::new()));
     }
 
-    fn characteristic(&mut self, name: &str, about: &Parameter, place: Place, read_only: bool) -> String {
+    fn characteristic(
+        &mut self,
+        name: &str,
+        about: &Parameter,
+        location: ValueLocation,
+        read_only: bool,
+    ) -> String {
         let name = self.name(name);
-        let mut made = Characteristic::new(
+        let mut characteristic = Characteristic::new(
             name.clone(),
             about.meaning.to_string(),
             CharacteristicType::Value,
-            place.address,
-            layout(place.format).into(),
+            location.address,
+            layout(location.format).into(),
             0.0,
-            place.conversion,
+            location.conversion,
             about.least,
             about.most,
         );
-        made.read_only = read_only.then(ReadOnly::new);
-        self.module.characteristic.push(made);
+        characteristic.read_only = read_only.then(ReadOnly::new);
+        self.module.characteristic.push(characteristic);
         name
     }
 
@@ -286,20 +293,20 @@ impl Maker<'_> {
             } else {
                 self.names(&about.name, signal.values)
             };
-            let place = Place { address: SIGNAL + at * NARROW, format: signal.format, conversion };
-            names.push(self.measurement(&about.name, &about.meaning, [about.least, about.most], place));
+            let location = ValueLocation { address: SIGNAL + at * NARROW, format: signal.format, conversion };
+            names.push(self.measurement(&about.name, &about.meaning, [about.least, about.most], location));
         }
         self.parts.push(("signals".into(), Vec::new(), names));
     }
 
-    fn measurement(&mut self, name: &str, meaning: &str, range: [f64; 2], place: Place) -> String {
+    fn measurement(&mut self, name: &str, meaning: &str, range: [f64; 2], location: ValueLocation) -> String {
         let name = self.name(name);
         let [least, most] = range;
-        let data = data_type(place.format);
-        let mut made =
-            Measurement::new(name.clone(), meaning.into(), data, place.conversion, 0, 0.0, least, most);
-        made.ecu_address = Some(EcuAddress::new(place.address));
-        self.module.measurement.push(made);
+        let data = data_type(location.format);
+        let mut measurement =
+            Measurement::new(name.clone(), meaning.into(), data, location.conversion, 0, 0.0, least, most);
+        measurement.ecu_address = Some(EcuAddress::new(location.address));
+        self.module.measurement.push(measurement);
         name
     }
 
@@ -307,8 +314,9 @@ impl Maker<'_> {
         let mut reported = Vec::new();
         for ((name, meaning), at) in STATUS.iter().zip(0_u32..) {
             let conversion = if at == 0 { self.names("trace", trace::STATES) } else { self.unit("") };
-            let place = Place { address: TRACE_STATUS + at * NARROW, format: Format::Long, conversion };
-            reported.push(self.measurement(name, meaning, [0.0, f64::from(u32::MAX)], place));
+            let location =
+                ValueLocation { address: TRACE_STATUS + at * NARROW, format: Format::Long, conversion };
+            reported.push(self.measurement(name, meaning, [0.0, f64::from(u32::MAX)], location));
         }
         let cycles = Parameter::new(
             ("trace.cycles", "cycles"),
@@ -331,12 +339,15 @@ impl Maker<'_> {
     /// Samples as a block of memory, which is only read.
     fn block(&mut self, about: &Parameter, address: u32, format: Format) -> String {
         let conversion = self.unit(&about.unit);
-        let name = self.characteristic(&about.name, about, Place { address, format, conversion }, true);
-        if let Some(made) = self.module.characteristic.iter_mut().find(|made| made.get_name() == name) {
-            made.characteristic_type = CharacteristicType::ValBlk;
+        let name =
+            self.characteristic(&about.name, about, ValueLocation { address, format, conversion }, true);
+        if let Some(characteristic) =
+            self.module.characteristic.iter_mut().find(|known| known.get_name() == name)
+        {
+            characteristic.characteristic_type = CharacteristicType::ValBlk;
             let mut length = MatrixDim::new();
             length.dim_list = vec![CAPACITY as u16];
-            made.matrix_dim = Some(length);
+            characteristic.matrix_dim = Some(length);
         }
         name
     }
@@ -361,7 +372,7 @@ impl Maker<'_> {
 }
 
 /// Address, format and conversion of a value.
-struct Place {
+struct ValueLocation {
     address: u32,
     format: Format,
     conversion: String,

@@ -313,14 +313,14 @@ pub(super) mod tests {
 
     /// Actions that record their calls.
     #[derive(Default)]
-    pub(crate) struct Notes {
+    pub(crate) struct ActionLog {
         pub(crate) set: Vec<(usize, f64)>,
         pub(crate) stored: Vec<Vec<f64>>,
         pub(crate) loads: usize,
         pub(crate) is_busy: bool,
     }
 
-    impl ParameterActions for Notes {
+    impl ParameterActions for ActionLog {
         fn set(&mut self, place: usize, value: f64) {
             self.set.push((place, value));
         }
@@ -395,38 +395,38 @@ pub(super) mod tests {
     fn a_value_is_taken_when_its_last_byte_is_there() {
         let value = 30.5_f64.to_le_bytes();
         for cut in 1..=8 {
-            let (mut image, mut notes) = (image(), Notes::default());
-            image.write(PARAMETERS, &value[..cut], &mut notes).unwrap();
+            let (mut image, mut log) = (image(), ActionLog::default());
+            image.write(PARAMETERS, &value[..cut], &mut log).unwrap();
             if cut < 8 {
-                assert!(notes.set.is_empty(), "{cut} bytes are no value");
+                assert!(log.set.is_empty(), "{cut} bytes are no value");
                 assert_eq!(read::<8>(&image, PARAMETERS), 25.0_f64.to_le_bytes());
-                image.write(PARAMETERS + cut as u32, &value[cut..], &mut notes).unwrap();
+                image.write(PARAMETERS + cut as u32, &value[cut..], &mut log).unwrap();
             }
-            assert_eq!(notes.set, [(0, 30.5)], "cut at {cut}");
+            assert_eq!(log.set, [(0, 30.5)], "cut at {cut}");
             assert_eq!(read::<8>(&image, PARAMETERS), value);
         }
     }
 
     #[test]
     fn a_block_whose_load_finds_a_full_queue_changes_nothing() {
-        let (mut image, mut notes) = (image(), Notes { is_busy: true, ..Notes::default() });
+        let (mut image, mut log) = (image(), ActionLog { is_busy: true, ..ActionLog::default() });
         let channel_4 = CONTROL + WIDE * (LOAD_SET as u32 - 2);
         let block: Vec<u8> = [3_u64, 0, 1].iter().flat_map(|value| value.to_le_bytes()).collect();
-        assert_eq!(image.write(channel_4, &block, &mut notes), Err(Refusal::Busy));
+        assert_eq!(image.write(channel_4, &block, &mut log), Err(Refusal::Busy));
         assert_eq!(read::<4>(&image, channel_4), 17_u32.to_le_bytes());
-        notes.is_busy = false;
-        image.write(channel_4, &block, &mut notes).unwrap();
-        assert_eq!((read::<4>(&image, channel_4), notes.loads), (3_u32.to_le_bytes(), 1));
+        log.is_busy = false;
+        image.write(channel_4, &block, &mut log).unwrap();
+        assert_eq!((read::<4>(&image, channel_4), log.loads), (3_u32.to_le_bytes(), 1));
     }
 
     #[test]
     fn the_rest_of_a_value_that_nobody_began_is_refused() {
-        let (mut image, mut notes) = (image(), Notes::default());
-        assert_eq!(image.write(PARAMETERS + 4, &[0; 4], &mut notes), Err(Refusal::Sequence));
-        image.write(PARAMETERS, &[0; 6], &mut notes).unwrap();
-        image.write(PARAMETERS + 8, &[0; 4], &mut notes).unwrap();
-        assert_eq!(image.write(PARAMETERS + 6, &[0; 2], &mut notes), Err(Refusal::Sequence));
-        assert!(notes.set.is_empty());
+        let (mut image, mut log) = (image(), ActionLog::default());
+        assert_eq!(image.write(PARAMETERS + 4, &[0; 4], &mut log), Err(Refusal::Sequence));
+        image.write(PARAMETERS, &[0; 6], &mut log).unwrap();
+        image.write(PARAMETERS + 8, &[0; 4], &mut log).unwrap();
+        assert_eq!(image.write(PARAMETERS + 6, &[0; 2], &mut log), Err(Refusal::Sequence));
+        assert!(log.set.is_empty());
     }
 
     #[test]
@@ -439,30 +439,30 @@ pub(super) mod tests {
             ([30.0, f64::INFINITY, 15.0], Refusal::OutOfRange),
             ([30.0, 2.0, 16.0], Refusal::WriteProtected),
         ] {
-            let (mut image, mut notes) = (image(), Notes::default());
-            assert_eq!(image.write(PARAMETERS, &bytes(values), &mut notes), Err(refusal), "{values:?}");
-            assert!(notes.set.is_empty(), "{values:?}");
+            let (mut image, mut log) = (image(), ActionLog::default());
+            assert_eq!(image.write(PARAMETERS, &bytes(values), &mut log), Err(refusal), "{values:?}");
+            assert!(log.set.is_empty(), "{values:?}");
             assert_eq!(image.parameters(), [25.0, 1.0, 15.0]);
         }
-        let (mut image, mut notes) = (image(), Notes::default());
-        image.write(PARAMETERS, &bytes([30.0, 2.0, 15.0]), &mut notes).unwrap();
-        assert_eq!(notes.set, [(0, 30.0), (1, 2.0)], "what stays the same is no change");
+        let (mut image, mut log) = (image(), ActionLog::default());
+        image.write(PARAMETERS, &bytes([30.0, 2.0, 15.0]), &mut log).unwrap();
+        assert_eq!(log.set, [(0, 30.0), (1, 2.0)], "what stays the same is no change");
     }
 
     #[test]
     fn signals_and_the_description_cannot_be_written() {
-        let (mut image, mut notes) = (image(), Notes::default());
+        let (mut image, mut log) = (image(), ActionLog::default());
         for address in [DESCRIPTION, SIGNAL, TRACE_STATUS, TRACE_CYCLES, TRACE_CHANNELS] {
-            assert_eq!(image.write(address, &[1], &mut notes), Err(Refusal::WriteProtected), "{address:#x}");
+            assert_eq!(image.write(address, &[1], &mut log), Err(Refusal::WriteProtected), "{address:#x}");
         }
-        assert_eq!(image.write(0x6000_0000, &[1], &mut notes), Err(Refusal::AccessDenied));
+        assert_eq!(image.write(0x6000_0000, &[1], &mut log), Err(Refusal::AccessDenied));
     }
 
     #[test]
     fn the_trigger_buffer_is_armed_with_what_was_written() {
-        let (mut image, mut notes) = (image(), Notes::default());
+        let (mut image, mut log) = (image(), ActionLog::default());
         let mut put = |image: &mut Image, place: usize, value: u32| {
-            image.write(CONTROL + place as u32 * WIDE, &value.to_le_bytes(), &mut notes)
+            image.write(CONTROL + place as u32 * WIDE, &value.to_le_bytes(), &mut log)
         };
         put(&mut image, trace::LENGTH, 4).unwrap();
         put(&mut image, trace::PRE_TRIGGER, 4).unwrap();

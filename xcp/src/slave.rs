@@ -49,7 +49,7 @@ static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Offset and length of each text in the description region, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Texts {
+pub(crate) struct TextLocations {
     pub a2l: (u32, u32),
     /// Name of the A2L file, without the path.
     pub file: (u32, u32),
@@ -58,7 +58,7 @@ pub(crate) struct Texts {
     pub event: (u32, u32),
 }
 
-/// What a slave counted since the start of the controller.
+/// Counters of a slave since the start of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub(crate) struct SlaveCounters {
     pub(crate) sessions: u64,
@@ -85,7 +85,7 @@ struct Block {
 pub struct Slave {
     /// The memory that clients see.
     pub image: Image,
-    texts: Texts,
+    texts: TextLocations,
     lock: Lock,
     pub(crate) daq: Daq,
     connected: bool,
@@ -99,7 +99,7 @@ pub struct Slave {
 
 impl Slave {
     /// A slave without a session, which may send so many DAQ packets in a cycle.
-    pub(crate) fn new(image: Image, texts: Texts, lock: Lock, daq_per_cycle: u32) -> Self {
+    pub(crate) fn new(image: Image, texts: TextLocations, lock: Lock, daq_per_cycle: u32) -> Self {
         Self {
             image,
             texts,
